@@ -1,4 +1,4 @@
-"""What the programs have in common: a mistake gets one line, whoever finds it."""
+"""What the programs share: every mistake of a user is reported in one line, whatever part of the code finds it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def status_of(
 ) -> int:
     """Return the exit status of an action, 0 for None; 130 after Ctrl-C; `wrong` after a line for a user's mistake.
 
-    What is `passed_on` goes on to whoever knows more of it.
+    Exceptions of the types in `passed_on` are raised again, for a caller that can say more about them.
     """
     try:
         return action() or 0

@@ -1,4 +1,4 @@
-"""What one simulation shares: whoever needs any of it is given all of it, once, by its constructor."""
+"""What the parts of one simulation share: each part that needs some of it gets all of it in its constructor."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ class CarriedBodies:
 class SimulationContext(ScriptContext):
     """World, weather, renderer, names and limits, beside what scripts share; it lasts from one start to the next.
 
-    `sub_step` in s; `script_time_limit` in s of real time; `magnetic_field` in T. `names` has for each body what a
-    person calls it, and its name among the objects of scripts, or ''; `link_names` the latter for single links.
+    `sub_step` in s; `script_time_limit` in s of real time; `magnetic_field` in T. `names` has for each body the name
+    that people read, and the name that scripts use ('' for none); `link_names` has the latter for single links.
     """
 
     world: World
@@ -66,16 +66,16 @@ class SimulationContext(ScriptContext):
     tunings: int = 0  # grows whenever something is other than it was that may be tuned
 
     def change_weather(self, changes: Mapping[str, Any]) -> None:
-        """Let another weather be where all are: keys of `weather`, as in YAML. Raises ParameterError."""
+        """Change the weather of all vehicles: keys of `weather`, as in YAML. Raises ParameterError."""
         self.weather.change(changes)
         self.tunings += 1
 
     def picture(self, kind: str, lens: Lens, pose: np.ndarray, only: Collection[str] | None = None) -> np.ndarray:
         """Return what is seen from a pose (4, 4), world from optical frame: "color" or "depth", as of Vision.picture.
 
-        Or "handles": (height, width) uint32, of the object that each pixel shows, NO_OBJECT for what is none of
-        scripts'. `only` are the names of the objects that there are; None is all. Raises ValueError where it needs
-        OpenGL, and there is none.
+        Or "handles": (height, width) uint32, the handle of the object that each pixel shows, NO_OBJECT for what scripts
+        do not know. `only`: names of the objects to draw; None draws all. Raises ValueError where OpenGL is needed and
+        not available.
         """
         if kind != "handles" and only is None:
             return self.vision.picture(kind, lens, pose)
@@ -98,5 +98,5 @@ class SimulationContext(ScriptContext):
         return self.link_names.get(place) or self.names.get(place[0], NOBODY)[0]
 
     def body_of(self, name: str) -> int:
-        """Return the body that scripts call so. Raises LookupError."""
+        """Return the body with this script name. Raises LookupError."""
         return next(body for body, (_, one) in self.names.items() if one == name)

@@ -24,12 +24,12 @@ def shown(value: Any) -> str:
 
 
 def printable(text: str) -> str:
-    """Return text without what a terminal would obey: control characters, lines, bytes of a name that are no text."""
+    """Return a text with ? for what is not printable: control characters, line ends, undecodable bytes of names."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def encodable(text: str) -> str:
-    r"""Return a text that every file and topic takes: half a surrogate pair, which UTF-8 has not, becomes `\ud800`."""
+    r"""Return a text that every file and topic can hold: a lone surrogate, invalid in UTF-8, becomes `\ud800`."""
     return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 

@@ -142,7 +142,7 @@ def refuse(topic):
 
 
 def enter(state, work=None):
-    """Be in a state, and do the work in every step; commands of the one before are over."""
+    """Change to a state, and do its work in every step; commands from the state before are cancelled."""
     self.state, self.work = state, work
     self.refused, self.waiting, self.still = {}, None, 0.0  # refused: when that was last said (s), by topic
     self.vx = self.vy = self.vz = self.rz = 0
@@ -161,7 +161,7 @@ def stop():
 
 
 def climb():
-    """Let the height to be held rise, and wait until the drone is there."""
+    """Raise the setpoint of the height, and wait until the drone has reached the top."""
     self.zref = min(self.zref + CLIMB * self.dt, self.top)
     vz = sim.getObjectVelocity(self.d)[0][2]
     if abs(sim.getObjectPosition(self.d, -1)[2] - self.top) < AT_HEIGHT and abs(vz) < SETTLED:
@@ -199,7 +199,7 @@ def approach():
 
 
 def watch_lean():
-    """Take the drone for crashed that leans so far, and has not moved for a while."""
+    """Consider the drone crashed if it has not moved for a while; called when it leans too far."""
     self.still = self.still + self.dt if math.hypot(*sim.getObjectVelocity(self.d)[0]) < LIES else 0.0
     if self.still > LIES_FOR and self.state != CRASHED:
         rest(CRASHED)

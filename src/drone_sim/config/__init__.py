@@ -1,1 +1,1 @@
-"""What a value in a YAML file may be, and the one line that a wrong one gets."""
+"""What a value in a YAML file may be, and the one-line message for a wrong one."""

@@ -1,4 +1,4 @@
-"""What a value in a YAML file may be, and the one line that a wrong one gets."""
+"""What a value in a YAML file may be, and the one-line message for a wrong one."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class ParameterError(ValueError):
     """Parameters are wrong: where, and why. As a text it is one line that names key, value and what is allowed."""
 
     def __init__(self, reason: str, location: Location = (), value: str = ""):
-        """Take what is wrong; with the keys above the wrong value, and that as messages show it, where it is one."""
+        """Take what is wrong; for a wrong value also the keys above it, and the value as messages show it."""
         self._take([ParameterProblem(location, reason, value)], "")
 
     @classmethod
@@ -84,7 +84,7 @@ class ParameterError(ValueError):
         return self.problems[0].location if self.problems else ()
 
     def below(self, *keys: Key) -> ParameterError:
-        """Return the error as one who has what is wrong under some keys knows it."""
+        """Return the same error, with these keys in front of the location of every problem."""
         return self.of([one._replace(location=(*keys, *one.location)) for one in self.problems])
 
 
@@ -108,7 +108,7 @@ def readable_key(location: Location) -> str:
 
 
 def numeric(value: Any) -> Any:
-    """Let nothing but a number be one. YAML 1.1, which rosparam reads, takes `1e3` for a text."""
+    """Accept only a number, or a text such as `1e3`: YAML 1.1, which rosparam reads, takes that for a text."""
     if isinstance(value, str) and len(value) < MAX_NAME and _EXPONENT.match(value):
         return float(value)
     if isinstance(value, (bool, str)):
@@ -225,7 +225,7 @@ class FoundFile(str):
     folder: str
 
     def seen_from(self, folder: Path | None) -> str:
-        """Return the name by which a file in `folder`, None for any, can name it: as given, where that leads to it."""
+        """Return the name of this file for a file in `folder` (None: any folder): as given, where that leads to it."""
         absolute = self.given.startswith(("package://", "~", "/"))
         is_beside = folder is not None and Path(self.folder or ".").resolve() == folder.resolve()
         return self.given if absolute or is_beside else str(self)
@@ -242,7 +242,7 @@ FileName = Annotated[
 
 
 def named_in(folder: Path, name: str) -> FoundFile:
-    """Return a file's name that was found in a file in `folder`; not yet looked for."""
+    """Return a file as a file in `folder` names it, without looking whether it is there."""
     absolute = name.startswith(("package://", "~", "/"))
     found = FoundFile(name if absolute else folder / name)
     found.given, found.folder = name, str(folder)
@@ -275,7 +275,7 @@ OptionalFile = Annotated[str, PlainValidator(_existing_file(True)), PlainSeriali
 
 
 def _script_value(value: Any) -> Any:
-    """Let a number, true or false, a text, or a list of numbers be one."""
+    """Accept a number, true or false, a text, or a list of numbers."""
     if isinstance(value, (bool, str)):
         return value
     several = value if isinstance(value, (list, tuple)) else [value]

@@ -19,7 +19,7 @@ _PLACE = ("parent", "position", "rpy")
 
 
 class SceneChange(NamedTuple):
-    """What is otherwise than before: objects by handle, scripts by the name of their object, settings."""
+    """What differs after an edit: objects by handle, scripts by the name of their object, settings."""
 
     entries: dict[int, _Pair[EntryParameters]]
     scripts: dict[str, _Pair[AttachedScriptParameters]]
@@ -27,7 +27,7 @@ class SceneChange(NamedTuple):
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing is otherwise."""
+        """Whether nothing has changed."""
         return not self.entries and not self.scripts and self.settings[0] == self.settings[1]
 
     @property
@@ -74,9 +74,9 @@ def _joined(first: Mapping[_Key, _Pair[_Value]], second: Mapping[_Key, _Pair[_Va
 
 
 def carry_out(simulation: Simulation, change: SceneChange, arrange: Callable[[Settings], None]) -> None:
-    """Let a scene that is as before a change be as after it; `arrange` lets it have other settings.
+    """Apply a change to a scene that is in the state before it; `arrange` applies other settings.
 
-    Raises ValueError, perhaps in the midst of it.
+    Raises ValueError, perhaps when a part of the change is done already.
     """
     _Changing(simulation, change).carry_out(arrange)
 
@@ -126,7 +126,7 @@ class _Changing:
                 operations.rename(handle, names.pop(handle))
 
     def _be(self) -> None:
-        """Let entries say what they are to say, all of them at once: the world is made anew once."""
+        """Give entries their new content, all at once, so that the world is rebuilt only once."""
         operations, entries = self._simulation.operations, {}
         for handle, (one, two) in self._other.items():
             if type(one) is not type(two):
@@ -143,7 +143,7 @@ class _Changing:
                 operations.describe(handle, **described)
 
     def _replace(self, handle: int, entry: EntryParameters) -> None:
-        """Let an object of another type have its place in the tree."""
+        """Replace an object by one of another type, at the same place in the tree."""
         tree, operations = self._simulation.context.objects, self._simulation.operations
         children = [child for child, _ in tree.children(tree[handle])]
         script = self._simulation.scene.scripts.get(entry.name)
@@ -171,5 +171,5 @@ class _Changing:
 
 
 def _others(one: EntryParameters, two: EntryParameters) -> set[str]:
-    """Return the keys of which two entries of one type say something else."""
+    """Return the keys in whose values two entries of one type differ."""
     return {key for key in type(two).model_fields if getattr(one, key, None) != getattr(two, key)}

@@ -1,4 +1,4 @@
-"""What of a scene is not saved yet, kept on the disk: the next node offers it."""
+"""Unsaved changes of a scene, kept on the disk: the next node offers them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Drafts:
         self.offer()
 
     def offer(self) -> None:
-        """Offer the draft that there is: what it is of has gone."""
+        """Offer the present draft: the scene that it is of is not open any more."""
         with self._lock, contextlib.suppress(OSError):
             if self._file and self._left:
                 self._file.replace(self._left)
@@ -73,7 +73,7 @@ class Drafts:
                 self._file.unlink(missing_ok=True)
 
     def take(self) -> Draft:
-        """Return what was offered, which is not any more. Raises ValueError where there is nothing."""
+        """Return the offered draft, and offer it no longer. Raises ValueError where there is none."""
         if self.offered is None or self._left is None:
             raise ValueError("there is no draft")
         taken, self.offered = self.offered, None

@@ -27,7 +27,7 @@ _DRAFT_PERIOD = 1.0  # s of real time
 
 
 class SceneEditor:
-    """One for a simulation, whose thread calls all of this: what windows and scripts ask for, they ask of it."""
+    """The editor of one simulation, called by its thread alone: all requests of windows and scripts go through it."""
 
     def __init__(self, player: Player, drafts: Path | None = None):
         """Edit the scene of the simulation that `player` plays; what is not saved is kept in the folder `drafts`."""
@@ -48,7 +48,7 @@ class SceneEditor:
 
     @property
     def is_modified(self) -> bool:
-        """Whether the file does not say what the scene is."""
+        """Whether the scene differs from what its file says."""
         return self.revision != self._saved
 
     @property
@@ -71,7 +71,7 @@ class SceneEditor:
         }
 
     def follow(self) -> None:
-        """Know what start, stop, and who has read another scene have done meanwhile."""
+        """Take note of what start, stop, or the loading of another scene have changed meanwhile."""
         simulation = self.simulation
         if simulation.scenes_read != self._read:
             self._read = simulation.scenes_read
@@ -150,7 +150,7 @@ class SceneEditor:
         return {"revision": self.revision, "said": said, "until_stop": self.simulation.running, **more}
 
     def _undo(self, request: records.Undo) -> dict[str, Any]:
-        """Take the last step back, or, of an edit in its midst, that one; what others did stays."""
+        """Undo the last step or, given a `merge`, the edits that belong to it; what others did since stays."""
         if not request.merge or self.history.is_last(request.merge):
             return self._go(self.history.undone, self.history.redone, "undone")
         step = self.history.of(request.merge)
@@ -163,7 +163,7 @@ class SceneEditor:
         return [*change.entries]
 
     def _go(self, step: Callable[[], Step], back: Callable[[], Step], word: str) -> dict[str, Any]:
-        """Undo or redo; `back` lets the history be as it was."""
+        """Undo or redo; `back` restores the history where that fails."""
         there = step()
         change = there.change.reversed if word == "undone" else there.change
         before = self.scene.content()

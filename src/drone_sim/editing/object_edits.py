@@ -142,7 +142,7 @@ class ObjectEdits:
     # ---- what they are like
 
     def set(self, said: Mapping[int, Mapping[str, Any]]) -> None:
-        """Let entries, by handle, say something else, all of them at once: the world is made anew once."""
+        """Give entries, by handle, other values, all at once, so that the world is rebuilt only once."""
         operations = self._scene.operations
         rest = {handle: self._look_otherwise(handle, values) for handle, values in said.items()}
         entries = {handle: operations.entry_with(handle, values) for handle, values in rest.items() if values}
@@ -150,7 +150,7 @@ class ObjectEdits:
             operations.exchange(entries)
 
     def _look_otherwise(self, handle: int, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Set what the world needs no other body for; return the values that are left."""
+        """Set the values that need no new body in the world; return the values that are left."""
         for key, word in _OTHERWISE.items():
             if key in values:
                 raise ParameterError(f"{key}: `{word}` changes it")

@@ -71,7 +71,7 @@ class AddVehicle(Checked):
 
 
 class Remove(Checked):
-    """What hangs on them stays, but for models, and for all of them where `below`."""
+    """What hangs on the objects stays, except on models; with `below` it is removed from all of them."""
 
     do: Literal["remove"]
     objects: _Objects
@@ -205,7 +205,7 @@ class Edit(Checked):
 
 
 class Undo(Checked):
-    """The last edit was not done, or that of this `merge`, whatever others have done since."""
+    """Undo the last edit, or that of this `merge`, whatever others have done since."""
 
     undo: Literal[True]
     merge: Label = ""
@@ -230,7 +230,7 @@ class TextOf(Checked):
 
 
 class Write(Checked):
-    """The scene is what a text says, which somebody made of that of a `revision`."""
+    """The scene becomes what a text says, which was made from the text of a `revision`."""
 
     write: str
     revision: int | None = None

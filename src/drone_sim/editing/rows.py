@@ -66,7 +66,7 @@ class SceneRows:
         return changed, gone
 
     def _beside(self, one: SceneObject, vehicle: Vehicle | None, said: Mapping[str, Any]) -> Any:
-        """Return what an object is like that is no entry of the scene; `said` is that of the vehicles."""
+        """Return the content of an object that is no entry of the scene; `said` has what is said of the vehicles."""
         if vehicle is None:
             return _simple(self._scene.simulation.parameters.scene.floor)
         if one is not vehicle.object:

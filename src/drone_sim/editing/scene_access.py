@@ -39,7 +39,7 @@ class SceneAccess:
 
     @property
     def folder(self) -> Path:
-        """Relative to which files are named."""
+        """The folder to which file names are relative."""
         return self.document.folder
 
     @property
@@ -57,7 +57,7 @@ class SceneAccess:
         return self.simulation.content()
 
     def handle(self, named: Any) -> int:
-        """Return the handle of an object that is given by it, or by name. Raises ValueError."""
+        """Return the handle of an object, given its handle or its name. Raises ValueError."""
         if isinstance(named, str):
             return self.tree.handle(named)
         self.tree[named]  # which there must be
@@ -113,7 +113,7 @@ class SceneAccess:
                 raise ValueError(f"{key}: is changed while the simulation is stopped: stop it first")
 
     def _only_moves(self, settings: Settings, parameters: Parameters) -> bool:
-        """Tell whether nothing is otherwise but where vehicles are."""
+        """Tell whether only the places of vehicles differ."""
         if _others(settings) != _others(self.settings):
             return False
         fleet = self.simulation.parameters.fleet

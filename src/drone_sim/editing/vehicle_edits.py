@@ -33,7 +33,7 @@ TYPES: dict[str, dict[str, Any]] = {  # what an entry says of a vehicle that is 
 
 
 class VehicleEdits:
-    """Each makes other settings of what is said now. All raise ValueError."""
+    """Operations that derive new settings from the present ones. All raise ValueError."""
 
     def __init__(self, scene: SceneAccess):
         """Take the scene."""
@@ -70,7 +70,7 @@ class VehicleEdits:
         return [self.root(self._scene.simulation.vehicles[one]) for one in made]
 
     def described(self, handle: int) -> tuple[str, dict[str, Any]]:
-        """Return the name of a vehicle, and what another one like it says."""
+        """Return the name of a vehicle, and the entry that a copy of it would have."""
         vehicle = self._vehicle(handle)
         if not self._scene.is_root(handle):
             raise ValueError(f"'{self._scene.tree[handle].name}' is a part of a vehicle: copy that")
@@ -199,7 +199,7 @@ class VehicleEdits:
         self._say({**said, vehicle.name: with_part(own, part, self._usual(vehicle, part, said), values)})
 
     def _usual(self, vehicle: Vehicle, part: Part, said: dict[str, dict[str, Any]]) -> Part | None:
-        """Return what a part is where nothing is said of it; None where it is not there then."""
+        """Return a part as it is by default, if nothing is said of it; None where there is none by default."""
         own = said[vehicle.name]
         others = {key: one for key, one in (own.get(part.among) or {}).items() if key != part.key}
         without = {**said, vehicle.name: {**own, part.among: others}}

@@ -48,7 +48,7 @@ def part_named(vehicle: VehicleParameters, name: str) -> Part | None:
 def with_part(said: Mapping[str, Any], part: Part, base: Part | None, values: Mapping[str, Any]) -> dict[str, Any]:
     """Return what is said of a vehicle with other values of a part, inner keys with dots or in mappings.
 
-    None, and what is as in `base`, which is there where nothing is said of the part, is left out.
+    Values that are None, or the same as in `base`, the part as it is by default, are left out.
     """
     own = dict(flattened((said.get(part.among) or {}).get(part.key) or {}))
     usual = base.values if base else {}
@@ -64,7 +64,7 @@ def with_part(said: Mapping[str, Any], part: Part, base: Part | None, values: Ma
 
 
 def _gone_with(part: Part, key: str) -> list[str]:
-    """Return a key, and those that are nothing without it: the coefficients of a lens without its model."""
+    """Return a key, and those that have no meaning without it, such as a lens' coefficients without its model."""
     fields = dict(inner_fields(type(part.parameters)))
     above, dot, _ = key.rpartition(".")
     is_needed = dot and key in fields and fields[key].is_required()

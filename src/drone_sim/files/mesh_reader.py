@@ -1,4 +1,4 @@
-"""Reads mesh files by trimesh, which imports SciPy, and takes longer than all else: imported for the first of them."""
+"""Reads mesh files by trimesh, which takes long to import: this is imported for the first mesh only."""
 
 from __future__ import annotations
 

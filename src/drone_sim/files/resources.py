@@ -40,7 +40,7 @@ def cache_path() -> Path:
 
 
 def is_file(path: Path) -> bool:
-    """Tell whether there is a regular file, of whatever name: none of such as no file can have."""
+    """Tell whether there is a regular file of this name; False also for a name that no file can have."""
     try:
         return path.is_file()
     except (OSError, ValueError):  # too long a name, a NUL in it

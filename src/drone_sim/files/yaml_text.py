@@ -169,7 +169,7 @@ class _Rewriting:
     # ---- anchors
 
     def _keep_anchors(self) -> None:
-        """Let what is named elsewhere be said there, where the place at which it stood says something else."""
+        """Where an anchored value is replaced, write it out at the first alias that is kept and stands after it."""
         for start, end, _ in [*self._parts]:
             for found in _ANCHOR.finditer(self._text, start, end):
                 node = _node_at(self._root, found.start())

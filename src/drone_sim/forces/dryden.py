@@ -39,7 +39,7 @@ _NOWHERE = 1e12  # knots
 
 
 class GustSeries:
-    """One component's gusts along the way, of deviation 1: made as far as somebody has been, the same for a seed."""
+    """One component's gusts along the way, of deviation 1: made as far as it was needed so far, the same for a seed."""
 
     def __init__(self, seed: Sequence[int], is_along: bool):
         """Take which of all series it is, and whether the gusts are those along the wind."""

@@ -95,7 +95,7 @@ class Runner:
         self._open.close()
 
     def fly(self, jobs: Sequence[Job], quiet: bool = False) -> Iterator[tuple[Job, Result]]:
-        """Give each job and its result, as they come, those first that are there already; `quiet`: without a word."""
+        """Yield each job and its result as they finish, those already stored first; `quiet`: print nothing."""
         known = self.store.known(jobs, self._flight_options.tables)
         if known and not quiet:
             said = "--fresh flies them anew"
@@ -117,7 +117,7 @@ class Runner:
                 yield flight.job, flight.result
 
     def _keep(self, flight: JobResult) -> None:
-        """Keep a flight where there is room; the others fly all the same."""
+        """Store a flight's result. If the disk is full, say so once; the other flights go on."""
         try:
             self.store.add(flight)
         except OSError as error:
@@ -146,7 +146,7 @@ def on_standard_output() -> Iterator[None]:
 
 
 def all_done(program: str, actions: Iterable[Callable[[], None]]) -> bool:
-    """Do everything, whatever cannot be done, which gets a line; return whether it all was."""
+    """Do every action, also after one that fails, which gets one line; return whether all succeeded."""
     return not any([status_of_action(program, action, WRONG) for action in actions])
 
 
@@ -163,7 +163,7 @@ def _interrupt() -> NoReturn:
 
 
 def is_sandboxed(program: str, wanted: str) -> bool:
-    """Tell whether scripts are to be in the sandbox, as is `wanted` (auto, on, off); say where there is none.
+    """Tell whether scripts run in the sandbox, as `wanted` says (auto, on, off); print a warning where there is none.
 
     Raises NoSandbox.
     """

@@ -1,4 +1,4 @@
-"""What results rest on, for whoever doubts them: hashes of all that they follow from, and a signature."""
+"""Evidence for results, for those who doubt them: hashes of everything that they depend on, and a signature."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ _SIGNATURE = "signature"
 def hashes_of(plan: Plan, script: str) -> dict[str, str]:
     """Return SHA-256 of the plan's file, of the files that it names (`config`), of the script's own, of the package.
 
-    None of what cannot be read any more. The package's is of its files, Python, NumPy, PyBullet and the processor.
+    What cannot be read any more is left out. The package's hash covers its files, Python, NumPy, PyBullet and the
+    processor.
     """
     found = {"package": version()}
     for name, paths in (
@@ -60,7 +61,7 @@ def signed(content: Mapping[str, Any], key: bytes) -> dict[str, Any]:
 
 
 def is_signed(content: Mapping[str, Any], key: bytes) -> bool:
-    """Tell whether the signature is that of what the file holds, by the same key."""
+    """Tell whether the signature in a file of results matches its content, with the same key."""
     return hmac.compare_digest(str(content.get(_SIGNATURE, "")).encode(), _signature(content, key).encode())
 
 

@@ -134,7 +134,7 @@ class Flight:
                 return
 
     def _is_quiet(self) -> bool:
-        """Tell whether the script that flies will hear nothing before its actuation of the next step: it is alone."""
+        """Tell whether no message or other script can reach the flying script before its actuation of the next step."""
         simulation = self._simulation
         scripts = len(simulation.child_scripts) + len(simulation.scene.scripts)
         return scripts == 1 and simulation.drone.commands.is_quiet and not self._timeline.is_due(simulation.steps)
@@ -163,12 +163,12 @@ def write_to(file: IO[str], rows: np.ndarray) -> None:
 
 
 def random_of(seed: int) -> int:
-    """Return the seed of what scripts draw from Python's and numpy's own generators, from which `seed` is not known."""
+    """Return the seed of Python's and numpy's own generators in scripts; it does not reveal `seed`."""
     return int.from_bytes(hashlib.sha256(b"what scripts draw, %d" % seed).digest()[:8], "little")
 
 
 def _through(door: SimulationEnd, submission: str) -> load.Loader:
-    """Return what loads a submission through a door, and any other script here."""
+    """Return a function that loads the submission through a door, and any other script in this process."""
 
     def load_script(
         path: str, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns, breakpoints: Breakpoints | None = None

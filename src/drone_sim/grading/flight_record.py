@@ -1,4 +1,4 @@
-"""What a flight was, for those who judge it: a table with a row per step, and what no table holds."""
+"""The record of a flight for the criteria: a table with a row per step, and what does not fit into a table."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class FlightRecord:
     """A flight of one vehicle. `rows` (N, 22) are as offline.recording.COLUMNS says, N >= 1, times increasing.
 
     `is_whole`: it lasted as long as the plan says. The others hold what the criteria ask for; a flight that is only
-    heard of, from a node, may lack some.
+    observed, over the topics of a node, may lack some.
     """
 
     rows: np.ndarray
@@ -57,7 +57,7 @@ class FlightRecord:
 
     @property
     def puts(self) -> np.ndarray:
-        """The rows (M,) in which the vehicle is farther from the one before than its speed says: it was put there."""
+        """The rows (M,) where the vehicle is farther from the row before than its speed allows: it was put there."""
         ways = np.linalg.norm(np.diff(self.rows[:, 1:4], axis=0), axis=1)
         speeds = self.columns["speed"]
         return np.flatnonzero(ways > _could(np.maximum(speeds[:-1], speeds[1:]), np.diff(self.times))) + 1
@@ -79,7 +79,7 @@ class FlightRecord:
 
 
 def _could(speed: Any, seconds: Any) -> Any:
-    """Return how far (m) a vehicle gets by itself."""
+    """Return how far (m) a vehicle can get by itself at a speed (m/s) in so many seconds."""
     return _ALWAYS + _FARTHEST * speed * seconds
 
 
@@ -99,9 +99,9 @@ UNITS = {  # of the columns that a criterion may be `of`
 def columns_of(rows: np.ndarray) -> dict[str, np.ndarray]:
     """Return the columns named in UNITS of a table (N, 22).
 
-    roll, pitch, yaw (rad) are ROS's, yaw without jumps; tilt is the angle between the body's and the world's z;
-    vx, vy, vz are the velocity in the track frame (at the drone, level, turned by its yaw), as commands are;
-    world_vx and world_vy are those that the table has, as wx, wy and wz are: in the world.
+    roll, pitch, yaw (rad) are ROS's, yaw without jumps; tilt is the angle between the body's and the world's z; vx, vy,
+    vz are the velocity in the track frame (at the drone, level, turned by its yaw), as commands are; world_vx,
+    world_vy, wx, wy and wz are in the world frame, as in the table.
     """
     found = {name: rows[:, index] for index, name in enumerate(_AS_RECORDED)}
     x, y, z, w = rows[:, 4:8].T

@@ -114,7 +114,7 @@ class FlightRecorder:
             self._touched.clear()
 
     def _follow(self, name: str, value: Callable[[], Any]) -> None:
-        """Keep a value whenever it has become another."""
+        """Record a value whenever it has changed."""
         kept = self._values[name] = []
 
         def look() -> None:
@@ -154,7 +154,7 @@ class OfflineBackend:
     """
 
     def __init__(self, wanted: Mapping[str, str]):
-        """Keep the topics `wanted`: the full name of each, by what a plan calls it."""
+        """Keep the topics `wanted`: the full name of each, by its name in the plan."""
         self.wanted = wanted
         self.last: dict[str, Any] = {}  # the last message, by the topic's full name
         self.clock: Callable[[], float] = lambda: 0.0  # simulated time in s
@@ -169,7 +169,7 @@ class OfflineBackend:
         return OfflinePublisher(self.last if topic in self.wanted.values() else {}, topic)
 
     def advertise_image(self, topic: str, queue: int) -> OfflinePublisher:
-        """Keep nothing: a picture is no figure."""
+        """Keep nothing: no criterion reads pictures."""
         return OfflinePublisher({}, topic)
 
     def time(self) -> float:
@@ -212,8 +212,8 @@ class OfflinePublisher:
         self._last[self._topic] = copy.deepcopy(message)
 
     def subscribers(self) -> int:
-        """Return how many listen: whoever grades."""
+        """Return the number of subscribers: one, the grader."""
         return 1
 
     def shutdown(self) -> None:
-        """Keep what was said."""
+        """Do nothing: the last message is kept."""

@@ -52,7 +52,8 @@ _WRITERS: dict[str, Callable[..., None]] = {"junit": junit.write, "json": as_jso
 def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = None) -> int:
     """Grade; return 0 where every flight passes, 1 where one does not, 2 after a line for what cannot be done.
 
-    With a guardian a signal ends it, with what has been flown so far kept, told and written, and 128 + its number.
+    With a guardian, a signal ends the program: the flights so far are kept, shown and written, and the exit status is
+    128 + the signal's number.
     """
     given = sys.argv[1:] if arguments is None else arguments
     if verify.asks_for_it(given):

@@ -1,4 +1,4 @@
-"""What a submission may ask about, where the plan lets it read of its own vehicle alone (`reads: own`)."""
+"""Which objects a submission may read where the plan limits it to its own vehicle (`reads: own`)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class OwnObjects:
         }
 
     def other_in(self, function: str, arguments: list[Any]) -> str | None:
-        """Return what a call is about that is not the submission's own, as a person calls it; None for nothing."""
+        """Return an object in a call that is not the submission's own, by its name for people; None for none."""
         return next(filter(None, map(self._other, _entities(function, arguments))), None)
 
     def _other(self, value: Any) -> str | None:
@@ -67,7 +67,7 @@ def _entities(function: str, arguments: list[Any]) -> Iterator[Any]:
 
 @functools.cache
 def _places() -> dict[str, tuple[tuple[int, Any], ...]]:
-    """Return where each function, as module.name, takes handles, with what holds where there is none."""
+    """Return for each function, as module.name, which arguments are handles, and the default where one is left out."""
     found = {}
     for kind in (*modules.SIM, Objects, Sensors, ImageFilters):
         for attribute in vars(kind).values():

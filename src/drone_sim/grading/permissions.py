@@ -1,7 +1,7 @@
-"""What a submission may call: to fly, to look, to say and to draw something. All else needs a word in the plan.
+"""What a submission may call: it may fly, read, print and draw; everything else has to be allowed in the plan.
 
-A function is free because it is said to be, here; one that nobody has thought of is not. `rules` looks at what has
-come of a flight, whatever was called.
+A function is free only if it is listed here; one that is not listed is not free. `rules` checks the effects on the
+flight, whatever was called.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ class Actions:
     def __init__(
         self, simulation: Simulation, flown: Iterable[Vehicle], scripts: Set[str], marks: Iterable[SceneObject] = ()
     ):
-        """Whoever calls flies the vehicles `flown`, is the scripts of the objects `scripts`, and may move `marks`."""
+        """The caller flies the vehicles `flown`, is the scripts of the objects `scripts`, and may move `marks`."""
         self._objects, self._scripts = simulation.context.objects, simulation.context.scripts
         self._flown, self._own = list(flown), scripts
         self._propellers = {name for one in self._flown for name in one.propulsion.script_parameters}
@@ -183,7 +183,7 @@ class Actions:
         return None
 
     def _is_mark(self, one: SceneObject) -> bool:
-        """Tell whether an object is a frame for a script's own use: nothing solid, which carries nothing solid."""
+        """Tell whether an object is a frame for a script's own use: it is not solid and carries nothing solid."""
         if one.kind not in ("dummy", "path") or one.body is not None:
             return False
         below = (other for other in map(self._objects.get, self._objects) if other is not None and other.hangs_on(one))

@@ -109,7 +109,7 @@ class Plan(Checked):
 
     @property
     def of(self) -> float:
-        """How many points can be had."""
+        """The most points that a flight can get."""
         return sum(one.points for one in self.criteria)
 
     @property

@@ -42,7 +42,7 @@ class Result:
     tried: tuple[str, ...] = ()  # what the script tried that the plan does not allow, in one line each
 
     def with_tried(self, tried: Sequence[str]) -> Result:
-        """Return it with what the script tried; such a flight is not passed."""
+        """Return the result with the forbidden things that the script tried; such a flight is not passed."""
         return replace(self, tried=tuple(tried), passed=self.passed and not tried)
 
     def of_script(self, script: str) -> Result:

@@ -1,8 +1,7 @@
 """The rules of the game: what scripts may not do in a graded flight, unless the plan allows it.
 
-They are told by what has come of it, whatever function has done it, in whatever language: a body that was put elsewhere
-has jumped, one that a script pushed has been pushed, a wall that was taken away is gone. What the plan's own timeline
-does is no script's doing.
+They are checked by their effects, whatever function or language caused them: a body that was put elsewhere has jumped,
+a push by a script acts on a body, a wall that was removed is gone. Whatever the plan's own timeline does is allowed.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ class Rules:
         self.accept()
 
     def accept(self) -> None:
-        """Take what has been done by now for none of a script's doings."""
+        """Accept everything that has been done so far as not done by a script."""
         self._known = {name: (one.jumps, one.pushes) for name, one in self._bodies.items()}
 
     def check(self) -> None:

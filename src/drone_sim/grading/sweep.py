@@ -52,7 +52,7 @@ class Trial:
     figures: dict[str, float | None]  # means, by the criteria's names; None where one flight had none
 
     def cost(self, smallest: str) -> float:
-        """Return what the best trial has least of: points, and among equals the figure of a criterion, decide."""
+        """Return the cost, lowest for the best trial: by points, then by the figure of the criterion `smallest`."""
         figure = self.figures[smallest] if smallest else 0.0
         return -self.points + _A_FIGURE * (2 / math.pi * math.atan(abs(figure)) if figure is not None else 1.0)
 
@@ -171,10 +171,10 @@ class _Sweep:
 def _search(costs: _Costs, bounds: Sequence[tuple[float, float]], evaluations: int, seed: int) -> None:
     """Ask for the costs of one generation of points after the other: about so many in all.
 
-    Points are given for what is passed or failed, so that the cost has steps, and no slope to go down: a population
-    finds its way over steps, a simplex stands still on them. SciPy's differential evolution flies a whole generation at
-    a time, on all workers, and the same seed gives the same search on one worker and on many; optuna, which learns from
-    each trial as it ends, does not.
+    A criterion is passed or failed, so the cost changes in steps and has no slope: a method with a population can cross
+    such steps, a simplex stops on them. SciPy's differential evolution flies a whole generation at a time, on all
+    workers, and the same seed gives the same search on one worker and on many; optuna, which learns from each trial as
+    it ends, does not.
     """
     from scipy.optimize import differential_evolution  # takes as long to import as ten flights
 

@@ -111,5 +111,5 @@ def _contents(plan: Plan, script: str) -> str:
 
 
 def asks_for_it(arguments: Sequence[str]) -> bool:
-    """Tell whether a command line is for this."""
+    """Tell whether a command line asks for a verification."""
     return any(one == "--verify" or one.startswith("--verify=") for one in arguments)

@@ -79,9 +79,9 @@ class HostedScript(ABC):
         return self._owner(joint, lambda one: one.blades.has(joint)).blades.turn(joint, angle)
 
     def _owner(self, name: str, has: Callable[[Propulsion], bool]) -> Propulsion:
-        """Return what drives the vehicle that has an object; where none has, of the first, which says what there is.
+        """Return the propulsion of the vehicle that has an object; if none has it, the first, which raises an error.
 
-        Raises ValueError where nobody flies.
+        Raises ValueError if no vehicle flies.
         """
         reached = [one.propulsion for one in self.reached()]
         if not reached:
@@ -113,12 +113,12 @@ class HostedScript(ABC):
         context.scripts.attached_to(self.own_script).loaded(self.script, context.clock.time)
 
     def _call_init(self) -> None:
-        """Call init. Raises ScriptError, also for a callback that it has not."""
+        """Call init. Raises ScriptError, also if it lacks one of its callbacks."""
         self.script.call("init")
         self._check_callbacks()
 
     def _check_callbacks(self) -> None:
-        """Raise ScriptError where it has subscribed with a function that it has not."""
+        """Raise ScriptError if it has subscribed with a function that it does not have."""
         for callback in self.bus.new_callbacks():
             self.script.check(callback)
 
@@ -174,7 +174,7 @@ class ChildScript(HostedScript):
         self.tuning = Tuning(vehicle, self.parameters)
 
     def begin(self) -> None:
-        """Have no script loaded, and the parameters of a start; be among the scripts of the simulation."""
+        """Unload the script, reset its parameters to those of a start, and register it in the simulation."""
         self.close()
         self.parameters.clear()
         self.parameters.update(_script_parameters(self.vehicle.parameters))
@@ -286,7 +286,7 @@ class AttachedScript(HostedScript):
 
     @property
     def is_loaded(self) -> bool:
-        """Whether it has begun, be it that it has failed."""
+        """Whether it has begun, even if it has failed."""
         return self.failure is not None or isinstance(self.script, GuardedScript)
 
     @property

@@ -1,4 +1,4 @@
-"""What scripts see: a vehicle's cameras; and what a vision sensor's own is told of every picture (sysCall_vision)."""
+"""Pictures for scripts: of a vehicle's cameras, and of a vision sensor for its own script (sysCall_vision)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST = 100  # packets
 
 
 def eye_of(context: SimulationContext, camera: Camera) -> Callable[..., np.ndarray]:
-    """Return what gives a picture of a vehicle's camera: of a kind or its own, of `only` some objects or of all."""
+    """Return a function that takes a camera's picture: of a kind or its own kind, of `only` some objects or all."""
 
     def look(kind: str = "", only: Collection[str] | None = None) -> np.ndarray:
         if only is None or camera.failure == "silent":

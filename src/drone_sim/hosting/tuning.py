@@ -53,7 +53,7 @@ class Config(NamedTuple):
 
 
 class TunedParameters(EquipmentParameters):
-    """A vehicle and the weather around it: what is changed at once is checked at once."""
+    """A vehicle and the weather around it: values that are changed together are checked together."""
 
     weather: WeatherParameters
 
@@ -126,7 +126,7 @@ class Tuning:
     # ---- changing
 
     def check(self, changes: Mapping[str, Any]) -> _Checked:
-        """Return what other values, by name, come to. Raises ParameterError for what is not allowed."""
+        """Return new values, given by name, checked and as YAML has them. Raises ParameterError for invalid ones."""
         known = self.everything
         for name, value in changes.items():
             if name not in known:
@@ -164,7 +164,7 @@ class Tuning:
         self._tell()
 
     def _keep(self, laid: Mapping[str, Any], new: TunedParameters) -> None:
-        """Keep what scripts read where they read it, and all but the conditions for the next start."""
+        """Store values where scripts read them, and for the next start (except weather and faults)."""
         vehicle = self._vehicle
         own = self._parameters
         own.update({name: getattr(new.control, name) for name in laid.get(CONTROL, ())})
@@ -186,7 +186,7 @@ class Tuning:
     # ---- starts and snapshots
 
     def take_over(self, before: Tuning) -> None:
-        """Be tuned as the vehicle was that this one takes the place of; say so where that is not possible."""
+        """Take over the tuned values of the vehicle that this one replaces; log if that is not possible."""
         self.chosen, self._initial = dict(before.chosen), dict(before._initial)
         self._read_before = before._read_before
         known = self.everything
@@ -198,8 +198,8 @@ class Tuning:
     def begin(self, before: Mapping[str, Any]) -> None:
         """Give the script's parameters the values that files or tuning say: those of its init are only defaults.
 
-        `before` are its parameters before its init. A default that is another one than at the last start has been
-        written since, and comes before what was tuned.
+        `before` are its parameters before its init. A default that differs from the one at the last start
+        has been edited since then, and overrides the tuned value.
         """
         own = self._parameters
         own.update(self._vehicle.parameters.script_parameters)
@@ -214,7 +214,7 @@ class Tuning:
                     self._initial[name] = initial
 
     def _begun(self, name: str, leaf: ParameterField, initial: Any) -> Any:
-        """Return what a parameter begins with that the script's init has set."""
+        """Return the first value of a parameter that the script's init has set."""
         if name in self.chosen and _fits(leaf, self.chosen[name]):
             if self._initial.get(name, initial) == initial:
                 return self.chosen[name]
@@ -237,7 +237,7 @@ def _fits(leaf: ParameterField, value: Any) -> bool:
 
 
 def _by_name(problem: ParameterProblem, known: Mapping[str, ParameterField]) -> ParameterProblem:
-    """Return what is wrong with a value named as it is tuned."""
+    """Return a problem with its location replaced by the name that is used for tuning."""
     names = (name for name, leaf in known.items() if leaf.location == problem.location)
     name = next(names, None)
     return problem if name is None else problem._replace(location=(name,))

@@ -170,9 +170,9 @@ class Entries:
 
 
 def _is_only_carried(one: Placed) -> bool:
-    """Tell whether a shape that the dynamics would move hangs on a joint that it does not.
+    """Tell whether a dynamic shape hangs on a joint that the dynamics does not move.
 
-    Joints that it does, and force sensors, hold the one shape right below them. What hangs on nothing is free.
+    Joints that it moves, and force sensors, hold the one shape right below them. A shape without a parent is free.
     """
     joint = one.above.object.of if one.above is not None else None
     return isinstance(joint, VrepJoint) and (joint.mode == "kinematic" or joint.kind in ("spherical", "screw"))

@@ -26,7 +26,7 @@ def numbers(values: Iterable[float]) -> list[float]:
 
 
 def shade(color: Iterable[float]) -> list[float]:
-    """Return a colour; of one that hides what is behind it, without the opacity."""
+    """Return a colour; an opaque one without the opacity."""
     red, green, blue, opacity = (number(value, 3) for value in color)
     return [red, green, blue] if opacity == 1 else [red, green, blue, opacity]
 

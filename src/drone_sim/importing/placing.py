@@ -48,7 +48,7 @@ class Placed:
 
     @property
     def top(self) -> Placed:
-        """What it hangs on, by way of others, too, and that hangs on nothing; itself perhaps."""
+        """The root object of its tree; it may be itself."""
         return self if self.above is None else self.above.top
 
     @property

@@ -2,7 +2,7 @@
 
 V-REP's is a dynamic shape with four others on force sensors, which are the propellers: as heavy as each other, and
 they say by their names or their scripts what they are, or a script of the model applies forces.
-For the scripts of V-REP's own propellers the built-in law stands in; others are brought.
+The built-in law replaces the scripts of V-REP's own propellers; other scripts are imported.
 """
 
 from __future__ import annotations
@@ -114,9 +114,9 @@ def plain_name(one: Placed) -> str:
 
 
 def swings_on(one: Placed, root: Placed) -> Placed | None:
-    """Return the spherical joint nearest to a quadricopter by which a body of it swings; None where it is held.
+    """Return the spherical joint, nearest to a quadricopter, on which a body of it swings; None if the body is held.
 
-    What a pair of linked dummies ties together again below such a joint, as in a hand, does not swing.
+    If a pair of linked dummies below such a joint closes a loop, as in a gripper, the body does not swing.
     """
     for here in reversed(one.between(root)):
         if isinstance(here.object.of, VrepJoint) and here.object.of.kind == "spherical":

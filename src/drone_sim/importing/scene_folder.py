@@ -252,7 +252,7 @@ class _Import:
                 yield entries.make(one, parent, local)
 
     def _chosen(self) -> set[int]:
-        """Return which objects get an entry: what is a vehicle's or the floor's, or only looked through, has none."""
+        """Return the objects that get an entry: not those of vehicles and the floor, nor idle ones (`_is_idle`)."""
         without = {id(one) for one in self._floor} | self._of_vehicles
         without |= {id(one) for vehicle in self._vehicles for one in vehicle.cameras}
         seen = {id(one) for vehicle in self._vehicles for one in (*vehicle.parts, *vehicle.looks)}

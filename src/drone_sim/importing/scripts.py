@@ -61,7 +61,7 @@ _LARGEST = 1024 * 1024  # bytes
 
 
 def renew(beside: Path, folder: Path) -> None:
-    """Bring once more what was brought into the folder of an import, as it is by now. Raises OSError."""
+    """Copy again, as they are now, the files that `bring` has copied into an import's folder. Raises OSError."""
     listed = folder / LIST
     before = set(listed.read_text(encoding="utf-8").split("\n")) if listed.is_file() else set()
     bring(beside, folder, {path.name for path in folder.glob("*.lua")} - before)

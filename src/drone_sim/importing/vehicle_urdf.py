@@ -147,7 +147,7 @@ class VehicleUrdf:
 
 
 def force_frame(propeller: Propeller) -> Matrix:
-    """Return the world from where a propeller pushes along z: the body's centre of mass, the force sensor's axes."""
+    """Return the frame, in the world, where a propeller pushes along z: body's centre of mass, force sensor's axes."""
     body, inertia = propeller.body, propeller.body.object.shape.inertia if propeller.body.object.shape else None
     centre = frames.transform(body.matrix, (0.0, 0.0, 0.0) if inertia is None else inertia.pose.position)
     m = propeller.link.matrix

@@ -47,7 +47,7 @@ class ImportedVehicle:
         return self.quadricopter.root
 
     def _known_objects(self) -> dict[str, Placed]:
-        """Return the file's objects that a vehicle has of itself, by their names there."""
+        """Return the file's objects that every vehicle of ours has anyway, by our names."""
         quadricopter = self.quadricopter
         found = {DRONE: quadricopter.root}
         for index, propeller in enumerate(quadricopter.propellers, start=1):
@@ -149,7 +149,7 @@ class ImportedVehicle:
         return {"script": "none"}
 
     def _object(self, ours: str, one: Placed) -> dict[str, Any]:
-        """Return how one of its objects is called, and where it is on what it hangs on in ours."""
+        """Return the name of one of its objects, and its pose in the frame of its parent in our vehicle."""
         keys: dict[str, Any] = {"name": one.name}
         if one.object.alias:
             keys["alias"] = label(one.object.alias)
@@ -160,7 +160,7 @@ class ImportedVehicle:
         return keys
 
     def _above(self, ours: str) -> Matrix:
-        """Return the world from what one of our objects hangs on."""
+        """Return the pose, in the world, of the parent of one of our objects."""
         if ours == TARGET:
             base = self.quadricopter.base
             return frames.multiply(self.root.matrix, BASE) if base is None else base.matrix
@@ -201,7 +201,7 @@ class ImportedVehicle:
 
 
 def _known_parts(index: int, propeller: Propeller) -> dict[str, Placed]:
-    """Return the file's objects that a propeller has of itself, by their names there."""
+    """Return the file's objects that every propeller of ours has anyway, by our names."""
     found = {f"Quadricopter_propeller{index}": propeller.link, respondable(index): propeller.body}
     if propeller.joint is not None:
         if propeller.joint.above in propeller.body.children:

@@ -73,12 +73,12 @@ class ControlledPath(Path):
         self._ends = list(itertools.accumulate(pieces, initial=0.0))
 
     def at(self, along: float) -> Matrix:
-        """Return its frame so far (m, as it counts) from its beginning, in its own frame. Raises ValueError."""
+        """Return the frame at a distance (m, as it counts) from the start, in the path's own. Raises ValueError."""
         station = self._station(along)
         return frames.from_quaternion(station.position, station.turn)
 
     def carried(self, along: float) -> tuple[int, list[float]]:
-        """Return flags and four numbers that it carries so far (m) from its beginning. Raises ValueError."""
+        """Return the flags and four numbers at a distance (m) from the beginning. Raises ValueError."""
         station = self._station(along)
         return station.flags, list(station.channels)
 
@@ -95,7 +95,7 @@ class ControlledPath(Path):
 
 
 def _counted(one: Station, other: Station, rules: PathRules) -> float:
-    """Return what counts of a piece, m."""
+    """Return what a piece counts for in the length, m."""
     turn = path_curves.angle_between(one.turn, other.turn) * rules.metres_per_radian
     pause = abs(other.pause - one.pause) * rules.metres_per_pause
     return COUNTS[rules.counts](math.dist(one.position, other.position), turn) + pause

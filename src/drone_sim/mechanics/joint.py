@@ -130,7 +130,7 @@ class Joint(SceneObject):
     # ---- what moves it
 
     def command(self, control: JointControl) -> None:
-        """Let it be moved like that from now on; without a drive, a target position is where it goes at once."""
+        """Be controlled like that from now on; without a drive, it jumps to a target position at once."""
         before, self.control = self.control, control
         self.dynamic_mode = control.mode if control.mode != KINEMATIC else self.dynamic_mode
         if self.drive is not None:

@@ -129,7 +129,7 @@ def _named(item: Item, tree: ObjectTree) -> dict[int, None]:
 
 
 def members(entity: int, objects: ObjectTree, collections: Collections) -> list[int]:
-    """Return the objects that an entity is, an object or a collection. Raises ValueError, TypeError."""
+    """Return the objects of an entity, which is an object or a collection. Raises ValueError, TypeError."""
     if entity in collections:
         return collections.objects(entity, objects)
     objects[entity]

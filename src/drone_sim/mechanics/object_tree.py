@@ -22,7 +22,7 @@ DEEPEST = 200  # objects above one; what asks for places goes up from each to th
 
 
 def levels(one: SceneObject, top: SceneObject | None = None) -> int:
-    """Return how many objects one hangs on, by way of others, too, up to `top`."""
+    """Return how many objects an object hangs on, directly or indirectly, up to `top`."""
     count, above = 0, one.parent
     while above is not None and one is not top:
         count += 1
@@ -141,7 +141,7 @@ class ObjectTree:
         return Handles(dict(self._handles), self._next)
 
     def look_for_loose_ones(self) -> None:
-        """Look anew which bodies go along only where a script moves what they hang on."""
+        """Find anew the bodies that follow their parent only when a script moves that."""
         self._loose = [one for one in self._objects.values() if one.is_loose]
 
     def is_copied(self, name: str) -> bool:

@@ -46,7 +46,7 @@ class Path(SceneObject):
 
     @property
     def position_along(self) -> float:
-        """How far (m) who follows it is, as V-REP 3.x keeps it: not beyond its ends, and anew where it is closed."""
+        """Position (m) of a follower, kept as in V-REP 3.x: within the path's ends, or wrapped around if closed."""
         return self._position_along
 
     @position_along.setter
@@ -67,7 +67,7 @@ class Path(SceneObject):
         return [one for m, point in zip(ends, self.points) for one in (*point, *frames.to_quaternion(m))]
 
     def at(self, along: float) -> Matrix:
-        """Return the frame of the path, in the path's own, so far (m) from its beginning: x ahead, z up.
+        """Return the frame at a distance (m) from the beginning, in the path's own frame: x ahead, z up.
 
         Beyond its ends it is at them; where it is closed, it begins again.
         """
@@ -81,16 +81,16 @@ class Path(SceneObject):
         return looking_along((x, y, z), (ahead[0], ahead[1], ahead[2]))
 
     def carried(self, along: float) -> tuple[int, list[float]]:
-        """Return flags and four numbers that it carries so far (m) from its beginning."""
+        """Return the flags and four numbers at a distance (m) from the beginning."""
         return 0, [0.0] * 4
 
     def nearest(self, place: Vector) -> float:
-        """Return how far (m) from its beginning it comes nearest to a place."""
+        """Return the distance (m) from the beginning at which the path is nearest to a place."""
         return nearest(self.points, self._ends, place)
 
 
 def nearest(points: Sequence[Sequence[float]], ends: Sequence[float], place: Vector) -> float:
-    """Return how far along a line comes nearest to a place, where its points are so far along."""
+    """Return the distance along a line at which it is nearest to a place; `ends`: those of its points."""
     found = [(math.inf, 0.0)]
     for (begin, end), (one, other) in zip(itertools.pairwise(ends), itertools.pairwise(points)):
         piece = math.dist(one, other)

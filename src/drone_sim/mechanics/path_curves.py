@@ -61,7 +61,7 @@ def line(points: Sequence[ControlPoint], closed: bool) -> list[Station]:
 
 
 def between(one: Station, other: Station, share: float) -> Station:
-    """Return what is so far between two, from 0 to 1: straight on, and turned about one axis."""
+    """Interpolate between two stations, at a share from 0 to 1: in a straight line, and turned about one axis."""
     x, y, z = _mixed(one.position, other.position, share)
     a, b, c, d = _mixed(one.channels, other.channels, share)
     flags = one.flags if share < 0.5 else other.flags

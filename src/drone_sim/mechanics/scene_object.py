@@ -69,7 +69,7 @@ class SceneObject:
 
     @property
     def is_loose(self) -> bool:
-        """Whether nothing but a script's moves take it along where its parent goes: a free body below another."""
+        """Whether it follows its parent only when a script moves that: a free body below another object."""
         return self.body is not None and self.parent is not None
 
     def is_part_of(self, whole: SceneObject) -> bool:

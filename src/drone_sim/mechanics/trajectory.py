@@ -26,7 +26,7 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Limits:
-    """The most of each; the least velocity and acceleration are as much the other way, where nothing else is said."""
+    """Upper limits; the lower ones of velocity and acceleration are the negative of these, unless given."""
 
     velocity: Sequence[float]
     acceleration: Sequence[float]

@@ -12,8 +12,8 @@ from drone_sim.mechanics.saved_state import Restore, saved
 class VelocityMeter:
     """Measures vehicles, and what else somebody has asked about: their mean velocities over the last step.
 
-    What a script or a person puts elsewhere has not moved there, if the dynamics moves it or what carries it: only what
-    happens between `begin_step` and `end_step` counts. All else moves whenever it is put.
+    For objects that the dynamics moves or carries, only motion between `begin_step` and `end_step` counts, not being
+    put elsewhere by a script or a person. For all others, being put elsewhere counts as motion, too.
     """
 
     def __init__(self, objects: ObjectTree, clock: Clock):

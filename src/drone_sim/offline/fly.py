@@ -150,7 +150,7 @@ def _draw(path: str, recording: Recording, timeline: Timeline) -> None:
 
 
 def _check_names(options: argparse.Namespace) -> None:
-    """Raise ValueError for a file's name that cannot be meant."""
+    """Raise ValueError for a file name with a wrong ending, and for an output that is another option's file."""
     for option, endings in _ENDINGS.items():
         name = getattr(options, option)
         if name is not None and Path(name).suffix.lower() not in endings:
@@ -211,7 +211,7 @@ def _films(
 
 @contextlib.contextmanager
 def _shown_on_stdout(log: logging.Logger) -> Iterator[None]:
-    """Let what a script prints be seen, whatever a terminal cannot show."""
+    """Show what scripts print on stdout, with escapes for what the terminal cannot show."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
     handler = logging.StreamHandler(sys.stdout)

@@ -30,7 +30,7 @@ _Row = tuple[float, ...]
 
 
 class OutputError(OSError):
-    """A table or a video of a flight cannot be written on; what there is of it is not kept."""
+    """A table or a video of a flight cannot be continued; what was written of it is not kept."""
 
 
 class TableRefused(ValueError):

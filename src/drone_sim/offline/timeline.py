@@ -123,7 +123,7 @@ class Entry(NamedTuple):
         return self.at + (self.action.duration if isinstance(self.action, Push) else 0.0)
 
     def apply(self, vehicles: Mapping[str, Vehicle]) -> None:
-        """Do it to one of these."""
+        """Carry the entry out, on the vehicle among these that it is for."""
         vehicle = vehicles[self.vehicle] if self.vehicle else next(iter(vehicles.values()))
         if isinstance(self.action, Twist):
             vehicle.commands.receive(self.action)

@@ -43,8 +43,8 @@ class Client:
     ):
         """`player` plays the simulation, `moved` watches where objects are put, `backend` carries messages.
 
-        `everybody` returns the say that each client has in the steps; `clock` counts real seconds; `watched` is what is
-        called instead of a function, by its name.
+        `everybody` returns the Stepping of each client; `clock` counts real seconds; `watched` returns what is called
+        instead of a function, by its name.
         """
         self._watched = watched
         self.stepping = Stepping()
@@ -102,7 +102,7 @@ class Client:
     # ---- what it may call
 
     def _keep_up(self) -> None:
-        """Let the modules be those of the simulation as it is now; what was left in an earlier run is gone."""
+        """Update the modules to the simulation as it is now; what the client left in an earlier run is removed."""
         simulation = self._simulation
         if self._run != simulation.run:
             self._run = simulation.run

@@ -37,9 +37,9 @@ Arrangements = dict[str, Arrangement]  # by the names of objects
 
 
 class MovedObjects:
-    """What objects are told while the simulation is stopped, where to be and how joints are to move.
+    """Changes of objects' places and of joints that are made while the simulation is stopped.
 
-    V-REP begins with that; here `start` reads the scene anew.
+    V-REP starts with these changes; here `start` reads the scene again, so they are kept here.
     """
 
     def __init__(self, simulation: Simulation):
@@ -55,16 +55,16 @@ class MovedObjects:
             self._initial = {} if self._simulation.running else self._all()
 
     def changed(self) -> Arrangements:
-        """Return what is otherwise than when the simulation stopped; places are in the world.
+        """Return what has changed since the simulation stopped; places are in the world.
 
-        Carried by an object that was moved is not moved.
+        An object that was only carried along by a moved one has not changed.
         """
         objects = self._simulation.context.objects
         changed = {name: one for name, one in self._all().items() if self._initial.get(name, one) != one}
         return {name: one._replace(place=objects[objects.handle(name)].matrix()) for name, one in changed.items()}
 
     def arrange(self, arrangements: Arrangements) -> None:
-        """Let objects be so again, as far as there still are some of these names."""
+        """Put objects and joints back into these arrangements, if objects of these names still exist."""
         objects = self._simulation.context.objects
         for name, (place, value, control) in arrangements.items():
             one = objects[objects.handle(name)] if name in objects else None
@@ -75,7 +75,7 @@ class MovedObjects:
                 one.command(control)
 
     def _all(self) -> Arrangements:
-        """Return how every object is; what a joint holds is where that says."""
+        """Return the arrangement of every object, except those that a joint holds: the joint gives their places."""
         objects = self._simulation.context.objects
         found = (objects[handle] for handle in objects)
         return {one.name: _arrangement(one) for one in found if not getattr(one, "is_held", False)}
@@ -99,7 +99,7 @@ class ClientControl:
     ):
         """`player` plays the simulation, `moved` watches where objects are put; `clock` counts real seconds.
 
-        `stepping` is the client's say in the steps, `everybody` returns all clients'.
+        `stepping` is the client's control of the steps, `everybody` returns that of each client.
         """
         self._clock = clock
         self._player = player
@@ -197,12 +197,12 @@ class ClientControl:
 
     @sim("5")
     def acquireLock(self) -> None:
-        """Let the simulation stand until releaseLock."""
+        """Let the simulation stand still until releaseLock."""
         self._stepping.lock(1)
 
     @sim("5")
     def releaseLock(self) -> None:
-        """Let the simulation go on that acquireLock had stand."""
+        """Let the simulation go on after acquireLock."""
         self._stepping.lock(-1)
 
     # ---- calls of the client's own functions
@@ -213,7 +213,7 @@ class ClientControl:
 
     @sim("")
     def testCB(self, first: Any, callback: Any, second: Any, iterations: int = 99) -> Task:
-        """Call a function of the client's with two values, so many times and once more; return what it returned."""
+        """Call a function of the client's with two values, `iterations` + 1 times; return its last result."""
         if not isinstance(callback, ClientFunction):
             raise WrongValue("a function of the client's is expected")
         if not 0 <= iterations <= _MOST_CALLS:
@@ -242,9 +242,9 @@ class ClientControl:
         return wait.value()
 
     def _carry_out(self, action: Action) -> Task:
-        """Let an action be done, and the simulation go on in between, if it is playing, until it is stopped.
+        """Carry out an action, at most until the simulation stops; a playing one goes on between the action's steps.
 
-        Raises ValueError for one that takes too many steps, where it is not.
+        Raises ValueError if the simulation is not playing and the action takes too many steps.
         """
         simulation, run, answer = self._simulation, self._simulation.run, None
         steps, at_once = iter(action), 0

@@ -25,7 +25,7 @@ class Call(NamedTuple):
 
 
 class Until(NamedTuple):
-    """Something that comes true by and by, without the client."""
+    """A condition that becomes true after some time, without an action of the client."""
 
     over: Callable[[], bool]
 
@@ -51,12 +51,12 @@ class ClientFunction:
         self.name = name
 
     def __call__(self, *_values: Any) -> Any:
-        """Raise ValueError: where a function has to return at once, nobody can ask a client."""
+        """Raise ValueError: a function that has to return at once cannot be called in a client."""
         raise ValueError("a function of a client outside cannot be called from here")
 
 
 def name_of(function: Any) -> str:
-    """Return what the client knows its function by, which it has said either way."""
+    """Return the client's name for its function, which is given as a ClientFunction or as a text."""
     return function.name if isinstance(function, ClientFunction) else str(function)
 
 
@@ -66,7 +66,7 @@ def returned(values: list[Any]) -> Any:
 
 
 class Stepping:
-    """One client's say. Levels and locks count, as CoppeliaSim's do: what was switched on twice is off after twice."""
+    """One client's control of the steps. As in CoppeliaSim, what is switched on twice has to be switched off twice."""
 
     def __init__(self) -> None:
         """Let the simulation run."""
@@ -75,7 +75,7 @@ class Stepping:
         self._waits: list[Until] = []
 
     def set(self, enabled: bool) -> int:
-        """Be asked before every step, or no more; return the level from before."""
+        """Raise or lower the level (above 0, each step waits for this client); return the level from before."""
         before = self.level
         self.level = before + 1 if enabled else max(0, before - 1)
         return before
@@ -101,7 +101,7 @@ class Stepping:
 
 
 class RemoteApi:
-    """Who else has a say in when the simulation steps, and is to be heard meanwhile: nobody, unless it is a server."""
+    """Remote clients, which may delay the steps of the simulation. This base class has none; servers derive from it."""
 
     address = ""
 

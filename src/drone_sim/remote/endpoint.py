@@ -55,7 +55,7 @@ class Endpoint:
         return int(self.address.rpartition(":")[2])
 
     def watch(self, number: int) -> None:
-        """Let a `wait` end, too, when something else can be read, by its file number."""
+        """Let a `wait` also end when another file can be read, given by its descriptor."""
         self._poller.register(number, zmq.POLLIN)
 
     def wait(self, seconds: float) -> None:
@@ -81,7 +81,7 @@ class Endpoint:
         return Incoming(tuple(one.bytes for one in envelope), int(payload.get(zmq.SRCFD)), payload.bytes)
 
     def send(self, envelope: tuple[bytes, ...], payload: bytes) -> None:
-        """Answer; what nobody waits for any more goes nowhere."""
+        """Send an answer; it is dropped if nobody waits for it any more."""
         with contextlib.suppress(zmq.ZMQError):
             self._socket.send_multipart([*envelope, payload], zmq.NOBLOCK)
 

@@ -63,7 +63,7 @@ class ClientHost:
 
 
 class _FromOutside(Scripts):
-    """The scripts of a simulation, called by somebody who is none of them."""
+    """The scripts of a simulation, called by a client that is not one of them."""
 
     are_own = False
 

@@ -1,4 +1,4 @@
-"""Whether anybody outside may drive the simulation: the servers where they are on, nobody where they are off."""
+"""Start of the remote API servers, through which programs outside control the simulation, if they are switched on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drone_sim.scripting.api.backend import Backend
 def start_server(
     parameters: RemoteApiParameters, player: Player, backend: Backend | None = None, watched: Watched = unwatched
 ) -> RemoteApi:
-    """Return who is outside; see RemoteApiServers. Raises OSError where nobody can be heard, in one line."""
+    """Return the servers, see RemoteApiServers; without any if switched off. Raises OSError, in one line."""
     if not parameters.serve:
         return RemoteApi()
     try:

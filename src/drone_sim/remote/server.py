@@ -42,7 +42,7 @@ class RemoteApiServer(RemoteApi):
         moved: MovedObjects | None = None,
         watched: Watched = unwatched,
     ):
-        """Listen for who drives a `player`, on an `address`, and a `port`, of which 0 is a free one.
+        """Listen for clients that control a `player`, on an `address` and a `port` (0: a free one).
 
         `backend` carries clients' messages, `clock` counts real seconds, `moved` watches where objects are put;
         `watched` is what clients call instead of a function. Raises OSError.
@@ -63,7 +63,7 @@ class RemoteApiServer(RemoteApi):
         return any(one.stepping.holds for one in self._clients.values())
 
     def watch(self, number: int) -> None:
-        """Let a `wait` end, too, when something else can be read, by its file number."""
+        """Let a `wait` also end when another file can be read, given by its descriptor."""
         self._endpoint.watch(number)
 
     def wait(self, seconds: float) -> None:
@@ -166,7 +166,7 @@ class RemoteApiServer(RemoteApi):
         return client
 
     def everybody(self) -> Iterator[Stepping]:
-        """Yield the say in the steps that each client has."""
+        """Yield the Stepping of each client."""
         return (one.stepping for one in self._clients.values())
 
     def _forget(self) -> None:

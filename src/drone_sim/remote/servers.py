@@ -21,7 +21,7 @@ class RemoteApiServers(RemoteApi):
         backend: Backend | None = None,
         watched: Watched = unwatched,
     ):
-        """Listen for who drives a `player`; `backend` carries the messages of the clients that have some.
+        """Listen for clients that control a `player`; `backend` carries the messages of the clients that have some.
 
         `watched` is what clients call instead of a function. Raises OSError, in one line.
         """

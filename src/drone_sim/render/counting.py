@@ -31,8 +31,8 @@ def pixels(
 ) -> np.ndarray:
     """Return the same where a lens makes pixels of fragments; slower.
 
-    instances, poses: whose each visual is, (N,), and where, (N, 4, 4). `mask` draws the instances' picture with others
-    in their places.
+    instances, poses: the object's number of each visual, (N,), and its pose, (N, 4, 4). `mask` draws the picture of
+    instances, given other numbers and poses.
     """
     counts = np.zeros(int(instances.max(initial=0)) + 1, dtype=np.int64)
     nowhere = np.eye(4)

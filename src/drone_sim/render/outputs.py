@@ -38,7 +38,7 @@ class Output:
         return bool(np.issubdtype(self.dtype, np.integer))
 
     def held(self, most: int) -> type:
-        """The dtype that an attachment has, if numbers are at most `most`: the CPU draws bytes the soonest."""
+        """The dtype that an attachment has, if numbers are at most `most`: the CPU draws bytes fastest."""
         return np.uint8 if self.is_whole and most <= np.iinfo(np.uint8).max else self.dtype
 
     @property

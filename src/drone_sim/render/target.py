@@ -44,7 +44,7 @@ class Target:
         self._rgba = np.empty((size[1], size[0], 4), dtype=np.uint8)
 
     def clear(self, alpha: float, box: Box, whole: tuple[int, int]) -> None:
-        """Be that box of a picture, whose width and height are `whole`, and be drawn into from now on.
+        """Take that box of a picture, whose width and height are `whole`, and make this the target of drawing.
 
         The colours are haze, with this alpha, and the outputs say that there is nothing.
         """
@@ -57,11 +57,11 @@ class Target:
         self.use()
 
     def use(self, color: bool = True, outputs: bool = True) -> None:
-        """Be drawn into from now on, which changes the colours or not, and the outputs or not."""
+        """Make this the target of drawing from now on; `color` and `outputs`: which of them drawing changes."""
         self._write([name for name in self._names if (color if name == COLOR else outputs)])
 
     def _write(self, names: Sequence[str]) -> None:
-        """Be drawn into from now on, which changes these alone."""
+        """Make this the target of drawing from now on, which changes only these attachments."""
         if len(self._names) > 1:
             self._drawn.color_mask = [(name in names,) * 4 for name in self._names]
         self._drawn.use()

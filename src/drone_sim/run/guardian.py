@@ -71,7 +71,7 @@ class Guardian:
         self._tell(signal.SIGTERM)
 
     def stand_down(self) -> None:
-        """Count no longer: the process has noticed, and is on its way. Another signal ends it at once."""
+        """Stop counting: the process has noticed, and is ending. Another signal ends it at once."""
         signal.set_wakeup_fd(-1)
         self._handle(signal.SIG_DFL)
         self._tell(_NOTICED)
@@ -91,7 +91,7 @@ class Guardian:
 
     @staticmethod
     def end_at_once(status: int) -> NoReturn:
-        """Exit with a status where all is in order: Python, taking down so many modules, needs a second and more."""
+        """Exit with a status, all being in order, without Python's usual shutdown, which takes more than a second."""
         _flush()
         os._exit(status)
 
@@ -112,14 +112,14 @@ class Guardian:
             os.write(self._write, bytes([number]))
 
     def _hold(self) -> None:
-        """Let signals wait while this thread forks: what is for the fork must not count here."""
+        """Block signals while this thread forks: a signal for the fork must not count here."""
         signal.pthread_sigmask(signal.SIG_BLOCK, self._signals)
 
     def _release(self) -> None:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, self._signals)
 
     def _let_go(self) -> None:
-        """In the fork: its signals and its life are its own."""
+        """In the fork: handle signals as usual, and be guarded no longer."""
         if self._write >= 0:
             signal.set_wakeup_fd(-1)
             self._handle(signal.SIG_DFL)

@@ -36,7 +36,7 @@ class Pacer:
 
     @property
     def is_far(self) -> bool:
-        """Whether the next period begins so late that whoever asks for something meanwhile would wait."""
+        """Whether the next period begins so late that a request that comes meanwhile would have to wait."""
         return self._due - self._clock() > _SLICE
 
     def change(self, period: float) -> None:
@@ -91,7 +91,7 @@ class Throttle:
 
 
 class Beat:
-    """Says when to show again what stands still: soon after a change, but not too often, and seldom without one."""
+    """Says when to show a state again: soon after a change, but not too often, and seldom without a change."""
 
     def __init__(self, soon: float, seldom: float, clock: Callable[[], float] = time.monotonic):
         """Take both periods in real seconds, and a monotonic clock."""

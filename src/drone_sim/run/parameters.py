@@ -313,7 +313,7 @@ def _checked(
 
 
 def _is_given(problem: ParameterProblem, *sources: Mapping[str, Any]) -> bool:
-    """Tell a wrong value of a vehicle's own from one that it has from the keys at the top, which is told of there."""
+    """Tell whether a wrong value is the vehicle's own; one from the keys at the top is reported there instead."""
     if problem.location[:1] != ("vehicles",) or len(problem.location) < 3:
         return True
     for source in sources:

@@ -1,4 +1,4 @@
-"""Floor, weather and vehicles that become others in the midst of a flight."""
+"""Change floor, weather and vehicles during a flight."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _NOT_ITS_OWN = (*PLACE, "suffix")  # keys of which no other value makes another 
 
 
 class Hanging(NamedTuple):
-    """An object of the scene that hangs on one of a vehicle's, by that one's name, and where."""
+    """An object of the scene that hangs on an object of a vehicle: its handle, that object's name, its place there."""
 
     handle: int
     parent: str
@@ -30,10 +30,11 @@ class Hanging(NamedTuple):
 
 
 def rearrange(setup: SimulationSetup, before: Parameters, after: Parameters, script: str) -> bool:
-    """Let floor, weather and vehicles be as other parameters say; return whether a vehicle has come or gone.
+    """Change floor, weather and vehicles to what other parameters say; return whether a vehicle has come or gone.
 
-    One that is only moved flies on from there; one of which more is otherwise begins anew where it is. `script` flies
-    who names none of its own. Raises ParameterError, UrdfError and ScriptError, where all is as it was.
+    A vehicle that is only moved flies on from its new place; one that differs in more is built anew where it is.
+    `script` flies the vehicles that name none of their own. Raises ParameterError, UrdfError and ScriptError, where all
+    is as it was.
     """
     came = _exchange(setup, before, after, script)
     if after.scene.floor != before.scene.floor:
@@ -79,7 +80,7 @@ def _exchange(setup: SimulationSetup, before: Parameters, after: Parameters, scr
 
 
 def _is_as(vehicle: Vehicle, old: VehicleParameters, new: VehicleParameters) -> bool:
-    """Tell whether a vehicle can stay, if only elsewhere."""
+    """Tell whether a vehicle can stay, perhaps at another place."""
     others = [key for key in VehicleParameters.model_fields if key not in _NOT_ITS_OWN]
     has_its_names = new.suffix is None or suffixed("", new.suffix) == vehicle.suffix
     return has_its_names and all(getattr(old, key) == getattr(new, key) for key in others)
@@ -88,7 +89,7 @@ def _is_as(vehicle: Vehicle, old: VehicleParameters, new: VehicleParameters) -> 
 def _predecessor(
     new: VehicleParameters, old: Mapping[str, VehicleParameters], wanted: Collection[str]
 ) -> VehicleParameters | None:
-    """Return the vehicle that one takes the place of: of its name, or, under another name, one that began there."""
+    """Return the vehicle that a new one replaces: that of its name, else one that is gone and began at its place."""
     gone = [one for name, one in old.items() if name not in wanted and are_same(one.matrix, new.matrix)]
     return old.get(new.name) or next(iter(gone), None)
 
@@ -96,7 +97,7 @@ def _predecessor(
 def _in_place_of(
     new: VehicleParameters, old: VehicleParameters | None, vehicles: Mapping[str, Vehicle]
 ) -> VehicleParameters:
-    """Return a vehicle that has the names of one that flies, and begins where it is, unless said to be elsewhere."""
+    """Return a vehicle with the object names of the one it replaces, at its present place unless another is given."""
     if old is None:
         return new
     vehicle = vehicles[old.name]
@@ -117,7 +118,7 @@ def _hanging(vehicle: Vehicle) -> Iterable[Hanging]:
 
 
 def _replace(setup: SimulationSetup, going: list[Vehicle], coming: list[VehicleParameters], script: str) -> None:
-    """Let some vehicles go and others come, or, where one cannot, all be as they were."""
+    """Remove some vehicles and add others; where one cannot be added, restore them all."""
     handles: Mapping[str, int] = {
         name: handle for one in going for handle in one.handles for name in one.context.objects[handle].names
     }
@@ -140,7 +141,7 @@ def _replace(setup: SimulationSetup, going: list[Vehicle], coming: list[VehicleP
 
 
 def _take_out(setup: SimulationSetup, name: str) -> None:
-    """Let a vehicle go, whatever its scripts' cleanup says."""
+    """Remove a vehicle, even where the cleanup of its scripts fails."""
     try:
         setup.remove(name, running=True)
     except ScriptError as error:

@@ -26,7 +26,7 @@ _Handles = Mapping[str, int]  # of objects, by their names
 
 
 def home() -> Path:
-    """Return the folder of scenes that were read from where nobody may write, or from no file."""
+    """Return the folder for scenes that have no file, or whose folder cannot be written to."""
     return Path(os.path.expanduser("~/.ros/drone_sim"))
 
 
@@ -83,7 +83,7 @@ class SceneDocument:
         return saved(self, "_text", "_settings")
 
     def belong_to(self, file: Path | None, folder: Path, text: str, handles: _Handles) -> None:
-        """Be another file, which says that, or none, in another folder."""
+        """Belong to another file with this text, or to no file, in another folder."""
         self.file, self.folder, self._age = file, folder, _age(file) if file else None
         self._text = _Text(text, folder, handles)
         self._settings, self._read = None, self._in_text
@@ -188,7 +188,7 @@ def _age(path: Path) -> int | None:
 
 
 def _changed(raw: Mapping[str, Any], before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what was written of an entry, but for what it says otherwise by now."""
+    """Return an entry as it was written in the text, with the values that have changed since."""
     keys = {key for key in {**before, **now} if before.get(key) != now.get(key)}
     written = {key: value for key, value in raw.items() if key not in keys or key in now}
     return {**written, **{key: now[key] for key in now if key in keys}}

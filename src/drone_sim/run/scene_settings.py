@@ -71,7 +71,7 @@ def _place_now(vehicle: Vehicle) -> Matrix:
 
 
 def as_between(now: Settings, before: Settings, after: Settings) -> Settings:
-    """Return settings that differ from those that are now as two others differ, of mappings inside, too."""
+    """Return the settings `now` with the changes from `before` to `after`, also inside nested mappings."""
     made = dict(now)
     for key in {**before, **after}:
         one, two = before.get(key), after.get(key)

@@ -124,7 +124,7 @@ class Simulation:
         self._take(built)
 
     def _take(self, built: SimulationSetup) -> None:
-        """Begin in what has been built."""
+        """Use the new setup from now on, and begin a run in it."""
         self._setup = built
         self.parameters = built.parameters
         self.context = built.context  # what all that flies, and every script, has in common
@@ -135,7 +135,7 @@ class Simulation:
         self._begin()
 
     def _identify(self) -> list[Identity]:
-        """Return whose each of the world's visuals is."""
+        """Return for each of the world's visuals the object that it belongs to."""
         categories = self.scene.categories()
         return [
             Identity(name, categories.get(name) or (VEHICLE if name in self.vehicles else category_of(name)))
@@ -160,10 +160,10 @@ class Simulation:
         raise LookupError("no vehicle flies in the scene")
 
     def set_vehicles(self, entries: Any) -> tuple[list[str], list[str]]:
-        """Let those fly that `entries` say, as the parameter `vehicles` does; return who came and who went.
+        """Let the vehicles in `entries`, as in the parameter `vehicles`, fly; return which came and which went.
 
-        Who was there and still is flies on, as it would have, to the last bit. A new one whose script fails in init
-        goes again. Snapshots are forgotten. Raises ParameterError, UrdfError and ScriptError.
+        Vehicles that stay fly on unchanged, to the last bit. A new one whose script fails in init is removed again.
+        Snapshots are forgotten. Raises ParameterError, UrdfError and ScriptError.
         """
         parameters = self.parameters.with_vehicles(entries)
         if self._is_arranged or self._before:
@@ -349,7 +349,7 @@ class Simulation:
     def restore(self, snapshot: Snapshot) -> None:
         """Bring a snapshot back: the flight goes on as it did from there, to the last bit. May be repeated.
 
-        Raises ValueError for a snapshot of another era.
+        Raises ValueError for a snapshot from before a start, a stop, or a change of vehicles, shapes or their scripts.
         """
         is_same = snapshot.era == self.era and snapshot.scripts == self._setup.scripts.changes
         if not is_same or not self.world.saved_states.has_snapshot(snapshot.world):

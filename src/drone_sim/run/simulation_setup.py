@@ -111,13 +111,13 @@ class SimulationSetup:
         return in_turn(saved(own.clock, "steps"), *(one.save_state() for one in parts))
 
     def tune_as(self, before: SimulationSetup) -> None:
-        """Let what was tuned of the vehicles in another setup be so here, too."""
+        """Take over the values that were tuned for the vehicles of another setup."""
         for name, script in self.scripts.child_scripts.items():
             if name in before.vehicles:
                 script.tuning.take_over(before.scripts.child_scripts[name].tuning)
 
     def end_scripts(self, clean_up: bool) -> None:
-        """Let go of every script; `clean_up`: let its thread end and call its cleanup before, whatever the others' do.
+        """Let go of every script; `clean_up`: end its thread and call its cleanup before, even if another's fails.
 
         Raises the first ScriptError.
         """
@@ -128,7 +128,7 @@ class SimulationSetup:
         raise_first(errors)
 
     def load_scripts(self, scripts: Iterable[AnyScript], script: str) -> None:
-        """Load some of the scripts, and run their init: `script` for who has none of its own. Raises ScriptError."""
+        """Load some of the scripts, and run their init: `script` for vehicles without their own. Raises ScriptError."""
         for one in scripts:
             if isinstance(one, ChildScript):
                 path = script_of(one.vehicle.parameters, self.parameters, script)
@@ -139,8 +139,7 @@ class SimulationSetup:
     def add(self, parameters: VehicleParameters, running: bool, script: str) -> None:
         """Put one more vehicle into the world; `running`: load its scripts, `script` where it names none of its own.
 
-        Where one fails in init, it goes again.
-        Raises ParameterError, UrdfError and ScriptError.
+        Where a script fails in init, the vehicle is removed again. Raises ParameterError, UrdfError and ScriptError.
         """
         vehicle = self._put(parameters)
         self.scripts.attach()

@@ -30,7 +30,7 @@ class DivergenceCheck:
         self._past: set[str] = set()
 
     def check(self, vehicles: Iterable[Vehicle]) -> None:
-        """Raise Diverged where one is nowhere any more."""
+        """Raise Diverged where the position or velocity of a vehicle is not finite, or absurdly large."""
         for vehicle in vehicles:
             (x, y, z), _, (vx, vy, vz), (wx, wy, wz) = vehicle.body.state
             # Of a NaN no comparison is true. One sum, since this runs in every step.
@@ -65,7 +65,7 @@ class Stepper:
         self.list_vehicles()
 
     def lay_floor(self, floor: FloorParameters) -> None:
-        """Know the floor from whose edge one falls."""
+        """Take another floor: past its edge, vehicles fall."""
         self._divergence_check = DivergenceCheck(floor, self._clock)
 
     def list_vehicles(self) -> None:
@@ -75,7 +75,7 @@ class Stepper:
         self.feel_weather()
 
     def feel_weather(self) -> None:
-        """Let every vehicle have what the weather asks for by now."""
+        """Give every vehicle the forces that the present weather needs."""
         self._weather_felt = self._context.weather.changes
         for vehicle in self.flying:
             vehicle.feel_weather()

@@ -87,7 +87,7 @@ class LinkBody:
 
 
 class CarriedBody:
-    """A body without mass that goes where the frame goes that carries it."""
+    """A body without mass that follows the frame that carries it."""
 
     def __init__(self, world: World, number: int, frame: Callable[[], Matrix]):
         """Take the world, the number of the body in it, and what returns world from its frame."""
@@ -104,7 +104,7 @@ class CarriedBody:
             self._world.set_pose(self._number, Pose(frames.position(matrix), frames.to_quaternion(matrix)))
 
     def renew(self) -> None:
-        """Put it where its frame is, if it ever was put anywhere: the world may have been put back since."""
+        """Put it where its frame is, if it was ever put anywhere: the world's state may have been restored."""
         if self._at is not None:
             self._at = None
             self.follow()
@@ -137,7 +137,7 @@ class ShapeObject(SceneObject):
         self.pass_carriers()
 
     def embody(self, solid: ShapeInWorld) -> None:
-        """Be this in the world from now on; `pass_carriers` is due then."""
+        """Use this body in the world from now on; `pass_carriers` has to be called next."""
         self.number, self.link, local, self.mass, static = solid
         self._passing: set[int] = set()
         self.carried = CarriedBody(self._world, self.number, self.matrix)
@@ -158,7 +158,7 @@ class ShapeObject(SceneObject):
 
     @property
     def is_loose(self) -> bool:
-        """Whether nothing but a script's moves take it along where its parent goes."""
+        """Whether it follows its parent only when a script moves that parent."""
         return not self.is_held and super().is_loose
 
     @property
@@ -218,7 +218,7 @@ class ShapeObject(SceneObject):
         self._world.shape_forces.drop(self.number, self.link, forces, torques)
 
     def release(self) -> None:
-        """Be in the world as at the beginning, before another object takes its place."""
+        """Move by the dynamics again, and without a carrier, before another object takes its place."""
         if self.mass:
             self.set_static(False)
         self.parent = None
@@ -234,7 +234,7 @@ class ShapeObject(SceneObject):
         return restore
 
     def forget_body(self, number: int) -> None:
-        """Know that a body is gone through which it passed."""
+        """Forget a removed body with which it did not collide."""
         self._passing.discard(number)
 
     def _renew(self) -> None:

@@ -21,7 +21,7 @@ from drone_sim.world.assemblies import Hinge, Link
 
 
 class Built(NamedTuple):
-    """A body in the world, of what, and its link (-1: the root) by entry of a shape."""
+    """A body in the world: its chain, its number, and its link (-1: the root) for each entry of a shape."""
 
     chain: Chain
     body: int

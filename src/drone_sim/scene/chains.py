@@ -1,9 +1,9 @@
 """Which joints of a scene the dynamics moves, and what hangs together by them and by force sensors.
 
 A joint that is not kinematic, is revolute or prismatic, and has just one shape with a mass right below it, holds that
-shape to what is above: to the next such shape or joint upwards, else to its parent, which stands still or carries it.
-A force sensor with such a shape holds it rigidly. Shapes with a mass between which there is neither are free of each
-other: the tree does not weld.
+shape to what is above: to the next such shape or joint upwards, else to its parent, which stands still or carries it. A
+force sensor with such a shape holds it rigidly. Shapes with a mass that neither of these connects move independently:
+parent and child in the tree are not rigidly joined.
 """
 
 from __future__ import annotations

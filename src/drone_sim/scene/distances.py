@@ -20,7 +20,7 @@ _Solid = tuple[int, int]  # a body in the world and its link, -1 the root
 
 
 class _Sorted(NamedTuple):
-    """Objects: the solids that they are or that carry them, each with the name of the first, and those without one."""
+    """Objects: the solids that they are or that carry them, each with the first one's name; and those without one."""
 
     solids: dict[_Solid, str]
     points: list[SceneObject]

@@ -105,7 +105,7 @@ def bounds(entry: EntryParameters) -> tuple[np.ndarray, np.ndarray]:
 def mesh_file(vertices: Sequence[float], indices: Sequence[int], used: Collection[str]) -> str:
     """Return a file with triangles: their corners' coordinates (m), and the corners of each, from 0.
 
-    It is named by its content. Those that were not asked for the longest, and are not `used`, make room for it.
+    It is named by its content. The least recently used files that are not among `used` are deleted to make room for it.
     """
     points = np.reshape(np.asarray(vertices, float), (-1, 3))
     corners = np.reshape(np.asarray(indices, int), (-1, 3))
@@ -176,7 +176,7 @@ def file_name(value: Any, folder: Path | None) -> Any:
 
 
 def write(path: Path, entries: Sequence[EntryParameters], scripts: Sequence[AttachedScriptParameters]) -> None:
-    """Write entries and the scripts on them as a file, over another model at most.
+    """Write entries and the scripts on them as a file; only a model that was saved here may be overwritten.
 
     Raises ValueError, in one line, where it cannot be.
     """

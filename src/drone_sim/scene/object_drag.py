@@ -1,4 +1,4 @@
-"""Objects in somebody's hand: put elsewhere while everything else goes on, and still until they are let go."""
+"""Objects that a user drags: moved while the simulation goes on, and held still until they are released."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from drone_sim.scene.bodies import ShapeObject
 
 
 class ObjectDrag:
-    """What is held of one scene. A hand is no part of what snapshots remember: who restores one lets go."""
+    """The objects of one scene that are being dragged. They are not part of snapshots: restoring one releases them."""
 
     def __init__(self, context: SimulationContext, things: Callable[[], Mapping[str, SceneObject]], floor: float):
-        """Take what is shared, what returns all that can be taken, by name, and the length of the floor's side (m)."""
+        """Take the context, what returns all objects that can be dragged, by name, and the floor's side (m)."""
         self.held: dict[str, int] = {}  # the body that stands still, by what is held of it
         self._world, self._objects = context.world, context.objects
         self._things = things
@@ -39,7 +39,7 @@ class ObjectDrag:
         self._world.collision_filter.freeze(number, still=False)
 
     def forget(self, number: int) -> None:
-        """Hold nothing of a body that is gone."""
+        """Release what belongs to a body that was removed."""
         self.held = {name: one for name, one in self.held.items() if one != number}
 
     def let_go_of_all(self) -> None:

@@ -249,7 +249,7 @@ class SceneOperations:
             scene.objects[index].alias = name
 
     def _move_script(self, name: str, heir: str) -> None:
-        """Let an object, or one under another name, have the script of one, if that has any."""
+        """Move the script of an object, if it has one, to another object, or to the object's new name."""
         script = self._scene.scripts.pop(name, None)
         if script is not None:
             self._scene.scripts[heir] = script.model_copy(update={"object": heir})
@@ -341,7 +341,7 @@ class SceneOperations:
             self._hold_anew(moved)
 
     def _hold_anew(self, moved: SceneObject) -> None:
-        """Let joints have another body that are, or hang on, what has another parent."""
+        """Mark the joints and force sensors that got another parent, or hang on such an object, to be built anew."""
         for index, one in self._scene.objects.items():
             if one.kind in ("joint", "force_sensor") and (one is moved or one.hangs_on(moved)):
                 self._scene.changed[index] += 1
@@ -403,7 +403,7 @@ class SceneOperations:
     def scale(self, handles: Collection[int], factors: Sequence[float], positions: bool = False) -> None:
         """Let objects be so many times as large along x, y and z, and as heavy; `positions`: and as far from parents.
 
-        Raises ValueError, before any of them is another, for what cannot be.
+        Raises ValueError, before any of them is changed, for an object that cannot be scaled so.
         """
         x, y, z = factors
         entries = {one: scaled(self.entry(one), (x, y, z)) for one in handles}
@@ -453,7 +453,7 @@ class SceneOperations:
 
     @contextlib.contextmanager
     def _changing(self, bodies: bool = True, change_tree: Callable[[], None] = lambda: None) -> Iterator[None]:
-        """Change entries within: then world and tree are made to follow, or, where that fails, all is as it was."""
+        """Let entries be changed inside `with`; then update world and tree or, where that fails, restore all."""
         scene = self._scene
         if bodies:
             scene.write_down_joints()

@@ -38,8 +38,8 @@ _AT_REST = (0.0, 0.0, 0.0)
 class Scene:
     """What stands in the world besides the vehicles: entries as in a scene file, their bodies, their objects.
 
-    Entries may come, go and change at any time (operations.py): `renew` makes of them what is not there yet, and takes
-    away what they do not say any more; all else goes on as it would have.
+    Entries may come, go and change at any time (operations.py): `renew` builds what they describe and is not there yet,
+    and removes what they do not describe any more; everything else goes on unchanged.
     """
 
     def __init__(self, parameters: SceneParameters, context: SimulationContext):
@@ -183,7 +183,7 @@ class Scene:
     def renew(self, change_tree: Callable[[], None] = lambda: None, bodies: bool = True) -> None:
         """Let world and tree be what the entries say by now; `change_tree` is called when there are the new bodies.
 
-        `bodies`: those may have to be others. Raises ParameterError, where world and tree are as they were.
+        `bodies`: bodies may have to be rebuilt, too. Raises ParameterError, where world and tree are as they were.
         """
         made = self._build()[0] if bodies else []
         for index in (index for one in made for index in one.links):
@@ -341,7 +341,7 @@ class Scene:
             self.entries[index] = self.entry_now(index)
 
     def write_down_joints(self) -> None:
-        """Let entries say where they are now, where joints may be about to hold others than they do."""
+        """Update the entries to where objects are now, if there are joints that may be about to hold other objects."""
         if any(isinstance(one, (JointParameters, ForceSensorParameters)) for one in self.entries.values()):
             self.write_down(self.entries)
 
@@ -384,7 +384,7 @@ class Scene:
         return {one.name: one.category for one in self.entries.values() if one.category}
 
     def visual_names(self) -> list[str]:
-        """Return whose each of the visuals is, as `things` calls it."""
+        """Return for each of the visuals the name of its object, as in `things`."""
         names = {place: self.entries[index].name for index, place in self._places.items()}
         return [names.get(place, "") for place in self._world.pictures.places(self._numbers())]
 

@@ -62,7 +62,7 @@ class Breakpoints:
         return bool(self._lines)
 
     def set(self, lines: Mapping[str, frozenset[int]]) -> bool:
-        """Have these lines, from 1, by the paths of files, and no others; return whether that is another set."""
+        """Replace all breakpoints by these lines (from 1), by the paths of files; return whether they differ."""
         wanted = {os.path.realpath(file): numbers for file, numbers in lines.items() if numbers}
         if wanted == self._lines:
             return False

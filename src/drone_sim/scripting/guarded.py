@@ -42,7 +42,7 @@ class GuardedScript:
         self._attempt(self._script.take_turn)
 
     def call_function(self, name: str, arguments: list[Any]) -> Any:
-        """Call a global function for another script, whose error it is where it fails. Raises ScriptError."""
+        """Call a global function for another script; an error counts as that script's. Raises ScriptError."""
         self._refuse_if_failed(name)
         return self._called(self._script.call_function, name, arguments)
 
@@ -51,7 +51,7 @@ class GuardedScript:
         return self._script.call_own(name, arguments)
 
     def execute(self, text: str) -> Any:
-        """Run a text in the script for another one, whose error it is where it fails. Raises ScriptError."""
+        """Run a text in the script for another one; an error counts as that script's. Raises ScriptError."""
         self._refuse_if_failed("executeScriptString")
         return self._called(self._script.execute, text)
 

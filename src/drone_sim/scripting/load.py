@@ -43,13 +43,13 @@ class Script(Protocol):
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
-        """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
+        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
 
     def execute(self, text: str) -> Any:
         """Run a text in the script; return None, a value or a tuple of several. Raises ScriptError."""
 
     def execute_own(self, text: str) -> Any:
-        """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
+        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
 
     def callback(self, callback: Callback, message: Any) -> None:
         """Call a function of the script with a message. Raises ScriptError."""

@@ -1,9 +1,9 @@
 """Stops a runaway script.
 
 A Lua script asks `exceeded` from a hook that counts instructions. A Python script runs in the simulation's own
-thread, where something has to raise an exception in it: in the main thread the handler of a kernel timer, which C
-code that waits or takes long and looks at signals (sleep, locks, sockets, `re`) lets through; in any other thread
-a watchdog, whose exception Python raises between two of its instructions.
+thread, and an exception has to stop it. In the main thread the handler of a kernel timer raises it; this also stops C
+code that waits or takes long, if it checks for signals (sleep, locks, sockets, `re`). In any other thread a watchdog
+sets the exception, which Python raises between two of its instructions.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Labels(dict[str, int]):
         self._path, self._limit = path, limit
 
     def __missing__(self, phase: str) -> int:
-        """Write down what is to be said where the phase never returns."""
+        """Give the phase a number, and store the error message for the case that it never returns."""
         text = f"[{phase}] {self._path}: did not return after {self._limit.seconds:g} s (script_time_limit)"
         number = self[phase] = _numbers.setdefault(text, len(_numbers))
         _write_text(number, text)
@@ -88,13 +88,13 @@ def watched_by(memory: Any) -> None:
 
 
 def overdue(memory: Any) -> tuple[float, int]:
-    """Return, in the process outside, when the script that runs had to return (0: none runs), and which it is."""
+    """Return, in the process outside, the deadline of the script that runs (0: none runs), and its number."""
     numbers = memoryview(memory)[:16].cast("d")
     return numbers[0], int(numbers[1])
 
 
 def text_of(memory: Any, number: int) -> str:
-    """Return, in the process outside, what is to be said of that script."""
+    """Return, in the process outside, the error message for that number."""
     text = bytes(memoryview(memory)[16 + number * _LONGEST_TEXT :][:_LONGEST_TEXT]).rstrip(b"\0")
     return text.decode("utf-8", "ignore") or "a script did not return in its time (script_time_limit)"
 
@@ -140,7 +140,7 @@ class TimeLimit:
             _seen[1], _seen[0] = self.label, self._deadline
 
     def hide(self) -> None:
-        """Let it see that none runs."""
+        """Let the process outside see that no script runs."""
         _seen[0] = 0.0
 
     def exceeded(self) -> bool:
@@ -229,7 +229,7 @@ class TimeLimit:
             raise
 
     def _end_strike(self) -> None:
-        """Drop an exception that is still on its way, and what the script traces with."""
+        """Discard an exception that has not been raised yet, and restore the trace function."""
         if sys.gettrace() is _let_pass:
             _set_trace(self._traced_by)
         with contextlib.suppress(ScriptStopped):
@@ -316,7 +316,7 @@ def running() -> TimeLimit | None:
 
 
 def _let_it_come() -> None:
-    """Do nothing, at the beginning of which Python raises what waits to be raised."""
+    """Do nothing: at the beginning of the call, Python raises an exception that is pending."""
 
 
 def _go_off(_number: int, frame: FrameType | None) -> None:

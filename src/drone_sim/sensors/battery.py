@@ -68,7 +68,7 @@ class BatterySample(NamedTuple):
 
 
 class Battery(Instrument):
-    """Gives its charge away in every sub-step."""
+    """Drains in every sub-step."""
 
     parameters: BatteryParameters
 

@@ -57,7 +57,7 @@ class Camera(Sensor):
         return bool(self.viewers) and any(looks() for looks in self.viewers)
 
     def change(self, parameters: CameraParameters) -> None:
-        """Look as often, and see as much, as these parameters say."""
+        """Take the rate, the optics and the imperfections of these parameters."""
         self.period = parameters.every
         self.intrinsics = parameters.intrinsics()
         self._photography.change(parameters)
@@ -69,7 +69,8 @@ class Camera(Sensor):
     def take(self, kind: str = "") -> np.ndarray:
         """Return a picture of the scene as it stands, of its own kind or another; as Vision.picture says.
 
-        Colours have the camera's imperfections. What was asked of the last picture's truth is drawn with this one.
+        Colours have the camera's imperfections. Outputs that were asked for in the truth of the last picture are drawn
+        together with this one.
         """
         kind = kind or self.kind
         if kind != COLOR:
@@ -105,7 +106,7 @@ class Camera(Sensor):
     def look(self, kind: str = "") -> np.ndarray:
         """Return what it sees now: the last picture of a kind where nothing has changed since, else a new one.
 
-        Frozen, it sees what it saw; silent, it is dark.
+        A frozen camera returns its last picture, a silent one a black picture.
         """
         kind = kind or self.kind
         changes, pose = self._vision.changes, self.pose()
@@ -118,7 +119,7 @@ class Camera(Sensor):
         return last[2]
 
     def truth(self) -> PictureTruth | None:
-        """Return what is true of what it sees now, and of the way since it was asked last; None without OpenGL.
+        """Return the ground truth of what it sees now, with the motion since the last call; None without OpenGL.
 
         A silent camera has none.
         """
@@ -133,7 +134,7 @@ class Camera(Sensor):
         return found
 
     def show(self, steps: int, image: np.ndarray | None, age: float = 0.0) -> None:
-        """Let those who look see a picture, which has come after so many steps, of some age (s); None is none."""
+        """Hand over a picture that has arrived after so many steps, at an age in s; None for no picture."""
         self.image, self.age = image, age
         if image is not None:
             self.shown += 1

@@ -71,7 +71,7 @@ class ImuSample(NamedTuple):
 
 
 class Imu(Instrument):
-    """Follows every sub-step, and samples what has come together."""
+    """Integrates in every sub-step; a sample is the mean since the last one."""
 
     parameters: ImuParameters
 

@@ -294,7 +294,7 @@ Failure = Literal["ok", "silent", "frozen"]
 
 
 class Failing:
-    """Looks in place of an instrument, which goes on measuring: once sound again, its noise is what it would be."""
+    """Takes the place of a failing instrument, which goes on measuring: the fault does not change its later noise."""
 
     def __init__(self, instrument: Instrument, failure: Failure):
         """Begin to fail; what is frozen before its first reading freezes with that."""
@@ -303,7 +303,7 @@ class Failing:
         self._last = instrument.latest
 
     def look(self, count: int) -> None:
-        """Take part in a sub-step; of new readings none is left, or each is the last one once more."""
+        """Take part in a sub-step; new readings are dropped, or each has the frozen value instead."""
         own = self._instrument
         known = len(own.readings)
         own.look(count)

@@ -1,6 +1,6 @@
-"""What is behind a camera's picture: whose each pixel is, boxes around what is seen, and how far it has come.
+"""The ground truth of a camera's picture: the object of each pixel, boxes around objects, and the optical flow.
 
-All is of the moment of the picture, and costs nothing while nobody asks.
+All is of the moment of the picture, and costs nothing as long as nobody asks for it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _NEAREST = 1e-3  # m, ahead of the camera
 
 
 class Identity(NamedTuple):
-    """Whose a visual is: its name in the scene, and the category that it belongs to."""
+    """The object that a visual belongs to: its name in the scene, and its category."""
 
     name: str
     category: str
@@ -76,7 +76,7 @@ class Numbered:
 
     @classmethod
     def of(cls, visuals: Sequence[Identity]) -> Numbered:
-        """Number whose the visuals are, in the order in which they come first."""
+        """Number the objects of the visuals, in the order in which they first appear."""
         identities = list(dict.fromkeys(visuals))
         numbers = {one: number for number, one in enumerate(identities, 1)}
         instances = np.array([numbers[one] for one in visuals], dtype=np.uint16)
@@ -94,7 +94,7 @@ def category_of(name: str) -> str:
 
 
 class PictureTruth:
-    """What is true of one picture; each part is made when it is first asked for."""
+    """The ground truth of one picture; each part is made when it is first asked for."""
 
     def __init__(
         self,
@@ -140,7 +140,7 @@ class PictureTruth:
         return np.asarray(along * self.output("depth")[..., None], dtype=np.float32)
 
     def flow(self, depth_before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return how far what is seen has come since the picture before, and where that is known.
+        """Return the optical flow since the picture before, and where it is known.
 
         (height, width, 2) float32, px to the right and down; and (height, width) bool: not of what was outside that
         picture, or hidden in it, as its depths `depth_before` tell.

@@ -20,7 +20,7 @@ RESERVED_TOPICS = (
 
 
 def check_sensors(cameras: Mapping[str, CameraParameters], sensors: Mapping[str, SensorParameters]) -> None:
-    """Raise ParameterError where they stand in each other's way."""
+    """Raise ParameterError where two claim the same object, topic or frame, or one claims the drone's own topic."""
     _check_cameras(cameras)
     topics = {topic: "the drone's own" for topic in RESERVED_TOPICS}
     objects: dict[str, str] = {}

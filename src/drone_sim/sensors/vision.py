@@ -73,7 +73,7 @@ class Vision:
     ) -> None:
         """Take the pictures of this subject from now on, in which blades turn when somebody looks.
 
-        `identify` returns whose each of the subject's visuals is, in their order.
+        `identify` returns for each of the subject's visuals, in their order, which object it belongs to.
         """
         self._subject, self._blades, self._identify = subject, blades, identify
         self._shown = -1  # the subject's changes, when its blades were turned
@@ -100,7 +100,7 @@ class Vision:
     def numbers(
         self, intrinsics: Lens, pose: np.ndarray, numbers: np.ndarray, shown: np.ndarray | None = None
     ) -> np.ndarray:
-        """Return for each pixel whose it is, (height, width) uint16, 0 for nobody's: of `numbers`, one for each visual.
+        """Return for each pixel the number of its visual, one of `numbers`, (height, width) uint16; 0 for none.
 
         `shown` as for `picture`. Raises ValueError where there is no OpenGL.
         """
@@ -116,7 +116,7 @@ class Vision:
         """Return the light of the picture from `pose`, (height, width, 3) float32; white is 1.
 
         `velocity` is that of the optical frame's origin and of its turn, (6,), m/s and rad/s in the world. Camera and
-        bodies go on as they do at the pose while the shutter is open. Without OpenGL it is so for no time at all.
+        bodies keep their velocities while the shutter is open. Without OpenGL the exposure takes no time.
         """
         speed = lens.fx * (np.linalg.norm(velocity[3:]) + np.linalg.norm(velocity[:3]) / _AWAY)
         with self.taking() as renderer:
@@ -144,7 +144,7 @@ class Vision:
         self.seconds += time.perf_counter() - began
 
     def truth(self, intrinsics: Intrinsics, pose: np.ndarray, before: Moment | None) -> PictureTruth | None:
-        """Return what is true of the picture from `pose`, since the one `before`; None where there is no OpenGL."""
+        """Return the truth of the picture from `pose`, with the flow since `before`; None where there is no OpenGL."""
         self._open()
         renderer = self._renderer
         if renderer is None:

@@ -17,7 +17,7 @@ class Visual:
     key: identity, for example ``(body, index)``; a different Visual under a known key replaces it.
     rgba: 0..1, multiplied with what a mesh's own material says; white leaves the material as it is.
     texture: path of an image that replaces a mesh's own texture.
-    edition: another one after these files have been written anew.
+    edition: changes when the files of this visual have been written anew.
     floor: receives the shadows; a horizontal surface whose top is the top of its geometry.
     ground: what is around the floor, as far as one sees; receives the shadows, too.
     """

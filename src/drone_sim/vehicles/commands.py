@@ -49,7 +49,7 @@ class Commands:
             self._obey(came[1])
 
     def advance(self) -> None:
-        """Grow a step older; one that is too old gives way to standing still."""
+        """Make the command a step older; one that is too old is replaced by a zero command."""
         if self._is_over:
             self._obey(Twist())
         self.age += self._clock.time_step
@@ -61,7 +61,7 @@ class Commands:
 
     @property
     def is_quiet(self) -> bool:
-        """Whether no script will hear of it at the beginning of the next step, unless another one is received."""
+        """Whether no script will get the command at the beginning of the next step, unless a new one is received."""
         return self.link is None and not self._is_over
 
     def _obey(self, twist: Twist) -> None:
@@ -128,7 +128,7 @@ class FlightState:
         self.begin()
 
     def begin(self) -> None:
-        """Forget what was asked in vain: another script may be there."""
+        """Forget which requests no script answered: another script may be there."""
         self.is_flown = False  # by a child script, which is loaded
         self._missing = ""
         self._dropped: set[str] = set()

@@ -50,7 +50,7 @@ class Rotors:
         return self._type.propellers(law, axes, points, time_step, commanded)
 
     def angle(self, number: int, air: float) -> float:
-        """Return the angle (rad) of a propeller's blades, from 0: they turn against the torque that they leave."""
+        """Return the angle (rad) of a propeller's blades, from 0: they turn opposite to their reaction torque."""
         return -self._type.rotors[number][1] * _BLADE_TURN * air
 
     def by_joint(self, values: Sequence[float]) -> dict[str, float]:

@@ -110,7 +110,7 @@ class Vehicle:
         self.commands.begin()
 
     def feel_weather(self) -> None:
-        """Have drag, once there is weather; what `forces` does not give has the coefficients of DragParameters."""
+        """Have drag, once there is weather; if `forces` gives none, with the default coefficients of DragParameters."""
         if self.context.weather.is_felt and not self._has_drag:
             self._has_drag = True
             self.sub_step_forces = [*self.sub_step_forces, DragParameters(kind="drag").make()]
@@ -133,7 +133,7 @@ class Vehicle:
         self.handles = []
 
     def leave(self) -> None:
-        """Go out of the world."""
+        """Remove it from the world."""
         self._leave_tree()
         self.context.blades.remove(self.propulsion.blades)
         self.context.names.pop(self.body.number, None)
@@ -175,7 +175,7 @@ class Vehicle:
         self.context.tunings += 1
 
     def change_faults(self, changes: Mapping[str, Any]) -> None:
-        """Let other things be wrong with it: keys of `faults`, as in YAML. Raises ParameterError."""
+        """Change its faults: keys of `faults`, as in YAML. Raises ParameterError."""
         self.faults.change(changes)
         self._prepare()
         self.context.tunings += 1

@@ -1,4 +1,4 @@
-"""The outside of a V-REP file: its header, and the payload, which one Huffman code may compress, its tree in front.
+"""The container of a V-REP file: its header, and the payload, which may be Huffman-coded, with the tree in front.
 
 The bits of a byte count from the most significant one. The tree stands in pre-order: 1 and 8 bits are a leaf, 0 is
 a node, after which its 0-child and its 1-child come. The codes follow at once.

@@ -133,9 +133,9 @@ class VrepControlPoint:
 
 @dataclass(frozen=True)
 class VrepPath:
-    """A path of 3.x: its control points, switches, how its length is counted (0 to 6), and where who follows it is (m).
+    """A path of 3.x: its control points, switches, how its length is counted (0 to 6), and where a follower is (m).
 
-    `has_surface`: whether a body is drawn along it; `broken`: how many more points there are, which are nowhere.
+    `has_surface`: whether a body is drawn along it; `broken`: how many more points there are, without a valid position.
     """
 
     points: tuple[VrepControlPoint, ...]
@@ -186,7 +186,7 @@ Kind = VrepShape | VrepJoint | VrepDummy | VrepPath | VrepCamera | VrepProximity
 class VrepScript:
     """A script on an object (its handle; -1 for the main script); since 4.9 it is an object of its own.
 
-    `parent_is_proxy`: of that, whether its paths begin from its parent, as of one that came from an older file.
+    `parent_is_proxy`: whether paths of such an object begin at its parent, as if the script came from an older file.
     """
 
     object: int
@@ -201,7 +201,7 @@ class VrepScript:
 
     @property
     def is_embedded(self) -> bool:
-        """Whether it is, for its paths, no object of its own."""
+        """Whether its paths begin at the object that it is on, not at the script as an object of its own."""
         return self.own_object == -1 or self.parent_is_proxy
 
 

@@ -4,7 +4,7 @@ import os
 
 
 def _load_pybullet_quietly() -> None:
-    """Import it for the first time without the line that it writes to stderr: when it was compiled."""
+    """Import pybullet for the first time, without the line on stderr that says when it was compiled."""
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
     try:

@@ -29,7 +29,8 @@ def create(
 ) -> int:
     """Add an object without its texture; return its body id. Only a URDF `moves`, by its own masses.
 
-    Whatever else is alike shares what is `made` of it. Raises ValueError, in one line, for a file that cannot be read.
+    Other equal shapes share the PyBullet shapes in `made`. Raises ValueError, in one line, for a file that cannot be
+    read.
     """
     position, orientation = pose
     try:

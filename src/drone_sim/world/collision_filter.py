@@ -26,7 +26,7 @@ class CollisionFilter:
         self._frozen.pop(body, None)
 
     def let_everything_pass(self, body: int, link: int) -> None:
-        """Let a link be met by nothing, and by no ray."""
+        """Make a link permeable: it collides with nothing, and no ray meets it."""
         pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
         self._permeable.add((body, link))
 

@@ -47,7 +47,7 @@ class NoGyroscopicTerm:
         self._links.pop(body, None)
 
     def begin_step(self) -> None:
-        """Ask for velocities in the next step of PyBullet's: attitudes of before do not tell them."""
+        """Forget earlier attitudes, so that the next step of PyBullet's reads the velocities themselves."""
         self._before = {}
 
     def begin_sub_step(self, attitudes: Mapping[int, Quaternion], duration: float) -> None:

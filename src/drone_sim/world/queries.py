@@ -105,7 +105,8 @@ class Queries:
     ) -> list[Met]:
         """Return the points within `reach` (m) that are nearest to a point (m), of all bodies and links that count.
 
-        `measured`: so do what it is inside of, and what nothing meets; a sensor sees neither.
+        `measured`: also of bodies that contain the point, and of links that collide with nothing; a sensor sees
+        neither.
         """
         if self._probe is None:
             self._probe = pybullet.createCollisionShape(
@@ -192,7 +193,7 @@ class Queries:
 
 
 def _normal(start: Vector, end: Vector, hit: Any) -> Vector:
-    """Return the unit normal of what a ray met; of what it begins in Bullet knows none, and returns anything."""
+    """Return the unit normal where a ray met something; against the ray if it begins inside: Bullet knows none then."""
     if hit[2] > 0.0:
         return hit[4]  # type: ignore[no-any-return] # PyBullet has no types
     length = dist(start, end)

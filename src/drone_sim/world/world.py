@@ -180,7 +180,7 @@ class World:
         self._files.drop_old()
 
     def set_material(self, body: int, link: int, friction: float, restitution: float) -> None:
-        """Let a link (-1: the root) rub and rebound otherwise; of two that touch, each is multiplied."""
+        """Set friction and restitution of a link (-1: the root); of two that touch, the values are multiplied."""
         pybullet.changeDynamics(
             body, link, lateralFriction=friction, restitution=restitution, physicsClientId=self._client
         )
@@ -208,9 +208,9 @@ class World:
     # ---- dynamics
 
     def solve_contacts_for_instruments(self) -> None:
-        """Solve contacts so far that what lies still does so for an accelerometer, too.
+        """Solve contacts so accurately that a body at rest is at rest for an accelerometer, too.
 
-        It costs nothing in flight; what touches something goes another way in its last bits.
+        It costs nothing in flight; the motion of bodies in contact differs in the last bits.
         """
         pybullet.setPhysicsEngineParameter(solverResidualThreshold=_SOLVED, physicsClientId=self._client)
 
@@ -234,7 +234,7 @@ class World:
         return State(position, orientation, (vx - sx, vy - sy, vz - sz), angular)
 
     def is_finite(self) -> bool:
-        """Whether every body is somewhere, and as fast as numbers go."""
+        """Whether the poses and velocities of all bodies are finite."""
         states = [self.state(body) for body in self._inertial_frames]
         return bool(np.isfinite([number for state in states for part in state for number in part]).all())
 
@@ -255,7 +255,7 @@ class World:
         self._dynamics.moved(body)
 
     def part(self, body: int) -> None:
-        """Take a body out of every contact, which Bullet would remember wherever it goes; it is far up then."""
+        """End all contacts of a body by moving it far up: Bullet would remember them wherever else it goes."""
         self.set_pose(body, Pose((0.0, 0.0, _FAR_UP)))
         pybullet.performCollisionDetection(self._client)
 

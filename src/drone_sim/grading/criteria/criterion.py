@@ -31,7 +31,7 @@ Column = Annotated[str, AfterValidator(_known)]
 
 
 class Missed(Exception):
-    """A flight has nothing by which a criterion could be met; a sentence that says why."""
+    """A flight lacks something that a criterion needs; the message is a sentence that says what."""
 
 
 class FlightPart(NamedTuple):
@@ -121,7 +121,7 @@ class Criterion(Checked):
         return ()
 
     def judge(self, flight: FlightRecord) -> Outcome:
-        """Return how the flight did; what it did not get to fails."""
+        """Return how the flight did; a criterion fails if the flight ended too early for it."""
         until = math.inf if self.until is None else self.until
         rows = (flight.times >= self.after - _ROUNDING) & (flight.times <= until + _ROUNDING)
         if not rows.any():
@@ -172,7 +172,7 @@ class AtMostCriterion(Criterion):
         return f"at most {figure(self.at_most, self.unit)}"
 
     def _compared(self, value: float, said: str, at: float | None = None) -> Outcome:
-        """Return the outcome of a figure, of which a sentence says how it came about, and when (s)."""
+        """Return the outcome of a figure; `said` is a sentence about how it came about, `at` when (s)."""
         return self._outcome(value <= self.at_most, f"{said}; {self.allowed} are allowed", value, self.unit, at)
 
 
@@ -196,7 +196,7 @@ class DistanceCriterion(AtMostCriterion):
         return vectors[..., ["xyz".index(axis) for axis in self.axes]]
 
     def _outcome_of(self, distances: np.ndarray, times: np.ndarray, what: str) -> Outcome:
-        """Return the outcome of distances (M,) at these times (M,); `what` they are from, in words."""
+        """Return the outcome of distances (M,) at these times (M,); `what`: what they are measured from, in words."""
         worst = int(distances.argmax())
         value = {
             "largest": float(distances[worst]),

@@ -21,7 +21,7 @@ class Stays(Criterion):
     at_most: Figure | None = None
 
     def model_post_init(self, context: Any) -> None:
-        """Refuse what everything, or nothing, is within."""
+        """Refuse bounds that every value, or no value, satisfies."""
         super().model_post_init(context)
         if self.at_least is None and self.at_most is None:
             raise ParameterError("missing; there must be an `at_least`, an `at_most`, or both", ("at_most",))

@@ -1,7 +1,7 @@
-"""Steady error: how far the mean of a column is from what it is to be, once it has had its time.
+"""Steady error: how far the mean of a column is from its target value, after it has had time to settle.
 
-The steady-state error is the limit for t to infinity (Ogata, Modern Control Engineering, 5th ed., section 5-8); of a
-flight that ends it is the mean over its last part.
+The steady-state error is the limit for t to infinity (Ogata, Modern Control Engineering, 5th ed., section 5-8); a
+flight ends, so here it is computed from the mean over the last part.
 """
 
 from __future__ import annotations

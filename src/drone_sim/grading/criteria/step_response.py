@@ -1,4 +1,4 @@
-"""Step responses: what a column does once it is to go from one value to another."""
+"""Step responses: how a column behaves from the moment when its target changes from one value to another."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Response(NamedTuple):
 
 
 class StepCriterion(AtMostCriterion):
-    """A step of a column at the time `after`, from one value to another; between two rows it is taken for straight."""
+    """A step of a column at the time `after`, from one value to another; linear between two rows."""
 
     of: Column
     start: Figure | None = Field(default=None, alias="from")  # where it is at `after`, where left out
@@ -29,7 +29,7 @@ class StepCriterion(AtMostCriterion):
     unit = "s"
 
     def model_post_init(self, context: Any) -> None:
-        """Refuse a step of nothing."""
+        """Refuse a step of height 0."""
         super().model_post_init(context)
         if self.start == self.to:
             raise ParameterError("is the same as `from`: there would be no step", ("to",), f"{self.to:g}")

@@ -1,4 +1,4 @@
-"""Which files a flight depends on: what it is flown again for where they change, and all that the sandbox shows it."""
+"""Which files a flight depends on: it is flown again when one of them changes, and the sandbox shows only them."""
 
 from __future__ import annotations
 
@@ -53,8 +53,9 @@ def of_plan(plan: Plan, changes: Mapping[str, Any]) -> list[Path]:
 def of_script(plan: Plan, script: str) -> list[Path]:
     """Return the file of a script, and then those inside its folder that it names, and so on; [] for a built-in one.
 
-    Another child script is not among them, whoever names it: it is somebody else's, or the plan's. Nor is what cannot
-    be read, and what is more than LARGEST together: any word may be a name, and no file of one spoils another's flight.
+    Other child scripts are left out, even if they are named: they belong to somebody else, or to the plan. So are files
+    that cannot be read, and those beyond LARGEST bytes in total, the smallest counted first: any word may happen to be
+    a file's name, and one student's files must not spoil another's flight.
     """
     path = Path(script_path(script)).resolve()
     if path.parent == BUILT_IN:
@@ -81,7 +82,8 @@ def read(path: Path, limit: int = LARGEST) -> bytes:
 def given_script(given: str) -> str:
     """Return the path of a script that somebody has handed in; a built-in one's name as it is.
 
-    Raises ScriptError for a name that is none, and Unreadable for what is there and is no file that it may be.
+    Raises ScriptError for a script that does not exist, and Unreadable for one that is not a regular file, or is a link
+    that leads out of its folder.
     """
     path = Path(os.path.abspath(given))
     try:
@@ -96,7 +98,7 @@ def given_script(given: str) -> str:
 
 
 def _own_script(plan: Plan) -> Iterator[str]:
-    """Give the script that flies where nobody names another: a solution, which the others have no need of."""
+    """Yield the script of the plan itself: it may be a solution, which other scripts must not see."""
     if plan.script and Path(plan.script).suffix:
         yield str(locate(plan.script_of(None)))
 
@@ -178,7 +180,7 @@ def _named_in(path: Path, folder: Path, is_handed_in: bool) -> Iterator[Path]:
 
 
 def _inside(path: Path, folder: Path, is_handed_in: bool) -> Iterator[Path]:
-    """Give the file of a path, or those of the folder that it is, if it lies in `folder` without a link out of it."""
+    """Yield the file at a path, or all files if it is a folder, if it lies in `folder` and no link leads out of it."""
     try:
         real = path.resolve()
         if not real.is_relative_to(folder) or real == folder:

@@ -1,4 +1,4 @@
-"""Flights, each in two processes of its own, seen from whoever wants them flown."""
+"""Flights, each in two processes of its own: the side that requests them."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ _TRIES = 2  # of a flight whose processes have died: it may have been somebody e
 
 
 class Cancelled(Exception):
-    """Nobody wants the flight any more."""
+    """The flight has been cancelled."""
 
 
 class Flyer:
-    """Flies by two processes that have everything imported, and fork one for each flight: the judge's, the script's.
+    """Flies with two servers, the judge's and the script's; with everything imported, they fork a process per flight.
 
     They start when they are needed. One thread uses this, and closes it.
     """
@@ -82,7 +82,7 @@ class Flyer:
         self._scripts.cut()
 
     def close(self) -> None:
-        """End all, and whatever is flown."""
+        """End both servers, and any flight in progress."""
         self._judge.close()
         self._scripts.close()
 

@@ -69,8 +69,9 @@ def key_of(contents: str, seed: int, changes: Mapping[str, Any]) -> str:
 def contents_of(plan: Plan, script: str) -> str:
     """Return a digest of all that a flight depends on beside seed and changes: its files, this package, its engine.
 
-    Of the files it is the contents that counts, and where each lies beside the one that names it: a script that was
-    moved is the same. Raises OSError, ScriptError for one that is not there, Unreadable for one that cannot be read.
+    Of each file, its content counts, and its path relative to the plan's or the script's folder: a script that was
+    moved to another folder is the same. Raises OSError, ScriptError for one that is not there, Unreadable for one that
+    cannot be read.
     """
     flown = files.of_script(plan, script)
     digest = hashlib.sha256(f"{version()}\0{flown[0].name if flown else script}".encode(errors="surrogateescape"))
@@ -111,12 +112,12 @@ def version() -> str:
 
 
 def default_folder() -> Path:
-    """Return where results lie if nobody says where: the user's cache."""
+    """Return the default folder of results, in the user's cache."""
     return cache_path() / "grading"
 
 
 def unpacked(folder: Path) -> Path:
-    """Return where, in the folder of results, the zips are laid out that a class has handed in."""
+    """Return the folder, inside the folder of results, into which the zips of a class are unpacked."""
     return folder / "submissions"
 
 

@@ -1,4 +1,4 @@
-"""The program that judges: it forks a process for each flight, with the world and all that counts in it.
+"""The program that judges: it forks a process for each flight, which holds the world and everything that is judged.
 
 The script that flies is in another process, behind a door (scripting.door); none of its lines ever runs here.
 """

@@ -1,4 +1,4 @@
-"""A process of a flight, its judge's or its script's: forked, limited, watched, and cleared away with all it began."""
+"""A process of a flight, its judge's or its script's: forked, limited, watched, and ended with all its children."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _PR_SET_PDEATHSIG, _PR_SET_DUMPABLE, _PR_SET_CHILD_SUBREAPER, _PR_SET_NO_NEW_PRI
 
 
 def keep_to_itself() -> None:
-    """Let nobody of the same user look into this process, or trace it."""
+    """Prevent other processes of the same user from reading this process's memory, or tracing it."""
     _prctl(_PR_SET_DUMPABLE, 0)
 
 
 def guard() -> None:
-    """Let nobody of the same user look into this process, and give it what its children leave behind."""
+    """Prevent others of the same user from reading this process's memory, and make it the parent of its orphans."""
     keep_to_itself()
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
 
@@ -51,7 +51,8 @@ class LimitedProcess:
         """Fork it, to `act` with descriptors to write to, by the names of its `outputs`.
 
         `limits`: of a flight, as config/grading.yaml has them, with `real_time` and `seconds` for this one. `outputs`
-        have the most bytes of each; descriptors that are `kept` stay open, too. `is_alone`: no others are in sight.
+        have the most bytes of each; descriptors that are `kept` stay open, too. `is_alone`: it sees no processes of
+        others, as in a sandbox.
         """
         self._limits, self._most = limits, outputs
         self._is_alone = is_alone
@@ -86,7 +87,7 @@ class LimitedProcess:
             os.close(descriptor)
 
     def watch(self, lifeline: int) -> bool:
-        """Read what comes until it ends, or has to; return False where something comes by a pipe `lifeline` first."""
+        """Read its output until it ends, or has to; return False if something comes by the pipe `lifeline` first."""
         poll = select.poll()
         for descriptor in self._read:
             poll.register(descriptor, select.POLLIN)
@@ -242,11 +243,11 @@ def _keep_only(descriptors: Sequence[int]) -> None:
 def _limit(seconds: float, memory: int, files: int, processes: int | None, open_files: int) -> None:
     """Limit this process, and what it begins, for good: s of processor time, MiB, MiB of a file, numbers.
 
-    That of processes is None for one that begins none: to limit them, all that there are have to be counted.
+    The limit of processes is None for a process that starts none: to set it, all existing ones have to be counted.
 
-    Memory is counted from what the process has now. Not the addresses (RLIMIT_AS) are what is limited first, of which
-    OpenGL reserves many and uses few, but the pages that are its own (RLIMIT_DATA); addresses are limited to more
-    than that, for memory that is shared is not counted among the pages. A crash leaves no core.
+    Memory is counted from what the process has now. The main limit is on the process's own pages (RLIMIT_DATA), not on
+    its addresses (RLIMIT_AS), because OpenGL reserves many addresses and uses few. Addresses have a higher limit,
+    because shared memory does not count among the pages. A crash leaves no core file.
     """
     own, addresses = _memory()
     seconds = max(1, round(seconds))

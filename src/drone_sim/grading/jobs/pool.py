@@ -46,10 +46,10 @@ Fly = Callable[[Sequence[Job]], Iterator[JobResult]]
 
 @contextlib.contextmanager
 def opened(options: FlightOptions, workers: int = 1, scheduler: str = "") -> Iterator[Fly]:
-    """Give a function that flies: it gives the flights as they come, in any order, each job's once.
+    """Yield a function that flies jobs: it yields the flights as they finish, in any order, one for each job.
 
-    On `workers` threads here, or by the scheduler at an address. At the end what is still flown is ended. Raises
-    PoolError; the function that, too, and what Flyer.fly raises.
+    They are flown on `workers` threads here, or by the scheduler at an address. At the end, flights in progress are
+    ended. Raises PoolError; the function raises that, too, and what Flyer.fly raises.
     """
     if scheduler:
         with _connected(scheduler, options.patience) as client:
@@ -73,7 +73,7 @@ def _flown(
     workers: int,
     killed: tuple[type[Exception], ...] = (),
 ) -> Iterator[JobResult]:
-    """Fly in batches; those in which a worker was lost, by an error of a type `killed`, job by job."""
+    """Fly in batches; a batch whose worker was lost (an error of a type in `killed`) is flown again, job by job."""
     size = options.batches.size(len(jobs), max(1, workers))
     alone: list[Job] = []  # one of them may be to blame
     batches = {
@@ -132,7 +132,7 @@ def _connected(address: str, patience: float) -> Iterator[Any]:
 
 @dataclass
 class _Clients:
-    """The fork servers of this process's threads, as their clients."""
+    """The clients of the fork servers: one for each thread of this process that flies."""
 
     own: threading.local = field(default_factory=threading.local)
     all: list[Flyer] = field(default_factory=list)
@@ -166,7 +166,7 @@ _CLIENTS = _Clients()
 
 
 def fly_batch(jobs: Sequence[Job], options: FlightOptions) -> list[JobResult]:
-    """Fly, in a worker. Raises PoolError where its files are others than those of whoever has sent the jobs."""
+    """Fly a batch, in a worker. Raises PoolError where the worker's files differ from those of the jobs' sender."""
     _check(jobs)
     client = _CLIENTS.of_thread(options)
     try:

@@ -1,4 +1,4 @@
-"""bubblewrap around the process that flies: what it needs to read, nothing else, and no network and other processes."""
+"""bubblewrap around the process that flies: it can read what it needs, nothing else; no network, no other processes."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def _shown_system() -> tuple[str, ...]:
 
 
 def _of_python() -> Iterator[str]:
-    """Give what this Python, and whoever it imports from, is made of, wherever it lies: pyenv's, conda's, a venv's."""
+    """Yield the folders of this Python and of all that it imports from, wherever they are: pyenv, conda, a venv."""
     for prefix in dict.fromkeys((sys.prefix, sys.exec_prefix, sys.base_prefix, os.path.realpath(sys.base_prefix))):
         yield from (os.path.join(prefix, name) for name in _OF_PYTHON)
     yield from sysconfig.get_paths().values()

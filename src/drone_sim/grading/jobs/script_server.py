@@ -1,7 +1,7 @@
-"""The program in whose forks scripts run, each in one of its own: in the sandbox, where there is one.
+"""The program that forks a process for each script: in the sandbox, where there is one.
 
-It knows no plan, no seed, and no judge: a door leads from a script's process to the process of its flight, and that is
-all there is.
+It knows no plan, no seed, and no judge: its only connection is a door from a script's process to the process of its
+flight.
 """
 
 from __future__ import annotations

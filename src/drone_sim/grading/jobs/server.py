@@ -1,7 +1,8 @@
-"""What the two programs have in common that fork a process for each flight: that of the judge, and that of the script.
+"""What the two programs share that fork a process for each flight: the judge's and the script's.
 
-Such a program has imported everything. Its input is a connection that brings requests in JSON, and takes the replies.
-It ends with it, whatever a flight does, and where nothing has been asked for a while.
+Such a program has imported everything. Its standard input is a connection that brings requests in JSON and takes the
+replies. The program ends when this connection ends, whatever a flight does, and when there has been no request for a
+while.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class Requests:
     """What is asked of the program."""
 
     def __init__(self) -> None:
-        """Take the program's own input, under another number; under its own is nothing any more."""
+        """Move the connection from standard input to another descriptor; standard input is /dev/null then."""
         guard()
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # from the first process of a sandbox the kernel keeps it, then
         self._connection: Connection = Connection(os.dup(0))
@@ -41,7 +42,8 @@ class Requests:
     def __iter__(self) -> Iterator[tuple[dict[str, Any], socket.socket]]:
         """Say that it is ready, and give each request, with one end of the connection between judge and script.
 
-        Who has forked the process that the end is for closes it: the other end is to hear when that process is gone.
+        After the fork this process closes its copy of the end, so that the other end notices when the forked process is
+        gone.
         """
         gc.collect()
         gc.freeze()  # a fork that counts references copies fewer pages

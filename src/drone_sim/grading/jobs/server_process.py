@@ -1,4 +1,4 @@
-"""A program that forks a process for each flight (judge_server, script_server), seen from whoever asks it to."""
+"""A program that forks a process for each flight (judge_server, script_server): the side that sends it requests."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class BatchSettings(Checked):
     of_a_worker: Annotated[int, Within(1, 1000)]
 
     def size(self, flights: int, workers: int) -> int:
-        """Return how many, of so many flights."""
+        """Return the size of a batch for so many flights."""
         return max(1, min(self.largest, flights // (workers * self.of_a_worker)))
 
 

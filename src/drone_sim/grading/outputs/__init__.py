@@ -1,1 +1,1 @@
-"""Results for who reads them: a terminal, a browser, a CI system, a program. Each file is one of these."""
+"""Results in the forms that a terminal, a browser, a CI system or a program reads: one file here for each."""

@@ -24,7 +24,7 @@ _FORMULAS = ("=", "+", "-", "@")  # what a spreadsheet takes for one
 
 
 def write(submissions: Iterable[Submission], scripts: Sequence[ScriptResults], path: str | Path) -> None:
-    """Write a line for every person, of a submission without any for its script. Raises OSError, which names the file.
+    """Write a line for each person, or for a submission's script if it has none. Raises OSError, which names the file.
 
     The mark is the mean of the flights' points.
     """
@@ -57,6 +57,6 @@ def feedback(result: ScriptResults) -> str:
 
 
 def _cell(text: str) -> str:
-    """Return a cell that is text everywhere."""
+    """Return a cell that every spreadsheet takes for text, not for a formula."""
     plain = encodable(printable(text))
     return f"'{plain}" if plain.startswith(_FORMULAS) and plain != _NEVER else plain

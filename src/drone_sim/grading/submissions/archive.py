@@ -1,4 +1,4 @@
-"""Zips of strangers: what is in them is laid into a folder, in limits, or refused in a line for its part of the zip."""
+"""Zips of strangers: unpacked into a folder, within limits; a part that is refused gets one line that says why."""
 
 from __future__ import annotations
 

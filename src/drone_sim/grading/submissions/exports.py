@@ -43,7 +43,7 @@ def _arranged(parts: Parts) -> tuple[str, Parts]:
 
 
 def person_of(name: str) -> Person | None:
-    """Return whose a folder or a file is by Moodle's name for it; None for another name."""
+    """Return to whom a folder or a file belongs, from the name that Moodle gives it; None for another name."""
     found = _MOODLE.fullmatch(name)
     return None if found is None else Person(found["name"], found["number"])
 

@@ -1,8 +1,8 @@
 """Which scripts of a class are alike: winnowing, as MOSS does it (Schleimer, Wilkerson, Aiken, SIGMOD 2003).
 
-What counts is the order of the words of a program: names, numbers and texts of one's own choice are all one, comments
-and spaces nothing. Of every GRAM words in a row a hash is made, and of every WINDOW hashes the least one is kept: two
-scripts with GRAM + WINDOW - 1 words in common have one in common. Who is alike has not yet copied.
+What counts is the order of the words of a program: names, numbers and texts that the author chose are all alike;
+comments and spaces are ignored. A hash is made of every GRAM words in a row, and of every WINDOW hashes the smallest is
+kept: two scripts with GRAM + WINDOW - 1 words in common share at least one. Similar scripts are no proof of copying.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def source_of(paths: Iterable[Path]) -> str:
 def similar(sources: Mapping[str, str], given: Mapping[str, str]) -> list[Pair]:
     """Return the pairs among programs, by the names of their files, that are alike, the most alike first.
 
-    What is in a file that all were `given`, or in more than half of a class, counts for nobody.
+    Code in a file that everybody was `given`, or in the scripts of more than half of a class, is ignored.
     """
     found = {name: _hashes(name, text) for name, text in sources.items()}
     common = {one for name, text in given.items() for one in _hashes(name, text)}

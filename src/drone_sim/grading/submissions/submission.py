@@ -13,7 +13,7 @@ class Refused(ValueError):
 
 @dataclass(frozen=True)
 class Person:
-    """Somebody who has handed in, as the course's system knows them; '' is what nobody has said."""
+    """Somebody who has handed in, as the course's system knows them; '' stands for unknown."""
 
     name: str
     participant: str = ""  # Moodle's number of them in the assignment
@@ -36,7 +36,7 @@ class Submission:
 
 
 def names_of(submissions: Iterable[Submission]) -> Mapping[str, str]:
-    """Return for each script the name of whose it is, which no other has: namesakes have a number, too."""
+    """Return for each script the name of its author, made unique: people of the same name get a number, too."""
     named = [one for one in submissions if one.people]
     count = Counter(one.name for one in named)
     return {

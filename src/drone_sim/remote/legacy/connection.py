@@ -16,7 +16,7 @@ _DEAD_AFTER = (  # a machine that is lost: s of silence, s between questions, ti
 
 
 class Connection:
-    """Reads no further while an answer has not gone out: who does not read is not heard."""
+    """A client's socket; while an answer has not been sent completely, no further requests are read."""
 
     def __init__(self, peer: socket.socket, name: str):
         """Take a connected socket, and what it is called in the log."""

@@ -12,10 +12,10 @@ _BACKLOG = 256
 
 
 class Doors:
-    """Sockets that listen, by the numbers by which `epoll` tells of them."""
+    """Sockets that listen, by their file descriptors, as `epoll` reports them."""
 
     def __init__(self, host: str, epoll: select.epoll):
-        """Take the address to listen on, '' for all of this machine's, and what tells who knocks."""
+        """Take the address to listen on, '' for all of this machine's, and the `epoll` that reports new connections."""
         self._host, self._epoll = host, epoll
         self._doors: dict[int, socket.socket] = {}
         self._ports: dict[int, int] = {}  # those of scripts: by port the number, -1 where there is none
@@ -60,7 +60,7 @@ class Doors:
             self._close(number)
 
     def _open_for_script(self, port: int) -> int:
-        """Return the number of a door at a port, -1 where it is open already, or cannot be: that is said once."""
+        """Open a port; return its socket's number, -1 if it is open already or cannot be opened (logged once)."""
         if any(door.getsockname()[1] == port for door in self._doors.values()):
             return -1
         try:

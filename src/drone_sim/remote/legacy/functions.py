@@ -47,5 +47,5 @@ FUNCTIONS: Table = {
 
 
 def served(code: int) -> Served:
-    """Return what carries out a command; of one that there is not, what refuses it."""
+    """Return the function that carries out a command; for an unknown one, a function that refuses it."""
     return FUNCTIONS.get(code) or _refused(f"command {code:#06x}", "there is no such command")

@@ -13,7 +13,7 @@ def _read_place(function: str) -> Served:
 
 
 def _read_place_as_before(function: str) -> Served:
-    """Return what older clients send: relative to what stands in the data."""
+    """Return the older form of a command, which has the object that the place is relative to in its data."""
     return Served(f"simxG{function[1:]}", lambda ask: floats(*ask.sim(function, *ask.key, *ask.take("i"))))
 
 

@@ -60,11 +60,11 @@ class LegacyServer(RemoteApi):
         clock: Callable[[], float] = time.monotonic,
         watched: Watched = unwatched,
     ):
-        """Listen for who drives a `player`, on an `address` ("*": all), and a `port`, of which 0 is a free one.
+        """Listen for clients that control a `player`, on an `address` ("*": all) and a `port` (0: a free one).
 
-        `moved` watches where objects are put; `others` returns the say in the steps that clients of other servers have,
-        who are let go when the simulation stops; `clock` counts real seconds; `watched` is what clients call instead of
-        a function. Raises OSError, in one line.
+        `moved` watches where objects are put; `others` returns the Stepping of each client of other servers, to release
+        it when the simulation stops; `clock` counts real seconds; `watched` returns what clients call instead of a
+        function. Raises OSError, in one line.
         """
         self._player, self._clock, self._others, self._watched = player, clock, others, watched
         self._moved = moved or MovedObjects(player.simulation)
@@ -181,7 +181,7 @@ class LegacyServer(RemoteApi):
                 self._let_go(guest, f"silent for {_SILENT:.0f} s")
 
     def _say(self, line: str) -> None:
-        """Write a line to the log, one in a second at most: who asks for many gets few."""
+        """Write a line to the log, at most one per second, so that clients cannot flood it."""
         if self._rarely.passes():
             more = f" ({self._unsaid} others before)" if self._unsaid else ""
             self._unsaid = 0
@@ -258,7 +258,7 @@ class LegacyServer(RemoteApi):
             self._watch(guest)
 
     def _watch(self, guest: _Guest) -> None:
-        """Be woken by what can go on: reading, where nothing is under way, and writing, where an answer waits."""
+        """Wake up for the right events of a guest: reading if no request is in progress, writing if an answer waits."""
         events = select.EPOLLRDHUP
         if guest.connection.has_to_write:
             events |= select.EPOLLOUT

@@ -47,7 +47,7 @@ class _Stream:
 
 
 class Session:
-    """One client's. The simulation's thread calls all of it."""
+    """The session of one client. Only the simulation's thread calls it."""
 
     def __init__(
         self,

@@ -89,7 +89,7 @@ class Stamp(NamedTuple):
 
 
 class Packets:
-    """Puts the packets of a connection together again, and answers in such as its client reads."""
+    """Joins the packets of a connection into messages, and splits answers into packets that its client can read."""
 
     def __init__(self) -> None:
         """Begin with nothing."""

@@ -42,7 +42,7 @@ class Cockpit:
     """One page for one simulation. While no browser is open, it listens to nothing."""
 
     def __init__(self, server: PageServer, simulator: str, scripts: Path):
-        """Fill what `server` serves with the simulation of the node `simulator`; the user's `scripts` are a folder."""
+        """Serve the simulation of the node `simulator` through `server`; `scripts` is the user's folder of scripts."""
         self._simulator = Simulator(simulator)
         self._topics = FoundTopics()
         self._view: SceneView | None = None

@@ -31,7 +31,7 @@ class CockpitParameters(NamedTuple):
 
 
 def read_parameters(given: Any) -> CockpitParameters:
-    """Return what is set in a node's private parameters. Raises ValueError, and FileNotFoundError for a home."""
+    """Return what is set in a node's private parameters. Raises ValueError; FileNotFoundError for an unknown home."""
     if not isinstance(given, Mapping):
         raise ValueError(f"the node's parameters: must be a mapping, not {shown(given)}")
     for name in given.keys() - set(CockpitParameters._fields):

@@ -27,8 +27,8 @@ class Inbox:
     ):
         """Start empty; whoever asks waits for `patience` (s).
 
-        `wait` sleeps by `sleep`, which `wake` ends, where others are to be heard meanwhile. `tell` is called before a
-        job that is an intervention.
+        `wait` calls `sleep`, and a new job calls `wake` to end it: give both if something else must be heard meanwhile.
+        `tell` is called before a job that is an intervention.
         """
         self._tell = tell
         self._patience = patience

@@ -1,8 +1,8 @@
-"""Say it, once each way, when the ROS master goes and when it comes back; be found by a new one, too.
+"""Report once when the ROS master goes, and once when it comes back; register with a new master, too.
 
-And by nodes whose connections a network has broken. TCP holds a connection over a silence, but not over any: a
+Also connect again to nodes after a network failure. A TCP connection survives a short silence, but not a long one: a
 subscriber of rospy's notices after 150 s that nothing comes, closes, and does not connect again until the master tells
-it of a publisher. So the master is asked to tell.
+it of a publisher. So the node registers again, which makes the master tell the others.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class MasterWatch(threading.Thread):
     # ---- nodes that have been cut off
 
     def _find_lost(self) -> None:
-        """Have those connected again that are lost, registered with the master, and can be reached.
+        """Restore the lost connections to nodes that are registered with the master and can be reached.
 
         Raises OSError and rosgraph.MasterException where the master does not answer.
         """

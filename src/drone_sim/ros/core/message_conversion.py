@@ -35,8 +35,8 @@ WORLD_FRAME, BASE_LINK, TRACK_BASE = "world", "base_link", "Track_base"  # the r
 def frame(vehicle: VehicleParameters, name: str) -> str:
     """Return what a vehicle's frame is called, such as `a/drone2/front_optical`; `world` is everybody's.
 
-    Whoever broadcasts sends on the same /tf. Two simulators under one master, in a namespace each, make one tree below
-    `world`, as their topics do not mix either.
+    All nodes broadcast on the same /tf. Two simulators under one master, each in its own namespace, make one tree below
+    `world`; the namespace keeps their frames apart, like their topics.
     """
     return name if name == WORLD_FRAME else f"{rospy.get_namespace()}{vehicle.frame_prefix}{name}".lstrip("/")
 

@@ -1,4 +1,4 @@
-"""The stamp of a step, and /clock; who begins to listen while nothing is published, because what is shown stands."""
+"""The stamp of a step, and /clock; new subscribers that come while nothing is published, because nothing changes."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ Tell = Callable[[genpy.Message], None]
 
 
 class Stamp(Protocol):
-    """Returns the stamp of what was the case so long ago (s of simulated time)."""
+    """Returns the stamp for a state that is `ago` old (s of simulated time)."""
 
     def __call__(self, ago: float = 0.0) -> rospy.Time:
-        """Return it."""
+        """Return the stamp."""
 
 
 class NewSubscribers(rospy.SubscribeListener):  # type: ignore[misc] # rospy has no types
-    """Those who have begun to listen to a topic, until they are taken; rospy's threads say so."""
+    """New subscribers of a topic, remembered until they are taken; rospy's threads add them."""
 
     def __init__(self) -> None:
         """Begin with none."""
@@ -37,15 +37,15 @@ class NewSubscribers(rospy.SubscribeListener):  # type: ignore[misc] # rospy has
         self._came: deque[tuple[float, Tell]] = deque(maxlen=_MOST)  # s of the monotonic clock, and what tells them
 
     def peer_subscribe(self, _topic: str, _publish: Tell, tell: Tell) -> None:
-        """Remember somebody; rospy calls this, with what sends a message to them alone."""
+        """Remember a subscriber; rospy calls this, with the function that sends a message to this subscriber alone."""
         self._came.append((time.monotonic(), tell))
 
     def take(self) -> list[Any]:
-        """Return what tells each of them, and forget them. One thread alone calls this, and it publishes the topic."""
+        """Return a send function for each of them, and forget them. Only the thread that publishes calls this."""
         return [self._came.popleft()[1] for _ in range(len(self._came))]
 
     def have_settled(self, seconds: float) -> bool:
-        """Tell, once, that the last of them has come so long ago, and forget them."""
+        """Return True once, when the last of them came more than `seconds` ago, and forget them."""
         settled = bool(self._came) and time.monotonic() - self._came[-1][0] > seconds
         if settled:
             self._came.clear()
@@ -55,9 +55,9 @@ class NewSubscribers(rospy.SubscribeListener):  # type: ignore[misc] # rospy has
 class StepTime:
     """What everything that belongs to a step is stamped with.
 
-    In real time that is the moment at which the step began. In simulated time it is the simulation's, and /clock
-    has said it before anything is sent under it; where nothing is sent, /clock need not tell of every step. What was
-    measured within the step has a stamp of its own: so long before, at the pace of the flight.
+    In real time this is the moment at which the step began. In simulated time it is the simulation's time, and /clock
+    publishes it before any message with this stamp; if nothing is sent, /clock may skip steps. What was measured within
+    the step has an earlier stamp of its own, at the pace of the flight.
     """
 
     def __init__(self, simulation: Simulation, simulated: bool):
@@ -86,7 +86,7 @@ class StepTime:
             self._pace = min(elapsed, steady) if elapsed >= 0 else steady  # or the machine's clock was set back
 
     def stamp(self, ago: float = 0.0) -> rospy.Time:
-        """Return the stamp of what is sent now, and was the case `ago` seconds of simulated time before."""
+        """Return the stamp of a message that is sent now, about the state `ago` seconds of simulated time before."""
         if self._clock is None:
             return self._began - ros_time(ago * self._pace, rospy.Duration) if ago else self._began
         now = self._simulation.time

@@ -21,9 +21,10 @@ _PATIENCE = 2.0  # s, of one thread for the other
 class Shutdown:
     """Hears SIGINT, SIGTERM, SIGHUP and `rosnode kill`; the thread that runs the node asks, and says when it is done.
 
-    rospy's own signal handler waits for ever where a signal interrupts what it needs itself: see end_on_signals. And
-    `rosnode kill` closes the topics from another thread, while a step may be publishing on them: here it waits until
-    there are no more steps. Where they do not come to an end, the guardian, if there is one, ends the process.
+    rospy's own signal handler waits for ever if a signal interrupts code that holds a lock it needs: see
+    end_on_signals. And `rosnode kill` closes the topics from another thread, while a step may be publishing on them:
+    here it waits until there are no more steps. If the steps do not end, the guardian, if there is one, ends the
+    process.
     """
 
     def __init__(self, guardian: Guardian | None = None, numbers: Iterable[int] = SIGNALS) -> None:
@@ -67,10 +68,10 @@ class Shutdown:
 
 
 def run_tool(name: str, run: Callable[[Callable[[], bool]], Any], signals: Iterable[int] = SIGNALS) -> int:
-    """Run what a person works with as a node; return its exit status. `run` gets what tells that it is time to end.
+    """Run an interactive tool as a node; return its exit status. `run` gets a function that tells when to end.
 
-    rospy's own handlers would close the topics before the last message is sent. Its time is the person's, who looks on,
-    and must be able to stop the drone, while /clock stands still.
+    rospy's own handlers would close the topics before the last message is sent. The tool runs in real time: its user
+    must be able to stop the drone even while /clock stands still.
     """
     if not init_node(name, anonymous=True, disable_signals=True, disable_rostime=True):
         return 1
@@ -83,9 +84,9 @@ def run_tool(name: str, run: Callable[[Callable[[], bool]], Any], signals: Itera
 def end_on_signals(signals: Iterable[int] = SIGNALS) -> None:
     """Have a signal shut the node down; call it in the main thread, after init_node with disable_signals.
 
-    rospy's own handler does that within whatever the signal interrupts, and waits for ever for a lock that this holds:
-    of a message that is being written, of the log, of a call to the master. Here CPython's handler in C writes to a
-    pipe, and a thread that reads from it shuts down. SIGHUP stays ignored under nohup.
+    rospy's own handler runs inside the code that the signal interrupts, and waits for ever for a lock that this code
+    holds: of a message that is being written, of the log, of a call to the master. Here CPython's handler in C writes
+    to a pipe, and a thread that reads from it shuts the node down. SIGHUP stays ignored under nohup.
     """
     read, write = os.pipe()
     os.set_blocking(write, False)
@@ -97,7 +98,7 @@ def end_on_signals(signals: Iterable[int] = SIGNALS) -> None:
 
 
 def _do_nothing(*_: object) -> None:
-    """Be a handler: of a signal without one nothing is written."""
+    """Do nothing: CPython writes to the pipe only for signals that have a handler."""
 
 
 def _wait(pipe: int, signals: set[int]) -> None:

@@ -1,8 +1,8 @@
-"""How a node starts: what may be wrong with environment and master gets one line; one name, one node.
+"""How a node starts: problems with environment and master are told in one line; only one node has a name at a time.
 
-Who is started takes the place of the node that has its name, once that one has ended. So it is with every node of ROS.
-But the master tells the older one only when the newer one is there, and takes whatever the older one still says (for a
-line on /rosout, rospy asks for a parameter) for a node that has come just now: it ends the newer one, too.
+A new node takes the place of an older one with the same name, once that has ended, as every ROS node does. But the
+master tells the older one to end only when the newer one is registered. If the older one still calls the master then
+(for a line on /rosout, rospy asks for a parameter), the master takes it for a new node, and ends the newer one, too.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ _Answer = TypeVar("_Answer")
 def init_node(name: str, others_wait: bool = False, **options: Any) -> bool:
     """Call rospy.init_node; return False, after one line on stderr, where it cannot become a node.
 
-    rospy itself would wait for the master, or fail with a traceback, or be a node that nobody can reach. Another node
-    of the name has ended by then; `others_wait`: who else wants it waits for release_name. What is logged goes
-    to stdout line by line: where that is no terminal, Python would keep it until 8 KiB have come together.
+    rospy itself would wait for the master, or fail with a traceback, or be a node that nobody can reach. An older node
+    of the same name is ended first; with `others_wait` other processes that want the name wait until release_name. Log
+    lines go to stdout at once: without a terminal, Python would keep them until there are 8 KiB.
     """
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
@@ -69,7 +69,7 @@ def init_node(name: str, others_wait: bool = False, **options: Any) -> bool:
 
 
 def _check_log(name: str) -> None:
-    """Do without a log, and say so, where none can be written: rospy would say nothing on the terminal then, either."""
+    """If no log file can be written, say so and work without one: rospy would not log to the terminal, either."""
     logging.FileHandler.handleError = _do_without_log  # type: ignore[assignment, method-assign]
     mappings = rospy.names.get_mappings()
     folder = os.path.dirname(os.path.abspath(mappings["__log"])) if "__log" in mappings else rospkg.get_log_dir()
@@ -134,7 +134,7 @@ def reported(name: str, action: Callable[[], Any]) -> int:
 
 
 def from_shell(name: str) -> str:
-    """Return the name of a file as it is seen from anywhere; of a built-in script ("target") as it is; "none" is "".
+    """Return a file's name so that it is valid in any folder; a built-in script's ("target") unchanged; '' for "none".
 
     A relative path is taken from the folder of the shell that ran roslaunch, which runs nodes in ~/.ros and hands that
     shell's PWD on.
@@ -154,8 +154,8 @@ _turn: socket.socket | None = None  # held by one process of a name, on this mac
 def _take_name(name: str) -> None:
     """End the node of a name, so that this process may register with the master.
 
-    Who is started at the same moment, on the same machine, waits for its turn until `release_name`. Raises OSError
-    where the older one does not end, or does not answer.
+    Another process that is started at the same moment, on the same machine, waits until `release_name`. Raises OSError
+    where the older node does not end, or does not answer.
     """
     _wait_for_turn(name)
     uri = _node(name)
@@ -165,7 +165,7 @@ def _take_name(name: str) -> None:
 
 
 def release_name() -> None:
-    """Let another process take the name: this one can end as it should."""
+    """Let another process take the name, now that it can end this one properly."""
     global _turn
     if _turn is not None:
         _turn.close()
@@ -173,7 +173,7 @@ def release_name() -> None:
 
 
 def _wait_for_turn(name: str) -> None:
-    """Hold a socket that one process of this machine can hold. Raises OSError."""
+    """Wait for a socket that only one process of this machine can hold at a time. Raises OSError."""
     global _turn
     digest = hashlib.sha256(f"{rosgraph.get_master_uri()} {name}".encode()).hexdigest()
     _turn = socket.socket(socket.AF_UNIX)
@@ -198,7 +198,7 @@ def _node(name: str) -> str:
 
 
 def _name(name: str, uri: str) -> str:
-    """Return the name of who answers there, '' for nobody. Raises OSError for somebody who does not answer."""
+    """Return the name of the node that answers at `uri`, '' for none. Raises OSError if it does not answer."""
     if not reached(uri, _CONNECTS):  # it was killed, and the master does not know
         return ""
     try:

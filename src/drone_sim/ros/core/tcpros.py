@@ -1,7 +1,8 @@
-"""Who connects to a node, to listen to a topic or to call a service: as many at once as come, none waits for another.
+"""Connections to a node, for topics and for services: any number at the same time, and none waits for another.
 
-rospy lets five callers wait at the door; TCP has whoever comes then try again after 1, 3 and 7 s. And one thread lets
-them in and hears them out in turn: a caller that says nothing, or stands still, keeps all others out for good.
+In rospy only five callers can wait to be accepted; TCP makes later ones try again after 1, 3 and 7 s. And one thread
+accepts the callers and reads from them one after the other: a caller that sends nothing, or hangs, blocks all others
+for good.
 """
 
 from __future__ import annotations

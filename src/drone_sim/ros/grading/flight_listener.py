@@ -137,7 +137,7 @@ class FlightListener:
             self._said.setdefault(name, []).append(ValueChange(self.time, value))
 
     def look_for_topics(self) -> None:
-        """Subscribe to topics of scripts and nodes that are there by now, of those that are asked for."""
+        """Subscribe to those topics of scripts and nodes that are asked for and exist by now."""
         for called, topic in list(self._topics.items()):
             kind, name, _ = rostopic.get_topic_class(topic)
             if kind is not None:
@@ -159,7 +159,7 @@ class FlightListener:
         return FlightRecord(table, bool(table[-1, 0] >= duration - 1e-6), touches, said.get("", ()), said, others)
 
     def _rows(self) -> list[_Row]:
-        """Return the table. Odometry and propellers come in pairs; the last are of the same step."""
+        """Return the table. Odometry and propellers are paired from the end: the last ones are of the same step."""
         pairs = min(len(self._odometry), len(self._propellers))
         propellers = [(0.0,) * 4] * (len(self._odometry) - pairs) + self._propellers[len(self._propellers) - pairs :]
         rows: dict[float, _Row] = {}

@@ -144,7 +144,7 @@ class _Live:
         self.rules = LiveRules(plan, simulator.node)
 
     def is_connected(self) -> bool:
-        """Whether the simulator hears all that is said, and the other way round."""
+        """Whether all topics from and to the simulator are connected."""
         return self._sender.is_heard and self.listener.is_connected() and self.rules.is_connected()
 
     def _follow(self, now: float) -> None:
@@ -174,7 +174,7 @@ class _Live:
         return ended or self._simulator.error
 
     def _wait(self) -> str:
-        """Wait for the end; return what came before it."""
+        """Wait for the end of the flight; return what ended it too early, '' for nothing."""
         last, since = -1.0, time.monotonic()
         while not self._over.wait(_LOOK):
             now = self.listener.time
@@ -195,9 +195,9 @@ class _Live:
         return ""
 
     def within_rules(self, flown: FlightRecord) -> tuple[FlightRecord | None, str]:
-        """Return a flight up to where somebody has put the vehicle elsewhere, if so, and what there is to say of it.
+        """Return a flight, cut off where somebody has moved the vehicle against the rules, and what to report of that.
 
-        It is None where that was before the first step.
+        The flight is None if that was before the first step.
         """
         if MOVE in self._plan.allowed:
             return flown, ""

@@ -1,4 +1,4 @@
-"""The rules of the game: who else has done to the world what the plan does not allow, as the simulator says it."""
+"""The rules of the game: what others have done to the world against the plan, as the simulator reports it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _QUEUE = 1000  # messages
 
 
 class LiveRules:
-    """Hears what others than whoever grades do to the world; docs/interface.md says what `interventions` holds."""
+    """Hears what others than the grader do to the world; docs/interface.md describes `interventions`."""
 
     def __init__(self, plan: Plan, simulator: str):
         """Hear what a `plan` does not allow of the node `simulator`."""

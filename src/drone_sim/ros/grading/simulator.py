@@ -56,7 +56,7 @@ class GradedSimulator(Simulator):
             time.sleep(_LOOK)
 
     def fit(self, plan: Plan) -> Parameters:
-        """Return what it will fly with in the plan's scene. Raises Mismatch where that is not what the plan says."""
+        """Return the parameters it will fly with in the plan's scene. Raises Mismatch if the plan has others."""
         if not use_sim_time():
             raise Mismatch("grading goes by simulated time: start the simulator with use_sim_time:=true")
         wanted = plan.parameters()
@@ -74,7 +74,7 @@ class GradedSimulator(Simulator):
         return running
 
     def check_seed(self, wanted: Parameters, scene_file: str) -> None:
-        """Raise Mismatch where a scene file would not bring about what a flight is to begin with."""
+        """Raise Mismatch if a scene file would not give the start conditions that the flight needs."""
         there = parameters_of(self.node, scene_file=scene_file, vehicles=0)
         for found in _differences(_beginning(wanted), _beginning(there), ()):
             raise Mismatch(f"the simulator cannot fly this seed of the plan: {found}")

@@ -21,8 +21,9 @@ _BUSY = "simulation"  # the finding that says that there is no answer
 class Diagnostics(threading.Thread):
     """Asks the simulation's thread for what it finds, between two steps, and publishes it; a daemon thread.
 
-    While nobody listens the steps know nothing of it. diagnostic_updater is of no use here: it asks the master for its
-    period, and fails where that has gone; it has a stamp of its own, and tells of what is new at once, before the rest.
+    While nobody listens it does not disturb the steps. diagnostic_updater is not used: it asks the master for its
+    period, and fails if the master has gone; it has a stamp of its own, and publishes a new entry at once, before the
+    rest.
     """
 
     def __init__(self, look: Callable[[], list[Finding]], stamp: Callable[[], rospy.Time], inbox: Inbox):

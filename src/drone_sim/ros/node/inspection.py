@@ -25,18 +25,18 @@ _MOST_NAMES = 2000
 
 
 class _Newcomers(rospy.SubscribeListener):
-    """Whether somebody has begun to listen; who lets go and listens again has, too."""
+    """Whether a new subscriber has come; one that unsubscribes and subscribes again counts, too."""
 
     def __init__(self) -> None:
         super().__init__()
         self._any = False
 
     def peer_subscribe(self, *_: Any) -> None:
-        """Hear from a thread of rospy's."""
+        """Note a new subscriber; a thread of rospy's calls this."""
         self._any = True
 
     def take(self) -> bool:
-        """Tell, and forget."""
+        """Return whether one has come, and forget it."""
         was, self._any = self._any, False
         return was
 
@@ -45,7 +45,7 @@ class LatchedText:
     """A latched topic of text, made anew only while somebody listens, and for everybody who begins to."""
 
     def __init__(self, topic: str, queue_size: int = 1):
-        """Advertise it; so many messages wait for who listens, before the oldest is lost."""
+        """Advertise it; `queue_size` messages wait for a subscriber, before the oldest is lost."""
         self._came = _Newcomers()
         self._publisher = rospy.Publisher(topic, String, self._came, queue_size=queue_size, latch=True)
         self._said = ""
@@ -69,7 +69,7 @@ class LatchedText:
 
 
 class InspectionTopics:
-    """Shows what scripts do to whoever writes them."""
+    """Shows the authors of scripts what their scripts do."""
 
     def __init__(self, player: Player, inbox: Inbox):
         """Advertise and subscribe for the simulation of `player`, whose thread empties `inbox`."""
@@ -80,7 +80,7 @@ class InspectionTopics:
         self._breakpoints = rospy.Subscriber("~breakpoints", String, self._on_breakpoints, queue_size=10)
 
     def update(self) -> None:
-        """Say what is new, where anybody wants to know it."""
+        """Publish what is new, if somebody listens."""
         if self._simulation.breakpoints and not self._breakpoints.get_num_connections():
             self._simulation.set_breakpoints({})  # who set them has gone
         if self._variables.is_heard:

@@ -23,7 +23,7 @@ _WAITING = 100  # messages
 
 
 class Interventions:
-    """Says them. The simulation's thread calls all of it."""
+    """Publishes the interventions. Only the simulation's thread calls its methods."""
 
     def __init__(self, simulation: Simulation):
         """Advertise for `simulation`."""
@@ -32,7 +32,7 @@ class Interventions:
         self._run = self._era = -1
 
     def update(self) -> None:
-        """Begin anew in another run; say what was tuned before it, and stays so."""
+        """Begin anew in another run; publish what was tuned before it, and is still in force."""
         simulation = self._simulation
         if self._run == simulation.run:
             return
@@ -58,7 +58,7 @@ class Interventions:
     # ---- clients of the remote APIs
 
     def watched(self, name: str, function: Function) -> Function:
-        """Return a function of clients' that says what is done by it; itself where it does nothing to the world."""
+        """Return a function for clients that also publishes what it does; unchanged if it does nothing to the world."""
         if name in free():
             return function
 
@@ -73,7 +73,7 @@ class Interventions:
         return told
 
     def _clients(self) -> Actions:
-        """Return what tells what clients do: they fly all vehicles, by the green spheres, too, and are no scripts."""
+        """Return the rules for clients: they may fly all vehicles, also by the green spheres, and are not scripts."""
         if self._era != self._simulation.era:
             self._era = self._simulation.era
             flown = self._simulation.vehicles.values()

@@ -175,7 +175,7 @@ class Node:
         return self.player.playing and not self._outside.holds
 
     def _reset_pacing(self) -> None:
-        """Let no step be late that came late because the simulation stood."""
+        """Do not count a step as late if it came late because the simulation stood still."""
         if self.player.playing and not self.player.begun:
             self._pacer.excuse()
         else:
@@ -234,7 +234,7 @@ class Node:
         self._show_to_eyes()
 
     def _show_at_the_same_time(self) -> None:
-        """Show what has changed under a stamp used before: transforms, of which tf2 takes one, to new subscribers."""
+        """Show changes with a stamp used before; transforms only to new subscribers: tf2 takes one for each stamp."""
         self._topics.follow()
         self._time.end(at_once=True)
         self._time.tell_new_subscribers()

@@ -21,7 +21,7 @@ _NOT_TURNED = (0.0,) * 4  # a message's own quaternion, which nobody has set
 
 
 class ObjectPoses:
-    """Listens. `child_frame_id` is the object's name; one whose rotation is left out stays turned as it is."""
+    """Subscribes. `child_frame_id` is the object's name; without a rotation in the message, it keeps its own."""
 
     def __init__(self, simulation: Simulation, inbox: Inbox):
         """Subscribe for `simulation`, whose thread empties `inbox`."""

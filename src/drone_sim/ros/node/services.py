@@ -53,7 +53,7 @@ class Services:
         self._vehicles.close()
 
     def tell_vehicles(self) -> None:
-        """Say in the parameter who flies, and let the topics follow: the scene may have other vehicles."""
+        """Write into the parameter which vehicles fly, and update their topics: the scene may have other vehicles."""
         self._vehicles.tell(self._player.simulation.parameters)
         self._follow()
 
@@ -103,7 +103,7 @@ class Services:
         self._player.simulation.script = script
 
     def set_vehicles(self) -> str:
-        """Let those fly that the parameter `vehicles` says; who was there and still is flies on."""
+        """Fly the vehicles in the parameter `vehicles`; those that fly already simply fly on."""
         added, removed = self._player.simulation.set_vehicles(self._vehicles.read())
         self._follow()
         told = [f"{', '.join(names)} {verb}" for names, verb in ((added, "added"), (removed, "removed")) if names]
@@ -118,7 +118,7 @@ class Services:
         return f"snapshot at t = {self._player.simulation.time:.2f} s"
 
     def restore(self) -> str:
-        """Bring it back."""
+        """Restore the state of the last snapshot."""
         if self._snapshot is None:
             raise ValueError("no snapshot has been taken")
         self._player.simulation.restore(self._snapshot)
@@ -133,8 +133,9 @@ def scene_parameter() -> str:
 class VehiclesParameter:
     """The private parameter `vehicles`, for people to change.
 
-    It holds an entry for each that flies, as long as nobody else has written it. rosparam, as roslaunch, leaves out
-    empty entries and lays the others over what is there: an entry laid over a number, or over nothing, would be alone.
+    It holds an entry for each vehicle that flies, as long as nobody else has written it. rosparam, like roslaunch,
+    leaves out empty entries and merges the others into the present value: an entry merged into a number, or into
+    nothing, would be the only one.
     """
 
     def __init__(self) -> None:
@@ -142,7 +143,7 @@ class VehiclesParameter:
         self._given = self._written = rospy.get_param(_VEHICLES, None)
 
     def tell(self, parameters: Parameters) -> None:
-        """Say who flies: what a scene file does not say, which comes before the parameter."""
+        """Write which vehicles fly, unless the scene file says it: that takes precedence over the parameter."""
         try:
             self._write(_sendable(parameters.vehicle_entries) or self._given)
         except (TypeError, OverflowError) as error:  # of XML-RPC: such as a seed of more than 32 bits

@@ -15,7 +15,7 @@ _MOST = 200  # numbers; the first of them are told
 
 
 class SignalTopic:
-    """Tells them as JSON, with the simulated time (s), after every step while somebody listens; the latest stays."""
+    """Publishes them as JSON, with the simulated time (s), after every step while somebody listens; latched."""
 
     def __init__(self, simulation: Simulation):
         """Advertise for `simulation`."""
@@ -24,7 +24,7 @@ class SignalTopic:
         self._told: tuple[float, dict[str, float]] = (-1.0, {})
 
     def update(self) -> None:
-        """Tell what the numbers are, where time has gone on and there are any, or were."""
+        """Publish the numbers if time has gone on, and there are any, or were any before."""
         if not self._topic.get_num_connections():
             return
         context, time = self._simulation.context, self._simulation.time

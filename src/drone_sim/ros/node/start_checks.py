@@ -24,9 +24,9 @@ _CLOCK = "/clock"
 def check_launch_arguments() -> None:
     """Raise ParameterError for an argument on roslaunch's command line that the launch file does not have.
 
-    roslaunch leaves such a one out, without a word. Looks only where this process's parent is a roslaunch of one of
-    ours alone: what another launch file, that includes it, does with its own arguments is not known here, and roslaunch
-    itself refuses wrong ones of an include.
+    roslaunch ignores such an argument silently. Checks only if this process's parent is a roslaunch that was given one
+    of our launch files: if another launch file includes ours, its own arguments are not known here, and roslaunch
+    itself refuses wrong arguments of an include.
     """
     parent = Path(f"/proc/{os.getppid()}")
     try:
@@ -70,9 +70,9 @@ def _is(launch: Path, arguments: Sequence[str], number: int, folder: Path) -> bo
 
 
 def check_others(vehicles: Iterable[str], simulated: bool) -> None:
-    """Raise ValueError where another simulator flies one of `vehicles`, or tells the time that this one would tell.
+    """Raise ValueError where another simulator flies one of `vehicles`, or publishes /clock as this one would.
 
-    No two may fly the same vehicle, and one alone tells the time.
+    Two simulators must not fly the same vehicle, and only one may publish /clock.
     """
     uri = rosgraph.get_master_uri()
     published, _, services = map(dict, call(uri, "getSystemState"))

@@ -119,7 +119,8 @@ class ViewPictures:
     def _vehicles_topic(self, name: str) -> str:
         """Return the topic of a vehicle's camera.
 
-        V-REP's two on its quadricopter have a picture in its window alone: the one that looks the same way shows it.
+        V-REP shows the pictures of its quadricopter's two vision sensors only in its window: here the camera that looks
+        the same way stands for each.
         """
         for vehicle in self._simulation.vehicles.values():
             topics = {one.object + vehicle.suffix: one.topic for one in vehicle.parameters.cameras.values()}
@@ -129,7 +130,7 @@ class ViewPictures:
         return ""
 
     def _same_way(self, vehicle: Vehicle, name: str) -> str:
-        """Return the object of a vehicle's camera that looks as another object of it does; its own name for none."""
+        """Return the object of the vehicle's camera that looks the same way as the object `name`; `name` for none."""
         objects = self._simulation.context.objects
         if name not in objects or not objects[objects.handle(name)].is_part_of(vehicle.object):
             return name

@@ -1,4 +1,4 @@
-"""How high, commanded and in what state vehicles are, where they flew: `view/height`, `/command`, `/state`, `/path`."""
+"""Height, command, state and path of vehicles as markers: `view/height`, `/command`, `/state`, `/path`."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def _plumb_line(height: float) -> Marker:
 
 
 def _arrow(command: Twist, base: frames.Matrix) -> Marker | None:
-    """Return it as seen from the drone; a command counts in `base`, Track_base."""
+    """Return the arrow relative to the drone's position; the command is given in the frame `base`, Track_base."""
     speed = math.hypot(*command.linear)
     if not speed:
         return None
@@ -214,7 +214,7 @@ class _Path:
 
     @property
     def seen(self) -> _Seen:
-        """What changes when it looks different."""
+        """A value that changes whenever the path looks different."""
         return [len(line) for line in self._lines], self._place
 
     def lines(self) -> list[list[Vector]]:
@@ -226,7 +226,7 @@ class _Path:
         self._jumps = None
 
     def follow(self, vehicle: Vehicle) -> None:
-        """Keep where it is, where that is some way from the last point."""
+        """Add the vehicle's position to the path if it is far enough from the last point."""
         self._place = vehicle.body.state.position
         if vehicle.body.jumps != self._jumps:
             self._lines = [line for line in self._lines if len(line) > 1]

@@ -1,6 +1,6 @@
 """What pushes the vehicles, in rviz: `view/forces`, with the namespaces `thrust`, `wind` and `contacts`.
 
-Forces are drawn to the scale of the vehicle's own weight: of four propellers that hold it, each has an arrow of HOVER.
+Forces are scaled by the vehicle's own weight: when four propellers hold it in hover, each has an arrow of length HOVER.
 Wind has a scale of its own.
 """
 

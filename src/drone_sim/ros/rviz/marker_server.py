@@ -21,7 +21,7 @@ _UPRIGHT = Quaternion(0, 2**-0.5, 0, 2**-0.5)  # a control acts along, about, or
 
 
 class MarkerServer(InteractiveMarkerServer):
-    """Its timer may still publish while rospy closes the topic, as the node ends; there is nobody left to tell."""
+    """An interactive marker server whose timer may still publish while rospy closes the topic at the node's end."""
 
     @property
     def watched(self) -> bool:
@@ -29,7 +29,7 @@ class MarkerServer(InteractiveMarkerServer):
         return bool(self.update_pub.get_num_connections())
 
     def publish(self, update: Any) -> None:
-        """Publish, or not any more."""
+        """Publish; do nothing if rospy has closed the topic at the node's end."""
         try:
             super().publish(update)
         except rospy.ROSException:
@@ -37,7 +37,7 @@ class MarkerServer(InteractiveMarkerServer):
                 raise
 
     def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:
-        """Hear whoever comes first to a new handle: interactive_markers hears nobody in its first second."""
+        """Accept a new handle's first client at once: interactive_markers ignores clients in the first second."""
         context = self.marker_contexts.get(feedback.marker_name)
         if context is not None and not context.last_client_id:
             context.last_client_id = feedback.client_id
@@ -63,12 +63,12 @@ def new_handle(name: str, looks: Sequence[Marker], scale: float = 0.5, arrows: b
 
 
 def level(matrix: Matrix) -> Matrix:
-    """Return where a handle stands for what is at `matrix`: turned about the vertical as it is, and upright."""
+    """Return the pose of a handle for an object at `matrix`: upright, with the object's yaw."""
     return frames.from_rpy(frames.position(matrix), (0, 0, frames.to_rpy(matrix)[2]))
 
 
 class HeldHandles:
-    """The handles that clients hold; one of which nothing has been heard for PATIENCE has let go, or has died.
+    """The handles that clients hold; a client that has been silent for PATIENCE has released its handle, or has died.
 
     Any thread may call all of it.
     """
@@ -80,7 +80,7 @@ class HeldHandles:
         self._heard: dict[tuple[str, str], float] = {}  # by handle and client, s
 
     def on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
-        """Take what a client tells of a handle; who has not taken one cannot hold it."""
+        """Take a client's feedback on a handle; only a client that has pressed the mouse on it can hold it."""
         held = feedback.marker_name, feedback.client_id
         with self._lock:
             if feedback.event_type == InteractiveMarkerFeedback.MOUSE_UP:

@@ -32,7 +32,7 @@ def namespace(simulation: Simulation) -> str:
 
 
 class MarkerTopic:
-    """A latched MarkerArray, in the frame `world` where its markers do not say another; their order is their id."""
+    """A latched MarkerArray, in the frame `world` unless a marker has another; ids are places in the list."""
 
     def __init__(self, topic: str, period: float):
         """Advertise `topic`; `period` is in s of real time."""
@@ -62,7 +62,7 @@ class MarkerTopic:
             self._publisher.publish(MarkerArray(self._shown))
 
     def show(self, markers: Sequence[Marker | None]) -> None:
-        """Publish; None takes away what may be shown in that place, and so does a shorter list at its end."""
+        """Publish; None deletes the marker with that id, and so does a list that is shorter than the last one."""
         shown = [marker or Marker(action=Marker.DELETE) for marker in markers]
         if not shown or shown[0].action != Marker.DELETEALL:
             shown += [Marker(action=Marker.DELETE) for _ in self._shown[len(shown) :]]
@@ -129,8 +129,8 @@ def band(left: Sequence[_Point], right: Sequence[_Point]) -> list[_Point]:
 def beside(vehicle: Vehicle, marker: Marker) -> Marker:
     """Let a marker, which is given in world axes from the vehicle's place, follow the vehicle in rviz.
 
-    It hangs on the vehicle's frame, turned back upright: rviz shows that where it is by now, and a marker in the
-    world where it was when it was sent.
+    It is attached to the vehicle's frame and turned back upright: rviz shows it where the vehicle is now, but a marker
+    in `world` where the vehicle was when it was sent.
     """
     back = frames.invert(frames.from_quaternion((0, 0, 0), vehicle.body.state.orientation))
     marker.header.frame_id, marker.frame_locked = frame(vehicle.parameters, BASE_LINK), True

@@ -1,7 +1,7 @@
 """The objects of the scene, to be dragged with the mouse in flight: `objects`, an interactive marker server.
 
-What is dragged is the object itself: its handle is its shape, not to be seen. The one that was dragged or clicked last
-has arrows, too. An object stands still while it is held, and falls, or goes on, when it is let go.
+The user drags the object itself: its handle is an invisible copy of its shape. The object that was dragged or clicked
+last has arrows, too. An object stands still while it is held, and falls, or moves on, when it is released.
 """
 
 from __future__ import annotations
@@ -134,10 +134,10 @@ class ObjectHandles:
 
 
 class _ObjectLooks:
-    """What the mouse meets of the objects in a scene now: their shapes once more, a little larger, not to be seen."""
+    """Invisible, slightly larger copies of the shapes of a scene's objects, for the mouse to grab."""
 
     def __init__(self, scene: Scene):
-        """Look."""
+        """Collect what is visible in the scene now."""
         self._found: dict[str, list[tuple[Visual, Matrix]]] = {}
         for name, visual, pose in zip(scene.visual_names(), *scene.visuals()):
             self._found.setdefault(name, []).append((visual, tuple(pose[:3].ravel().tolist())))

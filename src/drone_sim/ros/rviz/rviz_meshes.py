@@ -30,8 +30,8 @@ class RvizMeshes:
     def resource(self, visual: Visual, glow: float) -> str:
         """Return the URL of a visual's mesh, laid with its texture as the cameras lay it, tinted with its rgba.
 
-        `glow` is the share of its light (0..1) that does not depend on where it is seen from: rviz's only lamp is
-        carried by who looks. Raises ValueError for what cannot be read, OSError for what cannot be written.
+        `glow` is the share of its light (0..1) that does not depend on the viewpoint: rviz's only lamp moves with the
+        viewpoint. Raises ValueError for what cannot be read, OSError for what cannot be written.
         """
         key = (replace(visual, key=None), glow, *map(_age, (*visual.shape.files, visual.texture)))
         if key not in self._written:
@@ -63,7 +63,7 @@ class RvizMeshes:
 
 
 def _age(file: str) -> tuple[int, int]:
-    """Return what changes when a file is written anew."""
+    """Return a value that changes when a file is written again."""
     if not file:
         return (0, 0)
     state = os.stat(file)

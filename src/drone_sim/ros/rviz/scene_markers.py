@@ -1,7 +1,7 @@
 """The scene's objects and the vehicles as they look, in rviz: `<drone>/scene` and `view/bodies`, latched MarkerArrays.
 
-Dummies are small balls, paths are lines. Triangles are lit by the cameras' sun: rviz's own lamp is carried by who
-looks, and leaves sides black.
+Dummies are small balls, paths are lines. Triangles are lit by the same sun as in the cameras' pictures: rviz's own lamp
+moves with the viewpoint, and leaves sides black.
 """
 
 from __future__ import annotations

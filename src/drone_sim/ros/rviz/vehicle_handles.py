@@ -1,7 +1,7 @@
 """Handles in rviz: the green target spheres, and the vehicles themselves, to be dragged with the mouse in flight.
 
-A vehicle stands still while somebody holds its handle: its propellers do not pull against the hand. Let go, it flies on
-from there, at rest.
+A vehicle stands still while somebody holds its handle: its propellers do not pull against the mouse. When it is
+released, it flies on from there, at rest.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class VehicleHandles:
         self._server.applyChanges()
 
     def _wanted(self) -> dict[str, _Handle]:
-        """Return the handles by name: a sphere once a script has taken it off the drone, which it would only hide."""
+        """Return the handles by name; a sphere only after a script has detached it: before, it would hide the drone."""
         wanted = {}
         for vehicle in self._simulation.vehicles.values():
             own, alone = vehicle.parameters, vehicle.parameters.is_alone

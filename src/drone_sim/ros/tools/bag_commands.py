@@ -70,7 +70,7 @@ def _entries(bag: Bag, flight: BagFlight) -> Iterator[_Action]:
 
 
 class _Heard(NamedTuple):
-    """A twist: when the recorder heard of it, as a row, and what it says."""
+    """A twist: the row in which it was recorded, and its values."""
 
     row: int
     linear: tuple[float, ...]
@@ -94,7 +94,7 @@ def _twists(messages: Iterator[RecordedMessage], steps: BagSteps) -> Iterator[_A
 
 
 class _Match(NamedTuple):
-    """The best that can be said of the twists up to one that came into force in a row."""
+    """The best match of all twists up to one that came into force in `row`."""
 
     row: int
     found: int
@@ -103,10 +103,11 @@ class _Match(NamedTuple):
 
 
 def _obeyed(told: Sequence[_Heard], steps: BagSteps) -> dict[int, int]:
-    """Return the row in which each twist came into force that did, by its number, one after the other in their order.
+    """Return, by the number of each twist that came into force, the row in which it did; the twists keep their order.
 
-    As many as can be; of several ways that in which the recorder was least off. One that gave way to another within
-    the same step never came into force, and one that says what the last one said changed nothing.
+    As many as possible are matched; of several solutions, the one whose rows are nearest to those of the recorder. A
+    twist that was replaced by another within the same step never came into force, and one equal to the last changed
+    nothing.
     """
     best = [_Match(-1, 0, 0)]  # by rows, each better than those before
     for number, one in enumerate(told):
@@ -127,7 +128,7 @@ def _obeyed(told: Sequence[_Heard], steps: BagSteps) -> dict[int, int]:
 
 
 def _better(matches: Sequence[_Match]) -> list[_Match]:
-    """Return those, by rows, than which no earlier one is as good."""
+    """Return the matches that are better than all earlier ones, in the order of their rows."""
     kept: list[_Match] = []
     for one in matches:
         if not kept or (one.found, -one.off) > (kept[-1].found, -kept[-1].off):
@@ -136,7 +137,7 @@ def _better(matches: Sequence[_Match]) -> list[_Match]:
 
 
 def _rows(told: Sequence[_Heard], obeyed: dict[int, int]) -> Iterator[int]:
-    """Yield the row of each twist: those of others as late as the last one before that is known, in order."""
+    """Yield the row of each twist, in order; a twist without a known row is as late as the last one that has one."""
     late = last = 0
     following = sorted(obeyed.items())
     for number, one in enumerate(told):

@@ -83,7 +83,7 @@ def _rate(bag: Bag, topic: str) -> float:
 
 
 def _timed(bag: Bag, topic: str, rate: float, damaged: list[str]) -> Iterator[tuple[float, np.ndarray, int]]:
-    """Yield each picture with its stamp (s), and for how many pictures of a steady rate it is to be seen.
+    """Yield each picture with its stamp (s), and the number of frames at a constant rate for which it is shown.
 
     Pictures that cannot be read are left out, and why is added to `damaged`. Raises ValueError where all are.
     """

@@ -1,6 +1,6 @@
 """Bags, read with care, and the flight of one vehicle out of a bag.
 
-What cannot be read gets one line, and no message's class is made from the bag's own words.
+Errors are told in one line, and no message class is generated from the definitions in the bag.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Bag:
     def read(self, topic: str, kind: str) -> Iterator[RecordedMessage]:
         """Yield what was recorded of a topic, in the order of time; nothing for one that is not there.
 
-        What is of another kind of message on it than that (nav_msgs/Odometry, say) is left out. Raises BagError.
+        `kind` is a message type, such as nav_msgs/Odometry; messages of other types are left out. Raises BagError.
         """
         if self._counts.get(topic, 0) > MAX_MESSAGES:
             raise BagError(f"{self.path}: {self._counts[topic]} messages on {topic}; at most {MAX_MESSAGES} are read")
@@ -110,7 +110,7 @@ class Bag:
 
     @contextlib.contextmanager
     def _reading(self) -> Iterator[None]:
-        """Let whatever a broken file leads to become one line."""
+        """Turn any error that a broken file causes into a BagError with one line."""
         try:
             yield
         except OSError:
@@ -245,7 +245,7 @@ class BagSteps:
 
 
 def _held(values: list[tuple[float, list[float]]], times: np.ndarray, before: float) -> np.ndarray:
-    """Return the last of four values, each with its time, at each of these times (s); `before` where there is none."""
+    """Return the four numbers of `values` in force at each of `times` (s); `before` where there are none yet."""
     held = np.full((len(times), 4), before)
     if values:
         values.sort(key=lambda one: one[0])
@@ -264,7 +264,7 @@ def _command(twist: Any) -> list[float]:
 
 
 def _state(message: Any) -> tuple[float, ...]:
-    """Return position, quaternion and velocities in the world; nothing where they are none."""
+    """Return position, quaternion and velocities in the world; an empty tuple where they are not valid."""
     pose, twist = message.pose.pose, message.twist.twist
     values = (*xyz(pose.position), *xyz(twist.linear), *xyz(twist.angular))
     is_unit = abs(math.hypot(*xyzw(pose.orientation)) - 1) < _UNIT

@@ -162,7 +162,7 @@ class CommandInForce:
     def hear(self, command: Command) -> None:
         """Take the command in force.
 
-        Another one than was sent may be on its way from before; one that stays has come from elsewhere.
+        A command other than the one sent may be an older one that arrives late; if it stays, another node has sent it.
         """
         with self._lock:
             self.heard = command.rounded()

@@ -1,4 +1,4 @@
-"""config/joy.yaml, and from how a gamepad stands to what the drone is told. Neither a gamepad nor ROS is needed."""
+"""config/joy.yaml, and how a gamepad's state becomes a command to the drone. Neither a gamepad nor ROS is needed."""
 
 from __future__ import annotations
 
@@ -75,9 +75,10 @@ def load_joy(given: Mapping[str, Any]) -> JoyParameters:
 
 
 class JoyCommands:
-    """Who holds a gamepad. The drone obeys only while the dead-man's button is held.
+    """The commands of a gamepad. The drone obeys only while the dead-man's button is held.
 
-    After a gamepad was lost, that must be released first: one that comes back with it pressed commands nothing.
+    After a gamepad was lost, this button must be released first: a gamepad that comes back with it pressed commands
+    nothing.
     """
 
     def __init__(self, parameters: JoyParameters):
@@ -102,7 +103,7 @@ class JoyCommands:
         return Command(*(self._speed(one) for one in (axes.vx, axes.vy, axes.vz, axes.wz)))
 
     def see(self, pad: JoyState) -> list[str]:
-        """Take how the pad stands now; return what the buttons ask for that have been pressed since: takeoff, ..."""
+        """Take the gamepad's present state; return what newly pressed buttons ask for: takeoff, ..."""
         self._pad = pad
         if not pad.button(self._parameters.dead_man):
             self._armed = True

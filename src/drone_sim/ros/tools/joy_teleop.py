@@ -104,7 +104,7 @@ class JoyTeleop:
         self._pilot.lose()
 
     def _watch_topic(self) -> None:
-        """Take a topic for lost that commands, and has fallen silent."""
+        """Treat the topic as a lost gamepad if it commands the drone and has fallen silent."""
         timeout = self._parameters.timeout
         if self._gamepad is not None or self._pilot.command is None:
             return

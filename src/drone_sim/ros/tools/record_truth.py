@@ -46,7 +46,7 @@ class _Moments:
         self._lock = threading.Lock()
 
     def take(self, name: str, stamp: float, message: Any) -> None:
-        """Take a message; hand on what is whole with it."""
+        """Take a message; pass on the messages of its stamp if they are complete now."""
         key = round(stamp, 5)  # a stamp in JSON has no more digits
         with self._lock:
             parts = self._parts.setdefault(key, {})

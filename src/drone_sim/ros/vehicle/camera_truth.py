@@ -1,4 +1,4 @@
-"""What a camera publishes of the truth behind its picture, below `<topic>/truth`; nothing is made that nobody hears."""
+"""The ground truth that a camera publishes for its picture, below `<topic>/truth`; made only while somebody listens."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def _pose(one: Seen) -> Pose:
 
 
 def _markers(objects: list[Seen], header: Header) -> MarkerArray:
-    """Return the boxes in space for rviz, each with its name, but the floor's; those of the picture before go."""
+    """Return 3D boxes with names for rviz, except the floor's; those of the last picture are deleted."""
     made = [Marker(header=header, action=Marker.DELETEALL)]
     for one in (each for each in objects if each.identity.name != _FLOOR):
         shared = {"header": header, "id": one.number, "pose": _pose(one)}

@@ -76,7 +76,7 @@ class CameraOutput:
     def publish(self, stamp: Stamp) -> None:
         """Publish what the camera sees, and the model that belongs to it, stamped with when it was taken.
 
-        Over a link both come together, or neither; of a silent camera nothing comes.
+        Over a link both arrive together, or neither does; a silent camera publishes nothing.
         """
         camera = self._camera
         if self._truth is not None:

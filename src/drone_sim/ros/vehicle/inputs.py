@@ -39,7 +39,7 @@ _Job = Callable[[Vehicle], Any]
 
 
 class _Limits(NamedTuple):
-    """What callbacks check against: they read nothing of the simulation, which goes on meanwhile."""
+    """The limits that callbacks check: they must not read the simulation itself, which runs on in its own thread."""
 
     vehicle: VehicleParameters
     weather: WeatherParameters

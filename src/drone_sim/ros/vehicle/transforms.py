@@ -21,8 +21,8 @@ class Transforms:
     """Broadcasts where the vehicles are, once a step, and where the links of their URDFs sit on them.
 
     world -> base_link, Track_base, cameras with a `mount`; the links hang on each other as the URDF says, and sensors
-    on what carries them. What does not move on base_link is told once, by /tf_static; so is the frame that rviz
-    follows, Track_base of the first vehicle, whatever that is called, or `world`.
+    on what carries them. Frames that do not move relative to base_link are published once, on /tf_static; so is the
+    frame that rviz follows: Track_base of the first vehicle, whatever its name, or `world`.
     """
 
     def __init__(self) -> None:
@@ -33,7 +33,7 @@ class Transforms:
         self._eyes = Throttle(_EYES)
 
     def publish_static(self, vehicles: Collection[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
-        """Say where the links are that do not move, under what `stamp` returns; of vehicles that are new, or gone."""
+        """Publish the links that do not move, stamped with what `stamp` returns; called when vehicles come or go."""
         now = stamp()
         first = next((frame(one.parameters, TRACK_BASE) for one in vehicles), WORLD_FRAME)
         told = [transform(now, first, first_frame(rospy.get_name()), frames.IDENTITY)]
@@ -46,7 +46,7 @@ class Transforms:
         self._fixed.publish(TFMessage(told))
 
     def publish(self, vehicles: Iterable[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
-        """Publish all that moves under what `stamp` returns: tf2 takes but one for each stamp."""
+        """Publish all moving frames, stamped with what `stamp` returns: tf2 takes only one transform per stamp."""
         if not self._moving.get_num_connections():
             return
         self._new_subscribers.take()  # what is published reaches them all
@@ -56,7 +56,7 @@ class Transforms:
             self._moving.publish(TFMessage([one for vehicle in vehicles for one in _turning(now, vehicle)]))
 
     def tell_new_subscribers(self, vehicles: Iterable[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
-        """Tell those who have not heard what moves under the stamp that there is already."""
+        """Send the frames that move, with the present stamp, to new subscribers only."""
         for tell in self._new_subscribers.take():
             now = stamp()
             tell(TFMessage([one for vehicle in vehicles for one in (*_moving(now, vehicle), *_turning(now, vehicle))]))

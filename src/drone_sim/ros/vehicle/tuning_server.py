@@ -1,8 +1,8 @@
 """dynamic_reconfigure for a vehicle, or the node: `rosrun dynamic_reconfigure dynparam set /drone Kzref 2`.
 
-Of the library only its messages and their encoding are used. Its Server brings what is not allowed silently within the
-limits, takes what an earlier node has left on the parameter server, cannot change its description when a script
-declares a parameter, and asks the master twice for each of them.
+Only the library's messages and their encoding are used. Its Server silently clips values to the limits, takes values
+that an earlier node has left on the parameter server, cannot change its description when a script declares a parameter,
+and asks the master twice for each parameter.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ class TuningServer:
     ):
         """Advertise in `namespace`, and say what there is of `tuning`, whose thread empties `inbox`.
 
-        `rest` is the group of what has none of its own; `tuned` is called in that thread after a change, before whoever
-        asked for it hears of it.
+        `rest` is the group of parameters without one of their own; `tuned` is called in that thread after a change,
+        before the request is answered.
         """
         self._tuning, self._inbox, self._rest, self._tuned = tuning, inbox, rest, tuned
         name = self._name = rospy.resolve_name(namespace)
@@ -57,7 +57,7 @@ class TuningServer:
         self._service = rospy.Service(f"{name}/set_parameters", Reconfigure, self._set)
 
     def follow(self, tuning: Tuning | Pace) -> None:
-        """Be the server of this from now on; say what has changed since."""
+        """Serve this tuning from now on; publish what has changed since."""
         self._tuning = tuning
         known, values = dict(tuning.known), tuning.values()
         if known != self._known:
@@ -80,7 +80,7 @@ class TuningServer:
     # ---- changing
 
     def _set(self, request: ReconfigureRequest) -> ReconfigureResponse:
-        """Answer with what holds afterwards: a refusal is in the log, and has no place in the answer."""
+        """Answer with the values in force afterwards; a refusal is only logged: the answer has no field for it."""
         given = request.config
         changes = {one.name: one.value for kind in (given.bools, given.ints, given.strs, given.doubles) for one in kind}
         done = None
@@ -103,7 +103,7 @@ class TuningServer:
 
 
 def described(known: Mapping[str, ParameterField], values: Mapping[str, Any], rest: str = "") -> SimpleNamespace:
-    """Return what a module that is generated of a .cfg file holds, as far as encoding and library read it.
+    """Return what a module generated from a .cfg file would hold, as far as the encoding and the library read it.
 
     Made at run time: a .cfg file would make the package useless without a build. `rest` is the group of what has none
     of its own, '' for none.

@@ -58,7 +58,7 @@ class VehicleTopics:
         self.show_tuning()
 
     def show_tuning(self) -> None:
-        """Say what holds now of what may be tuned, where that is news, and check commands against it."""
+        """Publish the tuned values if they have changed, and check commands against them."""
         self.inputs.follow(self.vehicle)
         if self._tuning is not None:
             self._tuning.follow(self._simulation.child_scripts[self.vehicle.name].tuning)
@@ -135,7 +135,7 @@ class FleetTopics:
                 sensor.publish(self._stamp, self._simulation.time)
 
     def publish_transforms(self) -> None:
-        """Publish what is or becomes transforms: tf2 takes but one for each stamp."""
+        """Publish joint states and transforms: tf2 takes only one transform for each stamp."""
         for topics in self._topics.values():
             topics.outputs.publish_joints(topics.vehicle, self._stamp)
         self._transforms.publish(self._simulation.vehicles.values(), self._stamp)
@@ -152,7 +152,7 @@ class FleetTopics:
 
 
 def _told(parameters: VehicleParameters) -> tuple[str, Any]:
-    """Return what a vehicle's topics may depend on: not where it begins, nor the seeds of what is random.
+    """Return the parameters that a vehicle's topics may depend on: without its start place and random seeds.
 
     Topics that are advertised anew lose the first steps: nobody is connected to them yet.
     """
@@ -169,7 +169,7 @@ def _without_seeds(value: Any) -> Any:
 def _set_description(parameters: VehicleParameters) -> None:
     """Set the parameter `robot_description` in the namespace of a vehicle: its URDF, without inertias.
 
-    Who only computes poses needs none, and KDL warns of a root link that has one.
+    Programs that only compute poses need no inertias, and KDL warns of a root link that has one.
     """
     robot = Xml.fromstring(read_bytes(parameters.urdf, _LARGEST_URDF))
     for link in robot.iter("link"):

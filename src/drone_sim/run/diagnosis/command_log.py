@@ -1,4 +1,4 @@
-"""Who commanded a vehicle what, and what of it was refused: for people who ask why it does not fly."""
+"""Which commands a vehicle got from whom, and which were refused: for people who ask why it does not fly."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Refusal(NamedTuple):
 
 
 class CommandLog:
-    """What has come in for one vehicle since it is there. Any thread may write, and any may read."""
+    """The messages received for one vehicle since it was added. Any thread may write, and any may read."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, senders: Callable[[], list[str]] = list):
         """Begin empty; take a monotonic `clock` (s), and what returns the `senders` that are connected."""

@@ -13,7 +13,7 @@ Key = tuple[str, str]  # a vehicle, and one of its cameras
 
 
 class Since(NamedTuple):
-    """What there has been since a run began, or between two looks at both of which it flew."""
+    """Counts since a run began, or the differences between two looks, if the simulation was flying at both."""
 
     seconds: float  # of real time
     steps: int
@@ -57,7 +57,7 @@ def count(player: Player, pacer: Pacer, at: float) -> Counts:
 
 
 def between(before: Counts | None, now: Counts) -> Since | None:
-    """Return what has been in between; None where nothing can be said of it."""
+    """Return the differences between two looks; None where they cannot be compared."""
     if before is None or before[:3] != now[:3] or now.state != "flying":
         return None
     old, new = before.since, now.since

@@ -9,7 +9,7 @@ OK, WARN, ERROR = 0, 1, 2  # as diagnostic_msgs/DiagnosticStatus counts
 
 
 class Problem(NamedTuple):
-    """One thing that is not as a user expects, in words that end the search."""
+    """One thing that is not as a user expects, in words that say what to do about it."""
 
     level: int
     what: str

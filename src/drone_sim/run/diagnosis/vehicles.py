@@ -108,7 +108,7 @@ class VehicleDiagnosis:
         return problems
 
     def _is_on_its_own(self) -> list[Problem]:
-        """Nobody hears the commands, or nobody is there any more who gave the one in force."""
+        """Tell that no script listens to commands, or that the sender of the present command is gone."""
         vehicle, taken = self._vehicle, self._log.taken.get(COMMAND)
         if taken is None or not self._player.playing or str(vehicle.flight_state) in (LANDED, CRASHED):
             return []

@@ -39,7 +39,7 @@ class ControlPointParameters(Checked):
     channels: tuple[Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 0.0)
 
     def model_post_init(self, context: Any) -> None:
-        """Refuse a turn that is none."""
+        """Refuse a quaternion that is no rotation."""
         super().model_post_init(context)
         if abs(math.hypot(*self.turn) - 1.0) > 1e-3:
             raise ParameterError("the numbers x, y, z, w must have a length of 1", ("turn",))

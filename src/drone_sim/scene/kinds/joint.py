@@ -43,7 +43,7 @@ class JointParameters(KindParameters):
     max_force: _Force = _DEFAULT_FORCE
 
     def model_post_init(self, context: Any) -> None:
-        """Refuse a beginning that it cannot have."""
+        """Refuse an initial value outside of the limits, and a value or limits of a spherical joint."""
         super().model_post_init(context)
         low, high = self.limits or (-math.inf, math.inf)
         if not low <= self.value <= high:

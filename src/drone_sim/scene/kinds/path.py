@@ -29,7 +29,7 @@ class PathParameters(KindParameters):
     turns: Annotated[tuple[Turn, ...], Field(max_length=MAX_POINTS)] = ()
 
     def model_post_init(self, context: Any) -> None:
-        """Refuse turns that are none, or not one for each point."""
+        """Refuse quaternions that are no rotations, or not one for each point."""
         super().model_post_init(context)
         if self.turns and len(self.turns) != len(self.points):
             raise ParameterError(

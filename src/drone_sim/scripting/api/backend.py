@@ -1,4 +1,4 @@
-"""The seam to ROS: what carries a script's messages to others and back."""
+"""The interface to ROS: it carries a script's messages to other programs and back."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class MessageSender(Protocol):
         """
 
     def subscribers(self) -> int:
-        """Return how many listen; 0 also where what is published here is not sent."""
+        """Return the number of subscribers; also 0 if messages that are published here are not sent."""
 
     def shutdown(self) -> None:
         """Stop advertising."""
@@ -39,14 +39,14 @@ Ask = Callable[[Any, Callable[[Any], Any]], Any]
 
 
 class Backend(Protocol):
-    """What carries messages to and from others, such as rospy. Topics come resolved: '/drone/front'.
+    """Transport of messages to and from other programs, such as rospy. Topic names are resolved: '/drone/front'.
 
     Types are written as ROS does: 'geometry_msgs/Twist'. Every function is called in the simulation's
     thread, and raises ValueError, in one line, for a type that is not installed.
     """
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
-        """Call `take` with every message, from any thread; return what ends that.
+        """Call `take` with every message, from any thread; return a function that ends the subscription.
 
         A message is an object with the fields as attributes (rospy's own will do), or a mapping.
         """
@@ -73,10 +73,10 @@ class Backend(Protocol):
         """Call a service; raises ValueError, in one line, where it does not answer or fails."""
 
     def serve(self, name: str, kind: str, ask: Ask) -> Callable[[], None]:
-        """Offer a service of any installed type; return what ends that.
+        """Offer a service of any installed type; return a function that ends the service.
 
-        Any thread hands a request to `ask`, with what fills the response from the fields that the script gives, and
-        gets the response. Raises ValueError also for a name that is none, or that this process offers already.
+        Any thread may pass a request to `ask`, with a function that makes the response from the script's fields; `ask`
+        returns the response. Raises ValueError also for an invalid name, or one that this process offers already.
         """
 
     def advertise_image(self, topic: str, queue: int) -> MessageSender:

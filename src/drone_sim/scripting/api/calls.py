@@ -7,8 +7,8 @@ called and by which generations of V-REP have it under which names:
     def getInt32Param(self, parameter: int) -> int:
         ...
 
-Its arguments, as annotated, are what an error's message expects; its docstring is what the page says, where the class
-that it stands in is a section.
+Error messages name the expected arguments by their annotations; docs/api.md shows the docstring, in a section for each
+class.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Declaration:
     """What a function is in the API.
 
     names: what scripts call it, its own name first, and for each the generations of V-REP that have it: 3 for 3.x, 4
-    for 4.0 to 4.2, 5 for 4.3 and later, such as "45"; none has what is drone_sim's own.
+    for 4.0 to 4.2, 5 for 4.3 and later, such as "45"; '' if only drone_sim has it.
     """
 
     module: str
@@ -119,7 +119,7 @@ class Api:
     ):
         """`name`: what scripts call it; `functions` and `constants`: what it has.
 
-        `save_state` returns what brings back what a script has set in it, and that is nowhere else.
+        `save_state` returns a function that restores the values which a script has set, and which are stored only here.
         """
         self.__dict__.update(constants)
         self.__dict__.update(functions)

@@ -18,7 +18,7 @@ NO_THREAD = "only in a thread: in sysCall_thread, sysCall_threadmain, or a corou
 
 
 class Control:
-    """What the scripts of a simulation share of it; whoever plays the simulation looks at `asked` after each step."""
+    """Requests of scripts to stop or pause, shared by all; the Player reads `asked` after each step."""
 
     def __init__(self) -> None:
         """Begin with nothing asked for."""
@@ -69,10 +69,10 @@ class Wait:
         given_up: Callable[[], bool] = lambda: False,
         by_steps: bool = True,
     ):
-        """`over` tells whether it is over, `value` returns what the function returns then.
+        """`over` tells whether the wait has ended; `value` then gives the return value of the API function.
 
-        `given_up` tells, once it has been waited, whether a thread shall go on although it is not over; `by_steps`:
-        whether nothing but steps of the simulation brings its end.
+        `given_up` tells, after each step of waiting, whether a thread goes on although the wait has not ended;
+        `by_steps`: whether the wait can end only through steps of the simulation.
         """
         self.over = over
         self.value = value
@@ -88,20 +88,20 @@ class Wait:
 
 
 class Action(Wait):
-    """What a function of the API does step by step, while a thread waits for its end."""
+    """Work of an API function that takes several steps; a thread waits until it has ended."""
 
     def __init__(self, steps: Steps, value: Callable[[], Any]):
-        """`steps` are what it does; `value` returns what the function returns then."""
+        """`steps` does the work; `value` then gives the return value of the API function."""
         super().__init__(lambda: False, value)
         self._steps = steps
 
     def __iter__(self) -> Steps:
-        """Return its steps, which are there once."""
+        """Return its steps, which can be run only once."""
         return self._steps
 
 
 def has_passed(clock: Callable[[], float], seconds: float) -> Callable[[], bool]:
-    """Return what tells whether so many seconds of a clock have passed since now."""
+    """Return a function that tells whether so many seconds of a clock have passed since this call."""
     end = clock() + seconds - _SOON
     return lambda: clock() >= end
 
@@ -112,11 +112,11 @@ def waits(function: Callable[..., Any]) -> bool:
 
 
 class NoThread(ValueError):
-    """A script waits where it has no thread that could be left; one line that names the function."""
+    """A script calls a function that has to wait, but not in a thread; one line that names the function."""
 
 
 class Turns:
-    """When the thread of a Python script is left."""
+    """Decides when the thread of a Python script is switched."""
 
     def __init__(self) -> None:
         """Begin with V-REP's default timing, and no thread."""
@@ -130,9 +130,9 @@ class Turns:
         self._called = 0
 
     def wait_for(self, wait: Wait, function: str, call: Callable[[Call], Any]) -> Any:
-        """Leave the thread as long as a function has to wait; return what it brings. Raises NoThread.
+        """Leave the thread as long as a function has to wait; return the function's value. Raises NoThread.
 
-        `call` calls what the script is to be asked meanwhile.
+        `call` carries out each Call of the script's own functions that the wait needs.
         """
         steps, answer = iter(wait), None
         while True:
@@ -157,7 +157,7 @@ class Turns:
         return not self._forbidden
 
     def set_automatic(self, allowed: bool | int) -> int:
-        """Forbid it once more, allow it once more, or set how often it is forbidden; return how often it was."""
+        """Raise, lower or set the level that forbids automatic switching (0: allowed); return the level from before."""
         before = self._forbidden
         if not isinstance(allowed, (bool, int, float)) or not 0 <= allowed < 1e9:
             raise WrongValue("true, false, or a level of 0 or more is expected")

@@ -72,7 +72,7 @@ class DrawingObject:
 
 
 class Drawings:
-    """The drawing objects of a run, by handle. `changes` counts, so that whoever shows them sees that they changed."""
+    """The drawing objects of a run, by handle. `changes` is a counter: viewers see by it that something has changed."""
 
     def __init__(self, shown: bool = True) -> None:
         """Start with none; `shown` says whether anybody shows them, or whether there are handles alone."""
@@ -83,7 +83,7 @@ class Drawings:
 
     @property
     def carried(self) -> bool:
-        """Whether anything that is drawn may move though nothing was drawn."""
+        """Whether any item is attached to an object, so that it may move without being drawn again."""
         return any(one.frame is not None and one.items for one in self.objects.values())
 
     def new_handle(self) -> int:
@@ -113,9 +113,9 @@ class Drawings:
         return handle
 
     def add(self, handle: int, item: Item | None) -> None:
-        """Add an item, unless the object is full and not cyclic, or has one so near; None removes all items.
+        """Add an item, unless the object is full and not cyclic, or has an item nearby (tolerance); None removes all.
 
-        Raises ValueError for a handle that there is not, and for too few numbers.
+        Raises ValueError for an unknown handle, and for too few numbers.
         """
         drawn = self._object(handle)
         self.changes += 1
@@ -169,7 +169,7 @@ class Drawings:
 
 
 def _moved(matrix: Matrix, item: Item, has_normal: bool) -> Item:
-    """Return an item whose points are given in one frame in another; a normal is turned alone."""
+    """Return an item with its points transformed into another frame; a normal is only rotated."""
     if has_normal:
         return (*frames.transform(matrix, item[:3]), *frames.rotate(matrix, item[3:]))
     return tuple(one for at in range(0, len(item), 3) for one in frames.transform(matrix, item[at : at + 3]))

@@ -35,14 +35,14 @@ _FLOAT = ("objfloatparam_", "shapefloatparam_", "jointfloatparam_", "visionfloat
 
 @runtime_checkable
 class Freezable(Protocol):
-    """A shape of the scene that the dynamics may leave alone for a while."""
+    """A shape of the scene that can be made static for a while."""
 
     @property
     def is_static(self) -> bool:
-        """Whether it does."""
+        """Whether the shape is static: the dynamics does not move it."""
 
     def set_static(self, static: bool) -> None:
-        """Let it. Raises ValueError."""
+        """Make the shape static, or dynamic again. Raises ValueError."""
 
 
 def readable(found: SceneObject) -> Getters:
@@ -91,7 +91,7 @@ class Massive(Protocol):
     """A shape of the scene."""
 
     def inertia(self) -> Inertia | None:
-        """Return how its mass lies in it, None where it has none."""
+        """Return its inertia, None if it has no mass."""
 
 
 class Dynamics(Functions):
@@ -144,7 +144,7 @@ class Dynamics(Functions):
         return list(inertia.tensor), list(inertia.frame)
 
     def _inertia(self, handle: int) -> Inertia | None:
-        """Return how the mass of a shape lies in it, None where there is none."""
+        """Return the inertia of a shape, None if it has no mass."""
         found = self._objects[handle]
         return found.inertia() if isinstance(found, Massive) else self._surroundings.inertias().get(found.name)
 
@@ -175,7 +175,7 @@ class Dynamics(Functions):
     def setObjectInt32Param(self, handle: Handle, parameter: int, value: int) -> int:
         """Set a parameter of the scene's objects: sim.shapeintparam_static, sim.jointintparam_motor_enabled and others.
 
-        Any other is accepted and ignored. Return 1.
+        Other parameters are accepted and ignored. Return 1.
         """
         return self._set("setObjectInt32Param", handle, _WHOLE, parameter, value)
 

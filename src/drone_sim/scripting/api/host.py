@@ -62,7 +62,7 @@ class ScriptContext:
     remote_ports: RemotePorts = field(default_factory=RemotePorts)
 
     def clear(self) -> None:
-        """Leave nothing there, as before a run; whoever holds one of them may go on to do so."""
+        """Clear all parts, as before a run; they stay the same Python objects, so references to them remain valid."""
         parts = self.objects, self.velocities, self.scripts, self.signals, self.control, self.data, self.tubes
         for one in (*parts, self.graphs, self.collections, self.broadcasts, self.remote_ports):
             one.clear()
@@ -86,13 +86,13 @@ class Host(Protocol):
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in the frame of a shape, and a torque (N m).
 
-        Raises ValueError for what is none of the drone's.
+        Raises ValueError for a shape that is not a part of the drone.
         """
 
     def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
         """Forget the forces on a shape, or the torques, or both, that were added since the last step.
 
-        Raises ValueError for what is none of the drone's.
+        Raises ValueError for a shape that is not a part of the drone.
         """
 
     def turn_joint(self, joint: str, angle: float | None) -> float:
@@ -102,7 +102,7 @@ class Host(Protocol):
 class Operations(Protocol):
     """What can be done to the objects of the scene, by their handles, in the words of a scene file.
 
-    All of it raises ValueError, in one line, for what cannot be, and then nothing is done.
+    An operation that is not possible raises ValueError, in one line, and changes nothing.
     """
 
     def add(self, said: Sequence[Mapping[str, Any]]) -> list[int]:
@@ -136,13 +136,13 @@ class Operations(Protocol):
         """Let a key of its entry have another value."""
 
     def paint(self, handle: int, rgba: Sequence[float | None]) -> None:
-        """Give a shape another color, of which None stays."""
+        """Set the color of a shape; a component that is None stays as it is."""
 
     def color(self, handle: int) -> tuple[float, ...]:
         """Return the color of a shape, of its first part."""
 
     def scale(self, handles: Sequence[int], factors: Sequence[float], positions: bool = False) -> None:
-        """Let objects be so many times as large along x, y and z; `positions`: and as far from their parents."""
+        """Scale objects by factors along x, y and z; `positions`: also their distances from their parents."""
 
     def factors(self, handle: int) -> tuple[float, float, float]:
         """Return how many times as large an object is as it was."""
@@ -151,7 +151,7 @@ class Operations(Protocol):
         """Return size and centre (m) of the box around a shape, along its own axes."""
 
     def forms(self, handle: int) -> list[tuple[str, tuple[float, ...]]]:
-        """Return of which forms an object is, each with its size, as a scene file says; none for no shape of it."""
+        """Return the forms of a shape, each with its size, as in a scene file; [] if it is no shape of the scene."""
 
     def group(self, handles: Sequence[int]) -> int:
         """Make one rigid shape of several; return its handle."""

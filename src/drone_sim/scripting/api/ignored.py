@@ -1,6 +1,6 @@
-"""`sim` and its plugins: what is accepted and ignored, which the log says once for each function of a script.
+"""`sim` and its plugins: functions that are accepted and ignored; the log says so once for each function of a script.
 
-A script that shows something to a person flies here as it does where somebody looks. docs/api.md lists every one of
+So a script that shows something to a person also flies here, where nobody looks. docs/api.md lists every one of
 these functions, with what it returns.
 """
 

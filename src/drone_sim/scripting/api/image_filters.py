@@ -66,7 +66,7 @@ class ImageFilters(Functions):
 
     @simVision("45")
     def intensityScaleOnWorkImg(self, handle: Handle, start: Number, end: Number, greyScale: bool) -> None:
-        """Let every pixel be as grey as it is bright, of which 0 becomes `start` and 1 `end`."""
+        """Make the image grey, and scale its brightness: 0 becomes `start`, and 1 `end`."""
         if not greyScale:
             raise ValueError("there is no color scale here: greyScale = true is expected")
         low, high = numbers((start, end), 2)
@@ -84,9 +84,9 @@ class ImageFilters(Functions):
     def selectiveColorOnWorkImg(
         self, handle: Handle, color: ThreeNumbers, colorTolerance: ThreeNumbers, rgb: bool, keep: bool, toBuffer1: bool
     ) -> None:
-        """Black out what is not, or unless `keep` what is, within a tolerance of a color, of red, green, blue or HSL.
+        """Black out the pixels within a tolerance of a color, in RGB or HSL, or with `keep` all others.
 
-        With `toBuffer1` what is blacked out is kept there.
+        `toBuffer1`: put the pixels that get black into buffer 1.
         """
         image, middle, apart = self._image(handle), numbers(color, 3), np.array(numbers(colorTolerance, 3))
         off = np.abs((image if rgb else _hsl(image)) - middle)

@@ -173,7 +173,7 @@ class JointFunctions(Functions):
         self.setJointTargetForce(handle, force, False)
 
     def _is_propellers(self, handle: int, function: str) -> bool:
-        """Tell whether that is the joint of a propeller; say of one that nothing comes of the call."""
+        """Tell whether an object is the joint of a propeller; if so, log that the call is ignored."""
         found = self._objects[handle]
         if found.kind != "joint" or isinstance(found, Joint):
             return False

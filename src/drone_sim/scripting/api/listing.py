@@ -1,4 +1,4 @@
-"""All functions of the script API, for docs/api.md and for editors: an API of a drone that is not there."""
+"""All functions of the script API, for docs/api.md and for editors, without a simulated drone."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PAGES = {"simROS": "rosInterf", "simUI": "simUI", "simVision": "simVision"}  # 
 
 
 def apis() -> dict[str, Api]:
-    """Return every module of the script API, of a drone that is not there."""
+    """Return every module of the script API, without a simulated drone."""
     scripts = Scripts()
     scripts.add("Drone", {})
     clock, objects = Clock(0.05), ObjectTree()

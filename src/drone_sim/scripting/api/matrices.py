@@ -170,7 +170,7 @@ def about(axis: Sequence[float], angle: float) -> Quaternion:
 
 
 def between(first: Matrix, second: Matrix, part: float) -> Matrix:
-    """Return the transform so far between two."""
+    """Return the transform at a share (0 to 1) of the way between two."""
     turn = frames.multiply(frames.invert(first), second)
     axis, angle = axis_and_angle(frames.to_quaternion(turn))
     orientation = frames.multiply_quaternions(frames.to_quaternion(first), about(axis, part * angle))

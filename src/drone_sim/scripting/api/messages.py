@@ -36,8 +36,8 @@ class _Publisher(NamedTuple):
 class MessageBus:
     """What one script subscribes to, publishes and offers.
 
-    `backend` may be set at any time; it serves what is subscribed and advertised after that. Topics in
-    `own_topics` are never asked of it: the drone itself posts them, and hears what is published on them.
+    `backend` may be set at any time; it serves what is subscribed and advertised after that. It is not
+    used for the topics in `own_topics`: the drone itself posts them, and receives what is published on them.
     """
 
     def __init__(self, namespace: str, own_topics: Mapping[str, str] | None = None):
@@ -57,9 +57,9 @@ class MessageBus:
     # ---- what a script does
 
     def subscribe(self, topic: str, kind: str, callback: Callback, queue: int = 1) -> int:
-        """Leave messages of a topic for a callback, the last `queue` of a step; return a handle. Raises ValueError.
+        """Collect messages of a topic for a callback, the last `queue` of a step; return a handle. Raises ValueError.
 
-        The same topic, type and callback once more give the handle that they have.
+        A second call with the same topic, type and callback returns the same handle.
         """
         resolved = self.resolve(topic)
         there = self._subscriptions.same(resolved, kind, callback)

@@ -57,7 +57,7 @@ Parameters = dict[str, Any]
 
 
 class Motion:
-    """What moves along a trajectory: `seen` says what a state of that is, `put` puts what is moved there."""
+    """A motion along a trajectory: `seen` makes parameters of its state, `put` puts the joints or the object there."""
 
     def __init__(
         self,
@@ -157,9 +157,10 @@ class MotionFunctions(Functions):
     def moveToPose(self, params: Any, *arguments: Any) -> Wait:
         """Move an object to a pose, and return when it is there: what was given, with `pose`, `matrix`, `vel`, `accel`.
 
-        `params`: `object` (and `relObject`) or `pose`, `targetPose`, and `maxVel`, `maxAccel`, `maxJerk`, of x, y, z
-        and the angle, or with `metric`, what each of these four counts for, of the way; else as moveToConfig's. Before
-        4.6: flags, pose, maxVel, maxAccel, maxJerk, targetPose, callback, auxData, metric, timeStep.
+        `params`: `object` (and `relObject`) or `pose`, `targetPose`, and `maxVel`, `maxAccel`, `maxJerk`. These limits
+        are for x, y, z and the angle; with `metric`, four weights of these, they are for the weighted distance. The
+        rest is as for moveToConfig. Before 4.6: flags, pose, maxVel, maxAccel, maxJerk, targetPose, callback, auxData,
+        metric, timeStep.
         """
         given = _given(_POSE, params, arguments, ("pose", "vel", "accel"))
         place = "pose" if len(given.get("pose") or ()) != 12 else "matrix"
@@ -206,15 +207,15 @@ class MotionFunctions(Functions):
     # ---- both
 
     def move(self, given: Parameters, value: Callable[[Parameters], Any]) -> Wait:
-        """Move as moveToConfig, where there are `joints`, or as moveToPose; there may be more numbers than are needed.
+        """Move like moveToConfig if there are `joints`, otherwise like moveToPose; surplus numbers are ignored.
 
-        `value` returns what the function returns, of the motion's data.
+        `value` makes the function's return value from the motion's data.
         """
         given = {name: one for name, one in given.items() if one is not None}
         return self.run((self._config if "joints" in given else self._pose)({**given, "legacy": ("vel",)}), value)
 
     def run(self, motion: Motion, value: Callable[[Parameters], Any]) -> Wait:
-        """Return what waits for the end of a motion; `value` returns what the function returns, of its data."""
+        """Return the wait for the end of a motion; `value` makes the function's return value from the motion's data."""
 
         def steps() -> Steps:
             over = 0
@@ -272,7 +273,7 @@ def move_joints(joints: Sequence[Joint], positions: Sequence[float]) -> None:
 
 
 def _given(names: Sequence[str], params: Any, arguments: Sequence[Any], told: tuple[str, ...] = ()) -> Parameters:
-    """Return parameters by name, those that are nothing left out; `told`: what the callback of before 4.6 gets."""
+    """Return parameters by name, without those that are None; `told`: the names that a callback before 4.6 gets."""
     if isinstance(params, Mapping):
         found = dict(params)
     elif told and isinstance(params, (int, float)) and len(arguments) < len(names):
@@ -283,7 +284,7 @@ def _given(names: Sequence[str], params: Any, arguments: Sequence[Any], told: tu
 
 
 def _returned(given: Parameters, *names: str) -> Callable[[Parameters], Any]:
-    """Return what makes of a motion's data what is returned: all of it, or before 4.6 those of these names."""
+    """Return a function from a motion's data to the return value: all data, or before 4.6 those with these names."""
     if "legacy" not in given:
         return lambda data: data
     return lambda data: tuple(data[name] for name in names)
@@ -303,7 +304,7 @@ def _numbers(given: Parameters, name: str, count: int | None, otherwise: list[fl
 
 
 def _least(given: Parameters, name: str, most: str, count: int, is_behind: int) -> list[float] | None:
-    """Return the least of what `most` is the most of; before 4.6 it may stand behind that."""
+    """Return the lower limits that belong to the upper limits `most`; before 4.6 they may follow in the same list."""
     if "legacy" in given and is_behind:
         return list(numbers(given[most][count : 2 * count], count))
     return _numbers(given, name, count) if name in given else None

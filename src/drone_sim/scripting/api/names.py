@@ -6,8 +6,8 @@ A name without a suffix means the object of the script's own model, as in V-REP:
 Quadricopter_base is Quadricopter_base#0. Where there is none, it is an object of the scene, such as Floor, but not one
 of the model that Drone#0 is a copy of. `name#` is always the one without a suffix.
 
-Since CoppeliaSim 4.9 a script is an object of its own below the model (`..` is the model), before it was a part of the
-object itself (`.` is): both mean the drone in its script.
+Since CoppeliaSim 4.9 a script is an object of its own below the model, so `..` is the model; before that, a script was
+a part of the object, so `.` is the model. In the drone's script both mean the drone.
 """
 
 from __future__ import annotations
@@ -161,7 +161,7 @@ def _names(objects: ObjectTree, own: str) -> tuple[str, ...]:
 
 
 def _is_of_the_scene(objects: ObjectTree, name: str, own: str) -> bool:
-    """Tell whether a name is not one of the model that `own` has copies of, or is a copy of."""
+    """Tell whether a name does not belong to the original model, which `own` is or is a copy of."""
     original = plain(own)
     if name not in objects or original not in objects or not objects.is_copied(original):
         return True
@@ -170,9 +170,9 @@ def _is_of_the_scene(objects: ObjectTree, name: str, own: str) -> bool:
 
 
 def _only_copy(objects: ObjectTree, name: str, own: str) -> str:
-    """Return the first of the objects of which an import has made copies, but none of a copy of `own`; else the name.
+    """Return the first copy that an import has made of a name, with a suffix that no copy of `own` has; else the name.
 
-    Where a file's names are ours, all of that tree have a suffix (importing/scene_folder.py).
+    An import gives a suffix to all names of a tree if one of them is a name of ours (importing/scene_folder.py).
     """
     copies = sorted(split(one)[1] for one in objects.names if plain(one) == name) if objects.is_copied(name) else []
     return next((suffixed(name, end) for end in copies if suffixed(own, end) not in objects), name)

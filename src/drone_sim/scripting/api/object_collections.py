@@ -28,7 +28,7 @@ class CollectionFunctions:
     def createCollection(self, name: Name | int = "", _options: int = 0) -> int:
         """Make an empty collection: (options), or (name, options) as up to 4.1; return its handle.
 
-        The option 1, that it counts whatever its objects are, changes nothing: here they all count.
+        The option 1, which overrides properties of the objects, changes nothing: here all objects always count.
         """
         return self._collections.add(name if isinstance(name, str) else "")
 

@@ -1,12 +1,12 @@
-"""CoppeliaSim 4.x's paths: which object of the tree one means.
+"""Paths of CoppeliaSim 4.x: which object of the tree a path means.
 
     /Quadcopter/base  /base                    from the root of the scene
-    .  ./base  ..  ../propeller[0]             from the object that the script is on, or from what that hangs on
-    :  :/base  ::                              from the model that it is part of, or from that model's
+    .  ./base  ..  ../propeller[0]             from the object that the script is on, or from its parent
+    :  :/base  ::                              from the model that it is part of, or from the model above that
     /Quadcopter/propeller[1]  /Quad*/prop*     the second of siblings; any letters (*), one letter (?)
 
-An element names any descendant, the nearest first. What follows it is looked for below each that it names, until there
-is one.
+An element names any descendant, the nearest first. The next element is looked for below each of these, until an object
+is found.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def find(
 ) -> SceneObject | None:
     """Return the object that a path means, the index-th of several; None where there is none.
 
-    `own` is where paths begin that are relative (None: nowhere), `above` what `..` means there.
+    `own` is the object where relative paths begin (None: there is none), `above` the object that `..` means.
     """
     found = every(objects, path, own, above, index + 1) if index >= 0 else []
     return found[index] if len(found) > index else None
@@ -80,7 +80,7 @@ class _Search:
         self._seen: set[tuple[SceneObject | None, int]] = set()
 
     def below(self, here: SceneObject | None, elements: Sequence[str]) -> Iterator[SceneObject]:
-        """Yield what elements name from an object on (None: from the root of the scene), each once."""
+        """Yield the objects that elements name, beginning at an object (None: the root of the scene), each once."""
         if (here, len(elements)) in self._seen:
             return
         self._seen.add((here, len(elements)))

@@ -172,7 +172,7 @@ class Objects(Functions):
             push(frames.rotate(place, pull), frames.rotate(place, frames.cross(lever, pull)))
 
     def _pushed(self, handle: int, forces: int, torques: int) -> SceneObject:
-        """Return what is pushed, without what was added before where one of these flags says so."""
+        """Return the object to be pushed; if its handle has one of these flags, forget what was added before."""
         if handle < RESET_FORCE:
             return self._objects[handle]
         found = self._objects[bare(handle)]
@@ -182,7 +182,7 @@ class Objects(Functions):
 
 
 def _frame_and_values(first: Any, second: Any, count: int) -> tuple[int, tuple[float, ...]]:
-    """Tell a handle and values apart, which come in either order, or the values alone."""
+    """Return handle and values of two arguments in either order; without a handle, the world's and the values."""
     if isinstance(first, (int, float)):
         return int(first), numbers(second, count)
     if isinstance(second, (int, float)):

@@ -97,8 +97,8 @@ class OlderMotions(Functions):
     ) -> Wait:
         """Move an object to a position and Euler angles, one of which may be left out; return the time left in s.
 
-        At most so fast (m/s), the acceleration (m/s²) as it needs to be without one. `distance`: sim.distcalcmethod_...
-        and how many m a rad counts.
+        `velocity`: the most, m/s; `accel`: m/s², chosen to fit if it is left out. `distance`: sim.distcalcmethod_...
+        and how many m a rad counts for.
         """
         start = self._objects.matrix(handle, relativeTo)
         if position is None and orientation is None:
@@ -173,8 +173,8 @@ class OlderMotions(Functions):
     ) -> Wait:
         """Move joints to positions; return the time left in s.
 
-        With one velocity (rad/s or m/s) and acceleration all arrive together, with lists of them each for itself; of
-        revolute joints, one counts divided by `angleToLinearCoeff`.
+        With one velocity (rad/s or m/s) and acceleration, all arrive together; with lists, each moves by itself. With
+        one velocity for all, that of revolute joints is divided by `angleToLinearCoeff`.
         """
         joints = [self._found(handle, Joint, "a joint of the scene") for handle in jointHandles]
         alone = isinstance(velocity, Sequence)
@@ -208,7 +208,7 @@ class OlderMotions(Functions):
     def _mover(
         self, handle: int, relative: int, parts: int, place: Callable[[float], Matrix]
     ) -> Callable[[float], None]:
-        """Return what puts an object, or of it what `parts` say, where `place` says for a share of the way."""
+        """Return a function of the share of the way that puts an object at `place(share)`, or only its `parts`."""
         if parts not in (_POSITION, _ORIENTATION, _POSITION + _ORIENTATION):
             raise WrongValue("1 (position), 2 (orientation) or 3 is expected for what is moved")
         self._objects[handle]
@@ -229,7 +229,7 @@ def _apart(start: Matrix, goal: Matrix) -> tuple[float, float]:
 
 
 def _turned(start: float, target: float, turns: int) -> float:
-    """Return a target of an endless joint that lies so many turns, the last one begun, in that direction."""
+    """Return a target of a joint without limits, in the direction of the sign of `turns`; 2 or -2: one turn more."""
     ahead = (target - start) % math.tau if turns > 0 else -((start - target) % math.tau)
     return start + ahead + math.tau * (turns - 1 if turns > 0 else turns + 1)
 

@@ -73,8 +73,8 @@ class Paths(Functions):
 
         `options`: 2 closed, 16 it looks along itself, not as the poses do. It has `subdiv` points, and its corners are
         rounded off over `smoothness` (0 to 1) of each piece. In 3.x: (sim.pathproperty_..., intParams, floatParams),
-        -1 for V-REP's own, makes a curved path without points; of these 1 and 2 (from 0) are how its length counts
-        (sim.distcalcmethod_...), what a turn (m/rad) and what a pause counts for.
+        -1 for V-REP's own, makes a curved path without points. intParams[1] says how its length is counted
+        (sim.distcalcmethod_...), floatParams[1] and [2] how much a turn (m/rad) and a pause count; indices from 0.
         """
         operations = self._operations()
         if not isinstance(ctrlPts, Sequence):
@@ -245,7 +245,7 @@ def _control_point(given: Sequence[float], is_flat: bool) -> dict[str, Any]:
 
 
 def smoothed(points: Sequence[Sequence[float]], closed: bool, smoothness: float, count: int) -> list[list[float]]:
-    """Return so many points along a line through points, whose corners are parabolas over a share of each piece."""
+    """Return `count` points along a line through `points`; its corners are parabolas over a share of each piece."""
     corners = [*points, points[0]] if closed and points[0] != points[-1] else [*points]
     if len(corners) < 2:
         raise WrongValue("two control points or more are expected")
@@ -254,7 +254,7 @@ def smoothed(points: Sequence[Sequence[float]], closed: bool, smoothness: float,
 
 
 def _rounded(corners: Sequence[Sequence[float]], closed: bool, smoothness: float, along: float) -> list[float]:
-    """Return the point so many pieces along, which is rounded off where a corner is nearer than half its share."""
+    """Return the point at `along` (in pieces); it is rounded off if a corner is nearer than half of `smoothness`."""
     pieces = len(corners) - 1
     corner = round(along)
     index, share = min(int(along), pieces - 1), along - corner

@@ -1,7 +1,6 @@
 """The scripts of a simulation, by handle and by the object that each is attached to.
 
-A propeller has one, too, where the built-in law takes the place of V-REP's: nothing can be called in it, but it has
-parameters.
+A propeller with the built-in law has one, too, instead of V-REP's script: it has parameters, but no functions to call.
 """
 
 from __future__ import annotations
@@ -27,13 +26,13 @@ class Callee(Protocol):
         """Return what a global function returns: None, a value, or a tuple of several. Raises ScriptError."""
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
-        """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
+        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
 
     def execute(self, text: str) -> Any:
         """Run a text in the script; return None, a value or a tuple of several. Raises ScriptError."""
 
     def execute_own(self, text: str) -> Any:
-        """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
+        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
 
 
 class Attachment:
@@ -62,7 +61,7 @@ class Attachment:
 class Scripts:
     """Attachments by handle (a number that nothing else of the run has had) and by object.
 
-    `are_own`: whether who asks is one of them; the paths of a client outside begin at no object.
+    `are_own`: whether the caller is one of them; a client outside is not, and its paths begin at no object.
     """
 
     are_own = True
@@ -127,7 +126,7 @@ class Scripts:
         return {name: None for one in self if one.is_law for name in one.read}
 
     def ask(self, attachment: Attachment, name: str) -> None:
-        """Note that a script reads a parameter: what nobody reads need not be offered to whoever tunes."""
+        """Note that a script reads a parameter: parameters that no script reads need not be offered for tuning."""
         if name not in attachment.asked:
             attachment.asked.add(name)
             self.asked += 1

@@ -17,10 +17,10 @@ _WAITING, _CONNECTED = 0, 1
 
 
 class RemotePorts:
-    """The ports that scripts of a run ask for; whoever serves them looks at `wanted`, and tells who is connected."""
+    """The ports that scripts of a run ask for; the server reads `wanted`, and sets which ports are `connected`."""
 
     def __init__(self, are_served: bool = False):
-        """`are_served`: whether anybody looks."""
+        """`are_served`: whether there is a server for them."""
         self.are_served = are_served
         self.clear()
 

@@ -66,12 +66,12 @@ class TopicFunctions:
 
     @simROS()
     def publisherTreatUInt8ArrayAsString(self, handle: Handle) -> None:
-        """Do nothing: uint8[] goes as a string or a table anyhow."""
+        """Do nothing: uint8[] goes as a string or a table in any case."""
         self._bus.subscribers(handle)
 
     @simROS()
     def subscriberTreatUInt8ArrayAsString(self, handle: Handle) -> None:
-        """Do nothing: uint8[] arrives as a string anyhow; string.byte(data, 1) is its first byte."""
+        """Do nothing: uint8[] arrives as a string in any case; string.byte(data, 1) is its first byte."""
         self._bus.check_subscription(handle)
 
     @simROS()
@@ -112,7 +112,7 @@ class ServiceFunctions:
 
     @simROS()
     def serviceServerTreatUInt8ArrayAsString(self, handle: Handle) -> None:
-        """Do nothing: uint8[] is taken and given as a string anyhow."""
+        """Do nothing: uint8[] is taken and given as a string in any case."""
         self._bus.check_subscription(handle, is_service=True)
 
 
@@ -220,7 +220,7 @@ class RosFunctions:
 
     @simROS()
     def serviceClientTreatUInt8ArrayAsString(self, handle: Handle) -> None:
-        """Do nothing: uint8[] is taken and given as a string anyhow."""
+        """Do nothing: uint8[] is taken and given as a string in any case."""
         self._client(handle)
 
     def _client(self, handle: int) -> tuple[str, str]:

@@ -163,7 +163,7 @@ class ScriptFunctions(_OnScripts):
         return self._objects[self._objects.handle(script.name)]
 
     def _check_name(self, scripts: Collection[Attachment], name: Any) -> None:
-        """Raise ValueError for a misspelt parameter of a propeller; say of one that nothing reads that it is so."""
+        """Raise ValueError for a misspelt parameter of a propeller; log a parameter that nothing reads."""
         of_propellers = self._scripts.law_parameters()
         if list(scripts) == [self._own]:
             if name in of_propellers:
@@ -314,7 +314,7 @@ class ScriptCalls(_OnScripts):
 
     @property
     def _is_python(self) -> bool:
-        """Whether who asks is a Python script, which may do in Python what it likes anyhow."""
+        """Whether who asks is a Python script, which may do in Python what it likes in any case."""
         own = self._own.script if self._scripts.are_own else None
         return own is not None and own.language == "python"
 
@@ -360,6 +360,6 @@ class FunctionsOfScript:
 
 
 def handle_of(functions: FunctionsOfScript) -> int:
-    """Return the handle of the script whose functions they are, among which any name may be."""
+    """Return the handle of the script; it is no attribute, because the script's functions may have any name."""
     handle: int = vars(functions)["_script"]
     return handle

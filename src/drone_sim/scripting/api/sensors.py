@@ -1,8 +1,8 @@
 """`sim`: what sensors read: proximity sensors and force sensors of the scene, and a vehicle's instruments.
 
-A proximity sensor of the scene looks when it is read, at what is there at that moment; a range sensor has read when it
-was due. CoppeliaSim's accelerometers, gyroscopes and GPS are models whose scripts send what they make up; so there is
-one name more here, readSensor, for all instruments. Cameras are in vision.py.
+A proximity sensor of the scene measures at the moment when it is read; a range sensor has measured at its own rate.
+CoppeliaSim's accelerometers, gyroscopes and GPS are models whose scripts compute and send the readings; so there is one
+more function here, readSensor, for all instruments. Cameras are in vision.py.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ class ProximitySensors(Functions):
             self._objects[handle]
 
     def _detected(self, sensor: Detector, entity: int | None = None) -> FoundObject | None:
-        """Return what a sensor finds of an entity, of that which it looks for unless another is given."""
+        """Return what a sensor detects of an entity; if none is given, of the one that the sensor is set to detect."""
         of = sensor.entity if entity is None else entity
         if of == EVERYTHING:
             found: FoundObject | None = sensor.detect()

@@ -24,7 +24,7 @@ class ServiceRequest:
     """A request, from any thread, to what a script offers; the script answers it between two steps."""
 
     def __init__(self, content: Any, made: Callable[[Any], Any]):
-        """`content`: the request's message; `made` makes the response's of what the script answers, or ValueError."""
+        """`content`: the request message; `made` makes the response message of the answer, or raises ValueError."""
         self.content = content
         self._made = made
         self._answer: Future[Any] = Future()
@@ -35,9 +35,9 @@ class ServiceRequest:
         return self._answer.done() and self._answer.exception() is not None
 
     def answer(self, fields: Any) -> None:
-        """Give the answer: the response's fields, None for none; later than another, or than `refuse`, it is dropped.
+        """Give the answer: the response's fields, None for none; dropped after another answer, or after `refuse`.
 
-        What does not fit is said in the log, and to who asked.
+        Fields that do not fit are reported in the log, and to the caller.
         """
         try:
             made = self._made(_checked(fields))
@@ -61,10 +61,10 @@ class ServiceRequest:
 
 
 class ServiceServer:
-    """One service of a script: what its callers wait in."""
+    """One service of a script; its callers wait here for their answers."""
 
     def __init__(self, take: Callable[[ServiceRequest], None], patience: float = PATIENCE):
-        """`take` leaves a request where the script finds it; who asks has `patience` for so many seconds."""
+        """`take` leaves a request where the script finds it; a caller waits at most `patience` seconds."""
         self._take = take
         self._patience = patience
         self._waiting: set[ServiceRequest] = set()
@@ -74,8 +74,8 @@ class ServiceServer:
     def ask(self, content: Any, made: Callable[[Any], Any]) -> Any:
         """Return what the script's callback answers to a request; any thread but the simulation's may call it.
 
-        `made` is called with that answer in the simulation's thread; what it returns is returned. It raises ValueError
-        for what does not fit.
+        `made` makes the returned value from that answer, in the simulation's thread. It raises ValueError for an answer
+        that does not fit.
         Raises Unanswered: the service has ended, the callback failed, or no answer came in time.
         """
         request = ServiceRequest(content, made)

@@ -107,7 +107,7 @@ class SignalFunctions:
 
 
 def _add_kind(word: str, kind: type[Any], what: str, generations: str = "345", **others: str) -> None:
-    """Add what reads and forgets signals of a kind; `others`: what it is called besides, and by which generations."""
+    """Add the functions that read and clear signals of a kind; `others`: their other names, with generations."""
 
     def get(self: SignalFunctions, name: Name) -> Any:
         return self._signals.get(kind, name)

@@ -66,7 +66,7 @@ class Threads(Functions):
     def setThreadAutomaticSwitch(self, allowed: bool | int) -> int:
         """Forbid (false) or allow again (true) that the thread is switched by itself.
 
-        A number sets how often it is forbidden; return how often it was.
+        A number sets the level: how many times it is forbidden. Return the level before.
         """
         return self._surroundings.turns.set_automatic(allowed)
 

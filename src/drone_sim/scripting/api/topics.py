@@ -18,7 +18,7 @@ SERVICE = "service {}"  # instead of a topic, whose full name begins with a slas
 
 
 class OwnTopic:
-    """Takes what is published where the drone itself hears it, beside the topics of a Backend."""
+    """Sender for a topic that the drone itself receives; a Backend sends the other topics."""
 
     def __init__(self, said: dict[str, Any], topic: str):
         """`said` is where the last message of the `topic` is left."""
@@ -117,7 +117,7 @@ class Subscriptions:
             return any(one.topic == topic for one in self._by_handle.values())
 
     def new_callbacks(self) -> list[Callback]:
-        """Return what was subscribed with since the last call."""
+        """Return the callbacks of the subscriptions since the last call."""
         if not self._new_callbacks:
             return _NONE
         new, self._new_callbacks = self._new_callbacks, []

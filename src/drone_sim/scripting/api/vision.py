@@ -151,7 +151,7 @@ class VisionSensors(Functions):
     def checkVisionSensorEx(self, handle: Handle, entity: Handle, returnImage: bool) -> list[float]:
         """Return the image (0 to 1), or the depths (0 to 1), of only one object or collection.
 
-        The bottom row comes first. A depth of 1 is where it is not: the others are its mask.
+        The bottom row comes first. Pixels that do not show it have the depth 1; all others are its mask.
         """
         only = self._names(entity)
         if returnImage:

@@ -61,7 +61,7 @@ class Console:
 
 
 class Windows:
-    """What is open in a run, by handle. `changes` counts, so that whoever shows it sees that something has changed."""
+    """The open windows of a run, by handle. `changes` is a counter: viewers see by it that something has changed."""
 
     def __init__(self) -> None:
         """Begin with none, and with nobody who could answer a dialog."""

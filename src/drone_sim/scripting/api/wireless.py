@@ -30,9 +30,9 @@ class Wireless(Functions):
     ) -> int:
         """Send a string to sim.handle_all, _tree (below this script), _chain (above it) or a script; return 1.
 
-        Who receives it is in reach: of the object `antenna` (sim.handle_default: of the world's origin) at most
-        `actionRadius` (100 m) away, within `emissionAngle1` (pi) up and down and `emissionAngle2` (2 pi) about its z
-        axis, and asks within `persistence` seconds (one and a half steps).
+        A receiver must be in reach: at most `actionRadius` (100 m) from the object `antenna` (sim.handle_default: the
+        world's origin), within `emissionAngle1` (pi) up and down and `emissionAngle2` (2 pi) about its z axis. It must
+        ask within `persistence` seconds (one and a half steps).
         """
         if not isinstance(name, str) or not isinstance(data, (str, bytes)) or not name or not data:
             raise WrongValue("a name and data, both strings that are not empty, are expected")

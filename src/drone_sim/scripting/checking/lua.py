@@ -99,7 +99,7 @@ def _flat_names(code: str, flat: Collection[str], there: set[str]) -> Iterator[t
 
 
 def _calls(code: str, there: set[str]) -> Iterator[tuple[int, int, str]]:
-    """Yield the functions that are called and that nobody has written; names that begin with sim are told elsewhere."""
+    """Yield calls of functions that are not defined; names that begin with sim are reported elsewhere."""
     for match in _CALL.finditer(code):
         name = match[1]
         if name not in there and name not in _KEYWORDS and not name.startswith("sim"):

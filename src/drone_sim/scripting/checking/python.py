@@ -53,7 +53,7 @@ def _required(tree: ast.Module) -> set[str]:
 
 
 def _is_untold(node: ast.AST) -> bool:
-    """Tell whether a part of a script may give names values without naming them."""
+    """Tell whether a part of a script may define names that are not in its text, such as `import *`."""
     if isinstance(node, ast.ImportFrom):
         return node.names[0].name == "*"
     return isinstance(node, ast.Name) and node.id in _UNTOLD

@@ -53,7 +53,7 @@ class Channel:
         return message
 
     def _end(self) -> int | None:
-        """Return where the message ends that has begun to come; None where nobody knows. Raises Disconnected."""
+        """Return where the message that is being received ends; None if not known yet. Raises Disconnected."""
         if len(self._came) < 4:
             return None
         length: int = _LENGTH.unpack_from(self._came)[0]

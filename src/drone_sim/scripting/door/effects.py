@@ -1,6 +1,6 @@
-"""What functions of the API only read, and of what kind it is; and what those change that return nothing.
+"""Functions of the API that only read, with their kind of data; and what functions without a return value change.
 
-A read may be made before the script asks for it, and its answer kept until a call may have changed what is of its kind.
+A read may be made before the script asks for it, and its answer kept until a call may have changed data of its kind.
 A call that returns nothing may wait for the next message. Any other function is called when the script calls it, and
 may have changed everything.
 """

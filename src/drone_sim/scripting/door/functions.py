@@ -1,4 +1,4 @@
-"""What of the API is no plain value, and goes through the door by a number or a name: functions, and errors."""
+"""Functions and errors: they are no plain values, so they go through the door as a number or a name."""
 
 from __future__ import annotations
 
@@ -31,5 +31,5 @@ class ScriptFunction:
         self.__name__ = "callback"
 
     def __call__(self, *_values: Any) -> Any:
-        """Raise ValueError: where a function has to return at once, nobody can ask another process."""
+        """Raise ValueError: a function that has to return at once cannot be called in another process."""
         raise ValueError("a function of the script cannot be called from here")

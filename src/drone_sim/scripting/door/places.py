@@ -1,4 +1,4 @@
-"""Where objects are, in the script's process, as long as nothing has changed that but the script's own marks.
+"""Places of objects in the script's process, valid as long as only the script's own marks have moved.
 
 The functions on places are those of the API itself: the same numbers come out, to the last bit.
 """
@@ -17,11 +17,11 @@ Place = tuple[int, Matrix, Matrix | None, int, bool]  # see `place_of`
 
 
 def place_of(objects: ObjectTree, handle: Any) -> Place | None:
-    """Return, in the simulation's process, where an object is; None for none.
+    """Return, in the simulation's process, where an object is; None if there is no such object.
 
-    That is its handle; world from it; world from what hangs on it, None where that is the same; the handle of the
-    object above it that hangs on nothing; and whether it is a mark: what a script puts somewhere for its own use, such
-    as V-REP's track frame, a dummy that hangs on nothing.
+    That is its handle; the transform from its frame to the world; that from its children's frame, None if it is the
+    same; the handle of its root object; and whether it is a mark: a dummy without a parent, which a script moves for
+    its own use, such as V-REP's track frame.
     """
     one = objects.get(handle)
     if one is None:
@@ -35,7 +35,7 @@ def place_of(objects: ObjectTree, handle: Any) -> Place | None:
 
 
 class _Frame(SceneObject):
-    """An object that is where it has been said to be."""
+    """An object at the place that the simulation's process has sent."""
 
     def __init__(self) -> None:
         super().__init__(("",), "", None)
@@ -95,12 +95,12 @@ class Places:
         return frame is not None and frame.is_mark
 
     def forget_below(self, mark: int) -> None:
-        """Know no more where those are that hang on a mark."""
+        """Forget the places of the objects that hang on a mark."""
         known = self._tree.known
         for handle in [one for one, frame in known.items() if frame.root == mark and one != mark]:
             del known[handle]
 
     def is_apart(self, handle: int, mark: int) -> bool:
-        """Tell whether an object is known to hang on something else than a mark."""
+        """Tell whether an object is known, and is neither this mark nor hangs on it."""
         frame = self._tree.known.get(handle)
         return frame is not None and frame.root != mark

@@ -1,4 +1,4 @@
-"""The script's process: it does what the simulation's says, one thing at a time, and asks it what the script asks."""
+"""The script's process: it obeys the simulation's process, one command at a time, and sends it the API calls."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class ScriptEnd:
         self._asked = 0  # questions in the call that runs
 
     def open(self, channel: Channel, path: str) -> None:
-        """Take what messages come and go by, and the script's file."""
+        """Take the channel for messages, and the script's file."""
         self._channel, self.path = channel, path
 
     # ---- messages

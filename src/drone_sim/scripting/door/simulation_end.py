@@ -55,8 +55,8 @@ class SimulationEnd:
     def __init__(self, end: socket.socket, processor: int | None = None):
         """Take an end of the connection.
 
-        `processor` is that on which this process stays, for the script's to stay there, too: only one of them ever has
-        anything to do, and from one processor to another a message takes ten times as long.
+        `processor` is the one on which this process runs; the script's process runs there, too: only one of the two
+        works at a time, and a message to another processor takes ten times as long.
         """
         self._channel = Channel(end, _LOOK)
         self.processor = processor
@@ -73,8 +73,8 @@ class SimulationEnd:
 
         `permit` raises ValueError for a call that a script may not make: it gets its name, and what it is called with.
 
-        `is_quiet` tells whether a script will hear nothing between the sensing that is due and the next actuation: then
-        it may go on with that at once.
+        `is_quiet` tells whether a script will receive nothing between the sensing that is due and the next actuation:
+        then it may run that actuation right after the sensing.
         """
         self.objects, self.is_quiet = objects, is_quiet
         self.permit = permit or _all_permitted
@@ -151,7 +151,7 @@ class ScriptThere:
         return self._do("call_function", [name, arguments])
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
-        """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
+        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
         return self._do("call_own", [name, arguments])
 
     def execute(self, text: str) -> Any:
@@ -159,7 +159,7 @@ class ScriptThere:
         return self._do("execute", [text])
 
     def execute_own(self, text: str) -> Any:
-        """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
+        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
         return self._do("execute_own", [text])
 
     def callback(self, callback: Callback, message: Any) -> None:
@@ -209,7 +209,7 @@ class ScriptThere:
     def _do(self, what: str, arguments: list[Any], may_go_on: bool = False) -> Any:
         """Let the script do something; carry out what it asks for meanwhile; return what it returned.
 
-        `may_go_on`: after a sensing with the actuation of the next step, if it sees fit.
+        `may_go_on`: whether it may run the actuation of the next step right after this sensing.
         """
         if self._has_gone_on:  # the flight ends without that step
             with contextlib.suppress(ScriptError):
@@ -353,7 +353,7 @@ class ScriptThere:
     # ---- what is expected
 
     def _expect(self, item: list[Any]) -> None:
-        """Take from now on what is read in a stretch of a phase, before it is asked for."""
+        """Note the reads of a stretch of a phase; from now on they are made before the script asks for them."""
         if [type(one) for one in item[1:]] != [str, int, list, list]:
             raise NoMessage("no reads")
         if max(len(item[3]), len(item[4]), len(self._expected)) > _MOST_EXPECTED:
@@ -396,7 +396,7 @@ class ScriptThere:
     # ---- what it waits for
 
     def _kept(self, found: Any) -> Any:
-        """Return a value, or the number of what has to be waited for."""
+        """Return a value, or the number under which a Wait is kept here."""
         if not isinstance(found, Wait):
             return found
         if len(self._waits) >= _MOST_WAITS:

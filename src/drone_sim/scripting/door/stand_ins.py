@@ -1,8 +1,9 @@
 """The API in the script's process: functions that look like those of the simulation, and ask it through the door.
 
-Most calls of a controller cost nothing on the way: what it reads in every phase comes with the phase, as long as it has
-changed nothing of that kind; what it sets goes with the end of the phase, once a call of the same form has succeeded.
-Between two questions lies a `stretch` of a phase, and each has reads of its own that are known to come.
+Most calls of a controller need no message of their own: the answers to what it reads in every phase come with the start
+of the phase, and are valid until it changes something of that kind; what it sets goes with the end of the phase, once a
+call of the same form has succeeded. A `stretch` is the part of a phase between two questions to the simulation; the
+expected reads of each stretch are remembered.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ class Stretch:
     __slots__ = ("changed", "handles", "known", "number", "phase", "reads")
 
     def __init__(self, phase: str, number: int, known: dict[Read, Any]):
-        """It is the so-and-so-many-th of a `phase`, and begins with what is known of its reads."""
+        """Begin the stretch with a `number` (from 0) in a `phase`; `known`: the answers to its reads that have come."""
         self.phase, self.number, self.known = phase, number, known
         self.reads: dict[Read, None] = {}
         self.handles: dict[int, None] = {}
@@ -84,7 +85,7 @@ class StandIns:
     """The modules of one script."""
 
     def __init__(self, end: Asking, called: Callable[[Callable[[], Any]], Any], turns: Turns):
-        """`end` leads to the simulation; `called` calls what waits for it, off the script's time.
+        """`end` leads to the simulation; `called` calls a function that waits for it, outside the script's time limit.
 
         `turns` are those of the script's thread.
         """
@@ -235,7 +236,7 @@ class StandIns:
         return change
 
     def _ask(self, name: str, arguments: Any, named: Any) -> Any:
-        """Call a function there; what was known may be no more."""
+        """Call a function in the simulation's process; the known answers may no longer be valid."""
         stretch = self._stretches[-1]
         try:
             found, answers = self._send(name, arguments, named, stretch.number + 1)
@@ -286,7 +287,7 @@ class _WaitThere(Wait):
 
 
 def _form(name: str, arguments: tuple[Any, ...]) -> Any:
-    """Return what calls have in common that differ in their last finite number, or list of such, alone; else None."""
+    """Return a key that calls share if they differ only in their last argument, finite numbers; else None."""
     others = arguments[:-1]
     if not arguments or not _ALL_PLAIN(map(type, others)):
         return None
@@ -317,7 +318,7 @@ def _copied(value: Any) -> Any:
 
 @functools.cache
 def declared() -> list[tuple[str, dict[str, Function], dict[str, Any]]]:
-    """Return each module: its name, its functions, which belong to nothing and are not to be called, its constants."""
+    """Return each module: its name, its functions (of empty objects: not to be called), its constants."""
     ignored = Ignored("", int)
     return [
         ("sim", {**ignored.functions("sim"), **_functions_of(modules.SIM)}, CONSTANTS),

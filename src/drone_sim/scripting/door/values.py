@@ -1,7 +1,7 @@
 """Values on their way through the door.
 
-To the script goes what `marshal` writes: whoever reads it has every reason to trust who has written it. From the
-script comes JSON, which can be no more than what is read here; JSON's own objects are marks, by their only key:
+Messages to the script are written by `marshal`: the script can trust the simulation. Messages from the script are JSON,
+which can contain nothing but what is read here; a JSON object is a mark, named by its only key:
 
     {"t": [...]}  a tuple          {"d": [[key, value], ...]}  a mapping      {"b": "..."}  bytes, in base64
     {"f": 3}      a function       {"o": [[name, value], ...]}  an object with fields, such as a message
@@ -34,7 +34,7 @@ _decode = json.JSONDecoder().raw_decode
 
 
 class NoMessage(ValueError):
-    """What has come from the script's process is none of the messages that there are."""
+    """The script's process has sent something that is not a valid message."""
 
 
 # ---- to the script

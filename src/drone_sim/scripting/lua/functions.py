@@ -97,8 +97,8 @@ def _failed(
 def _asked_in_steps(name: str, state: LuaState, wait: Wait) -> tuple[Any, ...]:
     """Answer with a function that Lua calls once a step: it returns whether to wait, and what the wait has brought.
 
-    Where one of the script's own functions is to be called first, it and its arguments stand behind that it waits, and
-    the next call tells whether it has returned true.
+    If one of the script's own functions is to be called first, it and its arguments follow after whether to wait, and
+    the next call tells whether that function has returned true.
     """
     if state.waits >= _MOST_WAITS:
         state.runtime.gccollect()  # those of coroutines that are no more

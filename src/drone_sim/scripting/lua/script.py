@@ -153,7 +153,7 @@ class LuaScript:
         return self._state.values.handed_back()
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
-        """Do what `call_function` does, for the script itself, which runs now: on its time. Raises ScriptError."""
+        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
         arguments = self._state.values.to_lua(arguments, unpacked=True)
         self._check_own(name, self._lua["called_own"](name.encode(), *arguments))
         return self._state.values.handed_back()
@@ -164,7 +164,7 @@ class LuaScript:
         return self._state.values.handed_back()
 
     def execute_own(self, text: str) -> Any:
-        """Do what `execute` does, for the script itself, which runs now: on its time. Raises ScriptError."""
+        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
         self._check_own(_EXECUTE, self._lua["executed_own"](text.encode("utf-8", "replace")))
         return self._state.values.handed_back()
 

@@ -64,10 +64,10 @@ def newest() -> str:
 
 
 def dialect_for(text: bytes, flat: bool) -> str:
-    """Return the Lua that a script is for: V-REP 3.x's for `flat` names, the newest otherwise, or that which it is in.
+    """Return the Lua version for a script: V-REP 3.x's for `flat` names, otherwise the newest that can compile it.
 
-    Any other is for the newest one, unless it is written in an older one: as of Lua 5.5, what counts in a `for` cannot
-    be set. Raises ImportError.
+    An older one is needed, for example, if a script sets the variable of a `for` loop, which Lua 5.5 forbids. A script
+    that no version can compile gets the first choice. Raises ImportError.
     """
     likely = [OLDEST, *_newest_first()] if flat else _newest_first()
     return next((one for one in likely if _parses(one, text)), likely[0])
@@ -100,9 +100,9 @@ def syntax_error(text: bytes, flat: bool) -> str:
 
 
 class LuaState:
-    """Lua for one script. `close` lets go of it: Python cannot see a cycle that leads through Lua.
+    """Lua for one script. `close` frees it: Python cannot find a reference cycle that leads through Lua.
 
-    What Lua gets of Python must not lead back to the script's object, or neither is ever freed.
+    Python objects that Lua gets must not refer to the script's object, or neither is ever freed.
     """
 
     def __init__(

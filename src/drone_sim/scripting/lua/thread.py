@@ -1,8 +1,8 @@
-"""What runs everything that enters Lua: most often the thread that a Lua state lives in.
+"""Runs all calls into Lua, usually in a thread of its own for each Lua state.
 
 Lua does not hold Python's lock while it runs, so the simulation's thread can wait for it, with a limit. A hook
-inside Lua ends what loops in Lua. What loops in C, such as string.find with an evil pattern, cannot be ended
-inside a process: then the thread is left behind with its state, and finds the API closed should it ever wake up.
+inside Lua stops loops in Lua code. A loop in C code, such as string.find with a very slow pattern, cannot be stopped
+within a process: then the thread is left behind with its state, and if it ever goes on, it finds the API closed.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ class LuaThread:
             return 0.0
 
     def _is_back(self, timeout: float) -> bool:
-        """Wait for the function to end; does one errand, if there is one, instead."""
+        """Wait, and tell whether the function has ended; if it asks for an errand instead, do that."""
         if not self._done.acquire(timeout=timeout):
             return False
         if self._errand is None:

@@ -83,9 +83,9 @@ class Values:
         return found
 
     def readers(self) -> Sequence[Callable[[tuple[Any, ...]], Sequence[Any] | None]]:
-        """Return what makes a function's arguments of what a call handed over, by the form of the call.
+        """Return, for each form of a call, the function that makes the arguments from what Lua has handed over.
 
-        They return None where lists hold other things than numbers: the call is to be made anew, with a stream.
+        It returns None if a list contains anything but numbers: then the call is repeated with a stream.
         """
         return tuple, _scalars, _one_list, _first_and_second, _second_and_third, self._from_stream
 
@@ -106,7 +106,7 @@ class Values:
     def to_lua(self, value: Any, unpacked: bool = False) -> Any:
         """Return a value as Lua takes it: scalars as they are, everything else as a table.
 
-        `unpacked` is for a list: its items, each so. Raises ValueError for a value that is too large.
+        `unpacked`: return a list with each item converted. Raises ValueError for a value that is too large.
         """
         refuse_if_too_large(value, fields)
         return [self._to_lua(item) for item in value] if unpacked else self._to_lua(value)

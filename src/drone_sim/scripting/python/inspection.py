@@ -1,7 +1,7 @@
 """The variables of a Python script, as a person reads them. None of the script's own code is called for it.
 
-So nothing of a class of the script's is asked, neither its `__repr__` nor its properties: what cannot be read without
-that has its type alone. All of it is bounded, whatever stands there.
+So no method of a script's class is called, neither `__repr__` nor a property: of a value that needs them, only the type
+is shown. The size of the result is always limited.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What of the process a Python child script must not spoil, though it is trusted code: by mistake, that is."""
+"""Protection of the process from mistakes of a Python child script (not from attacks: it is trusted code)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ os.register_at_fork(after_in_child=_count_fork)
 
 
 def end_copy(path: str) -> NoReturn:
-    """End this process, which a script made by `os.fork` and let go on: it would fly, too, and answer in our name."""
+    """End this process, a copy that a script has made by `os.fork`: it would also fly, and answer in our name."""
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(_UNTIL_SAID)
     try:
@@ -95,7 +95,7 @@ def _mask(how: int, mask: Iterable[int]) -> Any:
 
 
 def _tracing(function: Callable[[Any], None]) -> Any:
-    """Return one that has the trace function taken back when the script has returned: it traces the script alone."""
+    """Return a version whose trace function is removed when the script has returned: it traces only the script."""
 
     @functools.wraps(function)
     def call(trace: Any) -> None:

@@ -155,7 +155,7 @@ class PythonScript:
         return self._run(name, self._globals[name], *arguments)
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
-        """Do what `call_function` does, for the script itself, which runs now: on its time."""
+        """Do the same when the script calls itself: the time counts for its present call."""
         self.check(name)
         return self._globals[name](*arguments)
 
@@ -164,7 +164,7 @@ class PythonScript:
         return self._run("executeScriptString", self.execute_own, text)
 
     def execute_own(self, text: str) -> Any:
-        """Do what `execute` does, for the script itself, which runs now: on its time."""
+        """Do the same when the script calls itself: the time counts for its present call."""
         try:
             code = _compiled_text(text, "eval")
         except SyntaxError:
@@ -196,7 +196,7 @@ class PythonScript:
             raise ScriptError(str(callback), self._path, 0, no_function(callback, known))
 
     def follow_breakpoints(self) -> None:
-        """Look at every line while there are breakpoints: another `_run` takes the place of the one that does not."""
+        """Check every line while there are breakpoints: then another `_run` replaces the one that does not."""
         tracer = LineTracer(self._breakpoints) if self._breakpoints else None
         if self._thread is not None:
             self._thread.tracer = tracer
@@ -212,7 +212,7 @@ class PythonScript:
     def save_state(self) -> Callable[[], None]:
         """Return a function that gives `self` and the global variables the values that they have now.
 
-        So it does for those of the modules beside the script. Values that cannot be copied (open files, modules, API
+        Likewise for the modules beside the script. Values that cannot be copied (open files, modules, API
         objects) stay as they are. Both raise ScriptError.
         """
         restoring = save_state(self._modules.values())
@@ -295,7 +295,7 @@ class PythonScript:
         return ScriptError(phase, path, line, message)
 
     def _format_error(self, error: BaseException) -> tuple[tuple[str, int], str]:
-        """Return place and message of an exception; whatever the script made of it may raise, or not return."""
+        """Return place and message of an exception; a class of the script's own may raise here, or never return."""
         if isinstance(error, SyntaxError) and error.filename in self._helpers.files:
             return (str(error.filename), error.lineno or 0), f"SyntaxError: {error.msg}"
         place = self._place(error)

@@ -2,10 +2,11 @@
 
     light' = light · time / reference · 10^(gain / 20)
 
-Automatically, the product follows what brings the mean luminance (ITU-R BT.709) to 18 %, middle grey, so that it would
-be there after `settling` but for 1/e of the way, in stops: first by the time, up to the one that is set, then by the
-gain, likewise. A picture is exposed as what was there before has shown, as in cameras; the first one by itself. The
-light is measured in a small picture whenever one is due, so that it does not matter who looks.
+With automatic exposure, the product approaches the value that brings the mean luminance (ITU-R BT.709) to 18 %, middle
+grey: `settling` is the time constant, after which 1/e of the distance, in stops, is left. The exposure time changes
+first, up to the value that is set, then the gain, up to its own. As in real cameras, a picture's exposure follows from
+the light measured before it; the first picture's from its own. The light is measured in a small picture whenever one is
+due, so that it does not matter who looks.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class ExposureParameters(Imperfection):
 
     @property
     def is_on(self) -> bool:
-        """Whether pictures are other ones by it."""
+        """Whether it changes the pictures."""
         return self.time > 0 or self.gain > 0
 
     @property
@@ -72,7 +73,7 @@ class ExposureParameters(Imperfection):
 
 
 class ExposureControl:
-    """What a camera's exposure is: how much brighter its pictures are than drawn."""
+    """The present exposure of a camera: how much brighter its pictures are than drawn."""
 
     def __init__(self) -> None:
         """Know nothing of what is seen yet."""
@@ -84,18 +85,18 @@ class ExposureControl:
 
     @property
     def has_seen_nothing(self) -> bool:
-        """Whether it is to `meter` before there is a brightness."""
+        """Whether `meter` has to be called before there is a brightness."""
         return self._brightness == 0.0
 
     def brightness(self, parameters: ExposureParameters, now: float) -> float:
-        """Return it for a picture at some time (s)."""
+        """Return the brightness of a picture at a time (s)."""
         if not parameters.automatic:
             return parameters.most
         left = math.exp((self._at - now) / parameters.settling) if parameters.settling else float(now == self._at)
         return min(self._wanted * (self._brightness / self._wanted) ** left, parameters.most)
 
     def meter(self, light: np.ndarray, brightness: float | None, now: float) -> None:
-        """Look at light of a picture at some time, before it is brightened, that was taken with such a brightness."""
+        """Measure the light of a picture at a time (s), before it is brightened; it was taken with this brightness."""
         mean = float(np.dot(cv2.mean(light)[:3], _LUMINANCE))
         self._wanted, self._at = _GREY / max(mean, _DARKEST), now
         self._brightness = self._wanted if brightness is None else brightness

@@ -30,7 +30,7 @@ class Imperfection(Checked):
 
     @property
     def is_on(self) -> bool:
-        """Whether pictures are other ones by it."""
+        """Whether it changes the pictures."""
         raise NotImplementedError
 
     def apply(self, light: np.ndarray, shot: Shot) -> np.ndarray:

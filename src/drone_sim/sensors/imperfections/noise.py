@@ -32,13 +32,13 @@ class PixelNoiseParameters(Imperfection):
     seed: Annotated[int, Within(0, 2**63 - 1)] = 0
 
     def model_post_init(self, _context: Any) -> None:
-        """Refuse electrons of which nobody knows how many make a picture white."""
+        """Refuse noise in electrons without `full_well`, the number of electrons in a white pixel."""
         if self.read and not self.full_well:
             raise ParameterError("needs full_well, the electrons of a white pixel", ("read",), f"{self.read:g}")
 
     @property
     def is_on(self) -> bool:
-        """Whether pictures are other ones by it."""
+        """Whether it changes the pictures."""
         return self.full_well > 0
 
     def apply(self, light: np.ndarray, shot: Shot) -> np.ndarray:

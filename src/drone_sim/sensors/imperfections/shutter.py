@@ -19,5 +19,5 @@ class ShutterParameters(Imperfection):
 
     @property
     def is_on(self) -> bool:
-        """Whether pictures are other ones by it."""
+        """Whether it changes the pictures."""
         return self.readout > 0

@@ -2,8 +2,8 @@
 
     E = E0 cosⁿ θ,  θ the angle of a pixel's ray from the optical axis
 
-With n = 4 it is the law of a thin lens (R. Kingslake, Optics in Photography, SPIE 1992, chapter 6). Nothing comes from
-beside the camera, or from behind it.
+With n = 4 it is the law of a thin lens (R. Kingslake, Optics in Photography, SPIE 1992, chapter 6). No light comes from
+90 degrees off the axis or more.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class VignetteParameters(Imperfection):
 
     @property
     def is_on(self) -> bool:
-        """Whether pictures are other ones by it."""
+        """Whether it changes the pictures."""
         return self.power > 0
 
     def apply(self, light: np.ndarray, shot: Shot) -> np.ndarray:

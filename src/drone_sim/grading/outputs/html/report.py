@@ -147,7 +147,7 @@ def _lay_shared(folder: Path) -> None:
 
 
 def _distribution(scripts: Sequence[ScriptResults]) -> list[Bar]:
-    """Return how the points of a class are distributed, in tenths of what can be had."""
+    """Return how the points of a class are distributed, in tenths of the full points."""
     most = max((one.of for one in scripts), default=0.0) or 1.0
     tenths = [min(_BARS - 1, int(_BARS * one.points / most)) for one in scripts]
     bounds = [naming.points(most * tenth / _BARS) for tenth in range(_BARS + 1)]
@@ -228,7 +228,7 @@ def _render(templates: jinja2.Environment, name: str, path: Path, **values: Any)
 
 
 def _write(path: Path, text: str) -> None:
-    """Write a file of the report. What is half written is written anew: nobody waits for the disk a thousand times."""
+    """Write a file of the report, without waiting for the disk each time: a report that is cut off is written anew."""
     with writing.naming(path):
         path.write_bytes(text.encode("utf-8", "replace"))  # a script's name need not be UTF-8
 
@@ -237,7 +237,7 @@ def _write(path: Path, text: str) -> None:
 
 
 class Figures(NamedTuple):
-    """Columns by name, as criteria have them, all equally long, or none; and what to say of them."""
+    """Columns of equal length, by their names in criteria, or none; and a note about them."""
 
     columns: dict[str, list[float]]
     note: str = ""

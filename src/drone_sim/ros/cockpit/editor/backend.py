@@ -97,7 +97,7 @@ class EditorBackend:
         }
 
     def _look(self, message: _Message) -> dict[str, Any]:
-        """Tell what has changed: the version of a script, '' where it is gone, which there are, and which flies."""
+        """Return what may have changed: a script's version ('' if deleted), a digest of all names, and what flies."""
         try:
             flown = self._flown()
         except FAILURES:  # the disk is there without a master, too
@@ -136,7 +136,7 @@ class EditorBackend:
         return {}
 
     def _locate(self, message: _Message) -> dict[str, Any]:
-        """Return the name of the script that a file is, '' for none of those on the lists."""
+        """Return the name of the script in a file, '' if that is not on the lists."""
         found = self._store.of_file(str(message.get("file")))
         return {"script": found.name if found else ""}
 
@@ -164,7 +164,7 @@ class EditorBackend:
         return self._lessons.find(message.get("lesson"))
 
     def _run(self, message: _Message) -> dict[str, Any]:
-        """Fly a script from the start, where its text says; what the simulation says of it is the answer."""
+        """Fly a script from the start, in the scene that its text asks for; return the simulation's answer."""
         script = self._script(message)
         path = str(script.path)
         if not path.isprintable():
@@ -195,7 +195,7 @@ def _text(message: _Message) -> str:
 
 
 def _in_one_line(answer: Callable[[_Message], Mapping[str, Any]]) -> Answer:
-    """Let what goes wrong with files and with the master be told in one line."""
+    """Turn errors of files and of the master into a ValueError with one line."""
 
     def answered(message: _Message) -> Mapping[str, Any]:
         try:

@@ -68,7 +68,7 @@ class ScriptInspector:
             return self._names
 
     def _wait_until_heard(self, publisher: rospy.Publisher) -> None:
-        """Let who asks go on when the simulation hears what is published, or after a while."""
+        """Wait until the simulation is connected to the publisher, at most _HEARD_WITHIN (s)."""
         until = time.monotonic() + _HEARD_WITHIN
         while not publisher.get_num_connections() and time.monotonic() < until:
             time.sleep(0.01)
@@ -87,7 +87,7 @@ class ScriptInspector:
         return found
 
     def look(self, is_there: bool) -> None:
-        """Listen, or do not: to be called again and again; `is_there`: there is a simulation, and a browser."""
+        """Start or stop listening; to be called repeatedly. `is_there`: there is a simulation, and a browser."""
         now = time.monotonic()
         with self._lock:
             self._pages = {name: one for name, one in self._pages.items() if now - one.at < _STAYS}

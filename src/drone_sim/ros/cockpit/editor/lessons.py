@@ -1,6 +1,6 @@
-"""The texts beside the editor: the tutorial's sections and the tasks, read from where they are for readers on paper.
+"""The texts beside the editor: the tutorial's sections and the tasks, from the same files that are read on paper.
 
-What is said otherwise to readers in the browser stands there in a comment, which those on paper do not see:
+Where readers in the browser need another text, it stands in a comment, which is invisible to other readers:
 
     <!-- browser:
     Press **Run**.
@@ -54,7 +54,7 @@ class Lesson:
         return Path(self.script).stem
 
     def is_begun_by(self, stem: str) -> bool:
-        """Tell whether a script of the user's with this name goes on with its script."""
+        """Tell whether a script of the user's with this name is a continuation of this text's script."""
         return bool(self.stem) and f"{stem}_".startswith(f"{self.stem}_")
 
     @property
@@ -122,7 +122,7 @@ class Lessons:
 
 
 def _parted(text: str) -> Iterator[tuple[str, str]]:
-    """Yield title and text of each section; what looks like a heading in a block of code is none."""
+    """Yield title and text of each section; headings inside code blocks do not count."""
     title, in_code = "", False
     lines: list[str] = []
     for line in text.splitlines():
@@ -138,7 +138,7 @@ def _parted(text: str) -> Iterator[tuple[str, str]]:
 
 
 def _for_the_browser(text: str) -> str:
-    """Return what a text says to who reads it beside the scene: no commands, but what they print."""
+    """Return a text for readers in the browser: without commands, but with what these print."""
     return _CONSOLE.sub(_printed, _ALTERNATIVE.sub(lambda found: found[1], text))
 
 

@@ -42,7 +42,7 @@ class RecentScenes:
         return [one for one in found if isinstance(one, str)][:_MOST] if isinstance(found, list) else []
 
     def add(self, file: str) -> None:
-        """Know that a file was opened, or saved; where that cannot be kept, nothing is."""
+        """Remember a file that was opened or saved; an error while writing the list is ignored."""
         if not file:
             return
         files = [file, *(one for one in self._recent() if one != file)][:_MOST]

@@ -71,9 +71,10 @@ def _config(plan: Plan) -> dict[str, Any]:
 
 
 def _content(config: Mapping[str, Any], scene: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a scene file can say of both.
+    """Return the content of a scene file made from both, as far as a scene file can hold it.
 
-    What vehicles carry stands among the vehicles; a vehicle with the drone's name alone is the drone.
+    Equipment goes into the entry of each vehicle; without vehicles, into a single entry with the drone's name, which
+    means the drone.
     """
     whole = merged({key: value for key, value in config.items() if key in ("scene", *BESIDE)}, dict(scene))
     carried = {key: value for key, value in config.items() if key in EquipmentParameters.model_fields}
@@ -104,7 +105,7 @@ class SceneSwitcher:
         self._before = ""  # the user's, to come back to
 
     def describe(self, lesson: Lesson) -> str:
-        """Return where a lesson is flown, in one line; '' for where the user is. Raises ValueError, OSError."""
+        """Return the scene in which a lesson is flown, in one line; '' for no change. Raises ValueError, OSError."""
         if lesson.task:
             return describe_scene_of(plan_of(lesson))
         if lesson.scene:

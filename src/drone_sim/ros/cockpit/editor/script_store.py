@@ -97,11 +97,11 @@ class ScriptStore:
         return place
 
     def of_file(self, path: str) -> ScriptFile | None:
-        """Return the script whose file that is, None where it is none of these."""
+        """Return the script stored in a file, None if there is none."""
         return next((script for script in self.scripts() if str(script.path) == path), None)
 
     def digest(self) -> str:
-        """Return what changes whenever a script comes or goes."""
+        """Return a text that changes whenever a script is added or removed."""
         names = "\n".join(script.name for script in self.scripts())
         return hashlib.sha1(names.encode("utf-8", "surrogatepass"), usedforsecurity=False).hexdigest()[:12]
 
@@ -147,8 +147,9 @@ class ScriptStore:
     def keep_both(self, name: Any, text: str, mine: bool) -> tuple[ScriptFile, str, str]:
         """End a conflict about a script of the user's: `text`, or what the file holds, goes into another file.
 
-        The file itself holds the `text` in the end where that is `mine`, or where there was no file. Return the script,
-        its version, and the name of the other script, '' where there is none. Raises ScriptStoreError.
+        If `mine` is true, or there was no file, `text` is written to the script's own file; otherwise this file does
+        not change. Return the script, its version, and the name of the other script, '' where there is none. Raises
+        ScriptStoreError.
         """
         file_name = str(name).removeprefix(f"{OWN}/")
         script = self._own(file_name if file_name in scripts_in(self.folder) else _checked(file_name))
@@ -203,7 +204,7 @@ class ScriptStore:
                 del self._removed[oldest]
 
     def bring_back(self, name: Any) -> tuple[ScriptFile, str]:
-        """Write a script again that was deleted, under its name or, where that is taken, beside it; return it.
+        """Restore a deleted script under its name or, if that is taken, under a new one; return it and its version.
 
         Raises ScriptStoreError.
         """
@@ -302,8 +303,8 @@ def _read_text(name: str, path: Path) -> tuple[str, str]:
 def _write_text(name: str, path: Path, text: str, is_new: bool = False) -> str:
     r"""Write a file, with lines ended by \r\n where most were, and return its version.
 
-    No link is followed: neither one that `path` is, nor one that it becomes meanwhile. What `is_new` takes the place
-    of nothing. Raises ScriptStoreError.
+    Links are not followed, even if `path` becomes one meanwhile. With `is_new` no existing file is replaced. Raises
+    ScriptStoreError.
     """
     try:
         content = text.encode("utf-8")
@@ -321,7 +322,7 @@ def _write_text(name: str, path: Path, text: str, is_new: bool = False) -> str:
 
 
 def _version_of(path: Path) -> str:
-    """Return what changes whenever the file does, '' where it is not there."""
+    """Return a text that changes whenever the file does, '' if there is no file."""
     try:
         state = path.stat()
     except (OSError, ValueError):
@@ -339,7 +340,7 @@ def _has_windows_line_ends(path: Path) -> bool:
 
 @contextlib.contextmanager
 def _naming_errors(name: str) -> Iterator[None]:
-    """Let what goes wrong with a file be told in one line: errno's words with the file, or our own."""
+    """Turn errors of a file into a ScriptStoreError with one line: errno's message with the file, or our own."""
     try:
         yield
     except OSError as error:

@@ -33,7 +33,7 @@ _SAID = 500  # characters of what went wrong
 class TimelinePlayer:
     """Sends the timeline of one plan at a time, some steps late: good enough to watch, not to grade.
 
-    The time is counted in steps, by the stamps of odometry: those of a simulation in real time do not tell it.
+    Time is counted in steps, one for each new stamp of odometry: in real time, stamps do not tell the simulated time.
     """
 
     def __init__(self, node: str):

@@ -15,7 +15,7 @@ _Value = TypeVar("_Value")
 
 
 class Board:
-    """Parts by name, with a version: what a browser has been told is not overwritten by an older whole."""
+    """Parts by name, with a version, so that in a browser an older whole does not overwrite a newer part."""
 
     def __init__(self, tell: Callable[[Mapping[str, Any]], None]):
         """`tell` sends a message to all browsers. Any thread may call."""
@@ -39,7 +39,7 @@ class Board:
         return self._parts.get(part, default)
 
     def log(self, line: str) -> None:
-        """Show one more line of the log, on which the oldest goes where there are many."""
+        """Add a line to the log, which drops its oldest line when it is full."""
         with self._lock:
             self._log.append(line[:_LONGEST])
             self._tell({"log": line[:_LONGEST]})

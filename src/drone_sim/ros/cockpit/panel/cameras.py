@@ -35,7 +35,7 @@ _KNOWN = {"track": "tracking"}  # what people call it in place of the topic
 
 
 class CameraSwitches:
-    """A switch for each topic of pictures; who is switched on is listened to, and shown over the scene."""
+    """A switch for each topic of pictures; topics that are switched on are listened to, and shown over the scene."""
 
     def __init__(self, board: Board, socket: PageSocket):
         """Show on `board` which there are; pictures go through `socket`."""
@@ -54,7 +54,7 @@ class CameraSwitches:
         return list(self._shown)
 
     def offer(self, sources: tuple[ImageTopic, ...], vehicles: Sequence[str] = ()) -> None:
-        """Offer these, of those vehicles and of others."""
+        """Offer these topics; the names of `vehicles` are used for their captions."""
         with self._lock:
             before, self._sources = self._sources.keys(), {one.topic: one for one in sources}
             self._names = {topic: camera_name(topic, vehicles) for topic in self._sources}
@@ -86,14 +86,14 @@ class CameraSwitches:
         return {}
 
     def follow_views(self, topics: frozenset[str]) -> None:
-        """Show what scripts have opened a view of since, and no more what they have closed."""
+        """Show the cameras of which scripts have opened views since the last call; hide those of closed views."""
         with self._lock:
             before, self._views = self._views, topics
             for topic in before ^ topics:
                 self.turn(topic, topic in topics)
 
     def turn(self, topic: str, on: bool) -> None:
-        """Turn a switch; a topic that there is not has none to turn on."""
+        """Turn a switch; a topic that does not exist cannot be switched on."""
         with self._lock:
             if on and topic in self._sources and topic not in self._shown:
                 self._shown[topic] = camera = _CameraListener(self._sources[topic])
@@ -125,7 +125,7 @@ class CameraSwitches:
             self._socket.show_picture(said, camera.overlay.painted(picture, stamp) if camera.overlay else picture)
 
     def rest(self, resting: bool) -> None:
-        """Listen to nobody while no browser is open, and to those that were switched on again afterwards."""
+        """Stop listening while no browser is open (`resting`); afterwards listen again to what is switched on."""
         with self._lock:
             self._resting = resting
             for camera in self._shown.values():
@@ -234,7 +234,7 @@ def _switch(message: Mapping[str, Any]) -> bool:
 
 
 def _step(message: CompressedImage | Image) -> int:
-    """Return of how many pixels one is shown, along each side."""
+    """Return n if only each n-th pixel is shown, along each side."""
     if isinstance(message, CompressedImage):
         return 1
     has_bytes = "8" in message.encoding  # rgb8, mono8, 8UC3; all others are depths

@@ -80,7 +80,7 @@ class Series:
             self._rows.popleft()
 
     def since(self, run: int, at: float, columns: slice) -> list[list[float | None]]:
-        """Return the rows after a time of a run, all of them to who knows another one; None is a gap."""
+        """Return the rows after the time `at`, or all rows if `run` is not the present run; None is a gap."""
         known = at if run == self.run else -math.inf
         return [
             [row[0], *(one if math.isfinite(one) else None for one in row[1:][columns])]

@@ -1,7 +1,7 @@
 """Things to drag in the browser: the handles that the simulation offers to rviz, and who holds which of them.
 
-A handle is said to the browsers as a marker of the kind `handle`: its name is `ns`, its server is `layer`. What it
-looks like where that is always to be seen, such as the green sphere, as markers of their own, in the layer of `server`.
+A handle is sent to the browsers as a marker of the kind `handle`: its name is `ns`, its server is `layer`. If it is
+always visible, such as the green sphere, its looks are sent as markers of their own, in the same layer.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ class DragControls:
     # ---- dragging
 
     def drag(self, browser: int, given: Drag) -> None:
-        """Tell the simulation what a browser drags. Whoever comes second is not heard until the first lets go."""
+        """Tell the simulation what a browser drags. A second browser is ignored until the first one lets go."""
         with self._lock:
             held = self._held.get(given.name)
             is_ours = held is not None and held.browser == browser
@@ -159,7 +159,7 @@ class DragControls:
             self._tell(given.name, browser, PHASES[given.phase], given.pose)
 
     def keep(self, browsers: Collection[int]) -> None:
-        """Tell that what is held is held still; let go for browsers that have gone, and of handles that have."""
+        """Tell the simulation which handles are still held; release those that have gone, or whose browser has gone."""
         with self._lock:
             for name, held in list(self._held.items()):
                 if held.browser not in browsers or name not in self._there:
@@ -179,6 +179,6 @@ class DragControls:
 
 
 def _multiply(above: scene_state.Pose, below: scene_state.Pose) -> scene_state.Pose:
-    """Return a pose that is seen from another one as that one is."""
+    """Return `below`, a pose in the frame of `above`, as a pose in the frame in which `above` is given."""
     x, y, z = frames.transform(frames.from_quaternion(above[:3], above[3:]), below[:3])
     return (x, y, z, *frames.multiply_quaternions(above[3:], below[3:]))

@@ -100,7 +100,7 @@ def _meshes(loaded: Any) -> Iterable[Any]:
 
 
 def _take_paint(loaded: Any) -> None:
-    """Let textures count as they are, whatever share of their light a material asks rviz for."""
+    """Give textured meshes one brightness, the sum of the shares of light that their material defines for rviz."""
     for mesh in _meshes(loaded):
         material: Any = getattr(mesh.visual, "material", None)
         image = getattr(material, "image", None)

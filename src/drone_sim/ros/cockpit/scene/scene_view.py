@@ -68,7 +68,7 @@ class SceneView:
         self._frames.came.clear()
 
     def keep(self, browsers: Collection[int]) -> None:
-        """Say of what is dragged that it is held still; let go for browsers that are not open any more."""
+        """Tell the simulation which handles are still held; release those of browsers that are not open any more."""
         for handles in self._handles.values():
             handles.keep(browsers)
 
@@ -97,7 +97,7 @@ class SceneView:
         push(self._pushers[vehicle].publish, ray, newtons)
 
     def meet(self, vehicles: Collection[str]) -> None:
-        """Hear which vehicles there are: the first message of a new publisher would be heard by nobody."""
+        """Advertise pushes to these vehicles early: nobody hears the first message of a new publisher."""
         for one in vehicles:
             if one not in self._pushers:
                 self._pushers[one] = rospy.Publisher(f"/{one}/push", WrenchStamped, queue_size=1)

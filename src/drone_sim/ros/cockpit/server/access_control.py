@@ -1,4 +1,4 @@
-"""Who comes in: whoever has the token that the printed address holds, and no page of another origin."""
+"""Access to the cockpit: only with the token in the printed address, and not from pages of another origin."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _BROKEN = (CloseCode.PROTOCOL_ERROR, CloseCode.INVALID_DATA, CloseCode.MESSAGE_T
 
 
 class AccessControl:
-    """What stands before the page and its socket: who has the token comes in."""
+    """The check in front of the page and its socket: only requests with the token get in."""
 
     def __init__(self, token: str, page: Callable[[str], Content], socket: Handler):
         """Let in whoever has `token`; `page` finds what is asked for by its path, `socket` serves our `SUBPROTOCOL`."""
@@ -110,7 +110,7 @@ class AccessControl:
 
 
 def _checked_host(headers: Headers) -> str:
-    """Return whom a browser thinks that it asks. Raises ValueError for it and for other headers."""
+    """Return the host that a browser asks for. Raises ValueError if that is wrong, or a header is repeated."""
     for name in _ONCE:
         if len(headers.get_all(name)) > 1:
             raise ValueError(f"{name}: must not be given twice")
@@ -125,7 +125,7 @@ def _is_socket(request: Request) -> bool:
 
 
 def _is_of_our_page(request: Request) -> bool:
-    """Tell whether a socket is opened by our own page; what is no browser says no origin."""
+    """Tell whether a socket is opened by our own page, or by a program other than a browser, which sends no origin."""
     origin, host = request.headers.get("Origin"), request.headers.get("Host", "")
     return origin is None or origin in (f"http://{host}", f"https://{host}")
 
@@ -162,7 +162,7 @@ def _response(
     host: str = "",
     forms: str = "'none'",
 ) -> Response:
-    """Return an answer with what keeps a browser from doing something else with it."""
+    """Return an answer with headers that keep a browser from using it in any other way."""
     body = content if isinstance(content, bytes) else content.encode()
     # Older browsers take 'self' for our pages alone, not for our sockets.
     policy = _POLICY.format(sockets=f"ws://{host} wss://{host}" if host else "", forms=forms)
@@ -171,7 +171,7 @@ def _response(
 
 
 class _CheckedConnection(ServerConnection):
-    """A browser's socket. Whoever breaks its rules is sent away, and that is one line for the user."""
+    """A browser's socket. A browser that breaks its rules is disconnected, and the user gets one line about it."""
 
     async def recv(self, decode: bool | None = None) -> Any:
         """Return the next message, as `ServerConnection` does."""

@@ -1,4 +1,4 @@
-"""Where the cockpit listens, checked before the server tries it; what opens it in a browser, and where that is told."""
+"""The address at which the cockpit listens, checked before the server uses it; its URLs, and how the user gets them."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _is_free(family: socket.AddressFamily, host: str, port: int) -> bool:
 
 
 def urls(host: str, port: int, token: str) -> tuple[str, str]:
-    """Return what opens the cockpit in a browser on this machine, and on others, '' where they cannot reach it."""
+    """Return the URL of the cockpit for this machine, and that for other machines, '' where they cannot reach it."""
     here = _EVERYWHERE.get(host, host)
     there = _outside(host) if host in _EVERYWHERE else ""
     url, far = (f"http://{f'[{one}]' if ':' in one else one}:{port}/?token={token}" for one in (here, there))

@@ -156,9 +156,10 @@ async def _send_from(box: SendQueue, connection: ServerConnection) -> None:
 
 
 class SendQueue:
-    """Used in the thread of its event loop. A picture goes when the browser has shown the last one of that name.
+    """What waits to be sent to one browser; used in the thread of its event loop.
 
-    So does the scene, of which a browser gets what has changed since the message before.
+    A picture is sent when the browser has shown the last one of that name. So is the scene, of which a browser gets
+    what has changed since the message before.
     """
 
     def __init__(self, scene: SceneSince = lambda version: (version, b"")):
