@@ -68,7 +68,7 @@ def _rviz() -> Line:
 
     found = show.find_rviz()
     if found is None:
-        return Line(HINT, "rviz", f"is not installed, and Debian testing has none: {show.INSTEAD}")
+        return Line(HINT, "rviz", f"is not installed: {show.INSTEAD}")
     return Line(OK, "rviz", found)
 
 

@@ -16,6 +16,7 @@ from drone_sim.ros.doctor.probe import FLIGHT, RENDERER
 PATIENCE = 60.0  # s, for all of it; two are usual
 _MODULES = {"python3-opencv": "cv2", "python3-pil": "PIL", "python3-pycollada-pip": "collada", "python3-tk": "tkinter"}
 _NO_MODULES = {"rviz"}
+_WITH_A_DISPLAY = {"tkinter"}  # `./dev.sh setup` leaves it out elsewhere
 _WITHOUT = {  # what still works where a module is missing
     "tkinter": "`view` writes files instead of opening a window",
     "matplotlib": "nothing draws plots",
@@ -54,7 +55,7 @@ def packages() -> Iterator[Line]:
 
 
 def _missing(module: str, key: str, why: str) -> Line:
-    here = (package_path() / "dev.sh").is_file()
+    here = (package_path() / "dev.sh").is_file() and module not in _WITH_A_DISPLAY
     debian = key if key.startswith("python3-") else f"python3-{key.replace('_', '-')}"
     cure = "`./dev.sh setup` installs it" if here else f"`apt install {debian}`, or install drone_sim anew"
     if module in SEPARATE:

@@ -29,8 +29,11 @@ from drone_sim.ros.core.message_conversion import first_frame
 from drone_sim.ros.core.startup import ask_master, from_shell
 
 _NAME = "show"
-INSTEAD = "`roslaunch drone_sim drone.launch web:=true` shows the simulation in a browser"
-_RVIZ = "rviz"  # which need not be there: Debian testing has none
+INSTEAD = (
+    "`apt install rviz` installs it (Debian testing has none);"
+    " `roslaunch drone_sim drone.launch web:=true` shows the simulation in a browser"
+)
+_RVIZ = "rviz"  # which need not be there
 _PATHS = "ROS_PACKAGE_PATH"
 _PATIENCE = 5.0  # s, for the frame that rviz follows
 _TOPIC = "/view/state"  # that the simulator advertises for rviz: the last one
@@ -93,7 +96,8 @@ def _fitting(simulator: str) -> Path:
 def renamed(text: str, names: Mapping[str, str]) -> str:
     """Return the text of a file of rviz with other names in its topics, frames and titles.
 
-    Where the docks are is in it too: Qt writes their titles as UTF-16 in hexadecimal digits, each after its length.
+    The file also holds the layout of the docks: Qt writes their titles as UTF-16 in hexadecimal digits, each after its
+    length.
     """
     for title in _TITLES.findall(text):
         text = text.replace(_as_dock(title), _as_dock(_renamed(title, names)))
