@@ -52,6 +52,16 @@ def test_a_script_pauses_the_simulation(tmp_path):
     simulation.close()
 
 
+def test_an_error_that_follows_in_cleanup_does_not_hide_the_first(tmp_path, caplog):
+    """Who shows the last error of the log, as the cockpit does, shows the cause."""
+    fails = "function sysCall_actuation() x.y = 1 end function sysCall_cleanup() z.y = 1 end"
+    simulation, _ = played(tmp_path, fails)
+    said = {record.levelname: record.getMessage() for record in caplog.records if "script error" in record.getMessage()}
+    assert "[actuation]" in said["ERROR"] and "[cleanup]" in said["WARNING"]
+    assert simulation.running is False
+    simulation.close()
+
+
 LEAVES = """
 def sysCall_init():
     self.drawn = sim.addDrawingObject(sim.drawing_discpts, 0.1, 0, sim.getObject('/target'), 5)

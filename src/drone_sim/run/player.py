@@ -146,8 +146,8 @@ class Player:
             _LOG.error(self.why_stopped)
             try:
                 self.simulation.stop()
-            except ScriptError as second:
-                _LOG.error(f"script error: {second}")
+            except ScriptError as second:  # mostly because of the first: whoever shows an error shows that one
+                _LOG.warning(f"script error in cleanup, after that: {second}")
             self._say_that_the_clock_stands("stopped; `start` runs the edited file")
             raise
         finally:
