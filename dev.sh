@@ -47,7 +47,7 @@ ALL=(requirements.txt requirements-all.txt requirements-dev.txt)
 
 COMPILERS=(build-essential python3-dev)
 WINDOWS=(rviz python3-tk)
-WITNESSES=(python3-cv-bridge python3-tf2-ros) # of the tests: other people's readers of what we publish
+TESTS=(librostest-dev python3-cv-bridge python3-tf2-ros) # and other people's readers of what we publish
 
 # ros-environment is what lets setup.bash set ROS_PACKAGE_PATH; on Debian 12 other packages bring it. The package.xml
 # without which `rosrun dynamic_reconfigure dynparam` does not run is in libdynamic-reconfigure-config-init-mutex-dev.
@@ -378,10 +378,13 @@ case "$command" in
   setup)
     case "$*" in "" | --all) ;; *) fail "setup $*: takes --all or nothing" ;; esac
     setup
-    if [ $# = 1 ]; then make_venv "${ALL[@]}"; fi
+    if [ $# = 1 ]; then
+      install_packages "${TESTS[@]}" "${COMPILERS[@]}" # which a catkin workspace asks for
+      make_venv "${ALL[@]}"
+    fi
     say "ready: source $root/devel/setup.bash" ;;
   run) stay_on_this_machine; setup; hint_at_the_browser "$@"; cd "$here"; PYTHONUNBUFFERED=1 exec roslaunch drone_sim drone.launch "$@" ;;
-  test) install_packages librostest-dev "${WITNESSES[@]}" "${WINDOWS[@]}"; setup ON; run_tests ;;
+  test) install_packages "${TESTS[@]}" "${WINDOWS[@]}"; setup ON; run_tests ;;
   test-web)
     install_packages chromium
     setup
@@ -393,7 +396,7 @@ case "$command" in
   fuzz) setup; make_venv "${ALL[@]}"; exec .venv/bin/python test/fuzz/run.py "$@" ;;
   docs-commands)
     setup
-    install_packages "${WITNESSES[@]}"
+    install_packages "${TESTS[@]}"
     make_venv "${ALL[@]}"
     exec .venv/bin/python test/docs/run.py "$@" ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
