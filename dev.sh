@@ -47,7 +47,7 @@ ALL=(requirements.txt requirements-all.txt requirements-dev.txt)
 
 COMPILERS=(build-essential python3-dev)
 WINDOWS=(rviz python3-tk)
-TESTS=(librostest-dev python3-cv-bridge python3-tf2-ros) # and other people's readers of what we publish
+TESTS=(librostest-dev python3-cv-bridge python3-tf2-ros) # the last two: other people's readers of what we publish
 
 # ros-environment is what lets setup.bash set ROS_PACKAGE_PATH; on Debian 12 other packages bring it. The package.xml
 # without which `rosrun dynamic_reconfigure dynparam` does not run is in libdynamic-reconfigure-config-init-mutex-dev.

@@ -14,6 +14,7 @@ from drone_sim.shapes.cylinder import Cylinder
 from drone_sim.shapes.mass import inertia_of
 from drone_sim.shapes.mesh import Mesh
 from drone_sim.shapes.shape import WHITE
+from drone_sim.shapes.solid import hull_of
 from drone_sim.shapes.sphere import Sphere
 from drone_sim.shapes.urdf import Urdf
 from drone_sim.world import World
@@ -78,6 +79,16 @@ def test_a_torque_turns_it_as_its_form_says(world, word):
         body = world.add_object(shape, Pose((0, 0, 5 * axis)), mass=MASS)
         expected = SUB_STEP * np.eye(3)[axis] / moments[axis]
         assert turned_by(world, body, np.eye(3)[axis]) == pytest.approx(expected, rel=1e-3, abs=1e-9)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_a_hull_fills_what_qhulls_does(scale):
+    for seed in range(5):
+        points = scale * np.random.default_rng(seed).normal(size=(300, 3))
+        ours, theirs = hull_of([points.reshape(-1, 3, 3)]), trimesh.convex.convex_hull(points)
+        assert ours.volume == pytest.approx(theirs.volume, rel=1e-9)
+        np.testing.assert_allclose(ours.centroid, theirs.center_mass, atol=1e-9 * scale)
+        np.testing.assert_allclose(ours.inertia, theirs.moment_inertia, rtol=1e-9, atol=1e-9 * scale**5)
 
 
 def test_a_mesh_turns_about_the_centre_of_its_hull(world, pole):

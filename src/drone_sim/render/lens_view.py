@@ -1,7 +1,7 @@
 """What a lens sees, gathered from pictures of pinholes: one, or some tiles, each of which looks its own way.
 
 A tile is a rectangle of the lens' picture. Nearly as many pixels are drawn for it as it has: in the middle of most
-lenses they are a little larger than its own, so that it is a little softer there, and a little smaller at the border.
+lenses they are larger than its own, by up to a third, so that it is a little softer there, and smaller at the border.
 """
 
 from __future__ import annotations
