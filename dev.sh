@@ -69,11 +69,12 @@ as_root() {
 installable() { [[ $(LC_ALL=C apt-cache policy "$1") = *"Candidate: "[!\(]* ]]; }
 
 install_packages() { # install_packages NAME...
-  local missing=() wanted=() package
+  local missing=() wanted=() package there
   if [ -n "$ros" ]; then return; fi
   command -v dpkg-query >/dev/null || fail "neither Debian nor a ROS 1 that has been sourced: see docs/install.md"
+  there=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' "$@" 2>/dev/null) || true # it fails if it lacks any
   for package in "$@"; do
-    dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing+=("$package")
+    [[ $'\n'$there$'\n' = *$'\n'"installed $package"$'\n'* ]] || missing+=("$package")
   done
   if [ ${#missing[@]} = 0 ] || { [ "${missing[*]}" = rviz ] && ! installable rviz; }; then return; fi
   [ "$(id -u)" = 0 ] || command -v sudo >/dev/null || fail "needs root or sudo to install: ${missing[*]}"
