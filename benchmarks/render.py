@@ -7,7 +7,8 @@ import importlib.util
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
 
@@ -46,16 +47,30 @@ def measure(name: str, draw: Callable[[], Any], seconds: float = 2.0, **facts: A
     """Time `draw` until `seconds` are over, at least five times after two for warming up."""
     amounts = ", ".join(f"{key} {value}" for key, value in facts.items() if key != "renderer")
     print(f"  {amounts or name}", file=sys.stderr, flush=True)
-    times: list[float] = []
-    for _ in range(2):
-        draw()
-    end = time.perf_counter() + seconds
-    while len(times) < 5 or time.perf_counter() < end:
-        start = time.perf_counter()
-        draw()
-        times.append(1000.0 * (time.perf_counter() - start))
+    return {**_row(name, in_turn({name: draw}, seconds)[name]), **facts}
+
+
+def in_turn(draws: Mapping[str, Callable[[], Any]], seconds: float) -> dict[str, np.ndarray]:
+    """Time five frames of each, again and again, for `seconds` each; return the rounds of each, (n, 5), ms."""
+    rounds: dict[str, list[list[float]]] = {name: [] for name in draws}
+    end = time.perf_counter() + seconds * len(draws)
+    while not all(rounds.values()) or time.perf_counter() < end:
+        for name, draw in draws.items():
+            draw()  # what the one before has left in the caches is not its own
+            draw()
+            rounds[name].append([_milliseconds(draw) for _ in range(5)])
+    return {name: np.array(times) for name, times in rounds.items()}
+
+
+def _milliseconds(draw: Callable[[], Any]) -> float:
+    start = time.perf_counter()
+    draw()
+    return 1000.0 * (time.perf_counter() - start)
+
+
+def _row(name: str, times: np.ndarray) -> Row:
     p10, median, p90 = (float(value) for value in np.percentile(times, [10, 50, 90]))
-    return {"name": name, "median_ms": median, "p10_ms": p10, "p90_ms": p90, **facts}
+    return {"name": name, "median_ms": median, "p10_ms": p10, "p90_ms": p90}
 
 
 def pose(x: float, y: float, z: float, yaw: float = 0.0) -> np.ndarray:
@@ -140,15 +155,7 @@ def bullet_draw(client: int, **options: int) -> Callable[[], Any]:
 def compare(folder: Path, seconds: float = 2.0) -> list[Row]:
     """Ours beside TinyRenderer and PyBullet's EGL plugin."""
     scene = build(folder)
-    rows = [
-        ours("drone_sim", scene, seconds),
-        ours("drone_sim, 4 samples", scene, seconds, samples=4),
-        ours("drone_sim, nothing but floor", build(folder, things=0), seconds, view=DOWNWARD),
-        ours("drone_sim, through a lens (plumb_bob)", scene, seconds, camera=LENS),
-        ours("drone_sim, through a lens (equidistant)", scene, seconds, camera=EQUIDISTANT),
-        ours("drone_sim, through a fisheye of 170 degrees", scene, seconds, camera=FISHEYE),
-        with_truth("drone_sim, with depth and instances", scene, seconds),
-    ]
+    rows = _ours(scene, build(folder, things=0), seconds)
     bare = {"shadow": 0, "flags": pybullet.ER_NO_SEGMENTATION_MASK}
     for name, plugin in (("TinyRenderer", False), ("EGL plugin", True)):
         client = pybullet.connect(pybullet.DIRECT)
@@ -162,7 +169,27 @@ def compare(folder: Path, seconds: float = 2.0) -> list[Row]:
             rows.append(measure(name, bullet_draw(client, renderer=kind, **bare), seconds))
         finally:
             pybullet.disconnect(client)
-    return [{**row, "of_ours": row["median_ms"] / rows[0]["median_ms"]} for row in rows]
+    return [{**row, "of_ours": row.get("of_ours", row["median_ms"] / rows[0]["median_ms"])} for row in rows]
+
+
+def _ours(scene: Drawn, floor: Drawn, seconds: float) -> list[Row]:
+    """Our renderer's ways to draw: compared are frames of the same round, for a machine is slower now and then."""
+    with drawing(scene) as frames, drawing(scene, samples=4) as smooth_frames, drawing(floor) as floor_frames:
+        times = in_turn(
+            {
+                "drone_sim": frames(CAMERA),
+                "drone_sim, 4 samples": smooth_frames(CAMERA),
+                "drone_sim, nothing but floor": floor_frames(CAMERA, DOWNWARD),
+                "drone_sim, through a lens (plumb_bob)": frames(LENS),
+                "drone_sim, through a lens (equidistant)": frames(EQUIDISTANT),
+                "drone_sim, through a fisheye of 170 degrees": frames(FISHEYE),
+                "drone_sim, with depth and instances": frames(CAMERA, outputs=("color", "depth", "instance")),
+            },
+            seconds,
+        )
+    medians = {name: np.median(own, axis=1) for name, own in times.items()}
+    ratios = {name: float(np.median(own / medians["drone_sim"])) for name, own in medians.items()}
+    return [{**_row(name, own), "of_ours": ratios[name]} for name, own in times.items()]
 
 
 def _load_plugin(client: int) -> bool:
@@ -171,52 +198,40 @@ def _load_plugin(client: int) -> bool:
     return bool(path) and pybullet.loadPlugin(path, "_eglRendererPlugin", physicsClientId=client) >= 0
 
 
-def ours(
-    name: str,
-    scene: Drawn,
-    seconds: float,
-    camera: Intrinsics = CAMERA,
-    view: np.ndarray = AHEAD,
-    samples: int = 0,
-    **facts: Any,
-) -> Row:
-    """Our renderer, poses sent anew for every frame, into one buffer."""
+@contextmanager
+def drawing(scene: Drawn, samples: int = 0) -> Iterator[Callable[..., Callable[[], Any]]]:
+    """Make a renderer; what it gives makes what draws a frame as a camera needs it, with all poses sent anew."""
     renderer = Renderer(samples=samples)
+    visuals, poses = scene
+    renderer.set_visuals(visuals)
+    numbers = np.arange(1, len(visuals) + 1)
+
+    def frames(camera: Intrinsics, view: np.ndarray = AHEAD, outputs: tuple[str, ...] = ()) -> Callable[[], Any]:
+        if outputs:
+            return lambda: renderer.render_outputs(outputs, camera, view, poses, instances=numbers)
+        return lambda: renderer.render(camera, view, poses)
+
     try:
-        visuals, poses = scene
-        renderer.set_visuals(visuals)
-        out = np.empty((camera.height, camera.width, 3), np.uint8)
-        draw = lambda: renderer.render(camera, view, poses, out)  # noqa: E731 - it is only timed
-        return measure(name, draw, seconds, renderer=renderer.description, **facts)
-    finally:
-        renderer.close()
-
-
-def with_truth(name: str, scene: Drawn, seconds: float) -> Row:
-    """Our renderer, with two of its other outputs beside the picture, as a camera draws what somebody listens to."""
-    renderer = Renderer()
-    try:
-        visuals, poses = scene
-        renderer.set_visuals(visuals)
-        numbers = np.arange(1, len(visuals) + 1)
-
-        names = ("color", "depth", "instance")
-        draw = lambda: renderer.render_outputs(names, CAMERA, AHEAD, poses, instances=numbers)  # noqa: E731
-        return measure(name, draw, seconds)
+        yield frames
     finally:
         renderer.close()
 
 
 def growth(folder: Path, seconds: float = 1.0) -> list[Row]:
     """Our frame time against picture size, number of bodies and number of triangles."""
-    scene, rows = build(folder), []
+    rows = []
+
+    def add(name: str, scene: Drawn, camera: Intrinsics = CAMERA, **facts: int) -> None:
+        with drawing(scene) as frames:
+            rows.append(measure(name, frames(camera), seconds, **facts))
+
     for width, height in ((160, 120), (320, 240), (640, 480), (1280, 720), (1920, 1080)):
         camera = Intrinsics(width, height, CAMERA.horizontal_fov, CAMERA.near, CAMERA.far)
-        rows.append(ours("size", scene, seconds, camera, width=width, height=height))
+        add("size", build(folder), camera, width=width, height=height)
     for things in (1, 10, 100, 1000):
-        rows.append(ours("bodies", build(folder, things), seconds, bodies=things))
+        add("bodies", build(folder, things), bodies=things)
     for triangles in (100, 1000, 10000, 100000):
-        rows.append(ours("triangles", build(folder, triangles=triangles), seconds, triangles=triangles))
+        add("triangles", build(folder, triangles=triangles), triangles=triangles)
     return rows
 
 
