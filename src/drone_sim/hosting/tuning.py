@@ -189,6 +189,8 @@ class Tuning:
         """Take over the tuned values of the vehicle that this one replaces; log if that is not possible."""
         self.chosen, self._initial = dict(before.chosen), dict(before._initial)
         self._read_before = before._read_before
+        if not self.chosen:
+            return
         known = self.everything
         try:
             self.change({name: one for name, one in self.chosen.items() if name in known})

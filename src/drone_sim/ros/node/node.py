@@ -136,6 +136,7 @@ class Node:
         else:
             with contextlib.suppress(ScriptError):  # said already; the node waits for `start`
                 self.player.start()
+            self._topics.follow()  # so that cameras see the first step
         gc.collect()
         gc.freeze()  # what is there by now stays: the collector, looking through it again and again, makes steps late
         commands = ", ".join(rospy.resolve_name(f"{name}/cmd_vel") for name in self.simulation.vehicles)
