@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from drone_sim.config.errors import problems
 from drone_sim.config.types import (
@@ -62,7 +62,8 @@ else:
 
 _Value = TypeVar("_Value")
 _VREPS_WORDS = {"box": "Cuboid", "mesh": "Shape", "compound": "Shape", "urdf": "Shape"}
-_ENTRY: TypeAdapter[EntryParameters] = TypeAdapter(EntryChoice)
+# Made when an entry is first read by itself, which few simulations need.
+_ENTRY: TypeAdapter[EntryParameters] = TypeAdapter(EntryChoice, config=ConfigDict(defer_build=True))
 _SCRIPT = TypeAdapter(AttachedScriptParameters)
 
 
