@@ -102,7 +102,11 @@ def test_colours_and_greys_of_any_size():
     shown = picture(packed(message(red, "rgb8"))[0])
     assert shown.shape[1] == 500 and shown[1, 250, 2] > 200 > 50 > shown[1, 250, 0]
     assert picture(packed(message(red, "bgr8"))[0])[1, 250, 0] > 200
+    assert picture(packed(message(red, "8UC3"))[0])[1, 250, 0] > 200
+    assert picture(packed(message(red.astype(np.uint16) * 257, "rgb16"))[0])[1, 100, 2] > 200
     assert picture(packed(message(np.full((4, 4), 200, np.uint8), "mono8"))[0])[2, 2].min() > 190
+    red_under_its_filter = np.tile(np.array([[255, 0], [0, 0]], np.uint8), (20, 20))
+    assert picture(packed(message(red_under_its_filter, "bayer_rggb8"))[0])[20, 20, 2] > 150
 
 
 @pytest.mark.parametrize(
@@ -111,7 +115,7 @@ def test_colours_and_greys_of_any_size():
         Image(encoding="nonsense", height=1, width=1, step=1, data=b"1"),
         Image(encoding="rgb8", height=100, width=100, step=300, data=b"too short"),
         Image(encoding="rgb8"),
-        Image(encoding="rgb16", height=1, width=1, step=6, data=b"123456"),
+        Image(encoding="32FC3", height=1, width=1, step=12, data=b"123456789abc"),
     ],
 )
 def test_what_is_no_picture_is_refused_in_one_line(wrong):

@@ -59,12 +59,17 @@ def pixels(message: Image) -> np.ndarray:
 
 def bgr(message: Image) -> np.ndarray:
     """Return a color or gray image as BGR with 8 bits, (height, width, 3). Raises ValueError for any other."""
+    return to_bgr(pixels(message), message.encoding)
+
+
+def to_bgr(picture: np.ndarray, encoding: str) -> np.ndarray:
+    """Return what `pixels` has found as BGR with 8 bits, (height, width, 3). Raises ValueError for what is no color."""
     import cv2  # which takes its time, and the node needs none
 
-    found = np.ascontiguousarray(pixels(message))
-    if message.encoding in _YUV:
-        return cv2.cvtColor(found, getattr(cv2, f"COLOR_{_YUV[message.encoding]}"))
-    color = _COLOR.fullmatch(message.encoding)
+    found = np.ascontiguousarray(picture)
+    if encoding in _YUV:
+        return cv2.cvtColor(found, getattr(cv2, f"COLOR_{_YUV[encoding]}"))
+    color = _COLOR.fullmatch(encoding)
     if color is None:
         raise ValueError("is no color")
     if found.dtype != np.uint8:

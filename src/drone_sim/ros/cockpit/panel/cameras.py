@@ -28,6 +28,7 @@ _WIDEST, _WIDEST_DEPTHS = 640, 320  # px; of a larger one, every other pixel, or
 _COLORS = cv2.COLORMAP_TURBO  # near is blue, far is red
 _JPEG = (cv2.IMWRITE_JPEG_QUALITY, 80)
 _MILLIMETRES = "16UC1"  # REP-118
+_OPENCVS = {"8UC1": "mono8", "8UC3": "bgr8", "8UC4": "bgra8"}  # what is said of no colors has OpenCV's
 _KINDS = ("views", "dialogs", "consoles")
 _CONNECTING = 3.0  # s, for the simulation to hear of who answers
 _LONGEST = 1 << 21  # characters of a message; the simulation's own have less
@@ -245,15 +246,15 @@ def packed(message: CompressedImage | Image) -> tuple[bytes, str]:
     """Return a picture as a browser shows it, and a caption. Raises ValueError for one of an unknown kind."""
     if isinstance(message, CompressedImage):
         return bytes(message.data), ""
+    encoding, step = message.encoding, _step(message)
     try:
         image = image_messages.pixels(message)
+        if image.ndim == 2 and image.dtype != np.uint8:
+            depths = image[::step, ::step].astype(np.float32)
+            return _depths(depths * (1e-3 if encoding == _MILLIMETRES else 1.0))
+        return _encoded(image_messages.to_bgr(image, _OPENCVS.get(encoding, encoding))[::step, ::step]), ""
     except ValueError as error:
-        raise ValueError(f"encoding '{message.encoding[:40]}': {error}") from None
-    step = _step(message)
-    image = image[::step, ::step]
-    if image.ndim == 2 and image.dtype != np.uint8:
-        return _depths(image.astype(np.float32) * (1e-3 if message.encoding == _MILLIMETRES else 1.0))
-    return _encoded(_as_bgr(image, message.encoding)), ""
+        raise ValueError(f"encoding '{encoding[:40]}': {error}") from None
 
 
 def _depths(depths: np.ndarray) -> tuple[bytes, str]:
@@ -267,14 +268,6 @@ def _depths(depths: np.ndarray) -> tuple[bytes, str]:
     colored = cv2.applyColorMap(scaled, _COLORS)
     colored[~there] = 0
     return _encoded(colored), f"{near:.2f} m (blue) to {far:.2f} m (red)"
-
-
-def _as_bgr(image: np.ndarray, encoding: str) -> np.ndarray:
-    if image.dtype != np.uint8:
-        raise ValueError(f"encoding '{encoding[:40]}' must be colors with 8 bits, gray, or depth")
-    if image.ndim == 3 and image.shape[2] in (3, 4) and encoding.startswith("rgb"):
-        return np.ascontiguousarray(image[:, :, 2::-1])
-    return np.ascontiguousarray(image[:, :, :3] if image.ndim == 3 else image)
 
 
 def _encoded(image: np.ndarray) -> bytes:
