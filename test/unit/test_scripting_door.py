@@ -13,7 +13,7 @@ from drone_sim.grading import flight, tasks
 from drone_sim.grading import plan as plans
 from drone_sim.mechanics.state import Pose, Twist
 from drone_sim.scripting.api.control import Turns
-from drone_sim.scripting.door import effects, simulation_end, stand_ins, values
+from drone_sim.scripting.door import effects, script_there, simulation_end, stand_ins, values
 from drone_sim.vehicles.commands import Empty, request
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -312,13 +312,13 @@ def test_a_message_without_end_is_not_waited_for(plan):
 
 
 def test_a_process_that_is_silent_is_not_waited_for(quick, monkeypatch):
-    monkeypatch.setattr(simulation_end, "GRACE", 0.2)
+    monkeypatch.setattr(script_there, "GRACE", 0.2)
     result, _ = behind_door.flown(quick, "pilot", serve=lambda end: end.recv(1) and end.recv(2**20) and end.recv(1))
     assert "did not return after 0.2 s (script_time_limit)" in result.error
 
 
 def test_a_process_that_floods_is_not_heard_out(quick, monkeypatch):
-    monkeypatch.setattr(simulation_end, "GRACE", 0.2)
+    monkeypatch.setattr(script_there, "GRACE", 0.2)
     message = json.dumps([["set", "sim.setInt32Signal", "said", 1]]).encode()
 
     def serve(end):
