@@ -8,7 +8,7 @@ import pytest
 from drone_sim.files.resources import package_path
 
 FAKES = {
-    "dpkg-query": 'grep -qx "${@: -1}" "$FOLDER/installed" && echo installed',
+    "dpkg-query": 'for one in "${@:4}"; do grep -qx "$one" "$FOLDER/installed" && echo "installed $one"; done',
     "apt-cache": 'grep -qx "$2" "$FOLDER/known" && printf "%s:\\n  Candidate: 1.2\\n" "$2" || true',
     "apt-get": 'echo "$1 ${@:6}"',
     "sudo": '"$@"',
