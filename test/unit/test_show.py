@@ -1,6 +1,9 @@
 """`rosrun drone_sim show`: the files of rviz with the names of what flies."""
 
 import re
+import signal
+import subprocess
+import sys
 
 import pytest
 import yaml
@@ -83,3 +86,42 @@ def test_rviz_finds_the_package_that_it_asks_for_and_nothing_else_does():
     assert {"drone_sim", "media_export"} <= set(found.list())
     assert "media_export" not in rospkg.RosPack([own]).list()
     assert show.with_media_export({})["ROS_PACKAGE_PATH"] == f"{own}/rviz/packages"
+
+
+# ---- rviz itself
+
+
+def shown(tmp_path, rviz, sent=None):
+    """Run a shell script in the place of rviz, send a signal when it says `up`; return status, stderr, its starts."""
+    script = tmp_path / "rviz"
+    script.write_text(f'#!/bin/bash\necho start >>"{tmp_path}/starts"\n{rviz}\n')
+    script.chmod(0o755)
+    program = f"import os, sys; from drone_sim.ros.tools import show; sys.exit(show.run([{str(script)!r}], os.environ))"
+    command = [sys.executable, "-c", program]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    if sent is not None:
+        assert running.stdout.readline() == "up\n"
+        running.send_signal(sent)
+    _, said = running.communicate(timeout=60)
+    return running.returncode, said, len((tmp_path / "starts").read_text().splitlines())
+
+
+def test_an_rviz_that_crashes_at_its_start_is_started_again(tmp_path):
+    status, said, starts = shown(tmp_path, f'[ $(wc -l <"{tmp_path}/starts") = 2 ] && exit 0; kill -SEGV $$')
+    assert (status, starts) == (0, 2)
+    assert said == "show: rviz has crashed (Segmentation fault): starting it again\n"
+
+
+def test_an_rviz_that_always_crashes_is_given_up(tmp_path):
+    status, said, starts = shown(tmp_path, "kill -ABRT $$")
+    assert (status, starts) == (128 + signal.SIGABRT, 3) and len(said.splitlines()) == 2
+
+
+def test_an_rviz_that_fails_is_not_started_again(tmp_path):
+    assert shown(tmp_path, "exit 3") == (3, "", 1)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_who_ends_show_ends_rviz_even_if_that_crashes_then(tmp_path, number):
+    crashing = 'trap "kill -SEGV \\$\\$" INT TERM\necho up\nwhile true; do sleep 0.01; done'
+    assert shown(tmp_path, crashing, number) == (128 + signal.SIGSEGV, "", 1)

@@ -1,7 +1,7 @@
 """Open rviz with all vehicles, whatever their names are, seen from behind the first one.
 
 It waits for the simulator, asks the master where the topics for rviz are and /tf_static which vehicle is the first,
-lays those names over rviz/drone.rviz, or over rviz/fleet.rviz where several fly, and then becomes rviz.
+lays those names over rviz/drone.rviz, or over rviz/fleet.rviz where several fly, and then runs rviz.
 """
 
 from __future__ import annotations
@@ -10,11 +10,12 @@ import argparse
 import os
 import re
 import signal
+import subprocess
 import sys
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NoReturn
 
 import rosgraph
 import rospkg
@@ -22,7 +23,7 @@ import rospy
 from roslib.packages import find_node
 from tf2_msgs.msg import TFMessage
 
-from drone_sim.command_line import FAILED, Parser, status_of
+from drone_sim.command_line import FAILED, SIGNALLED, Parser, status_of
 from drone_sim.files import writing
 from drone_sim.files.resources import cache_path, package_path
 from drone_sim.ros.core.message_conversion import first_frame
@@ -34,6 +35,8 @@ INSTEAD = (
     " `roslaunch drone_sim drone.launch web:=true` shows the simulation in a browser"
 )
 _RVIZ = "rviz"  # which need not be there
+_CRASHES = (-signal.SIGSEGV, -signal.SIGABRT)
+_STARTS, _STARTING = 3, 20.0  # how often rviz is started, if it has crashed within so many s
 _PATHS = "ROS_PACKAGE_PATH"
 _PATIENCE = 5.0  # s, for the frame that rviz follows
 _TOPIC = "/view/state"  # that the simulator advertises for rviz: the last one
@@ -43,7 +46,7 @@ _TITLES = re.compile(rf"^ *Name: (.*\b{_FIRST})$", re.MULTILINE)
 
 
 def main() -> int:
-    """Become rviz; return 1, after a line on stderr, where that cannot be.
+    """Run rviz, and return its exit status; return 1, after a line on stderr, where that cannot be.
 
     Where there is no rviz, a launch goes on without it: roslaunch gets 0, and reports no process that has died.
     """
@@ -60,14 +63,40 @@ def main() -> int:
     return status_of(_NAME, lambda: _show(rviz, options, remappings))
 
 
-def _show(rviz: str, options: argparse.Namespace, remappings: Sequence[str]) -> NoReturn:
-    """Raises OSError and ValueError."""
+def _show(rviz: str, options: argparse.Namespace, remappings: Sequence[str]) -> int:
+    """Return rviz's exit status. Raises OSError and ValueError."""
     config = from_shell(options.config)
     if config and not Path(config).is_file():
         raise OSError(f"--config {config}: no such file")
     simulator = rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(), options.simulator)
     config = config or str(_fitting(simulator.strip("/")))
-    os.execve(rviz, [rviz, "-d", config, *remappings], with_media_export(os.environ))
+    return run([rviz, "-d", config, *remappings], with_media_export(os.environ))
+
+
+def run(command: Sequence[str], environment: Mapping[str, str]) -> int:
+    """Run rviz; return its exit status. If it crashes at the start, as it does at times without a GPU, start it again.
+
+    A signal that ends this process ends rviz.
+    """
+    ends: list[int] = []
+
+    def end(number: int, _frame: object) -> None:
+        ends.append(number)
+        rviz.send_signal(number)
+
+    for start in range(_STARTS):
+        began = time.monotonic()
+        rviz = subprocess.Popen(command, env=environment)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, end)
+        status = rviz.wait()
+        is_early = time.monotonic() - began < _STARTING
+        if status not in _CRASHES or ends or not is_early or start + 1 == _STARTS:
+            break
+        print(
+            f"{_NAME}: rviz has crashed ({signal.strsignal(-status)}): starting it again", file=sys.stderr, flush=True
+        )
+    return SIGNALLED - status if status < 0 else status
 
 
 def with_media_export(environment: Mapping[str, str]) -> dict[str, str]:
