@@ -29,7 +29,7 @@ def machine() -> str:
 
 def table(rows: list[Row]) -> str:
     """Lay rows out in columns; a number gets three digits."""
-    keys = [key for key in dict.fromkeys(key for row in rows for key in row) if key != "renderer"]
+    keys = [*dict.fromkeys(key for row in rows for key in row)]
     cells = [keys] + [[_text(row.get(key, "")) for key in keys] for row in rows]
     widths = [max(map(len, column)) for column in zip(*cells)]
     return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(line, widths)).rstrip() for line in cells)

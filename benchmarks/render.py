@@ -44,8 +44,8 @@ ARM = 0.13  # metres from the middle to a propeller
 
 
 def measure(name: str, draw: Callable[[], Any], seconds: float = 2.0, **facts: Any) -> Row:
-    """Time `draw` until `seconds` are over, at least five times after two for warming up."""
-    amounts = ", ".join(f"{key} {value}" for key, value in facts.items() if key != "renderer")
+    """Time `draw` for so many `seconds`, at least five times."""
+    amounts = ", ".join(f"{key} {value}" for key, value in facts.items())
     print(f"  {amounts or name}", file=sys.stderr, flush=True)
     return {**_row(name, in_turn({name: draw}, seconds)[name]), **facts}
 
@@ -200,7 +200,7 @@ def _load_plugin(client: int) -> bool:
 
 @contextmanager
 def drawing(scene: Drawn, samples: int = 0) -> Iterator[Callable[..., Callable[[], Any]]]:
-    """Make a renderer; what it gives makes what draws a frame as a camera needs it, with all poses sent anew."""
+    """Make a renderer of a scene; give a function that returns, for a camera, what draws one frame of it."""
     renderer = Renderer(samples=samples)
     visuals, poses = scene
     renderer.set_visuals(visuals)
@@ -219,7 +219,7 @@ def drawing(scene: Drawn, samples: int = 0) -> Iterator[Callable[..., Callable[[
 
 def growth(folder: Path, seconds: float = 1.0) -> list[Row]:
     """Our frame time against picture size, number of bodies and number of triangles."""
-    rows = []
+    usual, rows = build(folder), []
 
     def add(name: str, scene: Drawn, camera: Intrinsics = CAMERA, **facts: int) -> None:
         with drawing(scene) as frames:
@@ -227,7 +227,7 @@ def growth(folder: Path, seconds: float = 1.0) -> list[Row]:
 
     for width, height in ((160, 120), (320, 240), (640, 480), (1280, 720), (1920, 1080)):
         camera = Intrinsics(width, height, CAMERA.horizontal_fov, CAMERA.near, CAMERA.far)
-        add("size", build(folder), camera, width=width, height=height)
+        add("size", usual, camera, width=width, height=height)
     for things in (1, 10, 100, 1000):
         add("bodies", build(folder, things), bodies=things)
     for triangles in (100, 1000, 10000, 100000):

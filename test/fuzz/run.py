@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """`./dev.sh fuzz [CASES] [--seed N]`: try odd input against the real code, in processes that may die.
 
-A case passes if it is taken, or refused with one line, within 6 s of the processor and the limit of memory. Each
+A case passes if it is taken, or refused with one line, within 3 s of the processor and the limit of memory. Each
 other way to end is a fault: it is counted, its smallest example is kept in a folder of its own, and named by one
 line at the end.
 Exit status 1 where there was any.

@@ -224,6 +224,13 @@ def _assignments(case: Case, folder: Path) -> str:
 # ---- bags
 
 
+def prepare(case: Case) -> None:
+    """Import what a case needs, for that is not its own time: matplotlib takes longer than most cases."""
+    if case.kind == "bags":
+        importlib.import_module(f"drone_sim.ros.tools.{case.data}")
+        importlib.import_module("drone_sim.offline.plot")
+
+
 def _bags(case: Case, folder: Path) -> str:
     """Read a bag with one of the programs for that; whatever is in it, the program ends with a line or a file."""
     program = importlib.import_module(f"drone_sim.ros.tools.{case.data}")  # ROS is there for this alone

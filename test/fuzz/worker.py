@@ -36,9 +36,10 @@ def _where(error: BaseException) -> str:
 
 
 def _try(case: Any, background: list[str]) -> Answer:
-    from trials import Fault, run
+    from trials import Fault, prepare, run
 
     folder = Path(tempfile.mkdtemp(prefix="fuzz"))
+    prepare(case)
     began = time.process_time()  # of the processor: other processes may be busy, too
     fault = refusal = ""
     try:

@@ -81,5 +81,5 @@ def test_what_cannot_be_read_is_said_in_one_line(changes, said):
 
 
 def test_what_is_no_color_is_said():
-    with pytest.raises(ValueError, match="is no color"):
+    with pytest.raises(ValueError, match="must be colors or gray"):
         image_messages.bgr(sent("32FC1"))

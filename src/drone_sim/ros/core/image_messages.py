@@ -71,7 +71,7 @@ def to_bgr(picture: np.ndarray, encoding: str) -> np.ndarray:
         return cv2.cvtColor(found, getattr(cv2, f"COLOR_{_YUV[encoding]}"))
     color = _COLOR.fullmatch(encoding)
     if color is None:
-        raise ValueError("is no color")
+        raise ValueError("must be colors or gray, such as rgb8, yuv422, bayer_rggb8 or mono8")
     if found.dtype != np.uint8:
         found = cv2.convertScaleAbs(found, alpha=255.0 / 65535.0)
     conversion = _COLORS[color[1]][1]

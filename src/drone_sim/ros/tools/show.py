@@ -79,16 +79,21 @@ def run(command: Sequence[str], environment: Mapping[str, str]) -> int:
     A signal that ends this process ends rviz.
     """
     ends: list[int] = []
+    started: list[subprocess.Popen[bytes]] = []
 
     def end(number: int, _frame: object) -> None:
         ends.append(number)
-        rviz.send_signal(number)
+        for one in started:
+            one.send_signal(number)
 
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, end)
     for start in range(_STARTS):
         began = time.monotonic()
         rviz = subprocess.Popen(command, env=environment)
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, end)
+        started.append(rviz)
+        for asked in ends:  # before rviz could be told
+            rviz.send_signal(asked)
         status = rviz.wait()
         is_early = time.monotonic() - began < _STARTING
         if status not in _CRASHES or ends or not is_early or start + 1 == _STARTS:
