@@ -82,7 +82,7 @@ class Cockpit:
         (own / "d.py").mkdir()
         self._outside = folder / "outside.py"
         asked = Asked(ScriptStore(own))
-        panel = Panel(asked.node, CommandPublisher(), SceneList(own), self.socket.tell)  # type: ignore[arg-type]
+        panel = Panel(asked.node, CommandPublisher(patience=0.0), SceneList(own), self.socket.tell)  # type: ignore[arg-type]
         panel.offer(FoundTopics("/drone", ("drone", "wing"), (), {"/drone/range": "sensor_msgs/Range"}), "")
         panel.follow("drone")
         cameras = CameraSwitches(panel.board, self.socket)

@@ -80,9 +80,10 @@ def read_command(given: Any) -> Command:
 class CommandPublisher:
     """Publishes to the chosen vehicle. A topic needs a moment until its publisher is heard: `choose` comes before."""
 
-    def __init__(self) -> None:
-        """Begin without a vehicle."""
+    def __init__(self, patience: float = 2.0) -> None:
+        """Begin without a vehicle. patience: s that one which has just come may take until it hears us."""
         self.vehicle = ""
+        self._patience = patience
         self._lock = threading.Lock()  # or one thread sends by what another has just put away
         self._command: rospy.Publisher | None = None
         self._requests: dict[str, rospy.Publisher] = {}
@@ -109,9 +110,14 @@ class CommandPublisher:
                 self._command.publish(twist(command[:3], (0.0, 0.0, command.wz)))
 
     def request(self, topic: str) -> str:
-        """Ask for what one of `REQUESTS` does; return one line for the user."""
-        publisher = self._requests.get(topic)
-        if publisher is None or not publisher.get_num_connections():
-            return f"{topic}: nobody listens"
+        """Ask for what one of `REQUESTS` does; return one line for the user.
+
+        Raises ValueError where nobody listens.
+        """
+        until = time.monotonic() + self._patience
+        while (publisher := self._requests.get(topic)) is None or not publisher.get_num_connections():
+            if time.monotonic() >= until:
+                raise ValueError(f"{topic}: nobody listens")
+            time.sleep(0.05)
         publisher.publish(Empty())
         return f"{topic} sent to {self.vehicle}"
