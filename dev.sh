@@ -198,6 +198,7 @@ make_wheel() {
   local version tag
   which_pybullet
   locked "$wheels" compile_pybullet
+  pip install -q wheel >&2 # which is not there where the wheel was taken from a folder
   packaging/wheel.sh "$venv/bin/python" "$wheels/${version/==/-}-$tag-"*.whl "$root/wheels"
   say "copy $root/wheels into another checkout, or name it there as DRONE_SIM_WHEELS: its set-up takes PyBullet from it"
 }

@@ -238,6 +238,18 @@ def test_a_wheel_of_pybullet_is_taken_only_with_its_checksum(machine, checksum):
         assert machine.asked("pip wheel") == 1 and there.read_text(encoding="utf-8") == ""
 
 
+def test_a_wheel_that_was_taken_can_be_given_on(machine):
+    wheel = machine.checkout / f"wheels/pybullet-1-cp311-cp311-linux_{os.uname().machine}.whl"
+    wheel.parent.mkdir()
+    wheel.write_text("ours", encoding="utf-8")
+    summed = f"{hashlib.sha256(b'ours').hexdigest()}  {wheel.name}\n"
+    (wheel.parent / "SHA256SUMS").write_text(summed, encoding="utf-8")
+    code, said = machine.run("wheel", env={"NO_WHEEL": "1"})
+    assert code == 0 and summed in said and machine.asked("pip wheel") == 0
+    log = (machine.folder / "log").read_text(encoding="utf-8")
+    assert 0 < log.index("install -q wheel") < log.index("-m wheel unpack") < log.index("-m wheel pack")
+
+
 def test_a_wheel_lies_where_one_says_and_one_of_another_python_is_left_alone(machine):
     name = f"pybullet-1-cp312-cp312-linux_{os.uname().machine}.whl"
     (machine.folder / "lab").mkdir()
