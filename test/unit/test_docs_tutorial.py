@@ -281,4 +281,4 @@ def run(command):
 
 def comparable(printed):
     """Return what a command printed, without how long it took."""
-    return re.sub(r" in [\d.]+ s \(\d+ times real time\)", "", printed).strip().splitlines()
+    return re.sub(r" in [\d.]+ s \([\d.]+ times real time\)", "", printed).strip().splitlines()

@@ -258,8 +258,9 @@ def _summary(recording: Recording, took: float) -> str:
     row = recording.rows[-1]
     # + 0.0 makes a 0 of -0
     x, y, z, yaw = (round(value, 3) + 0.0 for value in (*row[1:4], to_euler(recording.matrix(-1))[2]))
+    factor = row[0] / took
     return (
-        f"flew {row[0]:.2f} s in {took:.2f} s ({row[0] / took:.0f} times real time); "
+        f"flew {row[0]:.2f} s in {took:.2f} s ({factor:.{0 if factor >= 10 else 2}f} times real time); "
         f"ended at x {x:.3f} y {y:.3f} z {z:.3f} m, yaw {yaw:.3f} rad"
     )
 
