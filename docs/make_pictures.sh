@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # Makes every picture of README.md and docs/: docs/make_pictures.sh [SECTION...]   (default: all sections)
 #
-# Needs what ./dev.sh setup --all installs; section rviz also the packages xvfb, imagemagick and xdotool.
+# Needs what ./dev.sh setup --all installs; section windows also packages that it names.
 # A section is a function below, named in `sections`.
 set -eo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/src:$PYTHONPATH
 python=.venv/bin/python
 pictures=docs/pictures
-sections=(diagrams cameras plots remote weather report tasks cockpit cockpit-film rviz)
+sections=(diagrams cameras plots remote weather report tasks cockpit cockpit-film windows)
 
 # The diagrams of docs/tutorial.md.
 diagrams() { "$python" docs/draw_diagrams.py "$pictures"; }
@@ -52,8 +52,8 @@ cockpit() { "$python" docs/take_cockpit_pictures.py "$pictures"; }
 # The same in motion, for README.md; three minutes, on a machine that does nothing else.
 cockpit-film() { "$python" docs/film_cockpit.py "$pictures/cockpit.webp"; }
 
-# rviz, as drone.launch shows it, and with the target sphere dragged.
-rviz() { docs/take_rviz_pictures.sh "$pictures"; }
+# rviz, as drone.launch shows it, and with the target sphere dragged; image_view.
+windows() { docs/take_window_pictures.sh "$pictures"; }
 
 plot() { # plot STAGE [OPTION...]
   "$python" scripts/fly --script "docs/tutorial/$1.py" --commands "docs/tutorial/$1.yaml" \

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Takes the pictures of rviz: docs/take_rviz_pictures.sh FOLDER. `docs/make_pictures.sh rviz` calls it.
+# Takes the pictures of rviz and image_view: docs/take_window_pictures.sh FOLDER. `docs/make_pictures.sh windows` calls it.
 #
 # It works on a display and a ROS master of its own, both of which it ends. A minute.
 set -eo pipefail
@@ -10,12 +10,15 @@ missing=()
 for needed in rviz:rviz Xvfb:xvfb import:imagemagick xdotool:xdotool; do
   command -v "${needed%:*}" >/dev/null || missing+=("${needed#*:}")
 done
+for package in ros-image-view libnodeletlib-tools libimage-view-dev; do
+  dpkg-query -s "$package" >/dev/null 2>&1 || missing+=("$package")
+done
 if [ ${#missing[@]} != 0 ]; then
-  echo "take_rviz_pictures.sh: needs apt-get install ${missing[*]}" >&2
+  echo "take_window_pictures.sh: needs apt-get install ${missing[*]}" >&2
   exit 1
 fi
 if [ ! -f devel/setup.bash ]; then
-  echo "take_rviz_pictures.sh: needs ./dev.sh setup" >&2
+  echo "take_window_pictures.sh: needs ./dev.sh setup" >&2
   exit 1
 fi
 source devel/setup.bash
@@ -38,18 +41,22 @@ until [ -s "$work/display" ]; do sleep 0.1; done
 DISPLAY=:$(cat "$work/display")
 export DISPLAY QT_X11_NO_MITSHM=1
 
-file=drone.launch drone=drone # what `start` launches, and whose odometry it waits for
+file=drone.launch drone=drone # what `simulate` launches, and whose odometry it waits for
 
-start() { # start CONFIG [ROSLAUNCH ARGUMENT...]: the simulation, then rviz with a view
+simulate() { # simulate [ROSLAUNCH ARGUMENT...]
   local port
   port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])')
   export ROS_MASTER_URI=http://localhost:$port
-  roslaunch -p "$port" drone_sim "$file" rviz:=false "${@:2}" >"$work/launch.log" 2>&1 &
+  roslaunch -p "$port" drone_sim "$file" rviz:=false "$@" >"$work/launch.log" 2>&1 &
   pids+=($!)
   until timeout 20 rostopic echo -n1 "/$drone/odom" >/dev/null 2>&1; do
     kill -0 "${pids[0]}" 2>/dev/null || { cat "$work/launch.log" >&2; exit 1; }
     sleep 0.5
   done
+}
+
+start() { # start CONFIG [ROSLAUNCH ARGUMENT...]: the simulation, then rviz with a view
+  simulate "${@:2}"
   rosrun rviz rviz -d "$1" >"$work/rviz.log" 2>&1 &
   pids+=($!)
   xdotool search --sync --name RViz >/dev/null
@@ -142,6 +149,19 @@ PYTHON
   end
 }
 
+# The window of image_view, with what the front camera sees.
+image_view() {
+  simulate scene:="$PWD/config/scenes/gates.yaml"
+  rosrun image_view image_view image:=/drone/front >"$work/image_view.log" 2>&1 &
+  pids+=($!)
+  local window
+  window=$(xdotool search --sync --name /drone/front | head -n1)
+  sleep 2 # it has a picture then
+  import -window "$window" "$folder/image_view.png"
+  end
+}
+
 flight
 target
 fleet
+image_view
