@@ -40,8 +40,9 @@ def test_a_picture_is_the_same():
     simulation.close()
     expected = cv2.cvtColor(cv2.imread(str(PICTURE)), cv2.COLOR_BGR2RGB).astype(int)
     differences = np.abs(shown - expected)
-    # Exact where llvmpipe draws with the vectors that it drew with; a graphics card rounds in its own way.
-    assert differences.max() == 0 if "256 bits" in renderer() else differences.mean() < 1
+    # Exact where llvmpipe draws with the vectors that it drew with. Others filter the floor in their own way: on arm64,
+    # llvmpipe's picture differs by 7 at most, 1.2 on average.
+    assert differences.max() == 0 if "256 bits" in renderer() else differences.mean() < 2
 
 
 def renderer():
