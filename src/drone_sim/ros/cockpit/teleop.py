@@ -80,8 +80,12 @@ def read_command(given: Any) -> Command:
 class CommandPublisher:
     """Publishes to the chosen vehicle. A topic needs a moment until its publisher is heard: `choose` comes before."""
 
-    def __init__(self, patience: float = 2.0) -> None:
-        """Begin without a vehicle. patience: s that one which has just come may take until it hears us."""
+    def __init__(self, patience: float = 1.0) -> None:
+        """Begin without a vehicle.
+
+        patience: s that a vehicle or a script which has just begun may take until it hears us. A browser's keys wait
+        behind its requests: longer than `_SILENCE`, and they were released meanwhile.
+        """
         self.vehicle = ""
         self._patience = patience
         self._lock = threading.Lock()  # or one thread sends by what another has just put away
