@@ -157,7 +157,10 @@ compiles_nothing() {
 
 # Both wait for the network, and then dpkg has one core, and pip the other. Ctrl-C ends apt, and pip a little later.
 fill_both() {
-  { renice -n 10 "$BASHPID" >/dev/null && make_venv requirements.txt; } &
+  { # who is nicer already, may not take that back
+    renice -n 10 "$BASHPID" >/dev/null 2>&1 || true
+    make_venv requirements.txt
+  } &
   # shellcheck disable=SC2046 # one word each
   install_packages $(packages)
   wait $!

@@ -126,6 +126,12 @@ def test_landing_and_takeoff(cockpit, panel):
     wait_until(panel.page, lambda: cockpit.drone.place[2] > 0.5)
 
 
+def test_a_script_that_cannot_land_is_said_so(cockpit, panel):
+    rospy.set_param("/drone_sim/script", "tutorial")
+    assert cockpit.call("restart").startswith("started")
+    panel.press("Land", "land: no effect: the child script does not subscribe to it")
+
+
 def test_another_scene(cockpit, panel):
     scene = "package://drone_sim/config/scenes/empty.yaml"
     panel.choose("Scene", "empty")

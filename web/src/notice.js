@@ -18,6 +18,11 @@ export class Notice {
     if (line && !bad) this.later = setTimeout(() => this.clear(), READ);
   }
 
+  // What the simulation warns of may be why a button did nothing; an error is more.
+  warn(line) {
+    if (!this.element.classList.contains("bad")) this.say(line);
+  }
+
   clear() {
     this.say("");
   }

@@ -131,7 +131,7 @@ class FlightState:
         """Forget which requests no script answered: another script may be there."""
         self.is_flown = False  # by a child script, which is loaded
         self._missing = ""
-        self._dropped: set[str] = set()
+        self._told: set[str] = set()  # topics that had no effect
 
     def __str__(self) -> str:
         """Return the state, as a script says it; `unknown` where none does."""
@@ -144,18 +144,21 @@ class FlightState:
     def ask(self, topic: str, message: Any, before: Callable[[], None] = lambda: None) -> None:
         """Call `before`, and leave the message for the next step; where no script listens, say so instead.
 
-        While the simulation is stopped, and has no script, nothing happens but a line for each topic and stop.
+        So it is while the simulation is stopped, and has no script. It is said once for each topic and script.
         """
         if not self.is_flown:
-            if topic not in self._dropped:
-                self._dropped.add(topic)
-                _LOG.warning("%s: no effect: the simulation is stopped; `start` it first", topic)
+            self._tell(topic, "the simulation is stopped; `start` it first")
             return
         hearing = [bus for bus in self._commands.buses if bus.hears(topic)]
         if hearing:
             before()
-        elif not self._missing:
-            self._missing = f"{UNKNOWN}: the script does not subscribe to {topic}"
-            _LOG.warning("%s: no effect: the child script does not subscribe to it; `pilot` does", topic)
+        else:
+            self._missing = self._missing or f"{UNKNOWN}: the script does not subscribe to {topic}"
+            self._tell(topic, "the child script does not subscribe to it; `pilot` does")
         for bus in hearing:
             bus.post(topic, message)
+
+    def _tell(self, topic: str, why: str) -> None:
+        if topic not in self._told:
+            self._told.add(topic)
+            _LOG.warning("%s: no effect: %s", topic, why)
