@@ -24,12 +24,12 @@ class Mouse:
     """The mouse on a page, whose eyes stand still while something is dragged."""
 
     def __init__(self, page):
-        self.page, self.at = page, (0, 0)
+        self.page, self.on = page, (0.0, 0.0, 0.0)
 
     def over(self, point):
         """Go to a point of the world; there is another picture when the page has seen it."""
-        self.at = self.page.evaluate(PROJECT, list(map(float, point)))
-        self.page.mouse.move(*self.at)
+        self.on = list(map(float, point))
+        self.page.mouse.move(*self.page.evaluate(PROJECT, self.on))
         self.page.evaluate("new Promise(done => scene.canvas.then(done))")
 
     def take(self, part, place=ARROW):
@@ -41,9 +41,13 @@ class Mouse:
         return tip
 
     def _has_handle(self):
-        """Whether the handle is shown; what comes under a mouse that rests is not seen: it moves a little."""
-        self.page.mouse.move(self.at[0] + 1, self.at[1])
-        self.page.mouse.move(*self.at)
+        """Whether the handle is shown; what comes under a mouse that rests is not seen: it moves a little.
+
+        In a scene that has just been loaded, the eyes may still follow the drone: where the point is, is asked anew.
+        """
+        x, y = self.page.evaluate(PROJECT, self.on)
+        self.page.mouse.move(x + 1, y)
+        self.page.mouse.move(x, y)
         return self.page.evaluate("scene.gizmo.isShown")
 
     def drag(self, point):
