@@ -425,5 +425,6 @@ case "$command" in
   deb) install_packages apt-utils python3-opencv python3-pil python3-tqdm python3-zmq
     setup; make_docs; TMPDIR=$cache packaging/deb.sh "$wheels" ;;
   wheel) setup; make_wheel ;;
-  *) sed -n '2,7s/^# \{0,1\}//p' "$0" ;;
+  help | -h | --help) sed -n '2,7s/^# \{0,1\}//p' "$0" ;;
+  *) fail "$command: no such command; ./dev.sh help lists them" ;;
 esac

@@ -19,7 +19,8 @@ def sysCall_init():
     self.frontImage = sim.getObjectHandle("FrontVision")
     self.gate = sim.getObjectHandle("Red")
     self.boxes = []
-    self.boxes_subscriber = simROS.subscribe("/drone/front/truth/boxes", "std_msgs/String", "on_boxes", 1)
+    if FIND == "box":
+        self.boxes_subscriber = simROS.subscribe("/drone/front/truth/boxes", "std_msgs/String", "on_boxes", 1)
     self.steps = 0
     self.until = None  # s, when it is through
 
@@ -90,5 +91,6 @@ def fly_to(box, now):
 
 def sysCall_cleanup():
     """End what init began."""
-    simROS.shutdownSubscriber(self.boxes_subscriber)
+    if FIND == "box":
+        simROS.shutdownSubscriber(self.boxes_subscriber)
     tutorial.sysCall_cleanup()

@@ -6,7 +6,7 @@ import argparse
 import signal
 import sys
 from collections.abc import Callable
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from drone_sim.files.resources import package_path
 from drone_sim.message_text import printable
@@ -19,9 +19,13 @@ SEPARATE = ("av", "distributed", "jinja2", "matplotlib", "scipy")
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that says what is wrong in one line, instead of the usage."""
+    """An argument parser that says what is wrong in one line, instead of the usage; `--seed` is not `--seeds`."""
 
     wrong = FAILED  # the exit status for wrong arguments
+
+    def __init__(self, **options: Any):
+        """Take what argparse's own takes; options are not abbreviated."""
+        super().__init__(allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
         """End the program, with that line on stderr."""

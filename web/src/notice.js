@@ -18,7 +18,7 @@ export class Notice {
     if (line && !bad) this.later = setTimeout(() => this.clear(), READ);
   }
 
-  // What the simulation warns of may be why a button did nothing; an error is more.
+  // A line that takes no error away.
   warn(line) {
     if (!this.element.classList.contains("bad")) this.say(line);
   }

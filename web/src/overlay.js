@@ -2,6 +2,7 @@
 import { create, iconButton } from "./dom.js";
 
 const SVG = "http://www.w3.org/2000/svg";
+const READABLE = 11; // px of the page, of a name
 const KINDS = { boxes: "Boxes around the objects in this picture", mask: "Mask: a color for each category in this picture" };
 
 export class Overlay {
@@ -29,7 +30,8 @@ export class Overlay {
     }
     const [width, height] = [image.naturalWidth * step, image.naturalHeight * step];
     this.svg.setAttribute("viewBox", `-0.5 -0.5 ${width} ${height}`);
-    this.svg.replaceChildren(...boxes.filter(({ box }) => Array.isArray(box)).flatMap((one) => drawn(one, width / 40)));
+    const size = Math.max(width / 40, (READABLE * width) / (this.svg.clientWidth || width));
+    this.svg.replaceChildren(...boxes.filter(({ box }) => Array.isArray(box)).flatMap((one) => drawn(one, size)));
     this.legend.replaceChildren(...legend.map(({ name, color }) => {
       const patch = create("i");
       patch.style.background = color;

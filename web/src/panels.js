@@ -13,7 +13,7 @@ import { Toolbar } from "./toolbar.js";
 import { Tune } from "./tune.js";
 import { View } from "./view.js";
 
-const WARNING = "warning: "; // so the simulation's warnings begin in the log
+const NO_EFFECT = /^warning: .*: no effect: /; // in the log: why a button did nothing
 const TOUCH = matchMedia("(pointer: coarse), (max-width: 900px)"); // where the script covers the scene
 
 export class Panels {
@@ -109,7 +109,7 @@ export class Panels {
       this.board.take(message);
     }
     if (message.log) this.log.add(message.log);
-    if (message.log?.startsWith(WARNING)) this.notice.warn(message.log);
+    if (NO_EFFECT.test(message.log)) this.notice.warn(message.log);
     this.build.told(message);
     if (message.pictures) this.cameras.show(message.pictures);
   }

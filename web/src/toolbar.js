@@ -106,7 +106,8 @@ export class Toolbar {
   }
 
   offer(select, all, now) {
-    const options = all.map((one) => create("option", { value: one, textContent: one === "none" ? "as launched" : one }));
+    const named = (one) => (one === "none" ? "as launched" : one.slice(one.lastIndexOf("/") + 1));
+    const options = all.map((one) => create("option", { value: one, title: one, textContent: named(one) }));
     select.replaceChildren(...options);
     select.value = now;
   }

@@ -22,7 +22,7 @@ from drone_sim.config.types import (
     word_of,
 )
 from drone_sim.files.yaml_files import YamlLines
-from drone_sim.message_text import shown
+from drone_sim.message_text import near_names, shown
 
 _UNIONS = (Union, UnionType)  # Union[A, B] and A | B
 _Model = TypeVar("_Model", bound=Checked)
@@ -53,7 +53,7 @@ def problems(error: ValidationError, model: type[BaseModel]) -> list[ParameterPr
         if one["type"] == "missing" and not place.is_in_list:
             missing.setdefault(place.location[:-1], []).append(place)
         else:
-            found.update(dict.fromkeys(_problems(one, place)))
+            found.update(dict.fromkeys(_problems(one, place, model)))
     return [*found, *map(_missing, missing.values())]
 
 
@@ -166,22 +166,24 @@ def _missing(places: list[_ErrorPlace]) -> ParameterProblem:
     return ParameterProblem(location[:-1], f"{', '.join(str(place.location[-1]) for place in places)} are missing")
 
 
-def _problems(error: Any, place: _ErrorPlace) -> Sequence[ParameterProblem]:
+def _problems(error: Any, place: _ErrorPlace, model: type[BaseModel]) -> Sequence[ParameterProblem]:
     raised = error.get("ctx", {}).get("error")
     if isinstance(raised, ParameterError):  # of several keys at once
         return [one._replace(or_above=bool(one.location)) for one in raised.below(*place.location).problems]
-    return [_problem(error, place)]
+    return [_problem(error, place, model)]
 
 
-def _problem(error: Any, place: _ErrorPlace) -> ParameterProblem:
+def _problem(error: Any, place: _ErrorPlace, model: type[BaseModel]) -> ParameterProblem:
     location, value = place.location, error["input"]
     if error["type"] in ("union_tag_invalid", "union_tag_not_found") and isinstance(value, Mapping):
         return _wrong_choice(_choice(place.annotation), location, value)
     if error["type"] == "missing":  # a number of a list
         location = location[:-1]
     if error["type"] == "extra_forbidden":
-        return ParameterProblem(location, f"unknown key{_near(str(location[-1]), place.known)}")
-    return ParameterProblem(location, _reason(error, place), shown(value))
+        key = str(location[-1])
+        return ParameterProblem(location, f"unknown key; {_below(model, key) or near_names(key[:80], place.known)}")
+    is_of_several = error["type"] == "value_error" and isinstance(value, Mapping)
+    return ParameterProblem(location, _reason(error, place), "" if is_of_several else shown(value))
 
 
 def _wrong_choice(choice: _Choice, location: Location, value: Mapping[str, Any]) -> ParameterProblem:
@@ -223,6 +225,9 @@ def _must_be_one_of(choice: _Choice, key: str = "") -> str:
     return f"must be one of {', '.join(map(repr, words))}{or_other if choice.others and not key else ''}"
 
 
-def _near(key: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(key[:80], known, n=3) or known
-    return f"; known are {', '.join(near)}" if near else ""
+def _below(model: type[BaseModel], key: str) -> str:
+    """Return 'there is a/key' where the key belongs into a mapping of the model, '' where into none."""
+    for name, field in model.model_fields.items():
+        if key in getattr(_bare(field.annotation), "model_fields", {}):
+            return f"there is {field.alias or name}/{key}"
+    return ""

@@ -124,7 +124,8 @@ class LensView:
 
     def _between(self, stack: np.ndarray, nearest: np.ndarray) -> np.ndarray:
         """Return the tiles' depths at the pixels: within one thing interpolated by 1/depth, linear on a plane."""
-        smooth = 1.0 / cv2.remap(1.0 / stack, self._exact[0], self._exact[1], cv2.INTER_LINEAR)
+        with np.errstate(divide="ignore"):  # where the lens sees nothing
+            smooth = 1.0 / cv2.remap(1.0 / stack, self._exact[0], self._exact[1], cv2.INTER_LINEAR)
         return np.where(np.abs(smooth - nearest) < _ALIKE * nearest, smooth, nearest)
 
 

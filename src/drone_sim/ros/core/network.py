@@ -33,8 +33,18 @@ def call(uri: str, method: str, *arguments: Any, patience: float | None = None) 
 
     Raises one of FAILURES.
     """
+    return _answer(uri, method, (_CALLER, *arguments), patience)
+
+
+def launched(uri: str) -> list[str]:
+    """Return what a roslaunch, of which this is the address, runs: names of nodes, and `master`. Raises as `call`."""
+    running, _ended = _answer(uri, "list_processes", (), None)
+    return [name.rpartition("-")[0] or name for name, _spawned in running]
+
+
+def _answer(uri: str, method: str, arguments: tuple[Any, ...], patience: float | None) -> Any:
     server = xmlrpc.client.ServerProxy(uri, transport=_Transport(patience or PATIENCE))
-    answer = getattr(server, method)(_CALLER, *arguments)
+    answer = getattr(server, method)(*arguments)
     if not isinstance(answer, list) or len(answer) != 3:
         raise ValueError("no answer of ROS's")
     code, said, value = answer

@@ -26,7 +26,7 @@ import rosgraph
 import rospkg
 import rospy
 
-from drone_sim.ros.core.network import FAILURES, addresses, call, check_master_uri, reached
+from drone_sim.ros.core.network import FAILURES, addresses, call, check_master_uri, launched, reached
 from drone_sim.ros.core.tcpros import take_connections
 from drone_sim.scripting.errors import ScriptError
 
@@ -41,12 +41,13 @@ _ASKS, _STARTING = 0.1, 5.0  # s, between two questions to the master; for a sim
 _Answer = TypeVar("_Answer")
 
 
-def init_node(name: str, others_wait: bool = False, **options: Any) -> bool:
+def init_node(name: str, is_required: bool = False, **options: Any) -> bool:
     """Call rospy.init_node; return False, after one line on stderr, where it cannot become a node.
 
     rospy itself would wait for the master, or fail with a traceback, or be a node that nobody can reach. An older node
-    of the same name is ended first; with `others_wait` other processes that want the name wait until release_name. Log
-    lines go to stdout at once: without a terminal, Python would keep them until there are 8 KiB.
+    of the same name is ended first. If `is_required`, its roslaunch ends with it: an older one is left where the master
+    would end, too; and other processes that want the name wait until release_name. Log lines go to stdout at once:
+    without a terminal, Python would keep them until there are 8 KiB.
     """
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
@@ -55,7 +56,7 @@ def init_node(name: str, others_wait: bool = False, **options: Any) -> bool:
         _check_own_address()
         own = _own_name(name, bool(options.get("anonymous")))
         if own:
-            _take_name(own)
+            _take_name(own, is_required)
     except (ValueError, OSError) as error:
         print(f"{name}: {error}", file=sys.stderr, flush=True)
         return False
@@ -63,7 +64,7 @@ def init_node(name: str, others_wait: bool = False, **options: Any) -> bool:
     done = not reported(name, lambda: rospy.init_node(name, **options))
     if done:
         take_connections()
-    if not others_wait:
+    if not is_required:
         release_name()
     return done
 
@@ -151,15 +152,17 @@ def from_shell(name: str) -> str:
 _turn: socket.socket | None = None  # held by one process of a name, on this machine; it goes when the process does
 
 
-def _take_name(name: str) -> None:
+def _take_name(name: str, is_required: bool) -> None:
     """End the node of a name, so that this process may register with the master.
 
     Another process that is started at the same moment, on the same machine, waits until `release_name`. Raises OSError
-    where the older node does not end, or does not answer.
+    where the older node does not end, does not answer, or would end the master with it.
     """
     _wait_for_turn(name)
     uri = _node(name)
     if uri and _name(name, uri) == name:
+        if is_required and _launched_with_master(name):
+            raise OSError(f"{name} is there already, and the master ends with it: press Ctrl-C in its terminal first")
         print(f"{name} is there already: it ends, and this one takes its place", file=sys.stderr, flush=True)
         _end(name, uri)
 
@@ -195,6 +198,15 @@ def _node(name: str) -> str:
         return str(call(rosgraph.get_master_uri(), "lookupNode", name, patience=_PATIENCE))
     except ValueError:
         return ""
+
+
+def _launched_with_master(name: str) -> bool:
+    """Whether the roslaunch that started the node of a name has started the master, too."""
+    with contextlib.suppress(*FAILURES):  # no roslaunch, or one that has ended meanwhile
+        for uri in call(rosgraph.get_master_uri(), "getParam", "/roslaunch/uris", patience=_PATIENCE).values():
+            if {"master", name.strip("/")} <= set(launched(uri)):
+                return True
+    return False
 
 
 def _name(name: str, uri: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import os
 import signal
@@ -12,6 +11,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from types import FrameType
 
+from drone_sim.command_line import Parser
 from drone_sim.ros.core.network import PATIENCE
 from drone_sim.ros.doctor import HINT, WRONG, Line, environment, packages
 from drone_sim.ros.doctor.master import Master, simulator
@@ -79,7 +79,7 @@ def _limited(seconds: float) -> Iterator[None]:
 
 def main() -> int:
     """Print the lines; return the exit status."""
-    parser = argparse.ArgumentParser(prog="doctor", description=__doc__, epilog=_EPILOG)
+    parser = Parser(prog="doctor", description=__doc__, epilog=_EPILOG)
     parser.add_argument("--quick", action="store_true", help="skip packages, pictures and the test flight")
     given = [one for one in sys.argv[1:] if ":=" not in one]  # roslaunch's and rosrun's
     thorough = not parser.parse_args(given).quick

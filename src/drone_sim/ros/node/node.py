@@ -55,6 +55,7 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import script_path
+from drone_sim.vehicles.situation import hears_commands
 from drone_sim.vehicles.vehicle import Vehicle
 
 _NAME = "drone_sim"
@@ -139,9 +140,7 @@ class Node:
             self._topics.follow()  # so that cameras see the first step
         gc.collect()
         gc.freeze()  # what is there by now stays: the collector, looking through it again and again, makes steps late
-        commands = ", ".join(rospy.resolve_name(f"{name}/cmd_vel") for name in self.simulation.vehicles)
-        doing = "flying" if self.player.playing else "stopped"
-        rospy.loginfo(f"drone_sim: {doing}; {f'commands on {commands}' if commands else 'no vehicle is in the scene'}")
+        rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; {self._topics_of_commands()}")
         self._diagnostics.start()
         steps, seconds = 0, 0.0
         self._pacer.restart()
@@ -262,6 +261,15 @@ class Node:
                 self.simulation.world.pictures.look_from_behind(position(track), to_euler(track)[2])
         self._beat.restart()
 
+    def _topics_of_commands(self) -> str:
+        """Return where commands are received, in words, and whether a script hears them."""
+        vehicles = self.simulation.vehicles
+        if not vehicles:
+            return "no vehicle is in the scene"
+        is_heard = not self.player.playing or any(map(hears_commands, vehicles.values()))
+        topics = ", ".join(rospy.resolve_name(f"{name}/cmd_vel") for name in vehicles)
+        return f"commands on {topics}{'' if is_heard else ', but no script subscribes to them'}"
+
     def descriptions(self) -> Iterable[str]:
         """Return the names of the parameters that hold the vehicles' URDFs; any thread may call it."""
         return self._topics.descriptions
@@ -285,7 +293,7 @@ class _ToRosout(logging.Handler):
 def main(guardian: Guardian) -> int:
     """Run the node; return its exit status: 1, after one line, for a wrong parameter, file or script."""
     # The time of messages is the simulation's; hearing its own /clock would cost the node half of its speed.
-    if not init_node(_NAME, others_wait=True, disable_signals=True, disable_rostime=True):
+    if not init_node(_NAME, is_required=True, disable_signals=True, disable_rostime=True):
         return 1
     shutdown = Shutdown(guardian)
     nodes = []

@@ -18,6 +18,7 @@ import rosgraph
 import rospy
 from sensor_msgs.msg import CompressedImage, Image
 
+from drone_sim.command_line import Parser
 from drone_sim.message_text import near_names
 from drone_sim.ros.core.shutdown import run_tool
 from drone_sim.ros.tools import pictures
@@ -176,7 +177,7 @@ def _window() -> Any:
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog=_NAME, description=__doc__)
+    parser = Parser(prog=_NAME, description=__doc__)
     parser.add_argument("topics", metavar="TOPIC", nargs="*", default=["drone/front"], help="default: drone/front")
     parser.add_argument("--png", metavar="FILE", help="write the next pictures to one PNG file, and end")
     return parser.parse_args(rosgraph.myargv(sys.argv)[1:])

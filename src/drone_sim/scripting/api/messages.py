@@ -6,6 +6,7 @@ at the start of its next step. What a script publishes goes to the Backend where
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -14,6 +15,8 @@ from drone_sim.scripting.api.backend import Backend, MessageSender
 from drone_sim.scripting.api.service_servers import ServiceServer
 from drone_sim.scripting.api.topics import SERVICE, OwnTopic, Subscriptions
 from drone_sim.scripting.api.types import Callback
+
+_LOG = logging.getLogger(__name__)
 
 _MOST = 200  # subscriptions and publishers
 _LONGEST_QUEUE = 1000  # messages
@@ -67,7 +70,10 @@ class MessageBus:
             return there
 
         def begin(take: Callable[[Any], None]) -> Callable[[], None]:
-            if self.backend is None or resolved in self._own_topics:
+            if resolved in self._own_topics:
+                return _nothing
+            if self.backend is None:
+                _LOG.warning("%s: no message will come: without ROS, nobody publishes it", resolved)
                 return _nothing
             return self.backend.subscribe(resolved, kind, take)
 
