@@ -71,7 +71,7 @@ class Conditions(unittest.TestCase):
         publisher.publish(message)
         self.log.wait_for(lambda said: "set_wind refused: wind/0 = 1000.0" in said.msg, after=0)
         self.weather.publish("gust", "1")
-        self.log.wait_for(lambda said: "weather refused: gust: unknown key; known are gusts" in said.msg, after=0)
+        self.log.wait_for(lambda said: "weather refused: gust: unknown key; near names are gusts" in said.msg, after=0)
         self.assertEqual(wind.wait_for().vector.x, 2)
 
     def test_a_slow_link(self):

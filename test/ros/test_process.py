@@ -109,7 +109,7 @@ class Process(unittest.TestCase):
             ("_time_step:=0.012", "parameter time_step = 0.012: must be a whole multiple of sub_step = 0.005"),
             ("_drone:={urdf: /no/such.urdf}", "parameter drone/urdf = '/no/such.urdf': no such file"),
             ("_cameras:={front: {width: 0}}", "parameter cameras/front/width = 0"),
-            ("_real_time_facter:=2", "parameter real_time_facter: unknown key; known are real_time_factor"),
+            ("_real_time_facter:=2", "parameter real_time_facter: unknown key; near names are real_time_factor"),
         ):
             with self.subTest(argument):
                 for name in ("time_step", "drone", "cameras", "real_time_facter"):
@@ -353,6 +353,20 @@ class Process(unittest.TestCase):
         last.communicate(timeout=HANGS)
         watchdog.cancel()
         self.assertEqual(last.returncode, 0)
+
+    def test_a_simulator_with_which_the_master_would_end_stays(self):
+        with socket.create_server(("localhost", 0)) as free:
+            port = str(free.getsockname()[1])
+        first = started("roslaunch", "-p", port, "drone_sim", "drone.launch", "rviz:=false")
+        try:
+            self.said_until(first, "flying; commands on")
+            second = simulator(ROS_MASTER_URI=f"http://localhost:{port}")
+            self.assert_refused(second, "/drone_sim is there already, and the master ends with it: press Ctrl-C in its")
+            self.assertIsNone(first.poll())
+        finally:
+            first.send_signal(signal.SIGINT)
+            said = first.communicate(timeout=HANGS)[0]
+        self.assertNotIn("REQUIRED process", said)
 
     def test_two_processes_fly_alike_to_the_last_bit(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -284,7 +284,7 @@ class Toolbar(unittest.TestCase):
         self.assertAlmostEqual(saved["drone"]["yaw"], 0.5, places=3)
         self.scene.write_text("object: []\n")
         said = self.call("load_scene", expected=False)
-        self.assertIn("parameter object: unknown key; known are collections, datum, drone, floor, gravity", said)
+        self.assertIn("parameter object: unknown key; near names are objects", said)
 
     def test_the_scene_is_edited_by_two_at_once(self):
         self.call("stop")

@@ -41,7 +41,7 @@ class Sensors(Checked):
         ),
         (
             {"sensors": {"a": {"kind": "laser", "raech": 1, "reach": 1}}},
-            "sensors/a/raech: unknown key; known are reach",
+            "sensors/a/raech: unknown key; near names are reach",
         ),
         ({"sensors": {}, "spare": {"kind": 5}}, "spare/kind = 5: must be one of 'ultrasonic', 'laser', 'scale'"),
         ({"sensors": {}, "places": [{}]}, "places/0/kind: missing; must be one of 'ultrasonic', 'laser', 'scale'"),

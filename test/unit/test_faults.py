@@ -250,7 +250,7 @@ def test_the_pages_example_is_allowed(tmp_path):
     [
         ({"propellers": [1, 1, 1]}, "faults/propellers = [1, 1, 1]: must be 4 numbers from 0 to 1"),
         ({"propellers": [1, 1, 1, 2]}, "faults/propellers/3 = 2: input should be less than or equal to 1"),
-        ({"commands": {"latancy": 1}}, "faults/commands/latancy: unknown key; known are latency"),
+        ({"commands": {"latancy": 1}}, "faults/commands/latancy: unknown key; near names are latency"),
         ({"images": {"latency": 3}}, "faults/images/latency = 3: input should be less than or equal to 2"),
         ({"sensors": {"front": "mad"}}, "faults/sensors/front = 'mad': input should be 'ok', 'silent' or 'frozen'"),
         ({"sensors": {"frnt": "ok"}}, "faults/sensors/frnt: no such sensor or camera; near names are front"),

@@ -83,7 +83,7 @@ def test_entries_change_what_they_name_alone(fly):
 @pytest.mark.parametrize(
     "vehicles, said",
     [
-        ({"a": {"controll": {}}}, r"parameter vehicles/a/controll: unknown key; known are control"),
+        ({"a": {"controll": {}}}, r"parameter vehicles/a/controll: unknown key; near names are control"),
         ({"a": {"control": {"Kzref": -1}}}, r"parameter vehicles/a/control/Kzref = -1: .*greater than or equal to 0"),
         ({"a b": {}}, r"parameter vehicles/a b.*: must be a letter and then letters, digits or _"),
         ({"a": {"name": "b"}}, r"parameter vehicles/a/name: unknown key; the key of the entry is its name"),

@@ -130,7 +130,7 @@ def test_changes_are_laid_over_the_plan(written):
     lazy = flight.grade(steps, changes={"control": {"Kvcorr": 0.0}})
     assert (lazy.passed, lazy.changes) == (False, {"control": {"Kvcorr": 0.0}})
     wrong = flight.grade(steps, changes={"control": {"Kvcor": 1}})
-    assert "control/Kvcor: unknown key; known are Kvcorr" in wrong.error
+    assert "control/Kvcor: unknown key; near names are Kvcorr" in wrong.error
     assert said(wrong) == {"rise_time": "nothing was flown"}
 
 
@@ -322,11 +322,11 @@ WRONG = {
     "duration: 5\ncriteria:\n- {kind: rise_time, of: vx, from: 1, to: 1, at_most: 1}": "criteria/0/to = 1: is the same",
 }
 BESIDE = {
-    "duratoin: 5": "line 1: duratoin: unknown key; known are duration",
+    "duratoin: 5": "line 1: duratoin: unknown key; near names are duration",
     "name: a b": "line 1: name = 'a b': must be a letter and then",
     "scene: nix.yaml": "no such file: ",
     "vehicle: dron": "line 1: vehicle = 'dron': no such vehicle; near names are drone",
-    "config: {control: {Kzre: 3}}": "line 1: config/control/Kzre: unknown key; known are Kzref",
+    "config: {control: {Kzre: 3}}": "line 1: config/control/Kzre: unknown key; near names are Kzref",
     "config: 3": "line 1: config = 3: must hold keys of config/drone.yaml, or be the name of a file",
     "timeline: [{at: 1, twst: {}}]": "line 1: entry 1: twst: unknown key",
     "timeline: 3": "line 1: timeline = 3: ",

@@ -131,7 +131,7 @@ def test_a_file_and_then_parameters_are_laid_over_joy_yaml(tmp_path):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"deadman": 5}, "parameter deadman: unknown key; known are dead_man"),
+        ({"deadman": 5}, "parameter deadman: unknown key; near names are dead_man"),
         ({"dead_man": -1}, "parameter dead_man = -1: "),
         ({"axes": {"vx": 4}}, "parameter axes/vx = 4: must hold `key: value` lines with axis, scale"),
         ({"axes": {"vx": {"axis": 1.5}}}, "parameter axes/vx/axis = 1.5: "),

@@ -12,7 +12,8 @@ BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
 @pytest.mark.parametrize(
     "overrides, message",
     [
-        ({"control": {"Kzreff": 4}}, "parameter control/Kzreff: unknown key; known are Kzref"),
+        ({"Kzref": 4}, "parameter Kzref: unknown key; there is control/Kzref"),
+        ({"control": {"Kzreff": 4}}, "parameter control/Kzreff: unknown key; near names are Kzref"),
         ({"time_step": 0.012}, "parameter time_step = 0.012: must be a whole multiple of sub_step = 0.005"),
         ({"time_step": 0}, "parameter time_step = 0: input should be greater than or equal to 0.0001"),
         ({"cameras": {"front": {"width": 0}}}, "parameter cameras/front/width = 0"),
@@ -91,7 +92,7 @@ def test_every_wrong_key_of_a_config_file_is_named_with_its_line(tmp_path):
         parameters.load({"config": str(file)})
     assert str(refused.value).split("; line ") == [
         f"{file}: line 1: parameter gui = 1: must be true or false",
-        "3: parameter control/Kzreff: unknown key; known are Kzref, Dzref",
+        "3: parameter control/Kzreff: unknown key; near names are Kzref, Dzref",
         "4: parameter control/thrust_limits = [1]: must be 2 numbers, [lowest, highest] in m/s, or none",
         "6: parameter cameras/9x = '9x': must be a letter and then letters, digits or _",
         "6: parameter cameras/9x = 5: must hold `key: value` lines with shutter, vignette, exposure, noise, object, "
@@ -113,7 +114,7 @@ def test_every_wrong_key_of_a_config_file_is_named_with_its_line(tmp_path):
         (
             "scene:\n  boxes: 1",
             2,
-            "parameter scene/boxes: unknown key; known are datum, magnetic_field, floor, objects",
+            "parameter scene/boxes: unknown key; near names are objects",
         ),
     ],
 )
@@ -129,7 +130,7 @@ def test_all_mistakes_of_a_command_line_are_named():
     with pytest.raises(parameters.ParameterError) as refused:
         parameters.load({"gravity": "down", "control": {"Kzreff": 3}})
     assert str(refused.value) == (
-        "parameter control/Kzreff: unknown key; known are Kzref, Dzref; "
+        "parameter control/Kzreff: unknown key; near names are Kzref, Dzref; "
         "parameter gravity = 'down': input should be a valid number"
     )
 
@@ -195,7 +196,7 @@ def test_the_files_that_a_config_file_names_lie_beside_it(tmp_path):
     [
         ("gravity: 1:30", "config.yaml: line 1: parameter gravity = '1:30'"),
         ("gravity: 1\ngravity: 2", "config.yaml: key 'gravity' comes twice (line 2, column 1)"),
-        ("gravty: 1", "config.yaml: line 1: parameter gravty: unknown key; known are gravity"),
+        ("gravty: 1", "config.yaml: line 1: parameter gravty: unknown key; near names are gravity"),
         ("config: other.yaml", "config.yaml: a config file names no other `config`"),
         ("- 1", "config.yaml: must hold `key: value` lines"),
     ],

@@ -29,7 +29,7 @@ def refused(overrides):
         ({"imu": 3}, "sensors/imu = 3: must have `key: value` lines, one of them `kind`"),
         ({"imu": {"rate": 200}}, "sensors/imu/kind: missing; must be one of 'imu', 'range', 'magnetic_field'"),
         ({"imu": {"kind": "lidar"}}, "sensors/imu/kind = 'lidar': must be one of 'imu', 'range'"),
-        ({"imu": {**IMU, "rat": 1}}, "sensors/imu/rat: unknown key; known are rate"),
+        ({"imu": {**IMU, "rat": 1}}, "sensors/imu/rat: unknown key; near names are rate"),
         ({"imu": {"kind": "imu"}}, "sensors/imu/rate: missing"),
         (
             {"imu": {**IMU, "rate": 150}},

@@ -148,7 +148,7 @@ def test_a_change_of_the_wind_lets_the_gusts_go_on():
 
 def test_a_wrong_change_changes_nothing():
     air, _ = weather((1.0, 0.0, 0.0))
-    with pytest.raises(ParameterError, match=r"^parameter gusts/lenght: unknown key; known are length"):
+    with pytest.raises(ParameterError, match=r"^parameter gusts/lenght: unknown key; near names are length"):
         air.change({"gusts": {"lenght": [1, 1, 1]}})
     with pytest.raises(ParameterError, match=r"wind = \[1, 2\]: must be 3 numbers, \[x, y, z\] in m/s"):
         air.change({"wind": [1, 2]})

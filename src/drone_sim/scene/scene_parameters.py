@@ -29,7 +29,7 @@ from drone_sim.files import images, mesh_files
 from drone_sim.files.resources import resolve
 from drone_sim.mechanics.object_names import numbered
 from drone_sim.mechanics.object_tree import DEEPEST
-from drone_sim.message_text import shown
+from drone_sim.message_text import near_names, shown
 from drone_sim.scene import attached_scripts, object_collections
 from drone_sim.scene.attached_scripts import AttachedScriptParameters, AttachedScripts
 from drone_sim.scene.entry import EntryParameters
@@ -183,8 +183,8 @@ def problem_in_file(problem: ParameterProblem) -> ParameterProblem | None:
         return None
     inner = problem._replace(location=problem.location[1:])
     if len(inner.location) == 1 and inner.location[0] not in SceneParameters.model_fields:
-        known = ", ".join(sorted([*SceneParameters.model_fields, *BESIDE]))
-        return inner._replace(reason=f"unknown key; known are {known}")
+        near = near_names(str(inner.location[0])[:80], [*SceneParameters.model_fields, *BESIDE])
+        return inner._replace(reason=f"unknown key; {near}")
     return inner
 
 
