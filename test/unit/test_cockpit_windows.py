@@ -265,6 +265,28 @@ def test_boxes_and_mask_are_those_of_the_pictures_stamp(cameras, sent):
     assert not Subscriber.there
 
 
+def test_a_picture_waits_for_its_boxes_unless_none_come_at_all(cameras, sent):
+    cameras.rest(False)
+    cameras.offer((ImageTopic("/drone/front", has_truth=True),))
+    cameras.turn("/drone/front", True)
+    cameras.overlay_asked({"topic": "/drone/front", "overlay": "boxes", "on": True})
+    hear, truth = Subscriber.there["/drone/front"], Subscriber.there["/drone/front/truth/boxes"]
+
+    def take(number):
+        one = message(np.full((2, 2, 3), 10 * number, np.uint8), "rgb8")
+        one.header.stamp = rospy.Time.from_sec(0.1 * number)
+        hear(one)
+        cameras.show()
+        return [int(picture(content)[0, 0, 0]) // 10 for _, content in sent.pictures]
+
+    assert take(1) == []
+    truth(String(json.dumps({"stamp": 0.1, "objects": []})))
+    assert take(2) == [1], "that of the second has not come"
+    for number in range(3, 9):
+        assert take(number) == [1]
+    assert take(9) == [1, 9]
+
+
 def test_a_view_of_a_script_switches_its_camera(cameras):
     cameras.rest(False)
     cameras.follow_views(frozenset({"/drone/depth/image", "/later"}))

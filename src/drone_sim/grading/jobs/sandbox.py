@@ -65,8 +65,8 @@ def _found() -> tuple[str, str]:
     except (OSError, subprocess.TimeoutExpired) as error:
         return "", f"bubblewrap does not work here: {error}"
     if tried.returncode:
-        said = " ".join(tried.stderr.decode(errors="replace").split())
-        return "", f"bubblewrap does not work here: {said:.200}"
+        said = " ".join(tried.stderr.decode(errors="replace").split()).partition(". See <")[0]
+        return "", f"bubblewrap does not work here: {said:.200} (*What is kept out* in docs/grading.md says when it does)"
     return program, ""
 
 

@@ -23,6 +23,7 @@ from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
 from drone_sim.ros.cockpit.topics import ImageTopic
 from drone_sim.ros.core import image_messages
 
+_KEPT = 8  # pictures, while their truth is waited for
 _BUFFER = 1 << 24  # bytes: more than a picture, or old ones wait in it
 _WIDEST, _WIDEST_DEPTHS = 640, 320  # px; of a larger one, every other pixel, or less, is shown
 _COLORS = cv2.COLORMAP_TURBO  # near is blue, far is red
@@ -136,7 +137,7 @@ class CameraSwitches:
 class _CameraListener:
     def __init__(self, source: ImageTopic):
         self.source = source
-        self._latest: deque[Any] = deque(maxlen=1)
+        self._latest: deque[Any] = deque(maxlen=_KEPT)
         self._subscriber: rospy.Subscriber | None = None
         self.overlay = overlays.Overlay(source.topic) if source.has_truth else None
 
@@ -158,8 +159,18 @@ class _CameraListener:
             self._subscriber = None
 
     def take(self) -> Any:
-        """Return what has come since the last time, None where nothing has. One thread alone calls this."""
-        return self._latest.pop() if self._latest else None
+        """Return the newest picture since the last time, None where there is none. One thread alone calls this.
+
+        The truth comes a little after its picture: it is waited for, unless it does not come at all.
+        """
+        came = [*self._latest]
+        if self.overlay is not None and len(came) < _KEPT:
+            came = [one for one in came if self.overlay.has(one.header.stamp.to_sec())]
+        if not came:
+            return None
+        while self._latest and self._latest.popleft() is not came[-1]:
+            pass
+        return came[-1]
 
 
 class ScriptWindows:

@@ -17,6 +17,7 @@ from drone_sim.ros.core import image_messages, mask_colors
 
 BOXES, MASK = KINDS = ("boxes", "mask")
 _KEPT = 8  # messages, among which is that of the picture's stamp
+_SAME = 1e-6  # s, between two stamps of one picture
 _BUFFER = 1 << 24  # bytes: more than a picture
 _EVERYWHERE = "Floor"  # whose box is the picture
 _LONGEST = 1 << 21  # characters of a message
@@ -66,6 +67,11 @@ class Overlay:
 
     def _on_mask(self, message: Image) -> None:
         self._masks.append((message.header.stamp.to_sec(), message))
+
+    def has(self, stamp: float) -> bool:
+        """Whether all that is wanted over the picture of a stamp (s) has come."""
+        heard = {BOXES: self._boxes, MASK: self._masks}
+        return all(any(abs(one[0] - stamp) < _SAME for one in [*heard[kind]]) for kind in self.kinds)
 
     def said(self, stamp: float) -> dict[str, Any]:
         """Return what the page draws by itself over the picture of a stamp (s): boxes in px, and a legend."""
