@@ -66,7 +66,7 @@ def _found() -> tuple[str, str]:
         return "", f"bubblewrap does not work here: {error}"
     if tried.returncode:
         said = " ".join(tried.stderr.decode(errors="replace").split()).partition(". See <")[0]
-        return "", f"bubblewrap does not work here: {said:.200} (*What is kept out* in docs/grading.md says when it does)"
+        return "", f"bubblewrap does not work here: {said:.200} (docs/grading.md, *What is kept out*)"
     return program, ""
 
 
