@@ -229,7 +229,7 @@ def test_no_contact_but_with_what_is_allowed():
     flight = flown(T, more={"contacts": contacts})
     outcome = judged(flight, "no_contact", allow=["Floor"])
     assert (outcome.passed, outcome.value, outcome.at) == (False, 2.0, 2.5)
-    assert outcome.said == "touched Pole, Tree, first Pole at 2.50 s; allowed is only Floor"
+    assert outcome.said == "touched Pole at 2.50 s, then Tree; it may touch only Floor"
     assert judged(flight, "no_contact", after=3).passed
     assert judged(flight, "no_contact", after=2, until=2.49).passed
 

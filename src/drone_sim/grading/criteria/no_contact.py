@@ -29,6 +29,7 @@ class NoContact(Criterion):
         found = [one for one in part.flight.contacts if first <= one.at <= last and one.what not in self.allow]
         if not found:
             return self._outcome(True, "touched nothing that it may not", 0.0)
-        what = sorted({one.what for one in found})
-        said = f"touched {', '.join(what)}, first {found[0].what} at {found[0].at:.2f} s; allowed is {self.allowed}"
+        what = list(dict.fromkeys(one.what for one in found))
+        said = f"touched {what[0]} at {found[0].at:.2f} s{''.join(f', then {one}' for one in what[1:])}"
+        said = f"{said}; it may touch {self.allowed}"
         return self._outcome(False, said, float(len(what)), "", found[0].at)
