@@ -45,7 +45,7 @@ class FakeBackend:
         return self.senders.setdefault((topic, "image", queue), FakeSender())
 
 
-def test_names_stand_in_the_drones_namespace():
+def test_names_stand_in_the_drones_namespace(caplog):
     bus, heard = MessageBus("drone"), []
     bus.subscribe("cmd_vel", "geometry_msgs/Twist", "relative")
     bus.subscribe("/drone/cmd_vel", "geometry_msgs/Twist", "absolute")
@@ -53,6 +53,8 @@ def test_names_stand_in_the_drones_namespace():
     bus.post("cmd_vel", 1)
     heard += bus.take()
     assert heard == [("relative", 1), ("absolute", 1)]
+    said = "/other/cmd_vel: no message will come: without ROS, nobody publishes it"
+    assert [one.getMessage() for one in caplog.records] == [said]
 
 
 def test_the_same_subscription_once_more_is_the_one_that_is_there():
