@@ -34,21 +34,26 @@ class Mouse:
 
     def take(self, part, place=ARROW):
         """Press the button on a part of the handle; return where that is in the world."""
-        wait_until(self.page, self._has_handle)
+        self.wait("scene.gizmo.isShown", True)
         tip = np.array(self.page.evaluate(TIP, [part, place]))
         self.over(tip)
         self.page.mouse.down()
         return tip
 
-    def _has_handle(self):
-        """Whether the handle is shown; what comes under a mouse that rests is not seen: it moves a little.
+    def wait(self, seen, expected):
+        """Stay on the point until the page shows what is expected.
 
-        In a scene that has just been loaded, the eyes may still follow the drone: where the point is, is asked anew.
+        What comes under a mouse that rests is not seen: it moves a little. In a scene that has just been loaded, the
+        eyes may still follow the drone: where the point is, is asked anew.
         """
-        x, y = self.page.evaluate(PROJECT, self.on)
-        self.page.mouse.move(x + 1, y)
-        self.page.mouse.move(x, y)
-        return self.page.evaluate("scene.gizmo.isShown")
+
+        def is_seen():
+            x, y = self.page.evaluate(PROJECT, self.on)
+            self.page.mouse.move(x + 1, y)
+            self.page.mouse.move(x, y)
+            return self.page.evaluate(seen) == expected
+
+        wait_until(self.page, is_seen)
 
     def drag(self, point):
         self.page.mouse.move(*self.page.evaluate(PROJECT, list(map(float, point))), steps=5)
@@ -87,9 +92,9 @@ def test_a_drone_has_handles_and_thrust_arrows_while_the_mouse_is_on_it(cockpit,
         .some((one) => one.userData.said.layer === 'view/forces' && one.visible)]"""
     wait_until(opened, lambda: opened.evaluate(seen) == [False, False, False])
     mouse.over(cockpit.drone.place)
-    wait_until(opened, lambda: opened.evaluate(seen) == [True, True, True])
+    mouse.wait(seen, [True, True, True])
     mouse.over(np.add(cockpit.drone.place, (0.5, 0.6, -0.6)))
-    wait_until(opened, lambda: opened.evaluate(seen) == [False, False, False])
+    mouse.wait(seen, [False, False, False])
 
 
 def test_the_drone_goes_where_its_arrow_is_dragged(cockpit, opened, mouse):
