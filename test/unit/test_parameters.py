@@ -13,6 +13,7 @@ BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
     "overrides, message",
     [
         ({"Kzref": 4}, "parameter Kzref: unknown key; there is control/Kzref"),
+        ({"control": {"position": 4}}, "parameter control/position: unknown key; known are "),  # not `drone/position`
         ({"control": {"Kzreff": 4}}, "parameter control/Kzreff: unknown key; near names are Kzref"),
         ({"time_step": 0.012}, "parameter time_step = 0.012: must be a whole multiple of sub_step = 0.005"),
         ({"time_step": 0}, "parameter time_step = 0: input should be greater than or equal to 0.0001"),

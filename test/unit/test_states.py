@@ -315,12 +315,13 @@ def test_a_snapshot_brings_back_the_pilot_too(landed):
 def test_another_script_has_no_states_and_that_is_said(caplog):
     simulation = Simulation(parameters.load(), script="tutorial")
     assert str(simulation.drone.flight_state) == "unknown"
-    for topic in ("takeoff", "land", "land"):
+    for topic in ("takeoff", "land", "reset", "land"):
         simulation.drone.ask(topic)
     assert str(simulation.drone.flight_state) == "unknown: the script does not subscribe to takeoff"
     assert [one.getMessage() for one in caplog.records] == [
         "takeoff: no effect: the child script does not subscribe to it; `pilot` does",
         "land: no effect: the child script does not subscribe to it; `pilot` does",
+        "reset: no effect: the child script does not subscribe to it; `pilot` does",
     ]
     simulation.close()
 

@@ -181,7 +181,9 @@ def _problem(error: Any, place: _ErrorPlace, model: type[BaseModel]) -> Paramete
         location = location[:-1]
     if error["type"] == "extra_forbidden":
         key = str(location[-1])
-        return ParameterProblem(location, f"unknown key; {_below(model, key) or near_names(key[:80], place.known)}")
+        belongs = _below(model, key) if len(location) == 1 else ""
+        known = belongs or (near_names(key[:80], place.known) if place.known else "")
+        return ParameterProblem(location, "; ".join(filter(None, ("unknown key", known))))
     is_of_several = error["type"] == "value_error" and isinstance(value, Mapping)
     return ParameterProblem(location, _reason(error, place), "" if is_of_several else shown(value))
 

@@ -3,6 +3,7 @@
 A new node takes the place of an older one with the same name, once that has ended, as every ROS node does. But the
 master tells the older one to end only when the newer one is registered. If the older one still calls the master then
 (for a line on /rosout, rospy asks for a parameter), the master takes it for a new node, and ends the newer one, too.
+A simulator with which its launch, and the master, would end keeps its place.
 """
 
 from __future__ import annotations

@@ -164,8 +164,9 @@ class _CameraListener:
         The truth comes a little after its picture: it is waited for, unless it does not come at all.
         """
         came = [*self._latest]
-        if self.overlay is not None and len(came) < _KEPT:
-            came = [one for one in came if self.overlay.has(one.header.stamp.to_sec())]
+        if self.overlay is not None:
+            complete = [one for one in came if self.overlay.has(one.header.stamp.to_sec())]
+            came = complete if complete or len(came) < _KEPT else came
         if not came:
             return None
         while self._latest and self._latest.popleft() is not came[-1]:
