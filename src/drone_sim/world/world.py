@@ -83,11 +83,15 @@ class World:
         self._made: bodies.Made = {}
         self.pictures = Pictures(client, self._files, window=self._gui)
         self.joints = Joints(client, self.pictures.look_anew)
-        self.collision_filter = CollisionFilter(client, self.pictures.moved)
+        self.collision_filter = CollisionFilter(client, self._moved)
         self.queries = Queries(client, self.collision_filter)
         self._dynamics = Dynamics(client, self._sub_step, self.queries, gyroscopic=self._gyroscopic)
         self.shape_forces = self._dynamics.shape_forces
         self.saved_states = SavedStates(client, self._all_moved)
+
+    def _moved(self, body: int) -> None:
+        self._dynamics.moved(body)
+        self.pictures.moved(body)
 
     def _all_moved(self) -> None:
         self._dynamics.all_moved()
@@ -242,8 +246,7 @@ class World:
         """Move a body's root link to `pose` and stop it."""
         inertial = self._inertial_frames[body][0]
         centre, turn = compose(pose, inertial)
-        self._dynamics.moved(body)
-        self.pictures.moved(body)
+        self._moved(body)
         pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
         pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
 
