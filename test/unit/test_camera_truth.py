@@ -89,6 +89,46 @@ def hidden(camera, seen):
     return (np.abs(local[:, 1:]) <= size[1:] / 2).all(axis=1).sum()
 
 
+@pytest.fixture(name="picture_of")
+def _picture_of(tmp_path):
+    """Return what takes a picture of objects with the front camera, 1 m above the floor; as its objects, and it."""
+    simulations = []
+
+    def take(objects, **camera):
+        scene = tmp_path / "scene.yaml"
+        scene.write_text(yaml.safe_dump({"objects": objects, "drone": {"position": [0, 0, 1]}}))
+        simulations.append(Simulation(parameters.load({"scene_file": str(scene), "cameras": {"front": camera}})))
+        front = simulations[-1].drone.cameras["front"]
+        return by_name(front.truth()), front
+
+    yield take
+    for one in simulations:
+        one.close()
+
+
+def test_nothing_is_hidden_of_a_compound_whose_parts_overlap(picture_of):
+    parts = [{"shape": "box", "size": [0.2, 0.4, 0.4], "position": [0, y, 0]} for y in (-0.1, 0.1)]
+    seen, _ = picture_of([{"name": "Pair", "shape": "compound", "parts": parts, "position": [2, 0, 1]}])
+    assert seen["Pair"].occlusion == 0 and seen["Pair"].pixels > 10_000
+
+
+def test_what_reaches_behind_the_camera_ends_at_its_near_plane(picture_of):
+    beam = {"name": "Beam", "shape": "box", "size": [6.0, 0.4, 0.2], "position": [0, 0.8, 1.0]}
+    seen, camera = picture_of([beam], near=0.05)
+    lens, eye = camera.intrinsics, camera.pose()
+    far, left, right = 3.0 - eye[3], 1.0 - eye[7], 0.6 - eye[7]  # of the beam, from the camera, m
+    top, bottom = 1.1 - eye[11], 0.9 - eye[11]
+    wanted = (
+        lens.cx - lens.fx * left / lens.near, lens.cy - lens.fx * top / lens.near,
+        lens.cx - lens.fx * right / far, lens.cy - lens.fx * bottom / lens.near,
+    )  # fmt: skip
+    np.testing.assert_allclose(seen["Beam"].full, wanted, rtol=1e-4, atol=0.5)
+    wide, high = wanted[2] - wanted[0], wanted[3] - wanted[1]
+    inside = (wanted[2] + 0.5) * lens.height  # the part that the picture shows is as high as the picture
+    assert seen["Beam"].truncation == pytest.approx(1 - inside / (wide * high), rel=1e-3)
+    assert seen["Floor"].truncation > 0.99, "the floor reaches behind the camera, too"
+
+
 def test_flow_is_that_of_reprojected_points(simulation):
     camera = simulation.drone.cameras["front"]
     first = camera.truth()
