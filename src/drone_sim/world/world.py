@@ -17,7 +17,6 @@ from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.shapes.compound import parts_of
 from drone_sim.shapes.mass import inertia_of
-from drone_sim.shapes.plane import Plane
 from drone_sim.shapes.shape import WHITE, DrawnShape, Rgba, SceneShape
 from drone_sim.shapes.urdf import Urdf
 from drone_sim.world import assemblies, bodies
@@ -111,12 +110,12 @@ class World:
 
         Returns its body id.
         """
-        body = bodies.create_floor(self._client, self._files, size, ground)
+        planes = bodies.floor_planes(size, ground)
+        body = bodies.create_floor(self._client, self._files, planes)
         self.pictures.cover(body, texture, visual=0)
         self._know(body)
         self.set_material(body, -1, friction=1.0, restitution=1.0)  # of two that touch, what falls on it has the say
-        seen = [(Plane(size, bodies.TILE), texture), (Plane(2 * bodies.GROUND_REACH, bodies.TILE), "")]
-        self.pictures.set_floor(body, seen if ground else seen[:1])
+        self.pictures.set_floor(body, list(zip(planes, (texture, ""))))
         return body
 
     def add_object(
