@@ -95,7 +95,7 @@ def _collision(told: Geometry) -> dict[str, Any]:
 def floor_planes(size: float, ground: bool) -> list[Plane]:
     """Return what is drawn of a floor of `size` metres a side, at z = 0: the floor, and the ground around it.
 
-    The two meet at the floor's edge and do not overlap. Without `ground`, or if the floor reaches as far, there is none.
+    The two meet at the floor's edge and do not overlap. Without `ground`, or if the floor is as large, there is none.
     """
     floor, reach = Plane(size, TILE), 2 * GROUND_REACH
     return [floor, Plane(reach, TILE, hole=size)] if ground and size < reach else [floor]
