@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 import pytest
 import yaml
+from pycocotools.coco import COCO
+from pycocotools.mask import area, toBbox
 from test_renderer_outputs import inner
 
 from drone_sim.mechanics.state import Pose
@@ -150,18 +152,15 @@ def test_a_flight_becomes_a_dataset_as_coco_has_it(tmp_path):
     scene.write_text(yaml.safe_dump(SCENE))
     folder, small = tmp_path / "seen", ["cameras.front.width=64", "cameras.front.height=48"]
     assert fly(["--scene", str(scene), "--duration", "0.15", "--truth", str(folder), "--set", *small]) == 0
-    said = json.loads((folder / "annotations.json").read_text())
+    said, read = json.loads((folder / "annotations.json").read_text()), COCO(folder / "annotations.json")
     assert [one["file_name"] for one in said["images"]] == [f"color/{number:06}.png" for number in range(3)]
     categories = {one["id"]: one["name"] for one in said["categories"]}
     assert len({one["id"] for one in said["annotations"]}) == len(said["annotations"]) > 6
     for one in said["annotations"]:
         file = f"{one['image_id']:06}.png"
         mask = cv2.imread(str(folder / "instances" / file), cv2.IMREAD_UNCHANGED) == one["number"]
-        counts = one["segmentation"]["counts"]  # of pixels that are out, in, out, ... column by column
-        runs = np.repeat(np.arange(len(counts)) % 2, counts).reshape(one["segmentation"]["size"][::-1]).T
-        assert (runs == mask).all() and one["area"] == mask.sum()
-        rows, columns = np.nonzero(mask)
-        assert one["bbox"] == [columns.min(), rows.min(), np.ptp(columns) + 1, np.ptp(rows) + 1]
+        np.testing.assert_array_equal(read.annToMask(one), mask)  # as COCO's own reader has it
+        assert one["bbox"] == toBbox(read.annToRLE(one)).tolist() and one["area"] == area(read.annToRLE(one))
     assert {one["name"]: categories[one["category_id"]] for one in said["annotations"]}["Wall"] == "obstacle"
     arrays = np.load(folder / "truth" / "000001.npz")
     assert {name: one.shape for name, one in arrays.items()} == {
