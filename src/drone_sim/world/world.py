@@ -12,7 +12,7 @@ import pybullet
 
 from drone_sim.mechanics.frames import Matrix, Vector, cross, multiply_quaternions, turned
 from drone_sim.mechanics.inertia import Inertia
-from drone_sim.mechanics.state import Pose, State, compose, inverse
+from drone_sim.mechanics.state import Motion, Pose, State, compose, inverse
 from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.shapes.compound import parts_of
@@ -80,6 +80,7 @@ class World:
         pybullet.setTimeStep(self._sub_step, client)
         self._inertial_frames: dict[int, tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._made: bodies.Made = {}
+        self._states: dict[int, tuple[Motion, State]] = {}  # the last ones that were asked for, by body
         self.pictures = Pictures(client, self._files, window=self._gui)
         self.joints = Joints(client, self.pictures.look_anew)
         self.collision_filter = CollisionFilter(client, self._moved)
@@ -175,6 +176,7 @@ class World:
         self.saved_states.forget_snapshots()
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
+        self._states.pop(body, None)
         self.saved_states.forget(body)
         self.joints.forget(body)
         self.collision_filter.forget(body)
@@ -227,14 +229,20 @@ class World:
         return Inertia((a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c), Pose(place, turn).matrix)
 
     def state(self, body: int) -> State:
-        """Return pose and velocity of a body's root link."""
-        centre, turn, (vx, vy, vz), angular = self._dynamics.motion(body)
+        """Return pose and velocity of a body's root link: the same object until it moves."""
+        motion = self._dynamics.motion(body)
+        known, state = self._states.get(body, (None, None))
+        if known is motion and state is not None:
+            return state
+        centre, turn, (vx, vy, vz), angular = motion
         inertial, backwards = self._inertial_frames[body]
         orientation = turn if backwards.orientation is _NO_TURN else multiply_quaternions(turn, backwards.orientation)
         arm = turned(orientation, inertial.position)  # from the root link to the centre of mass
         sx, sy, sz = cross(angular, arm)
         position = (centre[0] - arm[0], centre[1] - arm[1], centre[2] - arm[2])
-        return State(position, orientation, (vx - sx, vy - sy, vz - sz), angular)
+        state = State(position, orientation, (vx - sx, vy - sy, vz - sz), angular)
+        self._states[body] = motion, state
+        return state
 
     def is_finite(self) -> bool:
         """Whether the poses and velocities of all bodies are finite."""
