@@ -46,7 +46,7 @@ def _compare_flight(flight: str, other: Path, rounds: int) -> Row:
 
 def _worker(flight: str, tree: Path) -> subprocess.Popen[str]:
     path = f"{tree / 'src'}:{os.environ.get('PYTHONPATH', '')}"
-    command = [sys.executable, Path(__file__).with_name("loop_worker.py"), flight]
+    command = [sys.executable, str(Path(__file__).with_name("loop_worker.py")), flight]
     return subprocess.Popen(
         command, env={**os.environ, "PYTHONPATH": path}, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
@@ -61,4 +61,4 @@ def _ask(worker: subprocess.Popen[str], line: str = "") -> str:
     for answer in worker.stdout:
         if not answer.startswith("pybullet build time"):
             return answer
-    raise RuntimeError(f"a worker has ended: {worker.args}")
+    raise RuntimeError("a worker of the benchmark has ended: its traceback is above")

@@ -67,6 +67,9 @@ class NoGyroscopicTerm:
         if self._links:
             self._begin_sub_step_of_links(duration)
 
+    def end_sub_step(self, duration: float) -> None:
+        """Do nothing: the whole torque acted before the step."""
+
     def _begin_sub_step_of_links(self, duration: float) -> None:
         for body, links in self._links.items():
             states = pybullet.getLinkStates(body, list(links), 1, 1, self._client)  # with velocities, attitudes of now
