@@ -43,6 +43,7 @@ class FlightRecorder:
         self._values: dict[str, list[ValueChange]] = {}
         self._other_poses: dict[str, list[tuple[float, ...]]] = {}
         self._found: dict[str, list[str]] = {}
+        self.goals: list[int] = []  # handles of the objects that criteria name, and of such vehicles' objects
         self.look: Callable[[int], None] | None = None  # for Simulation.step
         self._each_step: list[Callable[[], None]] = [functools.partial(self._recording.add, simulation)]
         self._add_recorders(plan, backend)
@@ -64,10 +65,13 @@ class FlightRecorder:
             self._found[path] = [one.name for one in object_paths.every(objects, path)] or [path]
         named = (self._found.get(other, [other]) for other in others)
         for other in dict.fromkeys(itertools.chain.from_iterable(named)):
-            if other not in self._simulation.vehicles:
-                objects.handle(other)  # raises ValueError where there is none
+            vehicle = self._simulation.vehicles.get(other)
+            # Followed by its handle: another object may get the name later. Raises ValueError where there is none.
+            handle = objects.handle(other) if vehicle is None else objects.handle_of(vehicle.object)
+            self.goals.append(handle)
             self._other_poses[other] = []
-            self._each_step.append(lambda name=other: self._other_poses[name].append(self._pose(name)))  # type: ignore[misc]
+            pose = functools.partial(self._pose, other if vehicle is not None else "", handle)
+            self._each_step.append(lambda name=other, pose=pose: self._other_poses[name].append(pose()))  # type: ignore[misc]
 
     def record_step(self) -> None:
         """Record what there is now: before the first step, and after each."""
@@ -124,15 +128,15 @@ class FlightRecorder:
 
         self._each_step.append(look)
 
-    def _pose(self, name: str) -> tuple[float, ...]:
+    def _pose(self, vehicle_name: str, handle: int) -> tuple[float, ...]:
         """Return position (m) and quaternion (xyzw) of a vehicle or object, in the world; NaN once it is gone."""
-        vehicle = self._simulation.vehicles.get(name)
+        vehicle = self._simulation.vehicles.get(vehicle_name)
         if vehicle is not None:
             return (*vehicle.body.state.position, *vehicle.body.state.orientation)
-        objects = self._simulation.context.objects
-        if name not in objects:
+        one = self._simulation.context.objects.get(handle)
+        if one is None or vehicle_name:
             return _NOWHERE
-        matrix = objects.matrix(objects.handle(name))
+        matrix = one.matrix()
         return (*position(matrix), *to_quaternion(matrix))
 
 

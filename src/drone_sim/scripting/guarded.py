@@ -41,6 +41,11 @@ class GuardedScript:
         """Let its thread run until it is left."""
         self._attempt(self._script.take_turn)
 
+    def defines(self, name: str) -> bool:
+        """Return whether the script's own file defines a global function of this name. Raises ScriptError."""
+        self._refuse_if_failed(name)
+        return self._script.defines(name)
+
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function for another script; an error counts as that script's. Raises ScriptError."""
         self._refuse_if_failed(name)

@@ -39,6 +39,9 @@ class Script(Protocol):
     def take_turn(self) -> None:
         """Let its thread run until it is left; raises ScriptError."""
 
+    def defines(self, name: str) -> bool:
+        """Return whether the script's own file defines a global function of this name. Raises ScriptError."""
+
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
 

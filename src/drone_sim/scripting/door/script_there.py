@@ -78,6 +78,10 @@ class ScriptThere:
         """Let its thread run until it is left; raises ScriptError."""
         self._do("take_turn", [])
 
+    def defines(self, name: str) -> bool:
+        """Return False: only scripts in this process are asked, because the other process could lie."""
+        return False
+
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
         return self._do("call_function", [name, arguments])
@@ -230,8 +234,10 @@ class ScriptThere:
         if not _ALL_PLAIN(map(type, arguments)):
             arguments = [one if type(one) in _PLAIN else self._value(one) for one in arguments]
         try:
-            self._door.permit(name, arguments)
+            done = self._door.permit(name, arguments)
             function(*arguments)
+            if done is not None:
+                done(None)
         except Exception as error:
             self._failure = name, error
 
@@ -263,8 +269,11 @@ class ScriptThere:
             return self._waits.step(*given)
         if function is None:
             raise NoMessage("no function of the API")
-        self._door.permit(name, _in_order(function, given, by_name))
-        return function(*given, **by_name)
+        done = self._door.permit(name, _in_order(function, given, by_name))
+        found = function(*given, **by_name)
+        if done is not None:
+            done(found)
+        return found
 
     def _value(self, value: Any) -> Any:
         return values.unmarked(value, self._function_there)

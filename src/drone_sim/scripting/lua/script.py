@@ -147,6 +147,11 @@ class LuaScript:
         """Let its thread run until it is left; raises ScriptError."""
         self._run("thread", self._lua.get("phase"), _NUMBERS["thread"])
 
+    def defines(self, name: str) -> bool:
+        """Return whether the script's own file defines a global function of this name. Raises ScriptError."""
+        path, _ = self._named_functions().get(name, ("", 0))
+        return path == self._path
+
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
         self._run(name, self._call_function, name, arguments)

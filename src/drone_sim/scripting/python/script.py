@@ -149,6 +149,11 @@ class PythonScript:
         if self._thread is not None:
             self._run("thread", self._thread.take_turn, self._thread_function())
 
+    def defines(self, name: str) -> bool:
+        """Return whether the script's own file defines a global function of this name; imported ones do not count."""
+        function = self._globals.get(name)
+        return inspect.isfunction(function) and function.__code__.co_filename == self._path
+
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
         self.check(name)
