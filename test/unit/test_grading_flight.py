@@ -305,7 +305,7 @@ def test_who_moves_or_pushes_the_drone_himself_gains_nothing_by_it(written, tmp_
 
 BUILDS = """
 def sysCall_sensing():
-    sim.removeObject(sim.createPrimitiveShape(0, [0.1, 0.1, 0.1]))
+    sim.removeObject(sim.createPrimitiveShape(sim.primitiveshape_cuboid, [0.1, 0.1, 0.1]))
     sim.addForce(sim.getObject("/Quadcopter"), [0, 0, 0], [0, 0, 1e-3])
     sim.setObjectPosition(sim.getObject("/Goal"), -1, [0, 0, 0.8])
 """
