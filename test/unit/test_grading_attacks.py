@@ -7,11 +7,18 @@ from pathlib import Path
 
 import pytest
 
+from drone_sim.grading import permissions
 from drone_sim.grading import plan as plans
 from drone_sim.grading.jobs import sandbox, settings
 from drone_sim.grading.jobs.flyer import Flyer
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
+from drone_sim.grading.scene_values import SceneValues
 from drone_sim.message_text import printable
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting import load
+from drone_sim.scripting.api.calls import contents
+from drone_sim.scripting.api.ignored import MODULES
 
 SETTINGS = settings.load({"limits": {"seconds": 5.0, "patience": 2.0, "memory": 256}})
 SECRET = 123_456_789_012
@@ -537,3 +544,134 @@ def test_what_is_its_own_a_submission_may_set_and_call(fly_in_scene):
     result = fly_in_scene("", script=ITS_OWN)
     assert result.error is None and result.tried == ()
     assert [one.passed for one in result.outcomes] == [False, True, True], result.outcomes
+
+
+# What a submission reaches by each function of the API; a new function must be entered here, and decided on.
+REACHES = {
+    "nothing but answers": """
+        sim: boolAnd32 boolOr32 boolXor32 getCollectionHandle getCollectionName getCollectionObjects
+        getPersistentDataTags getProperty persistentDataRead
+        readCustomDataBlock readCustomDataBlockTags readCustomTableData checkCollision
+        checkDistance getObjectFloatParam getObjectFloatParameter getObjectInt32Param getObjectInt32Parameter
+        getShapeInertia getShapeMass getShapeMassAndInertia isDynamicallyEnabled getJointForce getJointInterval
+        getJointMatrix getJointMaxForce getJointMode getJointPosition getJointTargetForce getJointTargetPosition
+        getJointTargetVelocity getJointType getJointVelocity getObjectChildPose alphaBetaGammaToYawPitchRoll
+        buildIdentityMatrix buildMatrix buildMatrixQ copyMatrix getEulerAnglesFromMatrix getMatrixInverse
+        getQuaternionFromMatrix getRotationAxis interpolateMatrices invertMatrix multiplyMatrices multiplyVector
+        rotateAroundAxis yawPitchRollToAlphaBetaGamma getNameSuffix getObject getObjectAlias getObjectHandle
+        getObjectName setNameSuffix getObjectChild getObjectType getObjectUid getObjects getObjectsInTree isHandle
+        isHandleValid getObjectMatrix getObjectOrientation getObjectParent getObjectPose getObjectPosition
+        getObjectQuaternion getObjectVelocity getVelocity packDoubleTable packFloatTable packInt32Table packTable
+        packUInt16Table packUInt32Table packUInt8Table transformBuffer unpackDoubleTable unpackFloatTable
+        unpackInt32Table unpackTable unpackUInt16Table unpackUInt32Table unpackUInt8Table getClosestPosOnPath
+        getClosestPositionOnPath getDataOnPath getOrientationOnPath getPathInterpolatedConfig getPathLength
+        getPathLengths getPathPosition getPositionOnPath resamplePath buildPose interpolatePoses invertPose
+        matrixToPose multiplyPoses poseToMatrix checkProximitySensor checkProximitySensorEx handleProximitySensor
+        readProximitySensor resetProximitySensor getCustomizationScriptAssociatedWithObject getScript
+        getScriptAssociatedWithObject getScriptExecutionCount getScriptFunctions getScriptName
+        getObjectAssociatedWithScript getScriptHandle getScriptSimulationParameter getUserParameter readForceSensor
+        readSensor getShapeGeomInfo getObjectSizeFactor getObjectSizeValues getShapeBB getShapeColor getFloatSignal
+        getInt32Signal getStringSignal getArrayParam getBoolParam getFloatParam getInt32Param getModuleName getRandom
+        getSimulationState getSimulationStopping getSimulationTime getSimulationTimeStep getStringParam getSystemTime
+        getSystemTimeInMs startSimulation copyTable tubeStatus checkVisionSensor checkVisionSensorEx
+        getVisionSensorCharImage getVisionSensorDepth getVisionSensorDepthBuffer getVisionSensorImage
+        getVisionSensorImg getVisionSensorResolution handleVisionSensor readVisionSensor receiveData
+        simROS: getNumSubscribers getParamBool getParamDouble getParamInt getParamString getTime hasParam
+        searchParam""",
+    "its own log, drawings, windows, threads and pictures": """
+        sim: addLog addStatusbarMessage auxiliaryConsoleClose auxiliaryConsoleOpen auxiliaryConsolePrint
+        auxiliaryConsoleShow displayDialog endDialog getDialogInput getDialogResult addDrawingObject
+        addDrawingObjectItem removeDrawingObject addGraphStream destroyGraphCurve resetGraph setGraphStreamValue
+        setGraphUserData acquireLock delegateChildScriptExecution getThreadAutomaticSwitch getThreadExitRequest
+        getThreadId releaseLock setStepping setThreadAutomaticSwitch setThreadResumeLocation setThreadSwitchTiming
+        step switchThread wait waitForSignal ruckigPos ruckigRemove ruckigStep ruckigVel adjustView floatingViewAdd
+        floatingViewRemove createDummy createPath stopSimulation sendData createCollection tubeOpen
+        simROS: advertise advertiseService call imageTransportAdvertise imageTransportPublish
+        imageTransportShutdownPublisher publish publisherTreatUInt8ArrayAsString sendTransform sendTransforms
+        serviceClient serviceClientTreatUInt8ArrayAsString serviceServerTreatUInt8ArrayAsString shutdownPublisher
+        shutdownServiceClient shutdownServiceServer shutdownSubscriber subscribe subscriberTreatUInt8ArrayAsString
+        simVision: addBuffer1ToWorkImg addWorkImgToBuffer1 binaryWorkImg blobDetectionOnWorkImg buffer1ToWorkImg
+        buffer2ToWorkImg changedPixelsOnWorkImg coordinatesFromWorkImg edgeDetectionOnWorkImg horizontalFlipWorkImg
+        intensityScaleOnWorkImg multiplyWorkImgWithBuffer1 normalizeWorkImg selectiveColorOnWorkImg
+        sensorDepthMapToWorkImg sensorImgToWorkImg subtractBuffer1FromWorkImg subtractWorkImgFromBuffer1 swapBuffers
+        swapWorkImgWithBuffer1 uniformImgToWorkImg verticalFlipWorkImg workImgToBuffer1 workImgToBuffer2
+        workImgToSensorImg""",
+    "values that the scene's scripts have not set": """
+        sim: addItemToCollection addObjectToCollection destroyCollection emptyCollection persistentDataWrite
+        removeProperty setProperty writeCustomDataBlock writeCustomTableData clearFloatSignal clearInt32Signal
+        clearStringSignal setFloatSignal setInt32Signal setStringSignal tubeClose tubeRead tubeWrite
+        simROS: deleteParam setParamBool setParamDouble setParamInt setParamString""",
+    "its own parameters": "sim: setScriptSimulationParameter setUserParameter",
+    "its own blades": "sim: setJointPosition",
+    "its own frames": """
+        sim: moveToConfig moveToConfig_cleanup moveToConfig_init moveToConfig_step moveToPose moveToPose_init
+        setObjectMatrix setObjectOrientation setObjectParent setObjectPose setObjectPosition setObjectQuaternion
+        followPath moveToObject moveToPosition rmlMoveToPosition""",
+    "move": """
+        sim: resetDynamicObject setJointForce setJointInterval setJointMode setJointTargetForce
+        setJointTargetPosition setJointTargetVelocity setSphericalJointMatrix moveToJointPositions
+        rmlMoveToJointPositions setPathPosition""",
+    "push": "sim: addForce addForceAndTorque",
+    "change": """
+        sim: setObjectFloatParam setObjectInt32Param cutPathCtrlPoints insertPathCtrlPoints copyPasteObjects
+        createForceSensor createJoint createMeshShape createPrimitiveShape createProximitySensor createPureShape
+        createVisionSensor removeModel removeObject removeObjects setObjectAlias setObjectName setShapeInertia
+        setShapeMassAndInertia groupShapes scaleObject scaleObjects setShapeBB setShapeColor setShapeMass ungroupShape
+        pauseSimulation setArrayParam setBoolParam setFloatParam setInt32Param setSimulationTimeStep setStringParam""",
+    "call": "sim: callScriptFunction",
+    "run": "sim: executeScriptString",
+    "load": "sim: loadModel",
+    "write": "sim: saveModel",
+    "open": """
+        sim: extRemoteApiReset extRemoteApiStart extRemoteApiStatus extRemoteApiStop
+        simRemoteApi: reset start status stop""",
+}
+
+
+def entered():
+    """Yield each function of the table as module.name, and what a submission reaches by it."""
+    for reached, text in REACHES.items():
+        module = ""
+        for word in text.split():
+            module = word if word.endswith(":") else module
+            if word != module:
+                yield f"{module[:-1]}.{word}", reached
+
+
+def test_it_is_known_of_every_function_what_a_submission_reaches_by_it():
+    found = {}
+
+    def note(path, modules, *others):
+        found.update({f"{name}.{key}": one for name, api in modules.items() for key, one in contents(api)[1].items()})
+        return load.load(path, modules, *others)
+
+    simulation = Simulation(parameters.load(), load_script=note)
+    drone = simulation.drone
+    actions = permissions.Actions(simulation, [drone], {drone.object_name})
+    values = SceneValues(simulation, set())
+    looks = {
+        "values that the scene's scripts have not set": {*values.looks},
+        "its own parameters": {"sim.setScriptSimulationParameter", "sim.setUserParameter"},
+        "its own blades": {"sim.setJointPosition"},
+    }
+    ignored = {f"{name}.{key}" for name, groups in MODULES.items() for one in groups for key in one.functions}
+    reached = dict(entered())
+    assert len(reached) == sum(1 for _ in entered())
+    for name, function in found.items():
+        if name in ignored:
+            continue  # it does nothing
+        own = f"{name.partition('.')[0]}.{function.__name__}"
+        assert own in reached, f"{own}: enter in REACHES what a submission reaches by it"
+        what, needs = reached[own], actions.of(name, [])
+        assert (name in values.looks) == (own in looks["values that the scene's scripts have not set"])
+        if what in ("move", "push", "change", "call", "run", "load", "write", "open"):
+            assert needs == what, name
+        elif what == "its own frames":
+            assert actions.of(name, [simulation.context.objects.handle_of(drone.object)]) in ("move", None), name
+            assert name not in permissions.free(), name
+        elif what in looks:
+            assert own in looks[what] and (name in permissions.free()) == (name in values.looks), name
+        else:
+            assert needs is None and name not in values.looks, name
+    assert {*reached} <= {*found}
+    simulation.close()

@@ -88,7 +88,7 @@ class Flight:
             started=False,
             load_script=_loader(door, flown, watch),
         )
-        backend.clock = lambda: self._simulation.time
+        backend.clock, backend.is_scene = lambda: self._simulation.time, lambda: watch.is_scene
         try:
             self._recorder = FlightRecorder(plan, self._simulation, backend)
             self._permissions = Permissions(plan, self._simulation, flown, self._recorder.goals)

@@ -162,6 +162,8 @@ class OfflineBackend:
         self.wanted = wanted
         self.last: dict[str, Any] = {}  # the last message, by the topic's full name
         self.clock: Callable[[], float] = lambda: 0.0  # simulated time in s
+        self.is_scene: Callable[[], bool] = lambda: False  # whether the script that runs is one of the scene's
+        self._scenes: set[str] = set()  # topics that the scene's scripts have advertised
         self._parameters: dict[str, Any] = {}
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
@@ -169,12 +171,18 @@ class OfflineBackend:
         return lambda: None
 
     def advertise(self, topic: str, kind: str, queue: int, latch: bool) -> OfflinePublisher:
-        """Keep what will be published, if it is asked for."""
-        return OfflinePublisher(self.last if topic in self.wanted.values() else {}, topic)
+        """Keep what will be published, if it is asked for; of a topic of the scene's only what its scripts publish."""
+        is_scene = self.is_scene()
+        if is_scene and topic not in self._scenes:
+            self._scenes.add(topic)
+            self.last.pop(topic, None)
+        return OfflinePublisher(
+            self.last if topic in self.wanted.values() else {}, topic, lambda: is_scene or topic not in self._scenes
+        )
 
     def advertise_image(self, topic: str, queue: int) -> OfflinePublisher:
         """Keep nothing: no criterion reads pictures."""
-        return OfflinePublisher({}, topic)
+        return OfflinePublisher({}, topic, lambda: True)
 
     def time(self) -> float:
         """Return what messages are stamped with, in s."""
@@ -207,12 +215,14 @@ class OfflineBackend:
 class OfflinePublisher:
     """An advertised topic."""
 
-    def __init__(self, last: dict[str, Any], topic: str):
+    def __init__(self, last: dict[str, Any], topic: str, may_publish: Callable[[], bool]):
         """Leave the last message on `topic` in `last`."""
-        self._last, self._topic = last, topic
+        self._last, self._topic, self._may_publish = last, topic, may_publish
 
     def publish(self, message: Any) -> None:
-        """Keep a message as it is now."""
+        """Keep a message as it is now. Raises ValueError for a submission's on a topic of the scene's scripts."""
+        if not self._may_publish():
+            raise ValueError(f"{self._topic}: scripts of the scene publish on this topic, so a submission may not")
         self._last[self._topic] = copy.deepcopy(message)
 
     def subscribers(self) -> int:

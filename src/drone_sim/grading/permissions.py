@@ -134,7 +134,7 @@ _ACTIONS = {
     "executeScriptString": RUN,
 }
 _PORTS = ("simRemoteApi.", "sim.extRemoteApi")  # what functions begin with that open a port for clients
-_WHOLE = {LOAD: "a model", OPEN: "a port"}  # what such a call is about
+_WHOLE = {LOAD: "a model", OPEN: "a port", RUN: "a text in a script"}  # what such a call is about
 _PARAMETERS = ("setScriptSimulationParameter", "setUserParameter")
 _DRIVES = "particleVelocity"
 _SELF = CONSTANTS["handle_self"]
@@ -164,7 +164,8 @@ class Actions:
             (_BY_PARAMETERS, self._of_motion),
             (("setJointPosition",), self._of_joint),
         )
-        self._looks = {f"sim.{name}": look for named, look in looks for name in named}
+        by_name = {f"sim.{name}": look for named, look in looks for name in named}
+        self._looks = {name: by_name[own] for name, own in _own_names().items() if own in by_name}
 
     def of(self, function: str, arguments: list[Any]) -> str | None:
         """Return what a call needs, None for nothing."""
@@ -274,7 +275,7 @@ class Permissions(Actions):
         made = {"sim.createDummy": self._own_handles, "sim.createPath": self._own_handles, **self._values.makes}
         self._makes = {function: handles.add for function, handles in made.items()}
         for decided in ("sim.callScriptFunction", "sim.executeScriptString"):  # by `_permit_call`
-            self._looks[decided] = lambda _: None
+            self._looks[decided] = _nothing
         self._scripts.permit = self._permit_call
         self.tried: list[str] = []  # in one line each; the first time of each thing that was tried with each object
         self._known: set[tuple[str, str]] = set()
@@ -354,6 +355,10 @@ def _handles(values: Iterable[Any]) -> Iterator[int]:
             yield from (int(each) for each in one if _is_handle(each))
 
 
+def _nothing(_arguments: list[Any]) -> None:
+    pass
+
+
 def _is_of_scene(function: str) -> bool:
     """Tell whether what comes first in a call is not the handle of an object, or of a script."""
     name = function.partition(".")[2]
@@ -370,17 +375,35 @@ def _action_of(function: str) -> str | None:
         return None
     if function.startswith(_PORTS):
         return OPEN
-    return _ACTIONS.get(function.partition(".")[2], CHANGE)
+    return _ACTIONS.get(_own_names().get(function, function).partition(".")[2], CHANGE)
 
 
 @functools.cache
 def free() -> frozenset[str]:
     """Return the functions that are free, each as module.name."""
-    found = {f"sim.{name}" for name in _FREE}
-    found.update(f"{module}.{name}" for module, groups in MODULES.items() for one in groups for name in one.functions)
-    for kind in {*_FREE_CLASSES, *modules.SIM, ClientControl}:
-        for attribute in vars(kind).values():
-            declaration = declaration_of(attribute)
-            if declaration and (kind in _FREE_CLASSES or attribute.__name__.startswith(_READING)):
-                found.update(f"{declaration.module}.{name}" for name in declaration.names)
+    found = {f"{module}.{name}" for module, groups in MODULES.items() for one in groups for name in one.functions}
+    own = {f"sim.{name}" for name in _FREE}
+    for kind in (*_FREE_CLASSES, *modules.SIM, ClientControl):
+        names = _names_of(kind)
+        found.update(
+            name
+            for name, written in names.items()
+            if written in own or kind in _FREE_CLASSES or written.partition(".")[2].startswith(_READING)
+        )
     return frozenset(found)
+
+
+@functools.cache
+def _own_names() -> dict[str, str]:
+    """Return the name under which each function of the API is written, by all of its names; each as module.name."""
+    return {name: own for kind in (*modules.SIM, *_FREE_CLASSES) for name, own in _names_of(kind).items()}
+
+
+def _names_of(kind: type) -> dict[str, str]:
+    found = {}
+    for attribute in vars(kind).values():
+        declaration = declaration_of(attribute)
+        if declaration:
+            own = f"{declaration.module}.{attribute.__name__}"
+            found.update({f"{declaration.module}.{name}": own for name in declaration.names})
+    return found

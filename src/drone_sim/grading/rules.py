@@ -27,9 +27,10 @@ class ScriptWatch:
 
     def __init__(self) -> None:
         """Begin while no script runs."""
+        self.is_scene = False
         self.count: Callable[[], dict[str, int]] = dict  # of changes by anybody
         self.by_scene: dict[str, int] = {}  # of changes by the scene's scripts
-        self._is_scene, self._before = False, self.count()
+        self._before = self.count()
 
     def watched(self, script: Script, is_scene: bool) -> Script:
         """Return a script whose calls are watched."""
@@ -37,7 +38,7 @@ class ScriptWatch:
 
     def run(self, is_scene: bool, action: Callable[..., _Value], *arguments: Any) -> _Value:
         """Return what an action of a script returns."""
-        outer = self._is_scene
+        outer = self.is_scene
         self._switch(is_scene)
         try:
             return action(*arguments)
@@ -45,12 +46,12 @@ class ScriptWatch:
             self._switch(outer)
 
     def _switch(self, is_scene: bool) -> None:
-        if self._is_scene != is_scene:
+        if self.is_scene != is_scene:
             now = self.count()
-            if self._is_scene:
+            if self.is_scene:
                 for what, number in now.items():
                     self.by_scene[what] = self.by_scene.get(what, 0) + number - self._before.get(what, 0)
-            self._is_scene, self._before = is_scene, now
+            self.is_scene, self._before = is_scene, now
 
 
 class _Watched:

@@ -1,6 +1,6 @@
-"""Values that scripts share: signals, custom data, tubes, collections. A submission may not set those of the scene.
+"""Values that scripts share: signals, custom data, parameters, tubes, collections. Some belong to the scene's scripts.
 
-A value belongs to the scene's scripts if one of them has set it: it is then not what the submission has left there.
+A submission may not set these. A value belongs to the scene's scripts if it is not what the submission has left there.
 Tubes and collections belong to the script that has opened or made them.
 """
 
@@ -15,6 +15,7 @@ from drone_sim.scripting.api.calls import declaration_of
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.custom_data import CustomDataFunctions
 from drone_sim.scripting.api.object_collections import CollectionFunctions
+from drone_sim.scripting.api.ros_functions import RosFunctions
 from drone_sim.scripting.api.signals import SignalFunctions, TubeFunctions
 
 _APP, _ALL = CONSTANTS["handle_app"], CONSTANTS["handle_all"]
@@ -28,7 +29,7 @@ class SceneValues:
 
     def __init__(self, simulation: Simulation, own_objects: Set[int]):
         """Take the simulation before its scripts begin; `own_objects` are the handles of the submission's own."""
-        context = simulation.context
+        self._simulation, context = simulation, simulation.context
         self._objects, self._signals, self._data = context.objects, context.signals, context.data
         self._left: dict[Any, Any] = {}  # what the submission has left, by the key of a value
         self._own_objects = own_objects
@@ -44,6 +45,7 @@ class SceneValues:
             **dict.fromkeys(_names(CustomDataFunctions, ("write",)), self._of_data),
             **dict.fromkeys(_names(CustomDataFunctions, ("set", "remove")), self._of_property),
             "sim.persistentDataWrite": lambda given: self._of_data([_APP, *given]),
+            **dict.fromkeys(_names(RosFunctions, ("setParam", "deleteParam")), self._of_parameter),
             **dict.fromkeys(_names(TubeFunctions, ("tubeClose", "tubeWrite", "tubeRead")), self._of_tube),
             **dict.fromkeys(_names(CollectionFunctions, ("add", "empty", "destroy", "remove")), self._of_collection),
         }
@@ -65,6 +67,13 @@ class SceneValues:
         if key[1] in _PATHS and one is not None and key[0] not in self._own_objects:
             return shown, None  # scripts would take it for the path's own points
         return self._of("{}", {shown: key}, self._data.values.get)
+
+    def _of_parameter(self, given: list[Any]) -> tuple[str, Done | None]:
+        backend = self._simulation.context.backend
+        if backend is None or not given or not isinstance(given[0], str):
+            return "", None  # without a backend each script has parameters of its own
+        full = {one.bus.resolve(given[0]) for one in self._simulation.vehicles.values()}
+        return self._of("the parameter {}", {one: one for one in full}, backend.parameter)
 
     def _of(self, shown: str, keys: Mapping[str, Any], value: Callable[[Any], Any]) -> tuple[str, Done | None]:
         for name, key in keys.items():
