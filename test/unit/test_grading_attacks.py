@@ -390,6 +390,8 @@ def sysCall_init():
     sim.setIntegerSignal("score", 0)
     sim.writeCustomDataBlock(sim.getObject("/Post"), "key", "kept")
     sim.persistentDataWrite("key", "kept")
+    simROS.setParamString("/rule", "kept")
+    simROS.publish(simROS.advertise("/verdict", "std_msgs/Int32"), {"data": 0})
     self.tube = sim.tubeOpen(0, "secret", 1)
     self.crowd = sim.createCollection()
     sim.addItemToCollection(self.crowd, sim.handle_single, sim.getObject("/Box"), 0)
@@ -410,6 +412,7 @@ criteria:
   - {kind: reach, places: [Goal, Flag], within: 0.2}
   - {kind: signal, signal: found, equals: nothing}
   - {kind: signal, name: score, signal: score, equals: 0}
+  - {kind: signal, name: verdict, topic: /verdict, equals: 0}
 """
 NOT_ITS_OWN = {  # what is called, and what is said of it
     "the API of a Lua script": ("sim.callScriptFunction('simRemoveObject', lamp, box)", "call simRemoveObject of the"),
@@ -428,6 +431,7 @@ NOT_ITS_OWN = {  # what is called, and what is said of it
     "custom data": ("sim.writeCustomDataBlock(sim.getObject('/Post'), 'key', 'x')", "customData.key of Post"),
     "a property": ("sim.setStringProperty(sim.getObject('/Post'), 'customData.key', 'x')", "customData.key of Post"),
     "persistent data": ("sim.persistentDataWrite('key', 'x')", "customData.key of the scene"),
+    "a ROS parameter": ("simROS.setParamString('/rule', 'x')", "change the parameter /rule"),
     "a tube": ("sim.tubeWrite(1, 'x')", "change a tube of another script"),
     "a tube, closed": ("sim.tubeClose(1)", "change a tube of another script"),
     "a collection": ("sim.emptyCollection(sim.handle_all)", "change a collection of another script"),
@@ -491,7 +495,7 @@ def test_what_belongs_to_the_scene_is_out_of_reach(fly_in_scene, what):
     body, said = NOT_ITS_OWN[what]
     result = fly_in_scene(body)
     assert result.error is None and not result.passed
-    assert [one.passed for one in result.outcomes] == [False, True, True], result.outcomes
+    assert [one.passed for one in result.outcomes] == [False, True, True, True], result.outcomes
     assert len(result.tried) == 1 and said in result.tried[0]
 
 
@@ -501,6 +505,11 @@ def test_no_plan_lends_the_scenes_rights_or_its_goals(fly_in_scene, what):
     result = fly_in_scene(body, WITH_ALL)
     assert result.error is None and result.outcomes[1].passed, result.outcomes
     assert len(result.tried) == 1 and said in result.tried[0]
+
+
+def test_a_topic_of_the_scene_is_not_a_submissions(fly_in_scene):
+    result = fly_in_scene("simROS.publish(simROS.advertise('/verdict', 'std_msgs/Int32'), {'data': 5})")
+    assert [one.passed for one in result.outcomes] == [False, True, True, True], result.outcomes
 
 
 CALLED = "(sim.callScriptFunction('door', post, 3), sim.callScriptFunction('shine@Lamp', 1, 1))"
@@ -543,7 +552,7 @@ def twice(value):
 def test_what_is_its_own_a_submission_may_set_and_call(fly_in_scene):
     result = fly_in_scene("", script=ITS_OWN)
     assert result.error is None and result.tried == ()
-    assert [one.passed for one in result.outcomes] == [False, True, True], result.outcomes
+    assert [one.passed for one in result.outcomes] == [False, True, True, True], result.outcomes
 
 
 # What a submission reaches by each function of the API; a new function must be entered here, and decided on.

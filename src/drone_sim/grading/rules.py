@@ -30,7 +30,7 @@ class ScriptWatch:
         self.is_scene = False
         self.count: Callable[[], dict[str, int]] = dict  # of changes by anybody
         self.by_scene: dict[str, int] = {}  # of changes by the scene's scripts
-        self._before = self.count()
+        self._before: dict[str, int] = {}
 
     def watched(self, script: Script, is_scene: bool) -> Script:
         """Return a script whose calls are watched."""
