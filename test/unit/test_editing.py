@@ -1,5 +1,6 @@
 """The scene's editor: edits as records, undo and redo, the scene's text, files, drafts."""
 
+import errno
 import os
 
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import strategies as st
 from living import picture
 from scene_edits import assert_same, edit, editor_of, place, state, text_of
 
-from drone_sim.editing import records
+from drone_sim.editing import drafts, records
 from drone_sim.files import yaml_files
 from drone_sim.mechanics.state import Pose
 from drone_sim.scripting.errors import ScriptError
@@ -499,6 +500,24 @@ def test_a_draft_outlives_the_node(tmp_path):
     assert second.described()["draft"]
     assert not second.is_modified
     second.simulation.close()
+
+
+def test_a_draft_that_cannot_be_written_is_said_once(tmp_path, monkeypatch, caplog):
+    def full(path, _text):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    kept = drafts.Drafts(tmp_path)
+    with monkeypatch.context() as patched:
+        patched.setattr(drafts.writing, "write", full)
+        for text in ("first", "second"):
+            kept.keep("", text)
+            kept.wait()
+    assert [one.levelname for one in caplog.records] == ["WARNING"]
+    assert os.strerror(errno.ENOSPC) in caplog.text
+    assert ": no effect: " in caplog.text, "by which the cockpit's page shows it as a notice"
+    kept.keep("", "third")
+    kept.wait()
+    assert drafts.Drafts(tmp_path).offered.text == "third" and len(caplog.records) == 1
 
 
 def test_a_scene_that_is_loaded_in_flight_is_not_modified(editor):

@@ -1,8 +1,10 @@
 """Callbacks run in rospy's threads: they read nothing of the simulation, check, and leave a job for its thread."""
 
 import threading
+from queue import Queue
 from unittest import mock
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
@@ -10,11 +12,12 @@ pytest.importorskip("rospy", reason="needs ROS")
 import rospy
 from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, Vector3Stamped, WrenchStamped
-from std_msgs.msg import Empty
+from std_msgs.msg import Empty, Header
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.rviz import object_handles, vehicle_handles
+from drone_sim.ros.vehicle import cameras
 from drone_sim.ros.vehicle.inputs import VehicleInputs
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
@@ -124,3 +127,34 @@ def test_a_handle_is_dragged_without_the_simulation(simulation, callbacks, made)
     inbox.empty()
     is_moved = made is vehicle_handles.VehicleHandles
     assert simulation.drone.body.state.position[0] == pytest.approx(2.0 if is_moved else 0.0, abs=1e-3)
+
+
+def test_faults_checked_for_a_vehicle_that_was_replaced_are_refused_in_one_line(callbacks, caplog):
+    simulation = Simulation(parameters.load({"vehicles": {"drone": {"sensors": {"imu": {"kind": "imu", "rate": 20}}}}}))
+    inbox = Inbox()
+    inputs = VehicleInputs(simulation, simulation.drone.parameters, inbox)
+    callbacks["drone/faults"](KeyValue("sensors/imu", "silent"))
+    assert not inputs.log.refused
+    for vehicles in ({"other": {}}, {"drone": {}}):
+        simulation.set_vehicles(vehicles)
+    inbox.empty()
+    simulation.close()
+    assert inputs.log.is_refusing("faults") and "imu" in inputs.log.refused["faults"].why
+    assert not [one for one in caplog.records if one.exc_info]
+
+
+def test_a_picture_that_cannot_be_encoded_does_not_end_the_encoder(monkeypatch):
+    published, errors = Queue(), []
+    monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
+    monkeypatch.setattr(rospy, "Publisher", mock.MagicMock())
+    monkeypatch.setattr(
+        cameras, "Server", lambda _, keep, __: (keep({"format": "png", "png_level": 1}, 0), mock.Mock())[1]
+    )
+    monkeypatch.setattr(rospy, "logerr_throttle", lambda _, line: (errors.append(line), published.put("failed")))
+    output = cameras.CompressedPublisher("drone/camera/image", None)
+    output.publisher.publish = published.put
+    output.publish(Header(), np.zeros((0, 4, 3), np.uint8))
+    assert published.get(timeout=20) == "failed" and len(errors) == 1
+    output.publish(Header(), np.zeros((2, 4, 3), np.uint8))
+    assert "png" in published.get(timeout=20).format
+    output.unregister()

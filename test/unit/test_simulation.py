@@ -287,3 +287,20 @@ def test_what_a_script_held_goes_back_to_the_system(tmp_path):
     simulation.close()
     assert eaten > 30e6
     assert resources()[0] - before < eaten / 4
+
+
+def test_a_scene_that_cannot_be_restored_at_stop_is_not_the_beginning_of_the_next_flight(simulate, tmp_path, caplog):
+    mesh = tmp_path / "wedge.obj"
+    wedge = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+    mesh.write_text(wedge)
+    thing = {"name": "Wedge", "shape": "mesh", "file": str(mesh), "position": [3, 0, 0.5]}
+    simulation = simulate(
+        scene={"objects": [thing, {"name": "Crate", "shape": "box", "size": [0.2] * 3, "position": [2, 0, 1]}]}
+    )
+    simulation.operations.remove([simulation.object_handles["Crate"]])
+    mesh.unlink()
+    simulation.stop()
+    assert any("wedge.obj" in one.getMessage() for one in caplog.records)
+    mesh.write_text(wedge)
+    simulation.start()
+    assert "Crate" in simulation.object_handles

@@ -266,17 +266,19 @@ class Simulation:
         try:
             self._clean_up()
         finally:
-            if not self.scene.is_changed or not self._undo_changes():
+            # False even if the scene cannot be rebuilt: the next start must not take the flown scene as its beginning.
+            is_changed, self.scene.is_changed = self.scene.is_changed, False
+            if not is_changed or not self._undo_changes():
                 self._setup.begin_anew()
                 self._begin()
 
     def _undo_changes(self) -> bool:
-        """Build the scene as it began; return whether its files are still there."""
+        """Rebuild the scene as it began; return whether that was possible: its files may be missing by now."""
         self.clock.steps = 0  # whatever is made begins there
         try:
             self._rebuild(self.parameters, self._handles)
         except ValueError as error:
-            LOG.error("the scene stays as it is: %s", error)
+            LOG.error("the scene could not be restored and stays as it was flown; `start` tries again: %s", error)
             return False
         return True
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+import traceback
 from collections.abc import Callable
 
 import rospy
@@ -74,6 +75,7 @@ class Diagnostics(threading.Thread):
             self._stamped = self._stamp()
         except Exception as error:  # a flight does not end because it could not be described
             self._findings = {_BUSY: Finding(_BUSY, ERROR, f"cannot be diagnosed: {error!r}", {})}
+            rospy.logdebug(traceback.format_exc())
         self._answered.set()
 
 

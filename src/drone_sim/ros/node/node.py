@@ -284,10 +284,10 @@ class Node:
 
 
 class _ToRosout(logging.Handler):
-    """Hands what the modules without ROS log to rosout."""
+    """Log handler that passes the records of modules without ROS to rosout, with their tracebacks."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        logging.getLogger("rosout").log(record.levelno, record.getMessage())
+        logging.getLogger("rosout").log(record.levelno, self.format(record))
 
 
 def main(guardian: Guardian) -> int:
