@@ -143,6 +143,18 @@ def test_faults_checked_for_a_vehicle_that_was_replaced_are_refused_in_one_line(
     assert not [one for one in caplog.records if one.exc_info]
 
 
+def test_every_propeller_of_a_hexacopter_may_fail_by_a_message(callbacks):
+    simulation = Simulation(parameters.load({"config": "package://drone_sim/config/hexacopter.yaml"}))
+    inbox = Inbox()
+    inputs = VehicleInputs(simulation, simulation.drone.parameters, inbox)
+    callbacks["drone/faults"](KeyValue("propellers", "[1, 1, 1, 1, 1, 0]"))
+    inbox.empty()
+    assert simulation.drone.faults.now.propellers == (1, 1, 1, 1, 1, 0)
+    callbacks["drone/faults"](KeyValue("propellers", "[1, 1, 1, 1, 1]"))
+    assert inputs.log.is_refusing("faults")
+    simulation.close()
+
+
 def test_a_picture_that_cannot_be_encoded_does_not_end_the_encoder(monkeypatch):
     published, errors = Queue(), []
     monkeypatch.setattr(rospy, "resolve_name", lambda name: name)

@@ -62,31 +62,25 @@ OPTICAL_FROM_SENSOR = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # o
 
 
 def respondable(number: int) -> str:
-    """Return the name of propeller 1 to 4's body: forces act on it, its script takes particleVelocity."""
+    """Return the name of a propeller's body, counted from 1: forces act on it, its script takes particleVelocity."""
     return f"Quadricopter_propeller_respondable{number}"
 
 
 def seen(number: int) -> str:
-    """Return the name of what is seen of propeller 1 to 4 beside its blades."""
+    """Return the name of the visible part of a propeller, counted from 1, without its blades."""
     return f"Quadricopter_propeller_body{number}"
 
 
 def joint(number: int) -> str:
-    """Return the name of the joint that turns the blades of propeller 1 to 4."""
+    """Return the name of the joint that turns the blades of a propeller, counted from 1."""
     return f"Quadricopter_propeller_joint{number}"
 
 
-_PROPELLERS = [name(n) for n in (1, 2, 3, 4) for name in ("Quadricopter_propeller{}".format, respondable, seen, joint)]
-OWN_NAMES = (
-    DRONE,
-    "Quadricopter_base",
-    TRACK_BASE,
-    TARGET,
-    FLOOR_CAMERA,
-    FRONT_CAMERA,
-    SCRIPT,
-    *_PROPELLERS,
-)  # of every vehicle
+def own_names(propellers: int) -> tuple[str, ...]:
+    """Return the names of the objects of a vehicle with this number of propellers, without cameras and sensors."""
+    names = ("Quadricopter_propeller{}".format, respondable, seen, joint)
+    of_propellers = [name(number) for number in range(1, propellers + 1) for name in names]
+    return DRONE, "Quadricopter_base", TRACK_BASE, TARGET, FLOOR_CAMERA, FRONT_CAMERA, SCRIPT, *of_propellers
 
 
 REMOVABLE = (FLOOR_CAMERA, FRONT_CAMERA, TRACK_BASE)  # without which a vehicle flies
