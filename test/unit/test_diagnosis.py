@@ -294,3 +294,41 @@ def test_the_worst_comes_first():
     found = finding("x", "well", [Problem(WARN, "odd"), Problem(ERROR, "bad")], {})
     assert (found.level, found.message) == (ERROR, "bad; odd")
     assert finding("x", "well", [], {}).message == "well"
+
+
+@pytest.mark.parametrize("where", ["def sysCall_init():", "def sysCall_actuation():"])
+def test_a_vehicle_whose_script_has_failed_says_so_until_it_starts_again(looked, where):
+    looked.script.write_text(f"{where}\n    lost()\ndef sysCall_sensing(): pass\n")
+    try:
+        looked.player.start()
+        looked.fly(1)
+    except ScriptError as error:
+        assert error.phase == "init"
+    assert doing(looked.drone) == "script failed"
+    found = looked.look()
+    assert found.level == ERROR and "script.py:2: NameError" in found.message
+    looked.renew()
+    assert doing(looked.drone) == "flying" and looked.look().level == OK
+
+
+@pytest.mark.parametrize(("on", "is_part"), [("DronePosition", True), ("Wall", False)])
+def test_a_script_on_an_object_that_has_failed_is_an_error_with_its_line(tmp_path, on, is_part):
+    script = tmp_path / "attached.py"
+    script.write_text("def sysCall_actuation():\n    if sim.getSimulationTime() > 0.08: lost()\n")
+    scene = {"objects": [WALL], "scripts": [{"object": on, "script": str(script)}]}
+    simulation = Simulation(parameters.load({"scene": scene}))
+    player = Player(simulation, simulation.step, lambda _: None, False)
+    diagnosis = Diagnosis(player, Pacer(0.05, lambda: 0.0, lambda _: None), dict, False, lambda: 0.0)
+    before, levels = simulation.snapshot(), []
+    for _ in range(2):
+        levels.append({one.name: one.level for one in diagnosis.look()})
+        for _ in range(3):
+            player.step()
+    assert player.playing and set(levels[0].values()) == {OK}
+    assert levels[1]["simulation"] == ERROR and levels[1]["vehicle drone"] == (ERROR if is_part else OK)
+    assert doing(simulation.drone) == ("script failed" if is_part else "flying")
+    lines = [one.message for one in diagnosis.look() if one.level == ERROR]
+    assert len(lines) == 1 + is_part and all("attached.py:2: NameError" in one for one in lines)
+    simulation.restore(before)
+    assert doing(simulation.drone) == "flying"
+    simulation.close()

@@ -243,6 +243,7 @@ class AttachedScript(HostedScript):
         self._heard = bus
         if self.vehicle:
             self.vehicle.commands.listening.append(bus)
+            self.vehicle.flight_state.script_errors.append(self.error)
         # The parameters that V-REP's script has there; a propeller's built-in law gives way to it.
         law = self.vehicle.propulsion.give_way(self.own_script) if self.vehicle else None
         self.parameters: dict[str, Any] = {} if law is None else law
@@ -279,10 +280,9 @@ class AttachedScript(HostedScript):
             _LOG.warning("%s, on %s: %s", path, self.own_script, self.script.idle)
         self._call_init()
 
-    @property
-    def has_failed(self) -> bool:
-        """Whether its script is not called any more."""
-        return self.failure is not None or (isinstance(self.script, GuardedScript) and self.script.failure is not None)
+    def error(self) -> ScriptError | None:
+        """Return the error after which its script is not called any more; None while it is called."""
+        return self.failure or (self.script.failure if isinstance(self.script, GuardedScript) else None)
 
     @property
     def is_loaded(self) -> bool:
@@ -300,6 +300,7 @@ class AttachedScript(HostedScript):
         self._has_left = True
         if self.vehicle and self._heard in self.vehicle.commands.listening:
             self.vehicle.commands.listening.remove(self._heard)
+            self.vehicle.flight_state.script_errors.remove(self.error)
 
     def split_off(self) -> AttachedScript:
         """Return what still runs of it, with its messages, to be ended later; this one calls nothing any more."""

@@ -148,6 +148,9 @@ class Player:
                 self.simulation.stop()
             except ScriptError as second:  # mostly because of the first: whoever shows an error shows that one
                 _LOG.warning(f"script error in cleanup, after that: {second}")
+            if isinstance(error, ScriptError):  # shown until the next start
+                for vehicle in self.simulation.vehicles.values():
+                    vehicle.flight_state.script_errors.append(lambda failed=error: failed)
             self._say_that_the_clock_stands("stopped; `start` runs the edited file")
             raise
         finally:

@@ -301,9 +301,10 @@ class Simulation:
     # ---- stepping
 
     @property
-    def failed_scripts(self) -> list[str]:
-        """Names of the objects whose attached scripts have failed and are not called any more."""
-        return [one.own_script for one in self._setup.scripts.attached if one.has_failed]
+    def failed_scripts(self) -> dict[str, ScriptError]:
+        """Errors of attached scripts that have failed and are not called any more, by their objects' names."""
+        errors = ((one.own_script, one.error()) for one in self._setup.scripts.attached)
+        return {name: error for name, error in errors if error is not None}
 
     @property
     def steps(self) -> int:

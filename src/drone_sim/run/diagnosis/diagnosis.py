@@ -62,6 +62,7 @@ def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool
     asked = simulation.parameters.real_time_factor
     factor = since.steps * simulation.parameters.time_step / since.seconds if since else None
     problems = [Problem(ERROR, f"stopped: {player.why_stopped}")] if player.why_stopped and not player.playing else []
+    problems += [Problem(ERROR, f"script of {on} failed: {error}") for on, error in simulation.failed_scripts.items()]
     if simulated_time and not player.playing:
         problems.append(Problem(WARN, f"{player.state}: /clock stands still, and nodes that use simulated time wait"))
     if held and since and not since.steps:

@@ -43,6 +43,7 @@ class VehicleDiagnosis:
         """Return what was found."""
         problems = [
             *self._stands(),
+            *self._has_failed(),
             *self._rests(),
             *self._refuses(),
             *self._leans(),
@@ -65,6 +66,11 @@ class VehicleDiagnosis:
         if taken is not None and self._now - taken.at < _RECENT:
             return [Problem(WARN, f"commands of {taken.sender} come in, but the simulation is {player.state}: {cure}")]
         return []
+
+    def _has_failed(self) -> list[Problem]:
+        """Report a script on an object of the vehicle that has failed, while the simulation goes on."""
+        error = self._vehicle.flight_state.script_error
+        return [Problem(ERROR, f"script failed: {error}")] if error and not self._player.why_stopped else []
 
     def _rests(self) -> list[Problem]:
         """Tell of commands that do not move it, for it has landed or crashed."""
