@@ -332,3 +332,34 @@ def test_a_script_on_an_object_that_has_failed_is_an_error_with_its_line(tmp_pat
     simulation.restore(before)
     assert doing(simulation.drone) == "flying"
     simulation.close()
+
+
+def test_two_senders_at_once_are_named_and_a_change_of_the_sender_is_no_problem(looked):
+    for number in range(20):
+        looked.command(sender="/old" if number < 10 else "/pilot")
+        looked.fly(1)
+    assert looked.look().level == OK
+    for number in range(20):
+        looked.command(FORWARD if number % 5 else Twist(), sender="/pilot" if number % 5 else "/zeros")
+        looked.fly(1)
+    found = looked.look()
+    assert found.level == WARN and "/pilot and /zeros" in found.message
+    for _ in range(80):
+        looked.command()
+        looked.fly(1)
+    assert "/zeros" not in looked.look().message
+
+
+def test_a_twist_that_nobody_receives_is_named_while_no_command_comes(looked):
+    looked.diagnosis = Diagnosis(
+        looked.player,
+        looked.pacer,
+        lambda: {"drone": looked.log},
+        False,
+        looked.clock,
+        unheard=lambda: {"/cmd_vel": ["/teleop"]},
+    )
+    found = looked.look()
+    assert found.level == WARN and "/teleop publishes /cmd_vel" in found.message
+    looked.command()
+    assert looked.look().level == OK

@@ -16,6 +16,7 @@ from std_msgs.msg import Empty, Header
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
 from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.node import diagnostics
 from drone_sim.ros.rviz import object_handles, vehicle_handles
 from drone_sim.ros.vehicle import cameras
 from drone_sim.ros.vehicle.inputs import VehicleInputs
@@ -170,3 +171,22 @@ def test_a_picture_that_cannot_be_encoded_does_not_end_the_encoder(monkeypatch):
     output.publish(Header(), np.zeros((2, 4, 3), np.uint8))
     assert "png" in published.get(timeout=20).format
     output.unregister()
+
+
+def test_twists_without_a_subscriber_are_found_by_asking_the_master(monkeypatch):
+    answers = {
+        "getSystemState": [
+            [["/cmd_vel", ["/teleop"]], ["/own", ["/drone_sim"]], ["/heard", ["/teleop"]], ["/text", ["/teleop"]]],
+            [["/heard", ["/drone_sim"]], ["/cmd_vel", []]],
+            [],
+        ],
+        "getTopicTypes": [
+            *([topic, "geometry_msgs/Twist"] for topic in ("/cmd_vel", "/own", "/heard")),
+            ["/text", "std_msgs/String"],
+        ],
+    }
+    monkeypatch.setattr(rospy, "get_name", lambda: "/drone_sim")
+    monkeypatch.setattr(diagnostics, "call", lambda _uri, method: answers[method])
+    assert diagnostics.unheard_twists() == {"/cmd_vel": ["/teleop"]}
+    monkeypatch.setattr(diagnostics, "call", mock.Mock(side_effect=ConnectionRefusedError))
+    assert diagnostics.unheard_twists() == {}

@@ -117,6 +117,7 @@ class Node:
             self._time.simulated,
             frames_below=rospy.get_namespace().lstrip("/"),
             held=lambda: self._outside.holds,
+            unheard=lambda: self._diagnostics.unheard,
         )
         self._diagnostics = Diagnostics(diagnosis.look, self._time.stamp, self._inbox)
         self._beat = Beat(_SOON, _SELDOM)

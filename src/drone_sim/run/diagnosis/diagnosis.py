@@ -111,11 +111,14 @@ class Diagnosis:
         clock: Callable[[], float] = time.monotonic,
         frames_below: str = "",
         held: Callable[[], bool] = lambda: False,
+        unheard: Callable[[], Mapping[str, list[str]]] = dict,
     ):
         """Take what plays and paces, what returns the commands that came in, by vehicle, and a monotonic clock (s).
 
         The names of the vehicles' frames begin with `frames_below`; `held` tells whether a step waits for a client.
+        `unheard` returns the topics on which Twists are published and nobody listens, with the publishers' names.
         """
+        self._unheard = unheard
         self._frames_below, self._held = frames_below, held
         self._player, self._pacer, self._logs = player, pacer, logs
         self._simulated_time = simulated_time
@@ -126,13 +129,13 @@ class Diagnosis:
         """Return what is found: the simulation's, the cameras', and each vehicle's."""
         now = count(self._player, self._pacer, self._clock())
         since, self._before = between(self._before, now), now
-        logs = self._logs()
+        logs, unheard = self._logs(), self._unheard()
         return [
             pace(self._player, self._pacer, since, self._simulated_time, self._held()),
             cameras(self._player.simulation, since),
             *(
                 VehicleDiagnosis(
-                    vehicle, self._player, logs.get(name) or CommandLog(self._clock), since, self._frames_below
+                    vehicle, self._player, logs.get(name) or CommandLog(self._clock), since, self._frames_below, unheard
                 ).finding()
                 for name, vehicle in self._player.simulation.vehicles.items()
             ),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from drone_sim.mechanics.state import Twist
 from drone_sim.run.diagnosis.command_log import CommandLog
@@ -27,12 +29,21 @@ _DEAF = "this script does not listen to commands: the tutorial's do from stage 6
 class VehicleDiagnosis:
     """Looks at one vehicle, between two steps."""
 
-    def __init__(self, vehicle: Vehicle, player: Player, log: CommandLog, since: Since | None, frames_below: str = ""):
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        player: Player,
+        log: CommandLog,
+        since: Since | None,
+        frames_below: str = "",
+        unheard: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    ):
         """Take what is to be looked at; `since` is what was counted since the last look, None where nothing was.
 
-        The names of the vehicles' frames begin with `frames_below`.
+        The names of the vehicles' frames begin with `frames_below`. `unheard` has the topics on which Twists are
+        published and that have no subscriber, with the publishers' names.
         """
-        self._frames_below = frames_below
+        self._frames_below, self._unheard = frames_below, unheard
         self._vehicle, self._player, self._log, self._since = vehicle, player, log, since
         self._now = log.clock()
         self._tilt = tilt(vehicle.body)
@@ -50,6 +61,8 @@ class VehicleDiagnosis:
             *self._lies(),
             *self._cannot(),
             *self._is_on_its_own(),
+            *self._has_rivals(),
+            *self._misses(),
         ]
         return finding(f"vehicle {self._vehicle.name}", self._fine(), problems, self._values())
 
@@ -125,6 +138,23 @@ class VehicleDiagnosis:
             said = f"flies on by the last command of {taken.sender}, which has gone"
             return [Problem(WARN, f"{said}: send a zero one, or set cmd_vel_timeout")]
         return []
+
+    def _has_rivals(self) -> list[Problem]:
+        """Report several nodes that send commands at the same time: the drone obeys the last one before each step."""
+        rivals = self._log.rivals(COMMAND)
+        said = f"{' and '.join(rivals)} send {COMMAND} at the same time, and each overrides the other: stop all but one"
+        return [Problem(WARN, said)] if rivals else []
+
+    def _misses(self) -> list[Problem]:
+        """Report Twists on topics without a subscriber, while no command reaches the vehicle."""
+        taken = self._log.taken.get(COMMAND)
+        if taken is not None and self._now - taken.at < _RECENT:
+            return []
+        own = f"{self._vehicle.name}/{COMMAND}"
+        return [
+            Problem(WARN, f"no command comes: {', '.join(nodes)} publishes {topic}, which nobody receives, not {own}")
+            for topic, nodes in self._unheard.items()
+        ]
 
     # ---- what is so
 
