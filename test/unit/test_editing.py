@@ -543,3 +543,9 @@ def test_models_of_the_package_are_written_for_any_machine(editor):
         "      - {shape: cylinder, size: [0.15, 0.04], position: [0, 0, 0.02], color: [0.25, 0.25, 0.27, 1]}",
         "      - {shape: cylinder, size: [0.03, 2], position: [0, 0, 1.04], color: [0.95, 0.8, 0.1, 1]}",
     ]
+
+
+def test_a_vehicle_is_no_model(editor, tmp_path):
+    vehicle = editor.simulation.object_handles["Drone"]
+    with pytest.raises(ValueError, match="'Drone' is part of a vehicle"):
+        editor.answer({"save_model": vehicle, "file": str(tmp_path / "model.yaml")})

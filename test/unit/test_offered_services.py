@@ -158,6 +158,7 @@ def test_who_waits_in_vain_is_refused_and_the_script_is_not_asked_later():
     [
         ("'count', 'no/Type', 'f'", "'no/Type' is not installed"),
         ("'count', 'Trigger', 'f'", "'Trigger' is no service type; one is, for example, std_srvs/Trigger"),
+        ("'a b\\n', 'std_srvs/Trigger', 'counted'", "is no name of a service"),
         ("'count', 'std_srvs/Trigger', 'counter'", "no function 'counter' to call back; near names are counted"),
         ("'count', 'std_srvs/Trigger'", "wrong number of values"),
     ],

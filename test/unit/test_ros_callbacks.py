@@ -15,8 +15,9 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, Vec
 from std_msgs.msg import Empty, Header
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
+from drone_sim.ros.core import message_conversion
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.node import diagnostics
+from drone_sim.ros.node import diagnostics, scene_editing, services
 from drone_sim.ros.rviz import object_handles, vehicle_handles
 from drone_sim.ros.vehicle import cameras
 from drone_sim.ros.vehicle.inputs import VehicleInputs
@@ -190,3 +191,35 @@ def test_twists_without_a_subscriber_are_found_by_asking_the_master(monkeypatch)
     assert diagnostics.unheard_twists() == {"/cmd_vel": ["/teleop"]}
     monkeypatch.setattr(diagnostics, "call", mock.Mock(side_effect=ConnectionRefusedError))
     assert diagnostics.unheard_twists() == {}
+
+
+def test_a_type_whose_code_was_never_generated_is_told_from_one_that_is_not_there(monkeypatch, tmp_path):
+    for ending in ("msg", "srv"):
+        (tmp_path / "course_msgs" / ending).mkdir(parents=True)
+        (tmp_path / "course_msgs" / ending / f"Gate.{ending}").touch()
+    (tmp_path / "course_msgs" / "package.xml").write_text("<package><name>course_msgs</name></package>")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    for look, ending in ((message_conversion.message_class, "msg"), (message_conversion.service_class, "srv")):
+        with pytest.raises(ValueError, match=rf"Gate\.{ending}, but its Python code was never generated: build"):
+            look("course_msgs/Gate")
+        with pytest.raises(ValueError, match="'course_msgs/Gat' is not installed"):
+            look("course_msgs/Gat")
+
+
+def test_to_resume_what_is_not_paused_says_how_to_pause(simulation, monkeypatch):
+    player = mock.Mock(playing=True, pause=lambda on: "paused" if on else "resumed")
+    warnings = []
+    monkeypatch.setattr(services, "VehiclesParameter", mock.Mock())
+    monkeypatch.setattr(rospy, "Service", mock.Mock())
+    monkeypatch.setattr(rospy, "logwarn", warnings.append)
+    offered = services.Services(player, Inbox(), lambda: None)
+    assert "pause true` pauses" in offered.pause(False) and len(warnings) == 1
+    assert offered.pause(True) == "paused"
+    player.playing = False
+    assert offered.pause(False) == "resumed" and len(warnings) == 1
+
+
+def test_half_a_character_in_an_answer_of_the_editor_is_written_out(monkeypatch):
+    asked = mock.Mock(ask=mock.Mock(side_effect=ValueError("no file \ud800.yaml")))
+    done, said = scene_editing.SceneEditing._attempt(mock.Mock(_inbox=asked), str, "", None)
+    assert not done and said.encode("utf-8") == rb"no file \ud800.yaml"

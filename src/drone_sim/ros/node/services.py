@@ -45,7 +45,7 @@ class Services:
         for name in jobs:
             rospy.Service(f"~{name}", Trigger, partial(self._answer, name, getattr(self, name)))
         rospy.Service(
-            "~pause", SetBool, lambda request: self._answer("pause", lambda: player.pause(request.data), request)
+            "~pause", SetBool, lambda request: self._answer("pause", lambda: self.pause(request.data), request)
         )
 
     def close(self) -> None:
@@ -81,6 +81,14 @@ class Services:
         """Stop, and start."""
         self._take_script()
         return self._begun(self._player.restart())
+
+    def pause(self, on: bool) -> str:
+        """Pause, or resume, if not `on`. `rosservice call ... pause "{}"` means False, so a flight is not paused."""
+        if not on and self._player.playing:
+            said = f"not paused: `rosservice call {rospy.resolve_name('~pause')} true` pauses, false resumes"
+            rospy.logwarn(f"pause: no effect: {said}")
+            return said
+        return self._player.pause(on)
 
     def step(self) -> str:
         """Run one step while paused."""
