@@ -215,6 +215,16 @@ def test_who_flies(written, tmp_path):
     assert flight.grade(plain, str(tmp_path / "counting.py")).digest == flight.grade(inside).digest
 
 
+@pytest.mark.parametrize(("script", "falls"), [(None, True), ("", True), ("pilot", False)])
+def test_nobody_flies_a_vehicle_of_the_scene_that_has_no_script_unless_one_is_given(written, tmp_path, script, falls):
+    (tmp_path / "alone.yaml").write_text("vehicles: {drone: {position: [0, 0, 0.8], script: none}}\n")
+    found = flight.Flight(
+        written("{scene: alone.yaml, duration: 2, criteria: [{kind: rise_time, of: z, to: 2, at_most: 1}]}"), script
+    )
+    found.grade()
+    assert (found.rows[-1, 3] < 0.2) == falls
+
+
 def test_a_plan_of_two_vehicles_grades_the_one_that_it_names(written):
     two = """
 duration: 2

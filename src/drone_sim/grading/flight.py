@@ -26,7 +26,6 @@ from drone_sim.scripting.api.calls import Api
 from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.breakpoints import Breakpoints
 from drone_sim.scripting.door.simulation_end import SimulationEnd
-from drone_sim.scripting.load import DEFAULT
 from drone_sim.scripting.time_limit import TimeLimit
 
 
@@ -75,23 +74,23 @@ class Flight:
         scene runs here.
         """
         self._plan, self._seed, self._changes = plan, seed, changes or {}
-        parameters = plan.parameters(seed, None, changes)
-        self._script = plan.script_of(script) or (parameters.script if script is None else "")
+        parameters = plan.parameters(seed, "" if script == "" else None, changes)
+        self._script = plan.script_of(script) or parameters.script
         self._timeline = plan.timeline_of(parameters)
         self._steps = first_step(plan.duration, parameters.time_step)
         backend = OfflineBackend(plan.topics_of(parameters))
-        flown, watch = self._script or DEFAULT, ScriptWatch()
+        watch = ScriptWatch()
         self._simulation = Simulation(
             parameters,
-            script=flown,
+            script=self._script,
             backend=backend if backend.wanted else None,
             started=False,
-            load_script=_loader(door, flown, watch),
+            load_script=_loader(door, self._script, watch),
         )
         backend.clock, backend.is_scene = lambda: self._simulation.time, lambda: watch.is_scene
         try:
             self._recorder = FlightRecorder(plan, self._simulation, backend)
-            self._permissions = Permissions(plan, self._simulation, flown, self._recorder.goals)
+            self._permissions = Permissions(plan, self._simulation, self._script, self._recorder.goals)
             self._rules = Rules(plan, self._simulation, watch)
             if door is not None:
                 door.begin(self._simulation.context.objects, self._is_quiet, self._permissions)

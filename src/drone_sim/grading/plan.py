@@ -139,6 +139,11 @@ class Plan(Checked):
             return script
         return str(named_in(self.folder, self.script)) if Path(self.script).suffix else self.script
 
+    @property
+    def default_script(self) -> str:
+        """The script that flies if none is given: the plan's, or that of its config, '' for none. Raises ParameterError."""
+        return self.script_of(None) or self.parameters().script
+
     def parameters(
         self, seed: int = 0, script: str | None = None, changes: Mapping[str, Any] | None = None
     ) -> Parameters:

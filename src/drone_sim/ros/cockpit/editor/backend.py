@@ -13,6 +13,7 @@ from drone_sim.ros.cockpit.editor.script_store import OWN, ScriptFile, ScriptSto
 from drone_sim.ros.cockpit.editor.task_flights import Grader, TimelinePlayer
 from drone_sim.ros.cockpit.server.page_socket import Answer
 from drone_sim.ros.core.simulator import FAILURES, Simulator, script_failure
+from drone_sim.ros.core.startup import script_from_shell
 from drone_sim.scripting.api.listing import for_editors
 
 _Message = Mapping[str, Any]
@@ -74,7 +75,7 @@ class EditorBackend:
         }
 
     def _flown(self) -> str:
-        flown = str(self._simulator.parameter("script", "") or "pilot")
+        flown = script_from_shell(str(self._simulator.parameter("script", ""))) or "pilot"
         script = self._store.of_file(flown)
         if script is not None:
             return script.name
