@@ -483,6 +483,33 @@ def test_a_scaled_one_has_the_propellers_of_its_size(imported):
     assert rigid.links["propeller_front_left"][3::4] == pytest.approx((0.119496, 0.119496, 0.0026), abs=1e-6)
 
 
+def test_a_script_of_a_scaled_propeller_reads_its_size_factor(imported):
+    """The force goes with the cube of the size factor, as the mass does: it hovers at the unscaled one's velocity."""
+    own = PROPELLER.replace("function sysCall_actuation()", "function sysCall_actuation()\n  local own = 'setObject'")
+    content = imported(*quadricopter(scale=0.5, code=HOVER, propeller=own))
+    assert len(content["scripts"]) == 4
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    for _ in range(40):
+        simulation.step()
+    tree, operations = simulation.context.objects, simulation.operations
+    factor = operations.factors(tree.handle("Quadricopter_propeller1"))
+    height, begun = simulation.drone.body.state.position[2], simulation.drone.parameters.position[2]
+    simulation.close()
+    assert factor == (0.5, 0.5, 0.5)
+    assert height == pytest.approx(begun, abs=0.02)
+
+
+def test_a_scaled_object_of_the_scene_keeps_its_size_factor(imported):
+    content = imported(shape(0, "Box", mesh(), base=numbers("_fa", "Sfa", 2.0)), shape(1, "Plain", mesh()))
+    found = objects(content)
+    assert found["Box"]["size_factor"] == 2 and "size_factor" not in found["Plain"]
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
+    handle = simulation.context.objects.handle("Box")
+    simulation.operations.scale([handle], (1.5, 1.5, 1.5))
+    assert simulation.operations.factors(handle) == (3, 3, 3)
+    simulation.close()
+
+
 def test_propellers_with_scripts_of_their_own_keep_them(imported):
     content = imported(*quadricopter(propeller=PROPELLER.replace("0.002", "0.003 + 0.002")))
     assert [one["object"] for one in content["scripts"]] == [

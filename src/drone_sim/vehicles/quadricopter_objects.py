@@ -22,8 +22,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Annotated
 
-from drone_sim.config.types import Angles, Checked, Label, ParameterError, Point
+from drone_sim.config.types import Angles, Checked, Finite, Label, ParameterError, Point, Within
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, from_rpy
 from drone_sim.mechanics.object_tree import ObjectTree
@@ -33,13 +34,17 @@ from drone_sim.sensors.sensor import SensorParameters
 
 
 class ObjectPlace(Checked):
-    """Another name, to which no suffix is added, alias, parent ('' is the world), and place (m, rad) in its frame."""
+    """Another name, to which no suffix is added, alias, parent ('' is the world), and place (m, rad) in its frame.
+
+    `size_factor` is what sim.getObjectSizeFactor returns.
+    """
 
     name: Label = ""
     alias: Label = ""
     parent: Label | None = None
     position: Point | None = None
     rpy: Angles | None = None
+    size_factor: Annotated[Finite, Within(1e-6, 1e6)] = 1.0
 
     def local(self, default: Matrix) -> Matrix:
         """Return the parent's frame from its own: as given, or the default."""
@@ -170,6 +175,7 @@ class QuadricopterObjects:
         except ValueError as error:  # one of the scene has that name
             raise ParameterError(str(error)) from None
         self._objects[handle].is_model = name == DRONE
+        self._objects[handle].size_factor = place.size_factor
         self._handles.append(handle)
 
     def _add_sensor(self, links: Mapping[str, Matrix], name: str, sensor: SensorParameters) -> None:
