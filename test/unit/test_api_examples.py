@@ -237,5 +237,17 @@ def test_what_is_ignored_says_so_once(tmp_path, modules, caplog, suffix):
         assert len(said) == 1 and said[0].endswith("accepted and ignored (in the script of Drone)"), name
 
 
+@pytest.mark.parametrize(
+    ("link", "draw"),
+    [("simSetLinkDummy", "simAddDrawingObject"), ("sim.setLinkDummy", "sim.addDrawingObject")],
+)
+def test_what_is_ignored_is_told_as_the_script_writes_it_and_drawings_at_debug_level(tmp_path, caplog, link, draw):
+    (tmp_path / "script.lua").write_text(f"function sysCall_init()\n{link}(1, 2)\n{draw}(0, 1)\n{draw}(0, 1)\nend")
+    with caplog.at_level(logging.DEBUG), caplog.at_level(logging.DEBUG, "drone_sim.script"):
+        Simulation(parameters.load(), script=str(tmp_path / "script.lua")).close()
+    told = [(one.getMessage().partition(":")[0], one.levelno) for one in caplog.records if "accepted and" in one.message]
+    assert told == [(link, logging.WARNING), (draw, logging.DEBUG)]
+
+
 def test_the_page_is_made_from_the_code():
     assert make_api.PAGE.read_text(encoding="utf-8") == make_api.text(), "PYTHONPATH=src python docs/make_api.py"

@@ -362,4 +362,51 @@ def test_a_twist_that_nobody_receives_is_named_while_no_command_comes(looked):
     found = looked.look()
     assert found.level == WARN and "/teleop publishes /cmd_vel" in found.message
     looked.command()
+
+
+# What V-REP's tutorial puts into the sensing part in "Removing existing control code", and no later step removes.
+ZEROS = """    -- update twist
+    twist[1] = 0 -- front speed
+    twist[2] = 0 -- lateral speed
+    twist[3] = 0 -- absolute elevation request (if not null)
+    twist[6] = 0 -- yaw speed.
+"""
+
+
+@pytest.mark.parametrize(("zeros", "follows"), [(ZEROS, False), ("", True)])
+@pytest.mark.parametrize("twist", [FORWARD, Twist(Vector3(0, 0, 0), Vector3(0, 0, 0.5))])
+def test_a_script_that_hears_commands_and_never_uses_them_is_told(tmp_path, zeros, follows, twist):
+    """V-REP's tutorial, pasted literally, subscribes to cmd_vel and ignores every command."""
+    lua = SCRIPT.with_name("tutorial_v3.lua").read_text()
+    elevation = "    -- Elevation control\n"
+    assert lua.count(elevation) == 1
+    seed = tmp_path / "seed.lua"
+    seed.write_text(lua.replace(elevation, zeros + elevation))
+    small = {"front": {"width": 16, "height": 12}}
+    simulation = Simulation(parameters.load({"script": str(seed), "cameras": small}))
+    player, log, now = Player(simulation, simulation.step, lambda _: None, False), CommandLog(lambda: now), 0.0
+    diagnosis = Diagnosis(player, Pacer(0.05, lambda: now, lambda _: None), lambda: {"drone": log}, False, lambda: now)
+    simulation.drone.commands.receive(twist)
+    log.take("cmd_vel", "/pilot")
+    log.senders = lambda: ["/pilot"]
+    levels = []
+    for step in range(100):
+        player.step()
+        now += 0.05
+        if step % 20 == 19:
+            (found,) = (one for one in diagnosis.look() if one.name == "vehicle drone")
+            levels.append(found.level)
+    moved = simulation.drone.body.state.position[0], simulation.drone.body.state.angular_velocity[2]
+    simulation.close()
+    assert (max(moved) > 0.1) == follows
+    assert levels == ([OK] * 5 if follows else [OK, OK, OK, WARN, WARN])
+    assert ("not followed" in found.message) == (not follows)
+
+
+def test_a_drone_that_is_commanded_only_now_is_given_time_to_follow(looked):
+    for _ in range(6):
+        looked.fly(20)
+        looked.look()
+    looked.command()
+    looked.fly(1)
     assert looked.look().level == OK

@@ -3,7 +3,6 @@
 import gc
 import os
 from itertools import pairwise
-from pathlib import Path
 
 import pybullet
 import pytest
@@ -16,7 +15,6 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.run.stepping import Diverged
 from drone_sim.scripting.errors import ScriptError
 
-SCRIPTS = Path(__file__).parent / "scripts"
 RUNS = 100
 LEAK = 20 * 30_000  # bytes that 20 runs may add to the process: 30 kB a run
 SMALL = {name: {"width": 16, "height": 12} for name in ("front", "track")}
@@ -105,7 +103,7 @@ def test_worlds_beside_each_other_do_not_meddle(simulate):
     assert fly(second, 20) == alone
 
 
-@pytest.mark.parametrize("script", ["", SCRIPTS / "tutorial_v3.lua", SCRIPTS / "tutorial_v4.lua"])
+@pytest.mark.parametrize("script", ["", "tutorial_v3", "tutorial_v4"])
 def test_a_snapshot_brings_the_flight_back_bit_for_bit(simulate, script):
     """In the middle of a manoeuvre, a push under way, things of the scene tumbling."""
     simulation = simulate(script, scene={"objects": CLUTTER})

@@ -141,7 +141,7 @@ class Plan(Checked):
 
     @property
     def default_script(self) -> str:
-        """The script that flies if none is given: the plan's, or that of its config, '' for none. Raises ParameterError."""
+        """The script that flies if none is given: the plan's, or its config's, '' for none. Raises ParameterError."""
         return self.script_of(None) or self.parameters().script
 
     def parameters(

@@ -6,7 +6,7 @@ import copy
 import logging
 from abc import ABC, abstractmethod
 from collections import ChainMap
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from drone_sim.context import SimulationContext
@@ -46,6 +46,7 @@ class HostedScript(ABC):
         self.context = context
         self.script: load.Script = load.no_script()
         self.path = ""  # of the script that is loaded
+        self.flat_names: Collection[str] = ()  # functions that it calls by their names of 3.x
         self._filters = False  # whether its script is to see every picture of the vision sensor that it is on
 
     @abstractmethod
@@ -108,6 +109,7 @@ class HostedScript(ABC):
             **make_plugins(self),
         }
         script = context.load_script(path, modules, limit, turns, context.breakpoints)
+        self.flat_names = script.flat_names
         self._filters = filters_pictures(context, self.own_script, script)
         self.script, self.path = guarded(script), load.script_path(path)
         context.scripts.attached_to(self.own_script).loaded(self.script, context.clock.time)

@@ -21,6 +21,7 @@ class GuardedScript:
         self._script = script
         self.failure: ScriptError | None = None
         self.language, self.idle, self.is_empty = script.language, script.idle, script.is_empty
+        self.flat_names = script.flat_names
         self._calls = 0  # that have not returned
 
     @property

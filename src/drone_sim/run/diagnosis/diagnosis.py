@@ -10,7 +10,7 @@ from drone_sim.message_text import shown
 from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.diagnosis.counts import Counts, Since, between, count
 from drone_sim.run.diagnosis.finding import ERROR, WARN, Finding, Problem, finding
-from drone_sim.run.diagnosis.vehicles import VehicleDiagnosis
+from drone_sim.run.diagnosis.vehicles import VehicleDiagnosis, is_unmoved
 from drone_sim.run.pacing import Pacer
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
@@ -124,18 +124,31 @@ class Diagnosis:
         self._simulated_time = simulated_time
         self._clock = clock
         self._before: Counts | None = None
+        self._unmoved: dict[str, float] = {}  # s of simulated time during which a vehicle's commands have moved nothing
 
     def look(self) -> list[Finding]:
         """Return what is found: the simulation's, the cameras', and each vehicle's."""
         now = count(self._player, self._pacer, self._clock())
         since, self._before = between(self._before, now), now
         logs, unheard = self._logs(), self._unheard()
+        simulation = self._player.simulation
+        flown = since.steps * simulation.parameters.time_step if since else 0.0
+        self._unmoved = {
+            name: self._unmoved.get(name, 0.0) + flown if flown and is_unmoved(vehicle) else 0.0
+            for name, vehicle in simulation.vehicles.items()
+        }
         return [
             pace(self._player, self._pacer, since, self._simulated_time, self._held()),
             cameras(self._player.simulation, since),
             *(
                 VehicleDiagnosis(
-                    vehicle, self._player, logs.get(name) or CommandLog(self._clock), since, self._frames_below, unheard
+                    vehicle,
+                    self._player,
+                    logs.get(name) or CommandLog(self._clock),
+                    since,
+                    self._frames_below,
+                    self._unmoved[name],
+                    unheard,
                 ).finding()
                 for name, vehicle in self._player.simulation.vehicles.items()
             ),

@@ -23,6 +23,7 @@ _LEANING = math.radians(60)  # no flight of the tutorial's needs half as much
 _SHARE = 0.5  # of the steps with a propeller at its limit, after which it is a problem
 _SLOW = 0.1  # of the speed that is commanded
 _MOVES = 0.1  # m/s, of a command that means to
+_IGNORED_FOR = 3.0  # s of simulated time
 _DEAF = "this script does not listen to commands: the tutorial's do from stage 6 on, and `pilot` does"
 
 
@@ -36,14 +37,15 @@ class VehicleDiagnosis:
         log: CommandLog,
         since: Since | None,
         frames_below: str = "",
+        unmoved: float = 0.0,
         unheard: Mapping[str, Sequence[str]] = MappingProxyType({}),
     ):
         """Take what is to be looked at; `since` is what was counted since the last look, None where nothing was.
 
-        The names of the vehicles' frames begin with `frames_below`. `unheard` has the topics on which Twists are
-        published and that have no subscriber, with the publishers' names.
+        The names of the vehicles' frames begin with `frames_below`; `is_unmoved` has been true for `unmoved` s.
+        `unheard` has the topics on which Twists are published and that have no subscriber, with the publishers' names.
         """
-        self._frames_below, self._unheard = frames_below, unheard
+        self._frames_below, self._unmoved, self._unheard = frames_below, unmoved, unheard
         self._vehicle, self._player, self._log, self._since = vehicle, player, log, since
         self._now = log.clock()
         self._tilt = tilt(vehicle.body)
@@ -63,6 +65,7 @@ class VehicleDiagnosis:
             *self._is_on_its_own(),
             *self._has_rivals(),
             *self._misses(),
+            *self._ignores(),
         ]
         return finding(f"vehicle {self._vehicle.name}", self._fine(), problems, self._values())
 
@@ -156,6 +159,14 @@ class VehicleDiagnosis:
             for topic, nodes in self._unheard.items()
         ]
 
+    def _ignores(self) -> list[Problem]:
+        """Return a problem if the script hears commands, but the vehicle has not followed them for some time."""
+        if self._unmoved < _IGNORED_FOR or not hears_commands(self._vehicle):
+            return []
+        said = f"receives {_shown(self._vehicle.commands.now)}, but its velocity has not followed for"
+        cure = "does the script use the command, or overwrite it in each step (twist[1] = 0)?"
+        return [Problem(WARN, f"{said} {self._unmoved:.0f} s: {cure}")]
+
     # ---- what is so
 
     def _fine(self) -> str:
@@ -207,6 +218,16 @@ class VehicleDiagnosis:
     def _clipped(self) -> str:
         since = self._since
         return f"{since.clipped[self._vehicle.name]} of the last {since.steps} steps" if since else "not known"
+
+
+def is_unmoved(vehicle: Vehicle) -> bool:
+    """Return whether a vehicle that flies freely neither moves nor turns, though its command says so."""
+    command, state = vehicle.commands.now, vehicle.body.state
+    wanted, turn = math.hypot(*command.linear), abs(command.angular.z)
+    if max(wanted, turn) < _MOVES or doing(vehicle) != FLYING or vehicle.body.contacts():
+        return False
+    asked_and_done = (wanted, math.hypot(*state.linear_velocity)), (turn, abs(state.angular_velocity[2]))
+    return all(asked < _MOVES or done <= _SLOW * asked for asked, done in asked_and_done)
 
 
 def _names(contacts: list[Contact]) -> list[str]:

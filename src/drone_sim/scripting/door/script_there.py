@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from time import monotonic
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -59,6 +59,7 @@ class ScriptThere:
         self._has_gone_on = False  # after a sensing, with the next actuation
         self.language = "python" if path.endswith(".py") else "lua"
         self.idle, self.is_empty, self.threaded = "", False, False
+        self.flat_names: Collection[str] = ()
 
     def load(self) -> None:
         """Load it. Raises ScriptError."""

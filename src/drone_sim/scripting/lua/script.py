@@ -25,7 +25,7 @@ from drone_sim.scripting.breakpoints import Breakpoints, Scope
 from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.lua import functions, state
 from drone_sim.scripting.lua.helpers import LuaHelpers
-from drone_sim.scripting.lua.source import LuaSource
+from drone_sim.scripting.lua.source import LuaSource, mixed_forms
 from drone_sim.scripting.lua.thread import MOST_LEFT, Executor, LeftBehind, LuaThread, SameThread, left_behind
 from drone_sim.scripting.lua.variables import read_rows
 from drone_sim.scripting.time_limit import Labels, TimeLimit
@@ -67,18 +67,19 @@ class LuaScript:
         self._limit, self._labels = limit, Labels(path, limit)
         text = LuaSource(source)
         self.is_empty = not text.text.strip()
+        self.flat_names = text.flat_names
         self._modules = modules
         self._end = ""  # why nothing can be called any more
         self._phases = 0
         self.idle = ""  # why nothing of it is ever called
         self._helpers = LuaHelpers(path)
         self._breakpoints = breakpoints if breakpoints is not None else Breakpoints()
-        self._check_call_types(text)
+        self._check_form(text)
         if text.loops_in_c and left_behind() >= MOST_LEFT:
             raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")
         self._thread: Executor = LuaThread(limit) if text.loops_in_c else SameThread(limit)
         try:
-            dialect = state.dialect_for(text.text, text.flat or "phases" in text.form)
+            dialect = state.dialect_for(text.text, bool(text.flat_names) or "phases" in text.form)
             self._has_coroutines = text.coroutines
             self._lua = self._thread.run(self._build, dialect, text.threads)
             if self._breakpoints:
@@ -100,8 +101,10 @@ class LuaScript:
 
     # ---- the script
 
-    def _check_call_types(self, text: LuaSource) -> None:
-        """Raise ScriptError for a phase that does not exist: Lua would compare sim_call_type with nil."""
+    def _check_form(self, text: LuaSource) -> None:
+        """Raise ScriptError for two forms in one script, or a phase that does not exist: Lua would compare with nil."""
+        if text.mixed:
+            raise self._error("load", mixed_forms(*text.mixed), max(text.mixed))
         known = [name for name in CONSTANTS if name.startswith("childscriptcall_")]
         for name in text.call_types:
             if name not in known:

@@ -9,7 +9,7 @@ import functools
 import inspect
 import reprlib
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from types import CodeType
 from typing import TYPE_CHECKING, Any
 
@@ -73,6 +73,7 @@ class PythonScript:
         self._path = path
         self._limit, self._labels = limit, Labels(path, limit)
         self.is_empty = not source.strip()
+        self.flat_names: Collection[str] = ()
         self._modules = modules
         self._thread = self._new_thread(turns) if _NAMES_THREAD in source else None
         self._found = {name: _waiting(one, turns, self._called) for name, one in modules.items()}
