@@ -44,7 +44,8 @@ _TABLE = {
             - setUIButtonTexture
         """,
         "there is no selection here, and no keys are pressed": """
-            345 addObjectToSelection removeObjectFromSelection getObjectSelection=[] getSimulatorMessage=-1
+            345 addObjectToSelection removeObjectFromSelection getObjectSelection=[]
+                getSimulatorMessage=(-1,[0,0,0,0],[])
             5 setObjectSel getObjectSel=[]
             35 getObjectLastSelection=-1
         """,
@@ -150,7 +151,7 @@ class Ignored:
 
         def call(*_arguments: Any) -> Any:
             self.say(name, said, module, level)
-            return self._new_handle() if returned is HANDLE else copy.copy(returned)
+            return self._new_handle() if returned is HANDLE else copy.deepcopy(returned)
 
         call.__name__ = name
         return Module(module)(generations)(call)
