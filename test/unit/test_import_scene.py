@@ -28,6 +28,10 @@ from drone_sim.files import mesh_files
 from drone_sim.importing.main import main
 from drone_sim.mechanics import frames, urdf
 from drone_sim.run import parameters
+from drone_sim.run.diagnosis.diagnosis import Diagnosis
+from drone_sim.run.diagnosis.finding import WARN
+from drone_sim.run.pacing import Pacer
+from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.entry import Place
 from drone_sim.vrep_files.model import VrepFileError
@@ -285,6 +289,43 @@ def test_what_cannot_be_brought_is_said_object_by_object(imported):
     ):
         assert line in listed and line in imported.said
     assert "No quadricopter is in the file: none flies, unless `vehicles` says so" in imported.said
+
+
+ACTS = "function sysCall_actuation() -- setLinkDummy\nend"
+
+
+def _linked(tag_of_type=b""):
+    """Two bodies, each with a dummy that is linked to the other's."""
+    for first, other in ((0, 3), (2, 1)):
+        yield shape(first, f"Body{first}", mesh(), at=(0, 0, 1 + first), dynamic=True, wrapper=weight(0.1))
+        link = integers("Lli", other) + tag_of_type
+        yield scene_object("DMY", first + 1, f"Tip{first}", parent=first, own=link)
+
+
+@pytest.mark.parametrize(
+    ("chunks", "hole"),
+    [
+        ((scene_object("DMY", 0, "Mover"), script(0, ACTS, kind=6)), "Mover: its customization script acts"),
+        ((scene_object("DMY", 0, "Mover"), script(0, "x = 1 --[[ sysCall_actuation ]]", kind=6)), ""),
+        ((scene_object("DMY", 0, "Mover"), script(0, ACTS)), ""),
+        ((scene_object("DMY", 0, "Hook"), script(0, "x = simSetLinkDummy")), "Hook: its script links dummies"),
+        (tuple(_linked()), "Tip0, Tip2: this link of dummies holds two bodies together"),
+        (tuple(_linked(integers("Dl2", 5))), ""),
+    ],
+)
+def test_what_will_not_work_after_an_import_is_a_warning_at_launch_and_in_the_diagnostics(
+    imported, caplog, chunks, hole
+):
+    imported(*chunks)
+    assert ("WILL NOT WORK: " in imported.said) == bool(hole) and hole in imported.said
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": {"drone": {}}}))
+    player = Player(simulation, simulation.step, lambda _: None, False)
+    diagnosis = Diagnosis(player, Pacer(0.05, lambda: 0.0, lambda _: None), dict, False, lambda: 0.0)
+    found = next(one for one in diagnosis.look() if one.name == "simulation")
+    simulation.close()
+    warned = [one.getMessage() for one in caplog.records if one.levelno == logging.WARNING]
+    assert len([one for one in warned if hole and hole in one]) == bool(hole)
+    assert (found.level == WARN) == bool(hole) and hole in found.message
 
 
 PUSH = """

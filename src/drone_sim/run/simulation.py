@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from drone_sim.hosting.child_scripts import ChildScript
+from drone_sim.importing.folder import holes
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.object_tree import NO_HANDLES, Handles
 from drone_sim.mechanics.saved_state import Restore
@@ -100,6 +101,7 @@ class Simulation:
         for path in (*flown, *(one.script for one in parameters.scene.scripts)):  # one that is not there needs no world
             load.script_path(path)
         self._take(self._set_up(parameters, _world(parameters, gui)))
+        self._find_holes()
         self.document = SceneDocument(parameters, self.object_handles)
         try:
             if started:
@@ -214,9 +216,17 @@ class Simulation:
 
     def _read(self, scene_file: str) -> None:
         self._rebuild(self.parameters.in_scene(scene_file), NO_HANDLES)
+        self._find_holes()
         self.document = SceneDocument(self.parameters, self.object_handles)
         self._is_arranged = False
         self.scenes_read += 1
+
+    def _find_holes(self) -> None:
+        """Warn of what will not work in a scene that was imported from V-REP."""
+        file = self.parameters.scene_file
+        self.holes = holes(file) if file else []
+        for one in self.holes:
+            LOG.warning("%s: %s", file, one)
 
     def arrange(self, parameters: Parameters, rebuild: bool = True) -> None:
         """While it is stopped: begin as these parameters say from now on, with the handles that objects have, or had.

@@ -18,6 +18,7 @@ from drone_sim.sensors.vision import TINY
 
 _ENOUGH = 0.9  # of the nominal rate, and of the pace that is asked for
 _FEW = 2  # pictures that fall into this look or the next
+_MOST_HOLES = 3  # of what an import has left out
 _LATE = 0.1  # of the steps; a few are late on any busy computer
 
 
@@ -63,6 +64,7 @@ def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool
     factor = since.steps * simulation.parameters.time_step / since.seconds if since else None
     problems = [Problem(ERROR, f"stopped: {player.why_stopped}")] if player.why_stopped and not player.playing else []
     problems += [Problem(ERROR, f"script of {on} failed: {error}") for on, error in simulation.failed_scripts.items()]
+    problems += [Problem(WARN, f"will not work here: {one}") for one in simulation.holes[:_MOST_HOLES]]
     if simulated_time and not player.playing:
         problems.append(Problem(WARN, f"{player.state}: /clock stands still, and nodes that use simulated time wait"))
     if held and since and not since.steps:
