@@ -207,10 +207,10 @@ class _Import:
                 problem = "its script links dummies (setLinkDummy): links hold nothing here, so the bodies stay apart"
                 self._report.holes.append(f"{on.name}: {problem}")
         for one in self._objects:
-            of, other = one.object.of, None
-            if isinstance(of, VrepDummy) and of.holds:
-                other = self._by_handle.get(of.linked)
-            if other is not None and one.object.handle < of.linked and any(map(_is_on_a_body, (one, other))):
+            of = one.object.of
+            other = self._by_handle.get(of.linked) if isinstance(of, VrepDummy) and of.holds else None
+            is_second = other is not None and other.object.handle < one.object.handle
+            if other is not None and not is_second and (_is_on_a_body(one) or _is_on_a_body(other)):
                 problem = "this link of dummies holds two bodies together; it is not imported, so they come apart"
                 self._report.holes.append(f"{one.name}, {other.name}: {problem}")
 

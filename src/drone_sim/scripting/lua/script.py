@@ -12,7 +12,7 @@ import difflib
 import logging
 import re
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from drone_sim.message_text import near_names
@@ -67,7 +67,7 @@ class LuaScript:
         self._limit, self._labels = limit, Labels(path, limit)
         text = LuaSource(source)
         self.is_empty = not text.text.strip()
-        self.flat_names = text.flat_names
+        self.flat_names: Collection[str] = text.flat_names
         self._modules = modules
         self._end = ""  # why nothing can be called any more
         self._phases = 0
