@@ -322,6 +322,7 @@ def test_what_will_not_work_after_an_import_is_a_warning_at_launch_and_in_the_di
     player = Player(simulation, simulation.step, lambda _: None, False)
     diagnosis = Diagnosis(player, Pacer(0.05, lambda: 0.0, lambda _: None), dict, False, lambda: 0.0)
     found = next(one for one in diagnosis.look() if one.name == "simulation")
+    simulation.start()
     simulation.close()
     warned = [one.getMessage() for one in caplog.records if one.levelno == logging.WARNING]
     assert len([one for one in warned if hole and hole in one]) == bool(hole)

@@ -101,6 +101,7 @@ class Simulation:
         for path in (*flown, *(one.script for one in parameters.scene.scripts)):  # one that is not there needs no world
             load.script_path(path)
         self._take(self._set_up(parameters, _world(parameters, gui)))
+        self.holes: list[str] = []  # what will not work in an imported scene
         self._find_holes()
         self.document = SceneDocument(parameters, self.object_handles)
         try:
@@ -222,11 +223,12 @@ class Simulation:
         self.scenes_read += 1
 
     def _find_holes(self) -> None:
-        """Warn of what will not work in a scene that was imported from V-REP."""
-        file = self.parameters.scene_file
+        """Warn of what will not work in a scene that was imported from V-REP, unless it was said before."""
+        file, before = self.parameters.scene_file, self.holes
         self.holes = holes(file) if file else []
         for one in self.holes:
-            LOG.warning("%s: %s", file, one)
+            if one not in before:
+                LOG.warning("%s: %s", file, one)
 
     def arrange(self, parameters: Parameters, rebuild: bool = True) -> None:
         """While it is stopped: begin as these parameters say from now on, with the handles that objects have, or had.
