@@ -17,10 +17,12 @@ _BLOCK = 2**18
 _ENDING = 5.0  # s, for the kernel to take down a process, on a busy machine
 _LOOKS = 0.1  # s between two looks at how many processes there are, and what they take
 _ROUNDS = 10_000  # of killing what is left
+_MOST_FILES = 20_000  # that a submission may have in its temporary folders: each takes 1 KiB of the kernel's memory
 _MIB = 2**20
 _RESERVED = 2048  # MiB of addresses beyond what is written to: libraries reserve more than they use
 _LIFETIME = 1  # s of processor time after SIGXCPU, which a script may ignore
 _LIBC = ctypes.CDLL(None, use_errno=True)
+_RESIDENT = ("RssAnon", "RssShmem", "VmSwap")  # in /proc/…/status
 _CAPABILITY_VERSION = 0x20080522
 _OVER_OTHERS = (16, 17, 19, 21, 38, 39)  # CAP_SYS_MODULE, _RAWIO, _PTRACE, _ADMIN, CAP_PERFMON, CAP_BPF
 _PR_SET_PDEATHSIG, _PR_SET_DUMPABLE, _PR_SET_CHILD_SUBREAPER, _PR_SET_NO_NEW_PRIVS = 1, 4, 36, 38
@@ -46,16 +48,16 @@ class LimitedProcess:
         act: Callable[[Mapping[str, int]], None],
         outputs: Mapping[str, int],
         kept: Sequence[int] = (),
-        is_alone: bool = False,
+        sandbox_folders: Sequence[str] = (),
     ):
         """Fork it, to `act` with descriptors to write to, by the names of its `outputs`.
 
         `limits`: of a flight, as config/grading.yaml has them, with `real_time` and `seconds` for this one. `outputs`
-        have the most bytes of each; descriptors that are `kept` stay open, too. `is_alone`: it sees no processes of
-        others, as in a sandbox.
+        have the most bytes of each; descriptors that are `kept` stay open, too. `sandbox_folders`: the folders that
+        can be written in the sandbox around this process, where there are no processes of others; () without one.
         """
         self._limits, self._most = limits, outputs
-        self._is_alone = is_alone
+        self._sandbox_folders = sandbox_folders
         self._read: dict[int, str] = {}
         self._got = {name: bytearray() for name in outputs}
         self._lost = ""
@@ -130,19 +132,31 @@ class LimitedProcess:
         return bool(block)
 
     def _look(self, deadline: float, is_silent: bool) -> None:
-        """See whether its time is over; while it is silent, whether there are too many processes, or too large ones."""
+        """End the watch when its time is over, or (while it is silent) when it takes more than is allowed."""
         if time.monotonic() > deadline:
             self._lost = f"did not end within {self._limits['real_time']:g} s of real time"
-        if not (is_silent and self._is_alone):
-            return
-        allowed, memory = self._limits["processes"], self._limits["memory"]
+        elif is_silent and self._sandbox_folders:
+            self._lost = self._excess()
+
+    def _excess(self) -> str:
+        """Return what all processes in the sandbox together have too much of; '' for nothing."""
+        allowed, memory, sockets = (self._limits[name] for name in ("processes", "memory", "open_files"))
         processes = [int(name) for name in os.listdir("/proc") if name.isdigit()]
-        own = _resident(os.getpid())
-        taken = sum(max(0, _resident(one) - own) for one in processes) / _MIB
-        if sum(map(_threads, processes)) > allowed + 2:  # this one, and the flight's own
-            self._lost = f"began more than {allowed} processes and threads"
-        elif taken > memory:
-            self._lost = f"took more than {memory} MiB of memory"
+        most = allowed + 2  # this one, and the flight's own
+        # Threads are counted only where the processes are few: to count those of a fork bomb would take too long.
+        if len(processes) > most or sum(map(_threads, processes)) > most:
+            return f"began more than {allowed} processes and threads"
+        # Less what a fork of this process has from the start. More forks have the same again, whether or not they write
+        # to it; only the lock of their memory would show which, and they can hold that.
+        if sum(map(_resident, processes)) - 2 * _resident(os.getpid()) > memory * _MIB:
+            return f"took more than {memory} MiB of memory"
+        # The kernel lists all sockets of the sandbox's network, also those that wait in a message to be received.
+        if len(Path("/proc/self/net/unix").read_text().splitlines()) > sockets:  # and a line of titles
+            return f"opened more than {sockets} sockets"
+        file_systems = [os.statvfs(folder) for folder in self._sandbox_folders]
+        if sum(one.f_files - one.f_ffree for one in file_systems) > _MOST_FILES:
+            return f"made more than {_MOST_FILES} files"
+        return ""
 
     def _kill(self) -> None:
         """Kill all of it that there is now."""
@@ -150,7 +164,7 @@ class LimitedProcess:
             os.killpg(self._process, signal.SIGKILL)
         with contextlib.suppress(ProcessLookupError):
             os.kill(self._process, signal.SIGKILL)  # which may have no group of its own yet
-        if self._is_alone:
+        if self._sandbox_folders:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(-1, signal.SIGKILL)
 
@@ -201,7 +215,7 @@ def _resident(process: int) -> int:
         status = Path(f"/proc/{process}/status").read_text()
     except OSError:
         return 0
-    return sum(int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith(("RssAnon", "RssShmem")))
+    return sum(int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith(_RESIDENT))
 
 
 def _threads(process: int) -> int:

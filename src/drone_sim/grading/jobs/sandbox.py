@@ -18,8 +18,8 @@ from drone_sim.grading.jobs.server import HANDED_IN
 
 TEMPORARY = "/dev/shm"  # the one folder to write to, in memory
 _TRIED = 20.0  # s, on a busy machine; it takes some 10 ms
-_DEVICES = Path("/dev/dri")  # of the graphics card, which cameras may draw with
-_ABOUT_DEVICES = ("/sys/dev/char", "/sys/devices")
+# Not /dev/zero, whose memory counts for no process, nor the graphics card: cameras are rendered by the judge.
+_DEVICES = ("/dev/null", "/dev/random", "/dev/urandom")
 _TASKS = "tasks"
 _MIB = 2**20
 _ROOT = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")  # links, on most systems
@@ -71,7 +71,7 @@ def _found() -> tuple[str, str]:
 
 
 def _wrapped(program: str, files: int) -> list[str]:
-    devices = ("--dev-bind", str(_DEVICES), str(_DEVICES)) if _DEVICES.exists() else ()
+    devices = (word for name in _DEVICES for word in ("--dev-bind", name, name))
     here = os.getcwd()
     return [
         program,
@@ -79,7 +79,7 @@ def _wrapped(program: str, files: int) -> list[str]:
         # is none, of which sockets without a file (abstract ones) are a part.
         *("--unshare-all", "--as-pid-1", "--die-with-parent", "--new-session", "--cap-drop", "ALL"),
         *_shown_system(),
-        *("--proc", "/proc", "--dev", "/dev", *devices),
+        *("--proc", "/proc", "--tmpfs", "/dev", *devices, "--symlink", "/proc/self/fd", "/dev/fd"),
         *("--size", str(files * _MIB), "--tmpfs", TEMPORARY, "--size", str(2 * LARGEST), "--tmpfs", HANDED_IN),
         *(word for name in ("/tmp", "/run", here) for word in ("--dir", name)),  # which are empty
         *(word for name in ("/dev", package_path() / _TASKS, "/") for word in ("--remount-ro", str(name))),
@@ -97,7 +97,7 @@ def _shown_system() -> tuple[str, ...]:
         elif path.is_dir():
             said += "--ro-bind", str(path), str(path)
     shown: list[Path] = []
-    for path in map(Path, (*_SYSTEM, *_of_python(), *_of_package(), *(_ABOUT_DEVICES if _DEVICES.exists() else ()))):
+    for path in map(Path, (*_SYSTEM, *_of_python(), *_of_package())):
         if path.exists() and not any(path.is_relative_to(one) for one in shown):
             shown.append(path)
             said += "--ro-bind", str(path), str(path)

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from drone_sim.grading.jobs import system_calls
 from drone_sim.grading.jobs.limited_process import LimitedProcess, open_to_itself
 from drone_sim.grading.jobs.server import GONE, HANDED_IN, HUNG_UP, Requests
 from drone_sim.scripting.door import script_process
@@ -36,6 +37,7 @@ def main() -> None:
     """
     is_alone = sys.argv[1:] == ["alone"]  # in a sandbox, where it sees its own processes only
     script_end = script_process.prepared()
+    system_calls.forbid()
     requests = Requests()
     folders = [tempfile.gettempdir(), *([HANDED_IN] if is_alone else [])]
     with contextlib.suppress(*GONE):
@@ -43,7 +45,7 @@ def main() -> None:
             for path in request["handed_in"]:
                 _lay(f"{HANDED_IN}{path}", requests.receive())
             run = functools.partial(_run, script_end, request, door)
-            process = LimitedProcess(request["limits"], run, {}, [door.fileno()], is_alone)
+            process = LimitedProcess(request["limits"], run, {}, [door.fileno()], folders if is_alone else ())
             door.close()
             end = _end_of(process, requests)
             is_last = not all([_cleared(folder) for folder in folders])  # what cannot be removed here, its client does
@@ -90,6 +92,7 @@ def _cleared(folder: str) -> bool:
                 shutil.rmtree(entry.path)
             else:
                 os.unlink(entry.path)
+    os.utime(folder, (0, 0))
     return not os.listdir(folder)
 
 
