@@ -33,7 +33,8 @@ criteria:
 """
 # What a Python script does in each sensing; `found` is what it has laid its hands on, if anything.
 PYTHON = """
-import contextlib, ctypes, gc, glob, os, re, signal, socket, struct, subprocess, sys, time
+import contextlib, ctypes, gc, glob, mmap, os, re, resource, signal, socket, struct, subprocess, sys, tempfile, time
+LIBC = ctypes.CDLL(None)
 HERE = os.path.dirname(__file__)
 
 def attempt():
@@ -112,6 +113,7 @@ SEARCHES = {  # each would find something, were it there
     "the network": "found = socket.create_connection(('127.0.0.1', PORT), 1) and 'connected'",
     "the ROS master": "found = socket.create_connection(('127.0.0.1', 11311), 1) and 'connected'",
     "a tracer": "libc = ctypes.CDLL(None)\n    found = libc.ptrace(16, os.getppid(), None, None) == 0",
+    "memory of a device": "found = mmap.mmap(os.open('/dev/zero', os.O_RDWR), 4096)",
     "the home": "open(os.path.expanduser('~/.attacked'), 'w')",
     "the disk": "open(FOLDER + '/written', 'w')",
 }
@@ -150,19 +152,65 @@ FAR = {  # of the judge, where no sandbox hides it: each would find something, w
     "the judge's descriptors": "found = of_judges(lambda one: os.stat(f'/proc/{one}/fd/4'))",
     "the judge, traced": "found = of_judges(lambda one: ctypes.CDLL(None).ptrace(16, int(one), None, None) == 0)",
 }
-OF_JUDGES = """
+OF_JUDGES = f"""
+def is_of_test(process):
+    while process > 1 and process != {os.getpid()}:
+        process = int(open(f"/proc/{{process}}/stat").read().rpartition(")")[2].split()[1])
+    return process > 1
+
 def of_judges(look):
     found = []
     for one in os.listdir("/proc"):
         with contextlib.suppress(OSError):
-            if one.isdigit() and b"judge_server" in open(f"/proc/{one}/cmdline", "rb").read():
-                if look(one):
+            if one.isdigit() and b"judge_server" in open(f"/proc/{{one}}/cmdline", "rb").read():
+                if is_of_test(int(one)) and look(one):
                     found.append(one)
     return found
 """
+NUMBER = "{'x86_64': %d, 'aarch64': %d}[os.uname().machine]"  # of a system call that the C library has no function for
+ADD_KEY, IO_URING_SETUP = NUMBER % (248, 217), NUMBER % (425, 425)
+CALLS = {  # of the system: each would find something, were it allowed
+    "System V memory": "found = LIBC.shmget(4321, 2**20, 0o1600) != -1",
+    "System V semaphores": "found = LIBC.semget(4321, 1, 0o1600) != -1",
+    "System V messages": "found = LIBC.msgget(4321, 0o1600) != -1",
+    "a POSIX queue": "found = LIBC.mq_open(b'/attacked', os.O_CREAT | os.O_RDWR, 0o600, None) != -1",
+    "a key": f"found = LIBC.syscall({ADD_KEY}, b'user', b'attacked', b'found', 5, -4) != -1",
+    "an attribute of a folder": "os.setxattr(tempfile.gettempdir(), 'user.attacked', b'found')\n    found = 'set'",
+    "a limit of the parent": "resource.prlimit(os.getppid(), resource.RLIMIT_NOFILE, (99, 99))\n    found = 'set'",
+    "a processor of the parent": "os.sched_setaffinity(os.getppid(), {0})\n    found = 'set'",
+    "a priority of the parent": "os.setpriority(os.PRIO_PROCESS, os.getppid(), 19)\n    found = 'set'",
+    "a policy of the parent": "os.sched_setscheduler(os.getppid(), 5, os.sched_param(0))\n    found = 'SCHED_IDLE'",
+    "a file in memory": "found = os.memfd_create('attacked')",
+    "shared memory without a file": "found = mmap.mmap(-1, 4096)",
+    "a user namespace": "found = LIBC.unshare(0x10000000) == 0",
+    "a user namespace of a child": "child = LIBC.syscall(%s, 0x10000011, 0, 0, 0, 0)\n"
+    "    if child == 0:\n        os._exit(0)\n    found = child > 0" % (NUMBER % (56, 220)),
+    "io_uring": f"found = LIBC.syscall({IO_URING_SETUP}, 8, (ctypes.c_char * 200)()) != -1",
+    "a network": "found = socket.socket()",
+    "the host of a virtual machine": "found = socket.socket(40, socket.SOCK_STREAM)",
+    "large buffers": "socket.socketpair()[0].setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2**22)\n    found = 'set'",
+}
+EXCESS = {  # of what no limit of a single process counts, and what is said of it
+    "memory of many small processes": (
+        "for _ in range(30):\n        subprocess.Popen([sys.executable, '-S', '-c', "
+        "'x = bytearray(24 * 2**20); import time; time.sleep(99)'])\n    time.sleep(99)",
+        "more than 256 MiB of memory",
+    ),
+    "sockets of several processes": (
+        "os.fork() or os.fork()\n    kept = [socket.socketpair() for _ in range(110)]\n    time.sleep(99)",
+        "more than 256 sockets",
+    ),
+    "empty files": (
+        "for number in range(25000):\n        os.close(os.open(f'{tempfile.gettempdir()}/{number}', os.O_CREAT))\n"
+        "    time.sleep(99)",
+        "more than 20000 files",
+    ),
+}
+ONCE = "if not hasattr(self, 'begun'):\n        self.begun"
 STAYS = {  # what would outlive the flight
     "a daemon": "subprocess.Popen(['sleep', '4321'], start_new_session=True)",
-    "a copy": "os.fork() or (os.setsid(), time.sleep(4321))",
+    "a daemon's daemon": "ONCE = os.fork() or (os.setsid(), os.fork() and os._exit(0), time.sleep(4321))",
+    "a copy": "ONCE = os.fork() or (os.setsid(), time.sleep(4321))",
     "a fake table": "print('script   passed  points\\nmine.py     20/20    20/20', file=sys.__stdout__, flush=True);"
     " os.write(1, b'20 of 20'); os.write(2, b'20 of 20')",
     "other criteria": "import drone_sim.grading.criteria.reach as reach\n    reach.Reach._judged = lambda *_: 1 / 0",
@@ -339,17 +387,43 @@ def test_who_ends_a_flight_otherwise_has_flown_nothing(fly, folder, what):
 
 @pytest.mark.parametrize("what", STAYS)
 def test_what_stays_behind_is_nothing(fly, folder, what, capfd):
-    result = fly("stays.py", python(STAYS[what], folder))
+    fly("flies.py", python("pass", folder))
+    before = descendants()
+    result = fly("stays.py", python(STAYS[what].replace("ONCE", ONCE), folder))
     assert nothing_gained(result) and result.error is None and result.flown == pytest.approx(0.5)
     assert capfd.readouterr() == ("", "")
-    assert not any(b"4321" in one.read_bytes() for one in Path("/proc").glob("[0-9]*/cmdline") if readable(one))
+    assert descendants() <= before
 
 
-def readable(path):
-    try:
-        return bool(path.read_bytes())
-    except OSError:
-        return False
+def descendants():
+    """Return all processes that this one has begun, by now or through others."""
+    children = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            parent = int(path.read_text().rpartition(")")[2].split()[1])
+            children.setdefault(parent, []).append(int(path.parent.name))
+    found, waiting = set(), [os.getpid()]
+    while waiting:
+        begun = children.get(waiting.pop(), [])
+        found.update(begun)
+        waiting += begun
+    return found
+
+
+@pytest.mark.parametrize("what", CALLS)
+@pytest.mark.parametrize("where", ["fly", "fly_without_sandbox"])
+def test_the_system_is_not_called_for_what_outlives_a_flight_or_is_not_counted(where, folder, what, request):
+    result = request.getfixturevalue(where)("calls.py", python(CALLS[what], folder))
+    assert nothing_gained(result) and result.error is None
+    assert result.outcomes[1].passed, result.outcomes[1].said
+
+
+@pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
+@pytest.mark.parametrize("what", EXCESS)
+def test_all_processes_of_a_submission_are_counted_together(fly, folder, what):
+    body, said = EXCESS[what]
+    result = fly("takes.py", python(body, folder))
+    assert nothing_gained(result) and said in result.error
 
 
 @pytest.mark.parametrize("what", LUA)

@@ -25,6 +25,7 @@ from drone_sim.grading.jobs.pool import FlightOptions, PoolError
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 SETTINGS = settings.load({"limits": {"seconds": 5.0, "patience": 2.0, "memory": 256}, "batches": {"largest": 1}})
+LEFT_BEHIND = f"left-behind-{os.getpid()}"  # another checkout's tests may run on this machine
 PLAN = """
 name: hold
 duration: 0.2
@@ -176,7 +177,7 @@ def processes():
     found = set()
     for entry in Path("/proc").glob("[0-9]*/cmdline"):
         with contextlib.suppress(OSError):
-            if b"left-behind" in entry.read_bytes():
+            if LEFT_BEHIND.encode() in entry.read_bytes():
                 found.add(entry.parent.name)
     return found
 
@@ -228,7 +229,7 @@ def test_in_the_sandbox_nothing_else_is_to_be_seen(what, server, plan, tmp_path,
 
 
 def test_a_process_that_a_script_leaves_is_ended(server, plan, folder):
-    waits = "[sys.executable, '-c', 'input()', 'left-behind'], stdin=-1, start_new_session=True"
+    waits = f"[sys.executable, '-c', 'input()', {LEFT_BEHIND!r}], stdin=-1, start_new_session=True"
     body = f"import subprocess, sys; subprocess.Popen({waits})"
     assert server.fly(job_of(plan, script(folder, "daemon", body), 0)).result.passed
     assert not processes()

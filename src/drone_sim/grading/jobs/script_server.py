@@ -92,7 +92,6 @@ def _cleared(folder: str) -> bool:
                 shutil.rmtree(entry.path)
             else:
                 os.unlink(entry.path)
-    os.utime(folder, (0, 0))
     return not os.listdir(folder)
 
 
