@@ -37,7 +37,10 @@ def main() -> None:
     """
     is_alone = sys.argv[1:] == ["alone"]  # in a sandbox, where it sees its own processes only
     script_end = script_process.prepared()
-    system_calls.forbid()
+    try:
+        system_calls.forbid()
+    except OSError as error:
+        print(f"grade: scripts can share memory and use a network: {error.strerror}", file=sys.stderr)
     requests = Requests()
     folders = [tempfile.gettempdir(), *([HANDED_IN] if is_alone else [])]
     with contextlib.suppress(*GONE):

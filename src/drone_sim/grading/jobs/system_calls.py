@@ -80,11 +80,13 @@ def forbid() -> None:
     code = b"".join(_instructions(index, architecture))
     program = _Program(len(code) // 8, code)
     library = ctypes.CDLL(None, use_errno=True)
-    if library.prctl(_PR_SET_NO_NEW_PRIVS, *map(ctypes.c_ulong, (1, 0, 0, 0))) or library.syscall(
-        ctypes.c_long(seccomp), ctypes.c_ulong(_SET_MODE_FILTER), _SPECULATION_ALLOWED, ctypes.byref(program)
-    ):
-        number = ctypes.get_errno()
-        raise OSError(number, f"seccomp: {os.strerror(number)}")
+    library.prctl(_PR_SET_NO_NEW_PRIVS, *map(ctypes.c_ulong, (1, 0, 0, 0)))
+    for flags in (_SPECULATION_ALLOWED, 0):  # which not every kernel knows
+        words = map(ctypes.c_ulong, (seccomp, _SET_MODE_FILTER, flags))
+        if library.syscall(*words, ctypes.byref(program)) == 0:
+            return
+    number = ctypes.get_errno()
+    raise OSError(number, f"the kernel takes no seccomp filter: {os.strerror(number)}")
 
 
 def _instructions(index: int, architecture: int) -> Iterator[bytes]:
