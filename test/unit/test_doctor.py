@@ -15,6 +15,7 @@ import pytest
 from drone_sim.files.resources import package_path
 from drone_sim.ros.core import network
 from drone_sim.ros.doctor import HINT, OK, WRONG, Line, environment, packages
+from drone_sim.ros.doctor import master as master_checks
 from drone_sim.ros.doctor.doctor import run_check
 from drone_sim.ros.doctor.master import Master
 
@@ -163,7 +164,42 @@ def test_nodes_that_have_gone(known, closed):
     answers.node = f"http://localhost:{closed}"
     (line,) = master.dead()
     assert line.mark == HINT
-    assert "/gone is registered and does not answer: `rosnode cleanup`" in line.said
+    assert line.said.startswith("/gone ") and "`rosnode cleanup`" in line.said
+
+
+def test_all_nodes_are_asked_at_the_same_time(known, monkeypatch):
+    master, _ = known(published=[("/rosout", ["/first", "/second", "/third"])])
+    everyone_is_asked = threading.Barrier(3)  # broken, and so an exception, if one question waits for another's answer
+
+    def answer(_master, node):
+        everyone_is_asked.wait(timeout=5)
+        return node == "/second"
+
+    monkeypatch.setattr(master_checks, "answers", answer)
+    (line,) = master.dead()
+    assert line.mark == HINT
+    assert "/first, /third are" in line.said and "/second" not in line.said
+
+
+def test_nodes_that_never_answer_are_named_after_one_time_limit(known, monkeypatch):
+    master, _ = known(published=[("/rosout", ["/first", "/second"])])
+    end = threading.Event()
+    monkeypatch.setattr(master_checks, "answers", lambda *_: end.wait(HANGS))
+    monkeypatch.setattr(master_checks, "_ANSWERS", 0.05)
+    (line,) = run_check("nodes", master.dead, HANGS / 10)
+    end.set()
+    assert line.mark == HINT
+    assert "/first, /second" in line.said
+
+
+def test_one_wait_for_the_diagnostics_of_all_simulators(known, monkeypatch):
+    services = [("/red/save_scene", ["/red"]), ("/blue/save_scene", ["/blue"])]
+    master, _ = known(services=services)
+    waits = []
+    monkeypatch.setattr(master_checks, "_wait_for_diagnostics", lambda nodes: waits.append(nodes) or {})
+    lines = list(master_checks.simulator(master))
+    assert waits == [["/blue", "/red"]]
+    assert [(line.mark, line.said.split()[0]) for line in lines] == [(WRONG, "/blue"), (WRONG, "/red")]
 
 
 def test_a_node_s_address_that_others_cannot_use(monkeypatch):

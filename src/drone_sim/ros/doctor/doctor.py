@@ -36,7 +36,7 @@ def run_checks(thorough: bool = True) -> Iterator[Line]:
         ("host names", environment.across, _SECONDS),
         ("master", master.found, _SECONDS),
         ("clock", master.clocks, _SECONDS),
-        ("nodes", master.dead, 3 * _SECONDS),
+        ("nodes", master.dead, _SECONDS),
         ("commands", master.commands, _SECONDS),
         ("simulator", lambda: simulator(master), _SECONDS),
     ]
