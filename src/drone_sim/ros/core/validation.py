@@ -40,7 +40,7 @@ def read_changes(message: KeyValue, model: Checked) -> dict[str, Any]:
     for part in reversed(parts):
         value = {part: value} if part else value
     if not isinstance(value, Mapping):
-        raise Refused(f"key '': names none of {', '.join(type(model).model_fields)}")
+        raise Refused(f"key '': must be one of {', '.join(type(model).model_fields)}")
     check_changes(value, model)
     return dict(value)
 
@@ -72,7 +72,7 @@ def parameters_of(name: str, **others: Any) -> Parameters:
     """
     given: dict[str, Any] = rospy.get_param(name, {})
     if not isinstance(given, dict):
-        raise ParameterError(f"must hold parameters, such as {name}/script", (name,), str(given)[:80])
+        raise ParameterError(f"must be a namespace with parameters such as {name}/script", (name,), str(given)[:80])
     for key in ("config", "script", "scene_file"):
         if isinstance(given.get(key), str):
             names = given[key].split(",") if key == "config" else [given[key]]
