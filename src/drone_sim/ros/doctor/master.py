@@ -48,11 +48,11 @@ class Master:
             graph = call(self.uri, "getSystemState")
             self.published, self.subscribed, self.services = (dict(one) for one in graph)
         except ConnectionRefusedError:
-            return Line(HINT, "master", f"none at {self.uri}: {_START}")
+            return Line(HINT, "master", f"no master runs at {self.uri}: {_START}")
         except FAILURES as error:
             why = f"HTTP {error.errcode}" if isinstance(error, xmlrpc.client.ProtocolError) else str(error)
             said = f"port {port} of {self.uri} does not answer as a master ({why or type(error).__name__})"
-            cure = "end what listens there, or `export ROS_MASTER_URI=` with another port"
+            cure = "end the program that listens there, or `export ROS_MASTER_URI=` with another port"
             return Line(WRONG, "master", f"{said}: {cure}")
         self.there = True
         return Line(OK, "master", f"at {self.uri}, with {len(self.nodes())} nodes")
@@ -72,17 +72,17 @@ class Master:
             simulated = False
         tellers = self.published.get("/clock", [])
         if simulated is True and not tellers:
-            cure = "`rosparam set /use_sim_time false`, or use_sim_time:=true for drone.launch; then start them anew"
+            cure = "`rosparam set /use_sim_time false`, or use_sim_time:=true for drone.launch; then restart the nodes"
             yield Line(
-                WRONG, "clock", f"/use_sim_time is true, and nobody publishes /clock: nodes wait forever: {cure}"
+                WRONG, "clock", f"/use_sim_time is true, but no node publishes /clock, so nodes wait forever: {cure}"
             )
         elif simulated is True and len(tellers) > 1:
-            yield Line(WRONG, "clock", f"{', '.join(tellers)} all publish /clock: time jumps; end all but one")
+            yield Line(WRONG, "clock", f"{', '.join(tellers)} all publish /clock, so time jumps: stop all but one")
         elif simulated is True:
-            yield Line(OK, "clock", f"simulated time, from {tellers[0]}")
+            yield Line(OK, "clock", f"simulated time, published by {tellers[0]}")
         elif tellers:
-            said = f"{', '.join(tellers)} publishes /clock, but /use_sim_time is not true: nodes go by real time"
-            yield Line(HINT, "clock", f"{said}; set it before they start")
+            said = f"{', '.join(tellers)} publishes /clock, but /use_sim_time is not true, so nodes use real time"
+            yield Line(HINT, "clock", f"{said}: `rosparam set /use_sim_time true` before they start")
         else:
             yield Line(OK, "clock", "real time")
 
@@ -115,8 +115,8 @@ class Master:
         heard = [topic for topic in self.subscribed if topic.endswith("/cmd_vel")]
         for topic, nodes in self.published.items():
             if topic.endswith("cmd_vel") and topic not in self.subscribed:
-                cure = f"start it with cmd_vel:={heard[0]}" if heard else "no drone is there to hear it"
-                yield Line(HINT, "commands", f"{', '.join(nodes)} publishes {topic}, which nobody receives: {cure}")
+                cure = f"start it with cmd_vel:={heard[0]}" if heard else "no simulator with a drone is running"
+                yield Line(HINT, "commands", f"{', '.join(nodes)} publishes {topic}, which has no subscriber: {cure}")
 
 
 def simulator(master: Master) -> Iterator[Line]:
@@ -167,7 +167,5 @@ def _diagnosed(node: str, message: Any) -> Iterator[Line]:
         simulated |= any(pair.key == "stamps" and pair.value.startswith("simulated") for pair in one.values)
     apart = time.time() - message.header.stamp.to_sec()
     if not simulated and abs(apart) > _APART:
-        said = (
-            f"the clocks here and of {node} are {apart:.1f} s apart: transforms and pictures will not fit; run chrony"
-        )
+        said = f"the clocks of this machine and of {node} differ by {apart:.1f} s: run chrony on both"
         yield Line(HINT, "clock", said)
