@@ -85,7 +85,7 @@ class FaultParameters(Checked):
     propellers: Annotated[
         tuple[Fraction, Fraction, Fraction, Fraction],
         Parts(("front_left", "back_left", "back_right", "front_right")),
-        Field(description="4 numbers from 0 to 1, the share that each propeller still gives"),
+        Field(description="4 numbers from 0 to 1, the fraction of its thrust that each propeller still has"),
     ]
     commands: LinkParameters
     images: LinkParameters
@@ -103,7 +103,7 @@ class FaultParameters(Checked):
 def _own(places: Mapping[str, ObjectPlace | None]) -> Mapping[str, ObjectPlace | None]:
     for name, place in places.items():
         if name not in OWN_NAMES:
-            raise ValueError(f"'{name}' is no object of a vehicle; {near_names(name, OWN_NAMES)}")
+            raise ValueError(f"'{name}' is not an object of a vehicle; {near_names(name, OWN_NAMES)}")
         if place is None and name not in REMOVABLE:
             raise ValueError(f"'{name}': a vehicle needs it; null removes only {', '.join(REMOVABLE)}")
     return places
@@ -207,7 +207,7 @@ def laid_over(entry: Mapping[str, Any], name: str, everything: Mapping[str, Any]
     Raises ParameterError.
     """
     if "name" in entry:
-        raise ParameterError("unknown key; the key of the entry is its name", ("vehicles", name, "name"))
+        raise ParameterError("unknown key; a vehicle is named by the key of its entry", ("vehicles", name, "name"))
     drone = everything.get("drone")
     base = {key: everything[key] for key in EquipmentParameters.model_fields if key in everything}
     place = {key: value for key, value in drone.items() if key != "name"} if isinstance(drone, Mapping) else {}
