@@ -323,7 +323,7 @@ WRONG = {
 }
 BESIDE = {
     "duratoin: 5": "line 1: duratoin: unknown key; near names are duration",
-    "name: a b": "line 1: name = 'a b': must be a letter and then",
+    "name: a b": "line 1: name = 'a b': must begin with a letter",
     "scene: nix.yaml": "no such file: ",
     "vehicle: dron": "line 1: vehicle = 'dron': no such vehicle; near names are drone",
     "config: {control: {Kzre: 3}}": "line 1: config/control/Kzre: unknown key; near names are Kzref",
