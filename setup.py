@@ -12,6 +12,7 @@ setup(
             "drone_sim.grading.outputs.html": ["templates/*", "files/*"],
             "drone_sim.ros.cockpit": ["page/*.html", "page/*.css", "page/*.js"],
             "drone_sim.scripting.lua": ["*.lua"],
+            "drone_sim.child_scripts": ["*.lua"],
         },
     )
 )

@@ -1,15 +1,19 @@
-"""`./dev.sh bench [NAME...] [--plot FILE]`: measure, print tables, write benchmarks/results.json."""
+"""`./dev.sh bench [NAME...] [--plot FILE]`: measure, print tables, write benchmarks/results.json.
+
+`./dev.sh bench --against REVISION`: compare the loop with that of another revision, and write nothing.
+"""
 
 import argparse
 import json
 import platform
+import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from benchmarks import plot
+from benchmarks import against, plot
 from benchmarks.named import BENCHMARKS, Row, measured
 from drone_sim.files import writing
 from drone_sim.render.renderer import Renderer
@@ -55,7 +59,14 @@ def main() -> int:
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"one of {', '.join(BENCHMARKS)}; all without")
     parser.add_argument("--docs", action="store_true", help="put the tables into docs/benchmarks.md")
     parser.add_argument("--plot", metavar="FILE", help="draw the results to a picture")
+    parser.add_argument("--against", metavar="REVISION", help="compare the loop with that of a git revision, in turns")
     arguments = parser.parse_args()
+    if arguments.against:
+        try:
+            print(table(against.compare(arguments.against)))
+        except subprocess.CalledProcessError:
+            parser.error(f"--against {arguments.against}: git knows no such revision")
+        return 0
     unknown = set(arguments.names) - set(BENCHMARKS)
     if unknown:
         parser.error(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(BENCHMARKS)}")

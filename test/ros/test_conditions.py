@@ -133,7 +133,7 @@ class Conditions(unittest.TestCase):
 
     def test_what_is_refused_says_why(self):
         for key, value, said in (
-            ("propellers", "[1, 1]", "propellers = [1, 1]: must be 4 numbers"),
+            ("propellers", "[1, 2]", "propellers/1 = 2: input should be less than or equal to 1"),
             ("images/loss", "{", "value '{'"),
             ("", "5", "key '': must be one of propellers"),
             ("a/" * 1000, "5", "too long"),

@@ -15,12 +15,16 @@ from unittest import mock
 from xmlrpc.client import ServerProxy
 
 import rosgraph
+import roslaunch
 import rosnode
 import rospy
 import rostest
 from listening import Listener
 from nav_msgs.msg import Odometry
 from std_srvs.srv import Trigger
+
+from drone_sim.ros.core.validation import parameters_of
+from drone_sim.run.simulation_setup import script_of
 
 HANGS = 90.0  # s; nothing here takes nearly as long unless it hangs
 
@@ -81,6 +85,20 @@ def simulator(*arguments, **environment):
 
 def stuck(function, call):
     return started(sys.executable, "-c", STUCK.format(function=function, call=call))
+
+
+def launched_parameters(*arguments):
+    """Return what the simulator reads from the parameters that a roslaunch command sets."""
+    config = roslaunch.config.ROSLaunchConfig()
+    file = roslaunch.rlutil.resolve_launch_arguments(["drone_sim", arguments[0]])[0]
+    roslaunch.xmlloader.XmlLoader().load(file, config, argv=["rviz:=false", *arguments[1:]], verbose=False)
+    for name, one in config.params.items():
+        if name.startswith("/drone_sim/"):
+            rospy.set_param(name, one.value)
+    try:
+        return parameters_of("/drone_sim")
+    finally:
+        rospy.delete_param("/drone_sim")
 
 
 @contextlib.contextmanager
@@ -289,6 +307,54 @@ class Process(unittest.TestCase):
         self.assertEqual(launched.stderr.count(said) + launched.stdout.count(said), 1, launched.stderr)
         self.assertNotIn("Traceback", launched.stderr)
         rospy.delete_param("/drone_sim")
+
+    def test_a_default_of_the_launch_does_not_override_a_scene_or_a_config(self):
+        with tempfile.TemporaryDirectory() as folder:
+            scene, config = Path(folder) / "scene.yaml", Path(folder) / "config.yaml"
+            scene.write_text("vehicles: {drone: {position: [0, 0, 0.8], script: none}}\n")
+            config.write_text(
+                f"scene_file: {scene}\nstart: landed\nreal_time_factor: 4\n"
+                "remote_api: {serve: true, port: 0, legacy_port: 0}\n"
+            )
+            fleet = Path(folder) / "fleet.yaml"
+            fleet.write_text("vehicles: {red: {position: [0, 0, 1]}, blue: {position: [0, 1, 1]}}\n")
+            other = Path(folder) / "other.yaml"
+            other.write_text("drone: {position: [0, 0, 2]}\n")
+            for arguments, flown, where, config_counts in (
+                (["drone.launch", f"scene:={scene}"], {"drone": "none"}, 0.8, False),
+                (["drone.launch", f"scene:={scene}", "script:=pilot"], {"drone": "pilot"}, 0.8, False),
+                (["drone.launch", f"config:={config}"], {"drone": "none"}, 0.8, True),
+                (["drone.launch", f"config:={config}", f"scene:={other}"], {"drone": ""}, 2.0, True),
+                (["drone.launch"], {"drone": ""}, 0.8, False),
+                (["drone.launch", "script:=none"], {"drone": "none"}, 0.8, False),
+                (["fleet.launch"], dict.fromkeys(("drone1", "drone2", "drone3"), ""), 0.8, False),
+                (["fleet.launch", f"config:={fleet}"], {"red": "", "blue": ""}, 1.0, False),
+                (["fleet.launch", "n:=1", f"config:={fleet}"], {"drone1": ""}, 0.8, False),
+            ):
+                with self.subTest(arguments):
+                    parameters = launched_parameters(*arguments)
+                    flown_by = {one.name: script_of(one, parameters, parameters.script) for one in parameters.fleet}
+                    self.assertEqual(flown_by, flown)
+                    self.assertEqual(parameters.fleet[0].position[2], where)
+                    pace = (parameters.start, parameters.real_time_factor, parameters.remote_api.serve)
+                    self.assertEqual(pace, ("landed", 4, True) if config_counts else ("flying", 1, False))
+            given = launched_parameters("drone.launch", f"config:={config}", "start:=flying", "real_time_factor:=2")
+            self.assertEqual((given.start, given.real_time_factor), ("flying", 2))
+
+    def test_a_vehicle_without_a_script_falls_if_the_launch_gives_none(self):
+        with tempfile.TemporaryDirectory() as folder, socket.create_server(("localhost", 0)) as free:
+            scene, port = Path(folder) / "scene.yaml", str(free.getsockname()[1])
+            scene.write_text("vehicles: {drone: {position: [0, 0, 0.8], script: none}}\n")
+            free.close()
+            node = started("roslaunch", "-p", port, "drone_sim", "drone.launch", "rviz:=false", f"scene:={scene}")
+            try:
+                self.said_until(node, "flying; commands on")
+                command = ["rostopic", "echo", "-n", "1", "--filter", "m.pose.pose.position.z < 0.2", "/drone/odom"]
+                environment = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}"}
+                subprocess.run(command, env=environment, check=True, timeout=HANGS, stdout=subprocess.DEVNULL)
+            finally:
+                node.send_signal(signal.SIGINT)
+                node.communicate(timeout=HANGS)
 
     def assert_ends_cleanly(self, end):
         """Let it fly as fast as it can, with somebody listening, and end it by `end(process)`."""

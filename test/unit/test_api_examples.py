@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from api_examples import ANY
+from api_examples import ANY, Example
 
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
@@ -19,6 +19,7 @@ from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import Surroundings
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
+from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.time_limit import TimeLimit
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -235,6 +236,55 @@ def test_what_is_ignored_says_so_once(tmp_path, modules, caplog, suffix):
             assert values == expected or (gives is None and not values), name
         said = [one for one in caplog.messages if one.startswith(f"{name}: ")]
         assert len(said) == 1 and said[0].endswith("accepted and ignored (in the script of Drone)"), name
+
+
+# Functions that return several values in CoppeliaSim 4.9's Python synopses, and how many.
+DOCUMENTED = {
+    **dict.fromkeys(("checkCollision", "executeScriptString", "getJointInterval", "getJointMode"), 2),
+    **dict.fromkeys(("getObjectVelocity", "getPathLengths", "getRotationAxis", "getShapeBB", "getShapeColor"), 2),
+    **dict.fromkeys(("getShapeInertia", "getVelocity", "getVisionSensorDepth", "getVisionSensorImg"), 2),
+    **dict.fromkeys(("checkDistance", "getShapeGeomInfo", "readForceSensor", "ruckigStep", "getSimulatorMessage"), 3),
+    **dict.fromkeys(("readVisionSensor", "handleVisionSensor", "checkVisionSensor"), 3),
+    **dict.fromkeys(("yawPitchRollToAlphaBetaGamma", "alphaBetaGammaToYawPitchRoll"), 3),
+    **dict.fromkeys(("readProximitySensor", "handleProximitySensor"), 5),
+    **dict.fromkeys(("checkProximitySensor", "checkProximitySensorEx"), 5),
+}
+
+
+def test_python_unpacks_every_call_as_coppeliasim_documents_it(modules, tmp_path):
+    finding = "".join(f"{name} = sim.getObject('{path}')\n" for name, path in OBJECTS.items())
+    wrong = []
+    for name, count in DOCUMENTED.items():
+        examples = EXAMPLES["sim"].get(name) or [Example("NAME()", [])]
+        for example in (one for one in examples if one.call.startswith("NAME(")):
+            is_other_call = example.python.startswith("NAME(") and example.python.endswith(")")
+            call = in_python(example.call, example.python if is_other_call else "").replace("NAME", f"sim.{name}")
+            values = ", ".join(f"value{number}" for number in range(count))
+            try:
+                run(tmp_path / "unpack.py", f"{PYTHON}{finding}{values} = {call}\n", modules)
+            except ScriptError as error:
+                wrong.append(f"{call}: {error.reason}")
+    assert not wrong
+
+
+def test_in_lua_a_packet_that_is_not_there_is_nil(modules, tmp_path):
+    camera = f"sim.getObject('{OBJECTS['DEPTH']}')"
+    text = f"function sysCall_init() out.take(1, {{select('#', sim.readVisionSensor({camera}))}}) end"
+    assert plain(run(tmp_path / "packets.lua", text, modules)[1]) == [2]
+
+
+@pytest.mark.parametrize(
+    ("link", "draw"),
+    [("simSetLinkDummy", "simAddDrawingObject"), ("sim.setLinkDummy", "sim.addDrawingObject")],
+)
+def test_what_is_ignored_is_told_as_the_script_writes_it_and_drawings_at_debug_level(tmp_path, caplog, link, draw):
+    (tmp_path / "script.lua").write_text(f"function sysCall_init()\n{link}(1, 2)\n{draw}(0, 1)\n{draw}(0, 1)\nend")
+    with caplog.at_level(logging.DEBUG), caplog.at_level(logging.DEBUG, "drone_sim.script"):
+        Simulation(parameters.load(), script=str(tmp_path / "script.lua")).close()
+    told = [
+        (one.getMessage().partition(":")[0], one.levelno) for one in caplog.records if "accepted and" in one.message
+    ]
+    assert told == [(link, logging.WARNING), (draw, logging.DEBUG)]
 
 
 def test_the_page_is_made_from_the_code():

@@ -125,7 +125,7 @@ def test_a_script_that_fails_is_told_once_with_file_line_and_phase_and_the_other
         for _ in range(3):
             simulation.step()
         assert simulation.context.signals.get(float, "n") == 3
-        assert simulation.failed_scripts == ["Floor"]
+        assert list(simulation.failed_scripts) == ["Floor"]
         (said,) = [one.getMessage() for one in caplog.records if one.levelname == "ERROR"]
         assert said.startswith(f"[sensing] {tmp_path}/0.lua:2: sim.getObject: there is no object '/Nobody'")
         assert said.endswith("; this script is no longer called")

@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 import pytest
 import yaml
+from pycocotools.coco import COCO
+from pycocotools.mask import area, toBbox
 from test_renderer_outputs import inner
 
 from drone_sim.mechanics.state import Pose
@@ -89,6 +91,46 @@ def hidden(camera, seen):
     return (np.abs(local[:, 1:]) <= size[1:] / 2).all(axis=1).sum()
 
 
+@pytest.fixture(name="picture_of")
+def _picture_of(tmp_path):
+    """Return what takes a picture of objects with the front camera, 1 m above the floor; as its objects, and it."""
+    simulations = []
+
+    def take(objects, **camera):
+        scene = tmp_path / "scene.yaml"
+        scene.write_text(yaml.safe_dump({"objects": objects, "drone": {"position": [0, 0, 1]}}))
+        simulations.append(Simulation(parameters.load({"scene_file": str(scene), "cameras": {"front": camera}})))
+        front = simulations[-1].drone.cameras["front"]
+        return by_name(front.truth()), front
+
+    yield take
+    for one in simulations:
+        one.close()
+
+
+def test_nothing_is_hidden_of_a_compound_whose_parts_overlap(picture_of):
+    parts = [{"shape": "box", "size": [0.2, 0.4, 0.4], "position": [0, y, 0]} for y in (-0.1, 0.1)]
+    seen, _ = picture_of([{"name": "Pair", "shape": "compound", "parts": parts, "position": [2, 0, 1]}])
+    assert seen["Pair"].occlusion == 0 and seen["Pair"].pixels > 10_000
+
+
+def test_what_reaches_behind_the_camera_ends_at_its_near_plane(picture_of):
+    beam = {"name": "Beam", "shape": "box", "size": [6.0, 0.4, 0.2], "position": [0, 0.8, 1.0]}
+    seen, camera = picture_of([beam], near=0.05)
+    lens, eye = camera.intrinsics, camera.pose()
+    far, left, right = 3.0 - eye[3], 1.0 - eye[7], 0.6 - eye[7]  # of the beam, from the camera, m
+    top, bottom = 1.1 - eye[11], 0.9 - eye[11]
+    wanted = (
+        lens.cx - lens.fx * left / lens.near, lens.cy - lens.fx * top / lens.near,
+        lens.cx - lens.fx * right / far, lens.cy - lens.fx * bottom / lens.near,
+    )  # fmt: skip
+    np.testing.assert_allclose(seen["Beam"].full, wanted, rtol=1e-4, atol=0.5)
+    wide, high = wanted[2] - wanted[0], wanted[3] - wanted[1]
+    inside = (wanted[2] + 0.5) * lens.height  # the part that the picture shows is as high as the picture
+    assert seen["Beam"].truncation == pytest.approx(1 - inside / (wide * high), rel=1e-3)
+    assert seen["Floor"].truncation > 0.99, "the floor reaches behind the camera, too"
+
+
 def test_flow_is_that_of_reprojected_points(simulation):
     camera = simulation.drone.cameras["front"]
     first = camera.truth()
@@ -110,18 +152,15 @@ def test_a_flight_becomes_a_dataset_as_coco_has_it(tmp_path):
     scene.write_text(yaml.safe_dump(SCENE))
     folder, small = tmp_path / "seen", ["cameras.front.width=64", "cameras.front.height=48"]
     assert fly(["--scene", str(scene), "--duration", "0.15", "--truth", str(folder), "--set", *small]) == 0
-    said = json.loads((folder / "annotations.json").read_text())
+    said, read = json.loads((folder / "annotations.json").read_text()), COCO(folder / "annotations.json")
     assert [one["file_name"] for one in said["images"]] == [f"color/{number:06}.png" for number in range(3)]
     categories = {one["id"]: one["name"] for one in said["categories"]}
     assert len({one["id"] for one in said["annotations"]}) == len(said["annotations"]) > 6
     for one in said["annotations"]:
         file = f"{one['image_id']:06}.png"
         mask = cv2.imread(str(folder / "instances" / file), cv2.IMREAD_UNCHANGED) == one["number"]
-        counts = one["segmentation"]["counts"]  # of pixels that are out, in, out, ... column by column
-        runs = np.repeat(np.arange(len(counts)) % 2, counts).reshape(one["segmentation"]["size"][::-1]).T
-        assert (runs == mask).all() and one["area"] == mask.sum()
-        rows, columns = np.nonzero(mask)
-        assert one["bbox"] == [columns.min(), rows.min(), np.ptp(columns) + 1, np.ptp(rows) + 1]
+        np.testing.assert_array_equal(read.annToMask(one), mask)  # as COCO's own reader has it
+        assert one["bbox"] == toBbox(read.annToRLE(one)).tolist() and one["area"] == area(read.annToRLE(one))
     assert {one["name"]: categories[one["category_id"]] for one in said["annotations"]}["Wall"] == "obstacle"
     arrays = np.load(folder / "truth" / "000001.npz")
     assert {name: one.shape for name, one in arrays.items()} == {

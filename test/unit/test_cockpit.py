@@ -1,9 +1,11 @@
 """The parts of the cockpit that need no browser: who comes in, who flies, which files may be written, what is shown."""
 
 import asyncio
+import errno
 import gzip
 import http.client
 import json
+import os
 import socket
 import threading
 from pathlib import Path
@@ -239,6 +241,19 @@ def test_what_a_browser_says_is_checked(served, text, words):
         assert answer["id"] is None and words in answer["error"]
         socket.send(json.dumps({"id": 1, "ask": "double", "number": 1}))
         assert json.loads(socket.recv(timeout=5))["twice"] == 2
+
+
+def test_a_question_that_fails_in_any_way_is_answered_and_the_socket_stays_open(served, tmp_path, monkeypatch, caplog):
+    def exists(message):
+        return {"there": (tmp_path / message["name"]).exists() and 1 // 0}
+
+    monkeypatch.setitem(served.socket._answers, "exists", exists)
+    (tmp_path / "ours").touch()
+    with served.connect() as socket:
+        for name, words in (("x" * 300, os.strerror(errno.ENAMETOOLONG)), ("ours", "zero")):
+            socket.send(json.dumps({"id": 1, "ask": "exists", "name": name}))
+            assert words in json.loads(socket.recv(timeout=5))["error"]
+    assert [one.exc_info[0] for one in caplog.records if one.exc_info] == [ZeroDivisionError]
 
 
 # ---- who flies

@@ -264,7 +264,10 @@ def test_every_stage_and_every_task_has_a_text_and_a_script(ask):
     groups = {one["name"]: one["scripts"] for one in lists["groups"]}
     assert list(groups) == ["built-in", "tutorial", "solutions", "tasks", "mine"]
     assert lists["flown"] == "built-in/pilot.py"
-    assert groups["tutorial"] == STAGES and groups["tasks"] == [f"tasks/{name}.py" for name in tasks.names()]
+    in_lua = [one.replace(".py", ".lua") for one in STAGES[:6]]
+    assert groups["tutorial"] == sorted([*STAGES, *in_lua])
+    assert groups["tasks"] == [f"tasks/{name}.py" for name in tasks.names()]
+    assert ask("lesson", lesson=ask("open", script=in_lua[1])["lesson"])["script"] == STAGES[1]
     for script in (*STAGES, *groups["tasks"]):
         opened = ask("open", script=script)
         lesson = ask("lesson", lesson=opened["lesson"])

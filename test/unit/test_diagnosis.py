@@ -294,3 +294,119 @@ def test_the_worst_comes_first():
     found = finding("x", "well", [Problem(WARN, "odd"), Problem(ERROR, "bad")], {})
     assert (found.level, found.message) == (ERROR, "bad; odd")
     assert finding("x", "well", [], {}).message == "well"
+
+
+@pytest.mark.parametrize("where", ["def sysCall_init():", "def sysCall_actuation():"])
+def test_a_vehicle_whose_script_has_failed_says_so_until_it_starts_again(looked, where):
+    looked.script.write_text(f"{where}\n    lost()\ndef sysCall_sensing(): pass\n")
+    try:
+        looked.player.start()
+        looked.fly(1)
+    except ScriptError as error:
+        assert error.phase == "init"
+    assert doing(looked.drone) == "script failed"
+    found = looked.look()
+    assert found.level == ERROR and "script.py:2: NameError" in found.message
+    looked.renew()
+    assert doing(looked.drone) == "flying" and looked.look().level == OK
+
+
+@pytest.mark.parametrize(("on", "is_part"), [("DronePosition", True), ("Wall", False)])
+def test_a_script_on_an_object_that_has_failed_is_an_error_with_its_line(tmp_path, on, is_part):
+    script = tmp_path / "attached.py"
+    script.write_text("def sysCall_actuation():\n    if sim.getSimulationTime() > 0.08: lost()\n")
+    scene = {"objects": [WALL], "scripts": [{"object": on, "script": str(script)}]}
+    simulation = Simulation(parameters.load({"scene": scene}))
+    player = Player(simulation, simulation.step, lambda _: None, False)
+    diagnosis = Diagnosis(player, Pacer(0.05, lambda: 0.0, lambda _: None), dict, False, lambda: 0.0)
+    before, levels = simulation.snapshot(), []
+    for _ in range(2):
+        levels.append({one.name: one.level for one in diagnosis.look()})
+        for _ in range(3):
+            player.step()
+    assert player.playing and set(levels[0].values()) == {OK}
+    assert levels[1]["simulation"] == ERROR and levels[1]["vehicle drone"] == (ERROR if is_part else OK)
+    assert doing(simulation.drone) == ("script failed" if is_part else "flying")
+    lines = [one.message for one in diagnosis.look() if one.level == ERROR]
+    assert len(lines) == 1 + is_part and all("attached.py:2: NameError" in one for one in lines)
+    simulation.restore(before)
+    assert doing(simulation.drone) == "flying"
+    simulation.close()
+
+
+def test_two_senders_at_once_are_named_and_a_change_of_the_sender_is_no_problem(looked):
+    for number in range(20):
+        looked.command(sender="/old" if number < 10 else "/pilot")
+        looked.fly(1)
+    assert looked.look().level == OK
+    for number in range(20):
+        looked.command(FORWARD if number % 5 else Twist(), sender="/pilot" if number % 5 else "/zeros")
+        looked.fly(1)
+    found = looked.look()
+    assert found.level == WARN and "/pilot and /zeros" in found.message
+    for _ in range(80):
+        looked.command()
+        looked.fly(1)
+    assert "/zeros" not in looked.look().message
+
+
+def test_a_twist_that_nobody_receives_is_named_while_no_command_comes(looked):
+    looked.diagnosis = Diagnosis(
+        looked.player,
+        looked.pacer,
+        lambda: {"drone": looked.log},
+        False,
+        looked.clock,
+        unheard=lambda: {"/cmd_vel": ["/teleop"]},
+    )
+    found = looked.look()
+    assert found.level == WARN and "/teleop publishes /cmd_vel" in found.message
+    looked.command()
+
+
+# What V-REP's tutorial puts into the sensing part in "Removing existing control code", and no later step removes.
+ZEROS = """    -- update twist
+    twist[1] = 0 -- front speed
+    twist[2] = 0 -- lateral speed
+    twist[3] = 0 -- absolute elevation request (if not null)
+    twist[6] = 0 -- yaw speed.
+"""
+
+
+@pytest.mark.parametrize(("zeros", "follows"), [(ZEROS, False), ("", True)])
+@pytest.mark.parametrize("twist", [FORWARD, Twist(Vector3(0, 0, 0), Vector3(0, 0, 0.5))])
+def test_a_script_that_hears_commands_and_never_uses_them_is_told(tmp_path, zeros, follows, twist):
+    """V-REP's tutorial, pasted literally, subscribes to cmd_vel and ignores every command."""
+    lua = SCRIPT.with_name("tutorial_v3.lua").read_text()
+    elevation = "    -- Elevation control\n"
+    assert lua.count(elevation) == 1
+    seed = tmp_path / "seed.lua"
+    seed.write_text(lua.replace(elevation, zeros + elevation))
+    small = {"front": {"width": 16, "height": 12}}
+    simulation = Simulation(parameters.load({"script": str(seed), "cameras": small}))
+    player, log, now = Player(simulation, simulation.step, lambda _: None, False), CommandLog(lambda: now), 0.0
+    diagnosis = Diagnosis(player, Pacer(0.05, lambda: now, lambda _: None), lambda: {"drone": log}, False, lambda: now)
+    simulation.drone.commands.receive(twist)
+    log.take("cmd_vel", "/pilot")
+    log.senders = lambda: ["/pilot"]
+    levels = []
+    for step in range(100):
+        player.step()
+        now += 0.05
+        if step % 20 == 19:
+            (found,) = (one for one in diagnosis.look() if one.name == "vehicle drone")
+            levels.append(found.level)
+    moved = simulation.drone.body.state.position[0], simulation.drone.body.state.angular_velocity[2]
+    simulation.close()
+    assert (max(moved) > 0.1) == follows
+    assert levels == ([OK] * 5 if follows else [OK, OK, OK, WARN, WARN])
+    assert ("not followed" in found.message) == (not follows)
+
+
+def test_a_drone_that_is_commanded_only_now_is_given_time_to_follow(looked):
+    for _ in range(6):
+        looked.fly(20)
+        looked.look()
+    looked.command()
+    looked.fly(1)
+    assert looked.look().level == OK

@@ -1,5 +1,6 @@
 """The scene's editor: edits as records, undo and redo, the scene's text, files, drafts."""
 
+import errno
 import os
 
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import strategies as st
 from living import picture
 from scene_edits import assert_same, edit, editor_of, place, state, text_of
 
-from drone_sim.editing import records
+from drone_sim.editing import drafts, records
 from drone_sim.files import yaml_files
 from drone_sim.mechanics.state import Pose
 from drone_sim.scripting.errors import ScriptError
@@ -501,6 +502,24 @@ def test_a_draft_outlives_the_node(tmp_path):
     second.simulation.close()
 
 
+def test_a_draft_that_cannot_be_written_is_said_once(tmp_path, monkeypatch, caplog):
+    def full(path, _text):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    kept = drafts.Drafts(tmp_path)
+    with monkeypatch.context() as patched:
+        patched.setattr(drafts.writing, "write", full)
+        for text in ("first", "second"):
+            kept.keep("", text)
+            kept.wait()
+    assert [one.levelname for one in caplog.records] == ["WARNING"]
+    assert os.strerror(errno.ENOSPC) in caplog.text
+    assert ": no effect: " in caplog.text, "by which the cockpit's page shows it as a notice"
+    kept.keep("", "third")
+    kept.wait()
+    assert drafts.Drafts(tmp_path).offered.text == "third" and len(caplog.records) == 1
+
+
 def test_a_scene_that_is_loaded_in_flight_is_not_modified(editor):
     edit(editor, {"do": "add", "objects": [GATE], "position": [5, 0, 0]})
     editor.simulation.start()
@@ -524,3 +543,9 @@ def test_models_of_the_package_are_written_for_any_machine(editor):
         "      - {shape: cylinder, size: [0.15, 0.04], position: [0, 0, 0.02], color: [0.25, 0.25, 0.27, 1]}",
         "      - {shape: cylinder, size: [0.03, 2], position: [0, 0, 1.04], color: [0.95, 0.8, 0.1, 1]}",
     ]
+
+
+def test_a_vehicle_is_no_model(editor, tmp_path):
+    vehicle = editor.simulation.object_handles["Drone"]
+    with pytest.raises(ValueError, match="'Drone' is part of a vehicle"):
+        editor.answer({"save_model": vehicle, "file": str(tmp_path / "model.yaml")})

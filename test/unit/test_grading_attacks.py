@@ -7,11 +7,18 @@ from pathlib import Path
 
 import pytest
 
+from drone_sim.grading import permissions
 from drone_sim.grading import plan as plans
 from drone_sim.grading.jobs import sandbox, settings
 from drone_sim.grading.jobs.flyer import Flyer
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
+from drone_sim.grading.scene_values import SceneValues
 from drone_sim.message_text import printable
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting import load
+from drone_sim.scripting.api.calls import contents
+from drone_sim.scripting.api.ignored import MODULES
 
 SETTINGS = settings.load({"limits": {"seconds": 5.0, "patience": 2.0, "memory": 256}})
 SECRET = 123_456_789_012
@@ -360,3 +367,320 @@ def test_lua_gains_as_little(fly, what):
     )
     assert nothing_gained(result) and result.error is None and result.outcomes[1].passed
     assert [said in one for one in result.tried] == ([True] if said else [])
+
+
+# A scene whose scripts may do what a submission may not, and submissions that would have these do it for them.
+SCENE = """
+drone: {position: [0, 0, 1]}
+objects:
+  - {name: Lamp, kind: dummy}
+  - {name: Post, kind: dummy}
+  - {name: Goal, kind: dummy, position: [3, 0, 1]}
+  - {name: Board, kind: dummy, position: [3, 0, 0]}
+  - {name: Flag, kind: dummy, parent: Board}
+  - {name: Box, shape: box, size: [0.2, 0.2, 0.2], position: [5, 0, 1]}
+scripts:
+  - {object: Lamp, script: lamp.lua}
+  - {object: Post, script: post.py}
+"""
+POST = """
+from helper import run as helper
+
+def sysCall_init():
+    sim.setIntegerSignal("score", 0)
+    sim.writeCustomDataBlock(sim.getObject("/Post"), "key", "kept")
+    sim.persistentDataWrite("key", "kept")
+    simROS.setParamString("/rule", "kept")
+    simROS.publish(simROS.advertise("/verdict", "std_msgs/Int32"), {"data": 0})
+    self.tube = sim.tubeOpen(0, "secret", 1)
+    self.crowd = sim.createCollection()
+    sim.addItemToCollection(self.crowd, sim.handle_single, sim.getObject("/Box"), 0)
+
+def sysCall_sensing():
+    if sim.getStringSignal("asked"):
+        sim.setStringSignal("answered", "yes")
+
+def door(value):
+    return 2 * value
+"""
+LAMP = "function shine(value) return value + 1 end function sysCall_actuation() end"
+IN_SCENE = """
+duration: 0.3
+scene: scene.yaml
+MORE
+criteria:
+  - {kind: reach, places: [Goal, Flag], within: 0.2}
+  - {kind: signal, signal: found, equals: nothing}
+  - {kind: signal, name: score, signal: score, equals: 0}
+  - {kind: signal, name: verdict, topic: /verdict, equals: 0}
+"""
+NOT_ITS_OWN = {  # what is called, and what is said of it
+    "the API of a Lua script": ("sim.callScriptFunction('simRemoveObject', lamp, box)", "call simRemoveObject of the"),
+    "a phase": ("sim.callScriptFunction('sysCall_init', post)", "call sysCall_init of the script of Post"),
+    "a phase at an object": ("sim.callScriptFunction('sysCall_cleanup@Lamp', 1)", "call sysCall_cleanup of the"),
+    "a phase by attributes": ("sim.getScriptFunctions(lamp).sysCall_actuation()", "call sysCall_actuation of the"),
+    "what a script imports": ("sim.callScriptFunction('helper', post, ['touch', 'x'])", "call helper of the script"),
+    "a function that is not listed": ("sim.callScriptFunction('door', post, 3)", "call door of the script of Post"),
+    "a text in Python": ("sim.executeScriptString('1 + 1', post)", "run a text in the script of Post"),
+    "a text in Lua": ("sim.executeScriptString('return 1@Lamp', 1)", "run a text in the script of Lamp"),
+    "its parameters": ("sim.setUserParameter(sim.getObject('/Post'), 'x', 1)", "change"),
+    "a signal": ("sim.setIntegerSignal('score', 5)", "change the signal score"),
+    "a signal of another kind": ("sim.setStringSignal('score', 'x')", "change the signal score"),
+    "a signal, cleared": ("sim.clearIntegerSignal('score')", "change the signal score"),
+    "all signals, cleared": ("sim.clearFloatSignal()", "change the signal score"),
+    "custom data": ("sim.writeCustomDataBlock(sim.getObject('/Post'), 'key', 'x')", "customData.key of Post"),
+    "a property": ("sim.setStringProperty(sim.getObject('/Post'), 'customData.key', 'x')", "customData.key of Post"),
+    "persistent data": ("sim.persistentDataWrite('key', 'x')", "customData.key of the scene"),
+    "a ROS parameter": ("simROS.setParamString('/rule', 'x')", "change the parameter /rule"),
+    "a tube": ("sim.tubeWrite(1, 'x')", "change a tube of another script"),
+    "a tube, closed": ("sim.tubeClose(1)", "change a tube of another script"),
+    "a collection": ("sim.emptyCollection(sim.handle_all)", "change a collection of another script"),
+    "a dummy": ("sim.setObjectPosition(sim.getObject('/Lamp'), -1, [3, 0, 1])", "move Lamp"),
+    "the goal": ("sim.setObjectPosition(goal, -1, here())", "move Goal"),
+    "the goal's parent": ("sim.setObjectParent(goal, drone, False)", "move Goal"),
+    "the goal in a motion": ("sim.moveToPose({'object': goal, 'targetPose': here() + [0, 0, 0, 1]})", "move Goal"),
+    "what the goal is on": ("sim.setObjectPosition(sim.getObject('/Board'), -1, here())", "move Flag"),
+}
+WITH_ALL = "allowed: [move, push, change]"
+NEVER = {  # what no plan allows
+    **{what: one for what, one in NOT_ITS_OWN.items() if "call " in one[1] or "run " in one[1] or "the goal" in what},
+    "the goal's name": ("sim.setObjectName(goal, 'Goal2')", "change Goal"),
+    "the goal, removed": ("sim.removeObjects([box, goal])", "change Goal"),
+    "the goal's copy": ("sim.removeObject(sim.getObject('/Board'))", "change Flag"),
+    "a model": ("sim.loadModel('model.yaml')", "load a model"),
+    "a port": ("simRemoteApi.start(19999)", "open a port"),
+    "a file": ("sim.saveModel(box, 'mine.yaml')", "write Box"),
+}
+TRIES = """
+def sysCall_init():
+    global lamp, post, box, goal, drone
+    box, goal, drone = (sim.getObject(one) for one in ("/Box", "/Goal", "/Quadcopter"))
+    lamp, post = (sim.getScript(sim.scripttype_childscript, one) for one in ("/Lamp", "/Post"))
+
+def here():
+    return sim.getObjectPosition(drone, -1)
+
+def sysCall_sensing():
+    try:
+        found = repr(BODY)
+    except ValueError:
+        found = "nothing"
+    sim.setStringSignal("found", found)
+"""
+
+
+@pytest.fixture(scope="module")
+def fly_in_scene(tmp_path_factory):
+    """Return a function that flies a submission in the scene with scripts, under a plan with `more` keys."""
+    folder = tmp_path_factory.mktemp("scene")
+    files = {"scene.yaml": SCENE, "post.py": POST, "lamp.lua": LAMP, "helper.py": "def run(*words): return words"}
+    files["model.yaml"] = "objects: [{name: Loaded, kind: dummy}]"
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    with contextlib.closing(Flyer(SETTINGS.limits, sandboxed=False)) as flyer:
+
+        def fly(body, more="", script=TRIES):
+            (folder / "plan.yaml").write_text(IN_SCENE.replace("MORE", more))
+            (folder / "handed_in").mkdir(exist_ok=True)
+            path = folder / "handed_in" / "tries.py"
+            path.write_text(script.replace("BODY", body))
+            contents = contents_of(plans.read(folder / "plan.yaml"), str(path))
+            return flyer.fly(Job(str(folder / "plan.yaml"), str(path), 0, {}, key_of(contents, 0, {}))).result
+
+        yield fly
+
+
+@pytest.mark.parametrize("what", NOT_ITS_OWN)
+def test_what_belongs_to_the_scene_is_out_of_reach(fly_in_scene, what):
+    body, said = NOT_ITS_OWN[what]
+    result = fly_in_scene(body)
+    assert result.error is None and not result.passed
+    assert [one.passed for one in result.outcomes] == [False, True, True, True], result.outcomes
+    assert len(result.tried) == 1 and said in result.tried[0]
+
+
+@pytest.mark.parametrize("what", NEVER)
+def test_no_plan_lends_the_scenes_rights_or_its_goals(fly_in_scene, what):
+    body, said = NEVER[what]
+    result = fly_in_scene(body, WITH_ALL)
+    assert result.error is None and result.outcomes[1].passed, result.outcomes
+    assert len(result.tried) == 1 and said in result.tried[0]
+
+
+def test_a_topic_of_the_scene_is_not_a_submissions(fly_in_scene):
+    result = fly_in_scene("simROS.publish(simROS.advertise('/verdict', 'std_msgs/Int32'), {'data': 5})")
+    assert [one.passed for one in result.outcomes] == [False, True, True, True], result.outcomes
+
+
+CALLED = "(sim.callScriptFunction('door', post, 3), sim.callScriptFunction('shine@Lamp', 1, 1))"
+
+
+def test_a_plan_lists_the_functions_that_a_submission_may_call(fly_in_scene):
+    result = fly_in_scene(CALLED, "calls: [door, shine, helper]")
+    assert result.error is None and result.tried == (), result.error
+    assert "was '(6, 2)'" in result.outcomes[1].said
+    imported = fly_in_scene("sim.callScriptFunction('helper', post, 'x')", "calls: [door, shine, helper]")
+    assert "tried to call helper of the script of Post" in imported.tried[0] and imported.outcomes[1].passed
+
+
+ITS_OWN = """
+def sysCall_init():
+    self.mark, self.drone = sim.createDummy(0.01), sim.getObject("/Quadcopter")
+    self.tube, self.mine = sim.tubeOpen(0, "mine", 1), sim.createCollection()
+    self.track = sim.getObjectHandle("Track_base")
+
+def sysCall_sensing():
+    sim.setStringSignal("asked", "yes")
+    sim.setIntegerSignal("counted", 3)
+    sim.clearIntegerSignal("counted")
+    sim.writeCustomDataBlock(sim.getObject("/Box"), "mine", "x")
+    sim.tubeWrite(self.tube, "x")
+    sim.emptyCollection(self.mine)
+    sim.setObjectPosition(self.mark, self.drone, [0, 0, 1])
+    sim.setObjectPosition(self.track, -1, [0, 0, 1])
+    sim.callScriptFunction("twice", sim.handle_self, 2)
+    sim.executeScriptString("twice(2)", sim.handle_self)
+    assert sim.readCustomDataBlock(sim.getObject("/Post"), "key") == "kept"
+    if sim.getStringSignal("answered") == "yes":
+        sim.setStringSignal("found", "nothing")
+
+def twice(value):
+    return 2 * value
+"""
+
+
+def test_what_is_its_own_a_submission_may_set_and_call(fly_in_scene):
+    result = fly_in_scene("", script=ITS_OWN)
+    assert result.error is None and result.tried == ()
+    assert [one.passed for one in result.outcomes] == [False, True, True, True], result.outcomes
+
+
+# What a submission reaches by each function of the API; a new function must be entered here, and decided on.
+REACHES = {
+    "nothing but answers": """
+        sim: boolAnd32 boolOr32 boolXor32 getCollectionHandle getCollectionName getCollectionObjects
+        getPersistentDataTags getProperty persistentDataRead
+        readCustomDataBlock readCustomDataBlockTags readCustomTableData checkCollision
+        checkDistance getObjectFloatParam getObjectFloatParameter getObjectInt32Param getObjectInt32Parameter
+        getShapeInertia getShapeMass getShapeMassAndInertia isDynamicallyEnabled getJointForce getJointInterval
+        getJointMatrix getJointMaxForce getJointMode getJointPosition getJointTargetForce getJointTargetPosition
+        getJointTargetVelocity getJointType getJointVelocity getObjectChildPose alphaBetaGammaToYawPitchRoll
+        buildIdentityMatrix buildMatrix buildMatrixQ copyMatrix getEulerAnglesFromMatrix getMatrixInverse
+        getQuaternionFromMatrix getRotationAxis interpolateMatrices invertMatrix multiplyMatrices multiplyVector
+        rotateAroundAxis yawPitchRollToAlphaBetaGamma getNameSuffix getObject getObjectAlias getObjectHandle
+        getObjectName setNameSuffix getObjectChild getObjectType getObjectUid getObjects getObjectsInTree isHandle
+        isHandleValid getObjectMatrix getObjectOrientation getObjectParent getObjectPose getObjectPosition
+        getObjectQuaternion getObjectVelocity getVelocity packDoubleTable packFloatTable packInt32Table packTable
+        packUInt16Table packUInt32Table packUInt8Table transformBuffer unpackDoubleTable unpackFloatTable
+        unpackInt32Table unpackTable unpackUInt16Table unpackUInt32Table unpackUInt8Table getClosestPosOnPath
+        getClosestPositionOnPath getDataOnPath getOrientationOnPath getPathInterpolatedConfig getPathLength
+        getPathLengths getPathPosition getPositionOnPath resamplePath buildPose interpolatePoses invertPose
+        matrixToPose multiplyPoses poseToMatrix checkProximitySensor checkProximitySensorEx handleProximitySensor
+        readProximitySensor resetProximitySensor getCustomizationScriptAssociatedWithObject getScript
+        getScriptAssociatedWithObject getScriptExecutionCount getScriptFunctions getScriptName
+        getObjectAssociatedWithScript getScriptHandle getScriptSimulationParameter getUserParameter readForceSensor
+        readSensor getShapeGeomInfo getObjectSizeFactor getObjectSizeValues getShapeBB getShapeColor getFloatSignal
+        getInt32Signal getStringSignal getArrayParam getBoolParam getFloatParam getInt32Param getModuleName getRandom
+        getSimulationState getSimulationStopping getSimulationTime getSimulationTimeStep getStringParam getSystemTime
+        getSystemTimeInMs startSimulation copyTable tubeStatus checkVisionSensor checkVisionSensorEx
+        getVisionSensorCharImage getVisionSensorDepth getVisionSensorDepthBuffer getVisionSensorImage
+        getVisionSensorImg getVisionSensorResolution handleVisionSensor readVisionSensor receiveData
+        simROS: getNumSubscribers getParamBool getParamDouble getParamInt getParamString getTime hasParam
+        searchParam""",
+    "its own log, drawings, windows, threads and pictures": """
+        sim: addLog addStatusbarMessage auxiliaryConsoleClose auxiliaryConsoleOpen auxiliaryConsolePrint
+        auxiliaryConsoleShow displayDialog endDialog getDialogInput getDialogResult addDrawingObject
+        addDrawingObjectItem removeDrawingObject addGraphStream destroyGraphCurve resetGraph setGraphStreamValue
+        setGraphUserData acquireLock delegateChildScriptExecution getThreadAutomaticSwitch getThreadExitRequest
+        getThreadId releaseLock setStepping setThreadAutomaticSwitch setThreadResumeLocation setThreadSwitchTiming
+        step switchThread wait waitForSignal ruckigPos ruckigRemove ruckigStep ruckigVel adjustView floatingViewAdd
+        floatingViewRemove createDummy createPath stopSimulation sendData createCollection tubeOpen
+        simROS: advertise advertiseService call imageTransportAdvertise imageTransportPublish
+        imageTransportShutdownPublisher publish publisherTreatUInt8ArrayAsString sendTransform sendTransforms
+        serviceClient serviceClientTreatUInt8ArrayAsString serviceServerTreatUInt8ArrayAsString shutdownPublisher
+        shutdownServiceClient shutdownServiceServer shutdownSubscriber subscribe subscriberTreatUInt8ArrayAsString
+        simVision: addBuffer1ToWorkImg addWorkImgToBuffer1 binaryWorkImg blobDetectionOnWorkImg buffer1ToWorkImg
+        buffer2ToWorkImg changedPixelsOnWorkImg coordinatesFromWorkImg edgeDetectionOnWorkImg horizontalFlipWorkImg
+        intensityScaleOnWorkImg multiplyWorkImgWithBuffer1 normalizeWorkImg selectiveColorOnWorkImg
+        sensorDepthMapToWorkImg sensorImgToWorkImg subtractBuffer1FromWorkImg subtractWorkImgFromBuffer1 swapBuffers
+        swapWorkImgWithBuffer1 uniformImgToWorkImg verticalFlipWorkImg workImgToBuffer1 workImgToBuffer2
+        workImgToSensorImg""",
+    "values that the scene's scripts have not set": """
+        sim: addItemToCollection addObjectToCollection destroyCollection emptyCollection persistentDataWrite
+        removeProperty setProperty writeCustomDataBlock writeCustomTableData clearFloatSignal clearInt32Signal
+        clearStringSignal setFloatSignal setInt32Signal setStringSignal tubeClose tubeRead tubeWrite
+        simROS: deleteParam setParamBool setParamDouble setParamInt setParamString""",
+    "its own parameters": "sim: setScriptSimulationParameter setUserParameter",
+    "its own blades": "sim: setJointPosition",
+    "its own frames": """
+        sim: moveToConfig moveToConfig_cleanup moveToConfig_init moveToConfig_step moveToPose moveToPose_init
+        setObjectMatrix setObjectOrientation setObjectParent setObjectPose setObjectPosition setObjectQuaternion
+        followPath moveToObject moveToPosition rmlMoveToPosition""",
+    "move": """
+        sim: resetDynamicObject setJointForce setJointInterval setJointMode setJointTargetForce
+        setJointTargetPosition setJointTargetVelocity setSphericalJointMatrix moveToJointPositions
+        rmlMoveToJointPositions setPathPosition""",
+    "push": "sim: addForce addForceAndTorque",
+    "change": """
+        sim: setObjectFloatParam setObjectInt32Param cutPathCtrlPoints insertPathCtrlPoints copyPasteObjects
+        createForceSensor createJoint createMeshShape createPrimitiveShape createProximitySensor createPureShape
+        createVisionSensor removeModel removeObject removeObjects setObjectAlias setObjectName setShapeInertia
+        setShapeMassAndInertia groupShapes scaleObject scaleObjects setShapeBB setShapeColor setShapeMass ungroupShape
+        pauseSimulation setArrayParam setBoolParam setFloatParam setInt32Param setSimulationTimeStep setStringParam""",
+    "call": "sim: callScriptFunction",
+    "run": "sim: executeScriptString",
+    "load": "sim: loadModel",
+    "write": "sim: saveModel",
+    "open": """
+        sim: extRemoteApiReset extRemoteApiStart extRemoteApiStatus extRemoteApiStop
+        simRemoteApi: reset start status stop""",
+}
+
+
+def entered():
+    """Yield each function of the table as module.name, and what a submission reaches by it."""
+    for reached, text in REACHES.items():
+        module = ""
+        for word in text.split():
+            module = word if word.endswith(":") else module
+            if word != module:
+                yield f"{module[:-1]}.{word}", reached
+
+
+def test_it_is_known_of_every_function_what_a_submission_reaches_by_it():
+    found = {}
+
+    def note(path, modules, *others):
+        found.update({f"{name}.{key}": one for name, api in modules.items() for key, one in contents(api)[1].items()})
+        return load.load(path, modules, *others)
+
+    simulation = Simulation(parameters.load(), load_script=note)
+    drone = simulation.drone
+    actions = permissions.Actions(simulation, [drone], {drone.object_name})
+    values = SceneValues(simulation, set())
+    looks = {
+        "values that the scene's scripts have not set": {*values.looks},
+        "its own parameters": {"sim.setScriptSimulationParameter", "sim.setUserParameter"},
+        "its own blades": {"sim.setJointPosition"},
+    }
+    ignored = {f"{name}.{key}" for name, groups in MODULES.items() for one in groups for key in one.functions}
+    reached = dict(entered())
+    assert len(reached) == sum(1 for _ in entered())
+    for name, function in found.items():
+        if name in ignored:
+            continue  # it does nothing
+        own = f"{name.partition('.')[0]}.{function.__name__}"
+        assert own in reached, f"{own}: enter in REACHES what a submission reaches by it"
+        what, needs = reached[own], actions.of(name, [])
+        assert (name in values.looks) == (own in looks["values that the scene's scripts have not set"])
+        if what in ("move", "push", "change", "call", "run", "load", "write", "open"):
+            assert needs == what, name
+        elif what == "its own frames":
+            assert actions.of(name, [simulation.context.objects.handle_of(drone.object)]) in ("move", None), name
+            assert name not in permissions.free(), name
+        elif what in looks:
+            assert own in looks[what] and (name in permissions.free()) == (name in values.looks), name
+        else:
+            assert needs is None and name not in values.looks, name
+    assert {*reached} <= {*found}
+    simulation.close()

@@ -215,6 +215,16 @@ def test_who_flies(written, tmp_path):
     assert flight.grade(plain, str(tmp_path / "counting.py")).digest == flight.grade(inside).digest
 
 
+@pytest.mark.parametrize(("script", "falls"), [(None, True), ("", True), ("pilot", False)])
+def test_nobody_flies_a_vehicle_of_the_scene_that_has_no_script_unless_one_is_given(written, tmp_path, script, falls):
+    (tmp_path / "alone.yaml").write_text("vehicles: {drone: {position: [0, 0, 0.8], script: none}}\n")
+    found = flight.Flight(
+        written("{scene: alone.yaml, duration: 2, criteria: [{kind: rise_time, of: z, to: 2, at_most: 1}]}"), script
+    )
+    found.grade()
+    assert (found.rows[-1, 3] < 0.2) == falls
+
+
 def test_a_plan_of_two_vehicles_grades_the_one_that_it_names(written):
     two = """
 duration: 2
@@ -303,6 +313,38 @@ def test_who_moves_or_pushes_the_drone_himself_gains_nothing_by_it(written, tmp_
     assert allowed.flown == pytest.approx(1)
 
 
+BUILDS = """
+def sysCall_sensing():
+    sim.removeObject(sim.createPrimitiveShape(sim.primitiveshape_cuboid, [0.1, 0.1, 0.1]))
+    sim.addForce(sim.getObject("/Quadcopter"), [0, 0, 0], [0, 0, 1e-3])
+    sim.setObjectPosition(sim.getObject("/Goal"), -1, [0, 0, 0.8])
+"""
+BUILT = """
+duration: 0.4
+scene: built.yaml
+criteria:
+  - {kind: reach, places: [Goal], within: 0.1}
+"""
+BUILT_SCENE = """
+drone: {position: [0, 0, 0.8]}
+objects: [{name: Goal, kind: dummy, position: [3, 0, 1]}]
+scripts: [{object: Goal, script: builds.py}]
+"""
+
+
+def test_what_the_scenes_scripts_do_is_theirs_and_a_submission_is_told_of_its_own(written, tmp_path):
+    (tmp_path / "built.yaml").write_text(BUILT_SCENE)
+    (tmp_path / "builds.py").write_text(BUILDS)
+    plan = written(BUILT)
+    theirs = flight.grade(plan)
+    assert theirs.error is None and theirs.passed, theirs.outcomes  # a goal that moves is followed
+    for name in ("floor.lua", "force.py"):
+        does, done = CHEATS[name]
+        source = IN_LUA if name.endswith(".lua") else IN_PYTHON
+        (tmp_path / name).write_text(source.replace("PHASE", "sensing").replace("DOES", does))
+        assert flight.grade(plan, str(tmp_path / name)).error.startswith(f"a script {done} ")
+
+
 def test_what_the_plan_itself_does_breaks_no_rule(written):
     result = flight.grade(written(PLAYING))
     assert result.error is None
@@ -324,6 +366,8 @@ WRONG = {
 BESIDE = {
     "duratoin: 5": "line 1: duratoin: unknown key; near names are duration",
     "name: a b": "line 1: name = 'a b': must begin with a letter",
+    "calls: [sysCall_init]": "line 1: calls/0 = 'sysCall_init': must be a function that a script of the scene defines",
+    "calls: [simRemoveObject]": "line 1: calls/0 = 'simRemoveObject': must be a function that a script",
     "scene: nix.yaml": "no such file: ",
     "vehicle: dron": "line 1: vehicle = 'dron': no such vehicle; near names are drone",
     "config: {control: {Kzre: 3}}": "line 1: config/control/Kzre: unknown key; near names are Kzref",

@@ -68,8 +68,21 @@ def test_pictures_and_depth_show_the_ground():
     bottom = picture[-1].astype(float) / 255
     assert np.abs(bottom - GROUND).max() < 0.01
     assert np.isnan(depth[0]).all()
-    # 0.8 m above the ground, half a picture below the axis at a field of view of 60 degrees across 640 x 480.
-    assert depth[-1, 320] == pytest.approx(0.8 / (239.5 / simulation.drone.cameras["depth"].intrinsics.fy), rel=0.01)
+    simulation.close()
+
+
+@pytest.mark.parametrize("x", [0.0, 4.0, 8.0, -1000.0], ids=["floor", "rim", "ground", "far ground"])
+def test_floor_and_ground_are_seen_in_the_plane_where_bodies_rest(x):
+    simulation = simulation_at(x)
+    camera = simulation.drone.cameras["front"]
+    eye = np.reshape((*camera.pose(), 0, 0, 0, 1), (4, 4))
+    down = -(camera.intrinsics.rays / camera.intrinsics.rays[..., 2:]) @ eye[2, :3]
+    near = down > eye[2, 3] / 50.0
+    for outputs in (["depth", "instance"], ["depth", "instance", "color"]):  # drawn by different programs
+        truth = camera.truth()
+        truth.want(outputs)
+        np.testing.assert_allclose(truth.output("depth")[near], eye[2, 3] / down[near], rtol=1e-5)
+        assert (truth.output("instance")[near] == 1).all(), "the floor, and no gap at its rim"
     simulation.close()
 
 

@@ -86,9 +86,47 @@ def test_it_flies_beside_a_quadricopter(simulate):
     assert [one.body.state.position[2] for one in simulation.vehicles.values()] == pytest.approx([0.8, 0.8], abs=0.05)
 
 
-def test_a_broken_propeller_is_one_of_the_first_four(simulate):
+def test_four_numbers_are_of_the_first_four_propellers(simulate):
     simulation = simulate(faults={"propellers": [1, 0.5, 1, 1]})
-    assert simulation.drone.propulsion.law.effectiveness == (1, 0.5, 1, 1, 1, 1)
+    assert simulation.drone.faults.now.propellers == (1, 0.5, 1, 1, 1, 1)
+
+
+def test_each_propeller_may_fail_and_the_body_turns_towards_it(simulate):
+    """A failed propeller lacks its thrust and its reaction torque: propeller 6 is the mirror image of propeller 1."""
+    sound, first, sixth = simulate(), simulate(), simulate(faults={"propellers": [1, 1, 1, 1, 1, 0]})
+    first.child_scripts["drone"].tuning.change({"faults/propellers/front_left": 0.0})
+    motion = {}
+    for one in (sound, first, sixth):
+        one.step()
+        motion[one] = [*one.drone.body.state.angular_velocity, *one.drone.body.state.linear_velocity]
+    roll, pitch, yaw, _, _, climb = (ours - its for ours, its in zip(motion[sixth], motion[sound]))
+    thrust = sound.drone.propulsion.law.thrusts[5]
+    assert sixth.drone.propulsion.law.thrusts[:] == [*sound.drone.propulsion.law.thrusts[:5], 0]
+    assert climb == pytest.approx(-thrust * 0.05 / sound.drone.body.mass, rel=1e-3)
+    assert roll > 0.1 and pitch > 0.1 and yaw < -0.001, "right side and nose go down; it loses a positive torque"
+    mirrored = [ours - its for ours, its in zip(motion[first], motion[sound])][:3]
+    assert mirrored == pytest.approx([-roll, pitch, -yaw], rel=0.02)
+
+
+def test_propellers_5_and_6_have_names_in_files_and_in_tuning(simulate):
+    six = {"drone": {"objects": {"Quadricopter_propeller_respondable6": {"alias": "sixth"}}}}
+    simulation = simulate(**six)
+    objects = simulation.context.objects
+    assert objects.path(objects.handle("Quadricopter_propeller_respondable6")).endswith("/sixth")
+    tuning = simulation.child_scripts["drone"].tuning
+    assert sum(name.startswith("faults/propellers/") for name in tuning.values()) == 6
+    tuning.change({"faults/propellers/right": 0.5})
+    assert simulation.drone.faults.now.propellers == (1, 1, 1, 1, 0.5, 1)
+    with pytest.raises(ParameterError, match=r"Quadricopter_propeller_respondable6' is no object of a vehicle"):
+        parameters.load(six)
+
+
+@pytest.mark.parametrize("count", [3, 5, 7])
+def test_another_number_of_propellers_is_refused(simulate, count):
+    with pytest.raises(ParameterError, match=r"faults/propellers = \[1, .*must be 6 numbers"):
+        simulate(faults={"propellers": [1] * count})
+    with pytest.raises(ParameterError, match=r"faults/propellers = \[1, .*must be 6 numbers"):
+        simulate().drone.change_faults({"propellers": [1] * count})
 
 
 def test_a_snapshot_comes_again_to_the_bit(simulate):

@@ -104,6 +104,20 @@ def test_noise_grows_with_light_as_photons_do():
     assert full.mean() == pytest.approx(gain, rel=0.01), "the well is full"
 
 
+def test_noise_in_the_dark_is_cut_at_black():
+    noise = PixelNoiseParameters(full_well=2000.0, read=math.sqrt(141.0))
+    mean, deviation = 3.0 / 2000, 12.0 / 2000  # of 3 electrons, with a variance of 3 + 141
+    light = noise.apply(np.full((300, 300, 3), mean, np.float32), shot())
+    assert (light.mean(), light.std()) == pytest.approx((mean, deviation), rel=0.02)
+    seen = decoded(encoded(light))
+    density = math.exp(-((mean / deviation) ** 2) / 2) / math.sqrt(2 * math.pi)
+    share = (1 + math.erf(mean / deviation / math.sqrt(2))) / 2
+    cut_mean = mean * share + deviation * density
+    cut_variance = (mean**2 + deviation**2) * share + mean * deviation * density - cut_mean**2
+    assert (cut_mean, math.sqrt(cut_variance)) == pytest.approx((0.0032, 0.0040), abs=5e-5)
+    assert (seen.mean(), seen.std()) == pytest.approx((cut_mean, math.sqrt(cut_variance)), rel=0.01)
+
+
 def test_a_lens_darkens_the_corners_by_the_fourth_power_of_the_cosine():
     light = VignetteParameters(power=4.0).apply(np.ones((CAMERA.height, CAMERA.width, 3), np.float32), shot())
     away = np.hypot(CAMERA.cx, CAMERA.cy) / CAMERA.fx

@@ -28,6 +28,10 @@ from drone_sim.files import mesh_files
 from drone_sim.importing.main import main
 from drone_sim.mechanics import frames, urdf
 from drone_sim.run import parameters
+from drone_sim.run.diagnosis.diagnosis import Diagnosis
+from drone_sim.run.diagnosis.finding import WARN
+from drone_sim.run.pacing import Pacer
+from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.entry import Place
 from drone_sim.vrep_files.model import VrepFileError
@@ -285,6 +289,44 @@ def test_what_cannot_be_brought_is_said_object_by_object(imported):
     assert "The file has no quadricopter" in imported.said
 
 
+ACTS = "function sysCall_actuation() -- setLinkDummy\nend"
+
+
+def _linked(tag_of_type=b""):
+    """Two bodies, each with a dummy that is linked to the other's."""
+    for first, other in ((0, 3), (2, 1)):
+        yield shape(first, f"Body{first}", mesh(), at=(0, 0, 1 + first), dynamic=True, wrapper=weight(0.1))
+        link = integers("Lli", other) + tag_of_type
+        yield scene_object("DMY", first + 1, f"Tip{first}", parent=first, own=link)
+
+
+@pytest.mark.parametrize(
+    ("chunks", "hole"),
+    [
+        ((scene_object("DMY", 0, "Mover"), script(0, ACTS, kind=6)), "Mover: its customization script acts"),
+        ((scene_object("DMY", 0, "Mover"), script(0, "x = 1 --[[ sysCall_actuation ]]", kind=6)), ""),
+        ((scene_object("DMY", 0, "Mover"), script(0, ACTS)), ""),
+        ((scene_object("DMY", 0, "Hook"), script(0, "x = simSetLinkDummy")), "Hook: its script links dummies"),
+        (tuple(_linked()), "Tip0, Tip2: this link of dummies holds two bodies together"),
+        (tuple(_linked(integers("Dl2", 5))), ""),
+    ],
+)
+def test_what_will_not_work_after_an_import_is_a_warning_at_launch_and_in_the_diagnostics(
+    imported, caplog, chunks, hole
+):
+    imported(*chunks)
+    assert ("WILL NOT WORK: " in imported.said) == bool(hole) and hole in imported.said
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": {"drone": {}}}))
+    player = Player(simulation, simulation.step, lambda _: None, False)
+    diagnosis = Diagnosis(player, Pacer(0.05, lambda: 0.0, lambda _: None), dict, False, lambda: 0.0)
+    found = next(one for one in diagnosis.look() if one.name == "simulation")
+    simulation.start()
+    simulation.close()
+    warned = [one.getMessage() for one in caplog.records if one.levelno == logging.WARNING]
+    assert len([one for one in warned if hole and hole in one]) == bool(hole)
+    assert (found.level == WARN) == bool(hole) and hole in found.message
+
+
 PUSH = """
 function sysCall_actuation()
     local body = sim.getObjectHandle('Quadricopter_propeller_respondable{}')
@@ -479,6 +521,33 @@ def test_a_scaled_one_has_the_propellers_of_its_size(imported):
     rigid = urdf.read(str(imported.scene.parent / vehicle["urdf"]))
     assert rigid.mass == pytest.approx(0.52 * 1.3**3)
     assert rigid.links["propeller_front_left"][3::4] == pytest.approx((0.119496, 0.119496, 0.0026), abs=1e-6)
+
+
+def test_a_script_of_a_scaled_propeller_reads_its_size_factor(imported):
+    """The force goes with the cube of the size factor, as the mass does: it hovers at the unscaled one's velocity."""
+    own = PROPELLER.replace("function sysCall_actuation()", "function sysCall_actuation()\n  local own = 'setObject'")
+    content = imported(*quadricopter(scale=0.5, code=HOVER, propeller=own))
+    assert len(content["scripts"]) == 4
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    for _ in range(40):
+        simulation.step()
+    tree, operations = simulation.context.objects, simulation.operations
+    factor = operations.factors(tree.handle("Quadricopter_propeller1"))
+    height, begun = simulation.drone.body.state.position[2], simulation.drone.parameters.position[2]
+    simulation.close()
+    assert factor == (0.5, 0.5, 0.5)
+    assert height == pytest.approx(begun, abs=0.02)
+
+
+def test_a_scaled_object_of_the_scene_keeps_its_size_factor(imported):
+    content = imported(shape(0, "Box", mesh(), base=numbers("_fa", "Sfa", 2.0)), shape(1, "Plain", mesh()))
+    found = objects(content)
+    assert found["Box"]["size_factor"] == 2 and "size_factor" not in found["Plain"]
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
+    handle = simulation.context.objects.handle("Box")
+    simulation.operations.scale([handle], (1.5, 1.5, 1.5))
+    assert simulation.operations.factors(handle) == (3, 3, 3)
+    simulation.close()
 
 
 def test_propellers_with_scripts_of_their_own_keep_them(imported):

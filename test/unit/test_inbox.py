@@ -83,3 +83,12 @@ def test_where_others_are_heard_meanwhile_a_job_wakes_their_sleep():
     inbox.put(lambda: slept.append(0.0))
     inbox.empty()
     assert woken == [True] and slept == [3.0, 0.0]
+
+
+def test_a_job_that_fails_ends_nothing_and_leaves_a_traceback(caplog):
+    inbox, done = Inbox(), []
+    inbox.put(lambda: done.append(1 / 0))
+    inbox.put(lambda: done.append("next"))
+    inbox.empty()
+    assert done == ["next"]
+    assert [one.exc_info[0] for one in caplog.records] == [ZeroDivisionError]

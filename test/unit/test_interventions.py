@@ -14,11 +14,16 @@ from dynamic_reconfigure.msg import Config, DoubleParameter
 from geometry_msgs.msg import WrenchStamped
 from legacy_client import BLOCKING, command, floats, ints
 from legacy_client import Client as LegacyClient
+from nav_msgs.msg import Odometry
 from remote_client import Client, Refusal
+from std_msgs.msg import String
 
+from drone_sim.grading import plan as plans
 from drone_sim.remote.legacy.server import LegacyServer
 from drone_sim.remote.server import RemoteApiServer
 from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.grading.flight_listener import FlightListener
+from drone_sim.ros.grading.rules import LiveRules
 from drone_sim.ros.node import interventions, services
 from drone_sim.ros.vehicle import inputs, tuning_server
 from drone_sim.run import parameters
@@ -113,6 +118,9 @@ def test_a_client_that_flies_does_nothing_else(stage, client):
         ("pauseSimulation", "", (), "change the scene"),
         ("loadScene", "", ("",), "change the scene"),
         ("saveModel", "Crate", ("mine.ttm",), "write Crate"),
+        ("loadModel", "", ("mine.yaml",), "load a model"),
+        ("callScriptFunction", "", ("on_twist@Drone", 1), "call on_twist of the script of Drone"),
+        ("executeScriptString", "", ("1@Drone", 1), "run a text in a script"),
         (
             "setScriptSimulationParameter",
             "",
@@ -194,3 +202,26 @@ def test_services_are_told_but_a_snapshot(stage):
         stage.hear(f"~{name}", SimpleNamespace(data=True))
     said = [(one.split(" (")[0], one.rpartition("/")[0].rpartition("/")[2]) for one in stage.lines()]
     assert said == [("change the scene at 0.05 s", "restore, by "), ("change the scene at 0.05 s", "pause, by ")]
+
+
+def test_a_plan_lists_the_functions_that_a_client_may_call(stage):
+    rules = LiveRules(SimpleNamespace(allowed=["change"], calls=["shine"]), "/drone_sim")
+    hear = stage.callbacks["/drone_sim/interventions"]
+    for line in ("call shine of the script of Lamp at 1 s (x)", "change Lamp at 1 s (x)", "run a text in a script"):
+        hear(String(line))
+    hear(String("call sysCall_init of the script of Lamp at 1 s (x)"))
+    assert [one.split()[2:4] for one in rules.tried] == [["run", "a"], ["call", "sysCall_init"]]
+
+
+def test_odometry_of_another_node_is_no_flight(stage, tmp_path):
+    (tmp_path / "plan.yaml").write_text("duration: 1\ncriteria: [{kind: stays, of: z, at_least: 1}]")
+    plan = plans.read(tmp_path / "plan.yaml")
+    listener = FlightListener(plan, plan.parameters(), "/drone_sim", lambda _: None)
+    for sender, height in (("/drone_sim", 0.5), ("/flyer", 3.0), ("/flyer", 3.1)):
+        message = Odometry()
+        message.header.stamp = rospy.Time(0.05)
+        message.pose.pose.position.z, message.pose.pose.orientation.w = height, 1.0
+        message._connection_header = {"callerid": sender}
+        stage.callbacks["/drone/odom"](message)
+    assert listener.flown(1.0).rows[:, 3].tolist() == [0.5]
+    assert [one.split(" at ")[0] for one in listener.forged] == ["tried to forge /drone/odom"]

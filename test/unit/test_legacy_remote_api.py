@@ -1,5 +1,6 @@
 """V-REP's legacy remote API (`simxStart`): what a client sends, and what comes back."""
 
+import logging
 import socket
 import struct
 
@@ -751,3 +752,12 @@ def test_the_modes_of_oneshot_and_blocking_differ_on_the_clients_side_alone(stag
     client, key = stage.client(), text("Floor")
     (one,) = client.ask(command(HANDLE | ONESHOT, key)).answers.values()
     assert one == client.call(HANDLE, key)
+
+
+def test_a_fault_of_our_own_leaves_a_traceback_at_debug_level(stage, monkeypatch, caplog):
+    for name in ("server", "session"):
+        caplog.set_level(logging.DEBUG, f"drone_sim.remote.legacy.{name}")
+    client = stage.client()
+    monkeypatch.setattr(stage.simulation.context.objects, "handle", lambda *_: 1 // 0)
+    assert client.call(HANDLE, text("Crate")) == FAILED
+    assert any("ZeroDivisionError" in (one.exc_text or "") for one in caplog.records)

@@ -11,6 +11,8 @@ from test_renderer_outputs import cast, inner, random_scene
 
 from drone_sim.render.distortion import Distorted
 from drone_sim.render.renderer import Renderer
+from drone_sim.run import parameters
+from drone_sim.run.parameters import ParameterError
 
 pytestmark = pytest.mark.long
 
@@ -57,6 +59,16 @@ def test_a_fisheye_sees_what_is_behind_it_and_no_farther_than_it_can():
     np.testing.assert_allclose(lens.rays[240, 0], (-np.cos(0.34), 0, -np.sin(0.34)), atol=0.01)
     assert np.isnan(lens.rays[0, 0]).all()
     np.testing.assert_allclose(lens.project(np.array([1.0, 0.0, -0.1]))[0], 319.5 + lens.fx * 1.6704649, atol=1e-4)
+
+
+@pytest.mark.parametrize("width", [64, 4096])
+def test_the_widest_fisheye_is_as_wide_as_the_docs_say(width):
+    front = {"width": width, "height": 2, "horizontal_fov": 3.84, "lens": {"model": "equidistant"}}
+    lens = parameters.load({"cameras": {"front": front}}).cameras["front"].intrinsics()
+    angle = 1.92 * (1 - 1 / width)  # of the middle of the last pixel from the axis
+    assert np.arccos(lens.rays[0, -1, 2]) == pytest.approx(np.hypot(angle, 0.5 / lens.fx), abs=1e-9)
+    with pytest.raises(ParameterError, match=r"horizontal_fov.*3\.84"):
+        parameters.load({"cameras": {"front": {**front, "horizontal_fov": 3.85}}})
 
 
 @pytest.mark.parametrize(
@@ -130,11 +142,11 @@ def test_calibration_gives_the_lens_back(smooth, lens):
         flags = cv2.CALIB_RATIONAL_MODEL if lens.model == "rational_polynomial" else 0
         _, matrix, coefficients, *_ = cv2.calibrateCamera([flat] * len(found), found, size, None, None, flags=flags)
     wanted = camera_matrix(lens)
-    np.testing.assert_allclose((matrix[0, 0], matrix[1, 1]), lens.fx, rtol=0.005)
+    np.testing.assert_allclose((matrix[0, 0], matrix[1, 1]), lens.fx, rtol=0.002)
     np.testing.assert_allclose(matrix[:2, 2], wanted[:2, 2], atol=0.005 * lens.width)
     across = lens.rays[40:-40:40, 40:-40:40].reshape(-1, 3)
     missed = by_opencv(lens, across, matrix, coefficients) - lens.project(across)
-    assert np.abs(missed).max() < 0.005 * lens.width
+    assert np.abs(missed).max() < 1.0
 
 
 def test_undistorted_straight_lines_are_straight(smooth):

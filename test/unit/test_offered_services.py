@@ -160,6 +160,7 @@ def test_who_waits_in_vain_is_refused_and_the_script_is_not_asked_later():
     [
         ("'count', 'no/Type', 'f'", "'no/Type' is not installed"),
         ("'count', 'Trigger', 'f'", "'Trigger' is not a service type"),
+        ("'a b\\n', 'std_srvs/Trigger', 'counted'", "is no name of a service"),
         ("'count', 'std_srvs/Trigger', 'counter'", "no function 'counter' for this callback; near names are counted"),
         ("'count', 'std_srvs/Trigger'", "wrong number of values"),
     ],

@@ -1,5 +1,6 @@
 """CoppeliaSim's ZeroMQ remote API: what a client sends, and what comes back."""
 
+import logging
 import math
 import socket
 import struct
@@ -192,6 +193,14 @@ def test_a_mistake_is_one_line(stage, function, arguments, said):
     reply = stage.client().ask(function, *arguments)
     assert said in reply["err"] and "\n" not in reply["err"]
     assert reply["success"] is False and reply["error"] == reply["err"]
+
+
+def test_a_fault_of_our_own_leaves_a_traceback_at_debug_level(stage, monkeypatch, caplog):
+    caplog.set_level(logging.DEBUG, "drone_sim.remote.server")
+    client = stage.client()
+    monkeypatch.setattr(stage.simulation.context.objects, "path", lambda *_: 1 // 0)
+    assert client.ask("sim.getObjectAlias", 1, 2)["success"] is False
+    assert any("ZeroDivisionError" in (one.exc_text or "") for one in caplog.records)
 
 
 @pytest.mark.parametrize(

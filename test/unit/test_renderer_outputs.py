@@ -178,3 +178,27 @@ def test_masks_have_the_same_type_whatever_numbers_are_in_them(renderer, largest
     mask = renderer.render_outputs(("instance",), CAMERA, AHEAD, poses, instances=numbers)["instance"]
     assert mask.dtype == np.uint16
     assert set(np.unique(mask)) == {0, 3, largest}
+
+
+@pytest.mark.parametrize(
+    "centres",
+    [[(2, -0.1, 1), (2, 0.1, 1)], [(2, 0, 1), (2, 0, 1)], [(2, 0.1, 1), (2.1, 0, 1.1)], [(2, 0, 1), (3, 0.1, 1)]],
+    ids=["coplanar faces that overlap", "one at the place of the other", "interpenetrating", "one behind the other"],
+)
+def test_an_object_alone_has_each_pixel_once_however_its_parts_lie(renderer, centres):
+    boxes, poses = [box(name, (0.2, 0.4, 0.4)) for name in "ab"], np.array([at(*centre) for centre in centres])
+    renderer.set_visuals(boxes)
+    whole = np.isfinite(renderer.render_depth(CAMERA, AHEAD, poses)).sum()
+    np.testing.assert_array_equal(renderer.count_alone(CAMERA, AHEAD, poses, np.array([1, 1])), [0, whole])
+    apart = renderer.count_alone(CAMERA, AHEAD, poses, np.array([1, 2]))
+    for number, (visual, pose) in enumerate(zip(boxes, poses), 1):
+        renderer.set_visuals([visual])
+        assert apart[number] == np.isfinite(renderer.render_depth(CAMERA, AHEAD, pose[None])).sum() > 1000
+
+
+def test_an_object_alone_ends_at_the_near_and_the_far_plane(renderer):
+    camera = Intrinsics(320, 240, np.radians(60.0), 1.0, 3.0)
+    renderer.set_visuals([box("through near", (2.0, 0.2, 0.2)), box("beyond far", (0.2, 9.0, 9.0))])
+    poses, both = np.array([at(1.5, 0.3, 1), at(4, 0, 1)]), np.array([1, 2])
+    mask = renderer.render_outputs(("instance",), camera, AHEAD, poses, instances=both)["instance"]
+    np.testing.assert_array_equal(renderer.count_alone(camera, AHEAD, poses, both), [0, (mask == 1).sum(), 0])

@@ -1,8 +1,10 @@
 """Callbacks run in rospy's threads: they read nothing of the simulation, check, and leave a job for its thread."""
 
 import threading
+from queue import Queue
 from unittest import mock
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
@@ -10,11 +12,14 @@ pytest.importorskip("rospy", reason="needs ROS")
 import rospy
 from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, Vector3Stamped, WrenchStamped
-from std_msgs.msg import Empty
+from std_msgs.msg import Empty, Header
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
+from drone_sim.ros.core import message_conversion
 from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.node import diagnostics, scene_editing, services
 from drone_sim.ros.rviz import object_handles, vehicle_handles
+from drone_sim.ros.vehicle import cameras
 from drone_sim.ros.vehicle.inputs import VehicleInputs
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
@@ -124,3 +129,97 @@ def test_a_handle_is_dragged_without_the_simulation(simulation, callbacks, made)
     inbox.empty()
     is_moved = made is vehicle_handles.VehicleHandles
     assert simulation.drone.body.state.position[0] == pytest.approx(2.0 if is_moved else 0.0, abs=1e-3)
+
+
+def test_faults_checked_for_a_vehicle_that_was_replaced_are_refused_in_one_line(callbacks, caplog):
+    simulation = Simulation(parameters.load({"vehicles": {"drone": {"sensors": {"imu": {"kind": "imu", "rate": 20}}}}}))
+    inbox = Inbox()
+    inputs = VehicleInputs(simulation, simulation.drone.parameters, inbox)
+    callbacks["drone/faults"](KeyValue("sensors/imu", "silent"))
+    assert not inputs.log.refused
+    for vehicles in ({"other": {}}, {"drone": {}}):
+        simulation.set_vehicles(vehicles)
+    inbox.empty()
+    simulation.close()
+    assert inputs.log.is_refusing("faults") and "imu" in inputs.log.refused["faults"].why
+    assert not [one for one in caplog.records if one.exc_info]
+
+
+def test_every_propeller_of_a_hexacopter_may_fail_by_a_message(callbacks):
+    simulation = Simulation(parameters.load({"config": "package://drone_sim/config/hexacopter.yaml"}))
+    inbox = Inbox()
+    inputs = VehicleInputs(simulation, simulation.drone.parameters, inbox)
+    callbacks["drone/faults"](KeyValue("propellers", "[1, 1, 1, 1, 1, 0]"))
+    inbox.empty()
+    assert simulation.drone.faults.now.propellers == (1, 1, 1, 1, 1, 0)
+    callbacks["drone/faults"](KeyValue("propellers", "[1, 1, 1, 1, 1]"))
+    assert inputs.log.is_refusing("faults")
+    simulation.close()
+
+
+def test_a_picture_that_cannot_be_encoded_does_not_end_the_encoder(monkeypatch):
+    published, errors = Queue(), []
+    monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
+    monkeypatch.setattr(rospy, "Publisher", mock.MagicMock())
+    monkeypatch.setattr(
+        cameras, "Server", lambda _, keep, __: (keep({"format": "png", "png_level": 1}, 0), mock.Mock())[1]
+    )
+    monkeypatch.setattr(rospy, "logerr_throttle", lambda _, line: (errors.append(line), published.put("failed")))
+    output = cameras.CompressedPublisher("drone/camera/image", None)
+    output.publisher.publish = published.put
+    output.publish(Header(), np.zeros((0, 4, 3), np.uint8))
+    assert published.get(timeout=20) == "failed" and len(errors) == 1
+    output.publish(Header(), np.zeros((2, 4, 3), np.uint8))
+    assert "png" in published.get(timeout=20).format
+    output.unregister()
+
+
+def test_twists_without_a_subscriber_are_found_by_asking_the_master(monkeypatch):
+    answers = {
+        "getSystemState": [
+            [["/cmd_vel", ["/teleop"]], ["/own", ["/drone_sim"]], ["/heard", ["/teleop"]], ["/text", ["/teleop"]]],
+            [["/heard", ["/drone_sim"]], ["/cmd_vel", []]],
+            [],
+        ],
+        "getTopicTypes": [
+            *([topic, "geometry_msgs/Twist"] for topic in ("/cmd_vel", "/own", "/heard")),
+            ["/text", "std_msgs/String"],
+        ],
+    }
+    monkeypatch.setattr(rospy, "get_name", lambda: "/drone_sim")
+    monkeypatch.setattr(diagnostics, "call", lambda _uri, method: answers[method])
+    assert diagnostics.unheard_twists() == {"/cmd_vel": ["/teleop"]}
+    monkeypatch.setattr(diagnostics, "call", mock.Mock(side_effect=ConnectionRefusedError))
+    assert diagnostics.unheard_twists() == {}
+
+
+def test_a_type_whose_code_was_never_generated_is_told_from_one_that_is_not_there(monkeypatch, tmp_path):
+    for ending in ("msg", "srv"):
+        (tmp_path / "course_msgs" / ending).mkdir(parents=True)
+        (tmp_path / "course_msgs" / ending / f"Gate.{ending}").touch()
+    (tmp_path / "course_msgs" / "package.xml").write_text("<package><name>course_msgs</name></package>")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    for look, ending in ((message_conversion.message_class, "msg"), (message_conversion.service_class, "srv")):
+        with pytest.raises(ValueError, match=rf"Gate\.{ending}, but its Python code was never generated: build"):
+            look("course_msgs/Gate")
+        with pytest.raises(ValueError, match="'course_msgs/Gat' is not installed"):
+            look("course_msgs/Gat")
+
+
+def test_to_resume_what_is_not_paused_says_how_to_pause(simulation, monkeypatch):
+    player = mock.Mock(playing=True, pause=lambda on: "paused" if on else "resumed")
+    warnings = []
+    monkeypatch.setattr(services, "VehiclesParameter", mock.Mock())
+    monkeypatch.setattr(rospy, "Service", mock.Mock())
+    monkeypatch.setattr(rospy, "logwarn", warnings.append)
+    offered = services.Services(player, Inbox(), lambda: None)
+    assert "pause true` pauses" in offered.pause(False) and len(warnings) == 1
+    assert offered.pause(True) == "paused"
+    player.playing = False
+    assert offered.pause(False) == "resumed" and len(warnings) == 1
+
+
+def test_half_a_character_in_an_answer_of_the_editor_is_written_out(monkeypatch):
+    asked = mock.Mock(ask=mock.Mock(side_effect=ValueError("no file \ud800.yaml")))
+    done, said = scene_editing.SceneEditing._attempt(mock.Mock(_inbox=asked), str, "", None)
+    assert not done and said.encode("utf-8") == rb"no file \ud800.yaml"

@@ -203,7 +203,7 @@ def test_a_vision_sensor_sees_one_entity_alone_or_handles(simulate):
     depths = np.reshape(sim.checkVisionSensorEx(eye, finger, False), (24, 32))
     whole = found(simulation, "Eye").picture("depth")[::-1]
     assert (depths < 1).sum() == 4 and whole[depths < 1] == pytest.approx(1.45, abs=0.01)
-    result, statistics = sim.checkVisionSensor(eye, finger)
+    result, statistics, _ = sim.checkVisionSensor(eye, finger)
     assert result == 1 and statistics[6] > 0.5 and statistics[14] == pytest.approx(depths.mean())
     assert sim.checkVisionSensor(eye, objects.handle("Quadricopter_base"))[0] == 0, "it is elsewhere"
 
@@ -212,7 +212,7 @@ def test_a_vision_sensor_sees_one_entity_alone_or_handles(simulate):
     assert ((image == finger) == (depths < 1)).all() and {*np.unique(image)} == {finger, floor, 0xFFFFFF}, (
         "white: nothing"
     )
-    assert sim.readVisionSensor(eye) == (0, sorted([finger, floor]))
+    assert sim.readVisionSensor(eye) == (0, sorted([finger, floor]), ())
     sim.setObjectInt32Param(eye, sim.visionintparam_entity_to_render, finger)
     assert sim.readVisionSensor(eye)[1] == [finger]
     assert sim.getObjectInt32Param(eye, sim.visionintparam_entity_to_render) == finger

@@ -169,7 +169,7 @@ def test_images_come_with_the_bottom_row_first(sim):
     assert (width, height, image) == (3, 2, bytes([0, 0, 255] * 3 + [255, 0, 0] * 3))
     assert sim.getVisionSensorImg(front) == (image, [3, 2])
     assert sim.getVisionSensorRes(front) == sim.getVisionSensorResolution(front) == [3, 2]
-    assert sim.handleVisionSensor(sim.handle_all) == (0,)
+    assert sim.handleVisionSensor(sim.handle_all) == (0, (), ())
     with pytest.raises(TypeError, match="'Drone' is not a vision sensor; there are: FrontVision"):
         sim.getVisionSensorCharImage(sim.getObject("."))
 

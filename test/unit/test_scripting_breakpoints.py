@@ -13,8 +13,6 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.breakpoints import LONGEST_VALUE, MOST_INSIDE, MOST_ROWS, read_breakpoints
 from drone_sim.scripting.errors import ScriptError
 
-SCRIPTS = package_path() / "test/unit/scripts"
-
 PYTHON = """\
 import math
 gain = 2.5
@@ -299,7 +297,7 @@ def test_variables_of_lua_are_bounded_and_odd_ones_are_shown(begin):
 # ---- the flight
 
 
-@pytest.mark.parametrize("script", ["pilot", str(SCRIPTS / "tutorial_v4.lua"), str(SCRIPTS / "tutorial_v3.lua")])
+@pytest.mark.parametrize("script", ["pilot", "tutorial_v4", "tutorial_v3"])
 def test_whoever_looks_changes_nothing(script):
     flights = []
     for looks in (False, True):

@@ -64,6 +64,11 @@ def test_what_is_right_in_python(check, text):
         ("local function limit(x) return x end\ny = limt(1)\n", (2, 5), "'limt' is not defined; near names are limit"),
         ("local sim = require 'sim'\nsim.getFoo()\n", (2, 5), "sim has no 'getFoo'"),
         ("x = sim_handle_selff", (1, 5), "sim_handle_self"),
+        (
+            "function sysCall_init()\nend\nif sim_call_type==sim_childscriptcall_sensing then\nend\n",
+            (3, 1),
+            "line 1 defines a function sysCall_",
+        ),
     ],
 )
 def test_lua(check, text, place, words):

@@ -6,12 +6,13 @@ from types import SimpleNamespace
 import pytest
 from recorder import Recorder
 
+from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.backend import Image
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.ros_functions import TopicFunctions
+from drone_sim.scripting.api.ros_functions import RosFunctions, TopicFunctions
 
 
 class FakeSender:
@@ -222,3 +223,18 @@ def test_scripts_leave_nothing_behind(tmp_path):
     del simulation
     gc.collect()
     assert [script() for script in scripts] == [None] * 5
+
+
+@pytest.mark.parametrize("name", ["a b\n", "", "a//b", "a/", "~a", "x\u00e4", "a\x00"])
+def test_an_impossible_name_of_a_topic_is_refused_at_once(name):
+    bus = MessageBus("drone")
+    for call in (
+        lambda: bus.advertise(name, "std_msgs/Empty"),
+        lambda: bus.advertise_image(name),
+        lambda: bus.subscribe(name, "std_msgs/Empty", print),
+        lambda: bus.offer(name, "std_srvs/Empty", print),
+        lambda: RosFunctions(bus, Clock(0.05)).serviceClient(name, "std_srvs/Empty"),
+    ):
+        with pytest.raises(ValueError, match=r"is no name of a (topic|service)"):
+            call()
+    assert bus.advertise("/a/B_1", "std_msgs/Empty") == 1

@@ -1,7 +1,6 @@
 """The stock target-following controller settles where it should, with the offset that its numbers imply."""
 
 import math
-from pathlib import Path
 
 import pytest
 
@@ -9,7 +8,6 @@ from drone_sim.mechanics import frames
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
-LUA = str(Path(__file__).parent / "scripts" / "target_v4.lua")
 MASS, GRAVITY, STEP = 0.52, 9.81, 0.05
 THRUST = {"3.x": 5.335, "4.x": 5.45}  # m/s, what the controller takes for hovering
 PARTICLES = {"3.x": 21.5, "4.x": 21}  # a step, in the mean
@@ -23,7 +21,7 @@ def hover_offset(law):
 
 
 @pytest.mark.parametrize(
-    "script, law", [("target", "3.x"), ("target", "4.x"), (LUA, "4.x")], ids=["python 3.x", "python 4.x", "lua 4.x"]
+    "script, law", [("target", "3.x"), ("target", "4.x"), ("target_v3", "3.x"), ("target_v4", "4.x")]
 )
 def test_settles_on_a_target_moved_aside_and_turned(script, law):
     simulation = Simulation(parameters.load({"propellers": {"law": law}}), script=script)
@@ -52,7 +50,7 @@ def test_the_offsets_have_the_known_size():
 def test_scripted_forces_fly_as_particles_do():
     """addForceAndTorque with the law's own numbers is the law."""
     flights = []
-    for script in ("target", LUA):
+    for script in ("target", "target_v4"):
         simulation = Simulation(parameters.load({"propellers": {"law": "4.x"}}), script=script)
         objects = simulation.context.objects
         objects.set_matrix(objects.handle("target"), -1, frames.from_euler((0.5, 0.5, 1), (0, 0, 1)))

@@ -5,12 +5,13 @@ from pathlib import Path
 import pytest
 from recorder import Recorder
 
+from drone_sim.files.resources import package_path
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
-SCRIPTS = Path(__file__).parent / "scripts"
+STAGES = Path(package_path() / "docs" / "tutorial")
 STEPS = 1200  # 60 s
 SMALL = {"front": {"width": 16, "height": 12}}
 
@@ -52,18 +53,35 @@ def _built_in():
     return path
 
 
-@pytest.mark.parametrize("script", ["tutorial_v3.lua", "tutorial_v4.lua"])
+@pytest.mark.parametrize("script", ["tutorial_v3", "tutorial_v4"])
 def test_lua_flies_as_the_python_script(script, built_in):
-    path = fly(str(SCRIPTS / script))
+    path = fly(script)
     worst = max(abs(a - b) for ours, theirs in zip(path, built_in) for a, b in zip(ours, theirs))
     assert len(path) == STEPS and worst < 1e-9
 
 
 def test_the_tutorials_lua_publishes_its_camera():
     backend = Recorder()
-    fly(str(SCRIPTS / "tutorial_v3.lua"), steps=3, backend=backend)
+    fly("tutorial_v3", steps=3, backend=backend)
     topic, kind, image = backend.published[-1]
     assert (topic, kind, len(backend.published)) == ("/drone/front", "sensor_msgs/Image", 3)
     assert (image.width, image.height, len(image.data), image.frame_id) == (16, 12, 16 * 12 * 3, "drone front")
     top, bottom = image.data[: 16 * 3], image.data[-16 * 3 :]
     assert sum(top) > sum(bottom), "the sky is brighter than the floor: the top row comes first"
+
+
+@pytest.mark.parametrize("script", ["template_v3", "template_v4", "target_v3", "target_v4"])
+def test_every_built_in_script_in_lua_holds_the_drone(script):
+    path = fly(script, steps=20)
+    assert path[-1] == pytest.approx(path[0], abs=0.01)
+
+
+def test_the_stages_in_lua_hold_what_they_control():
+    """Stage 1 keeps the thrust, so it sinks slowly; from stage 2 on the height is held, and stage 6 obeys."""
+    flown = {file.stem: fly(str(file), steps=60) for file in sorted(STAGES.glob("*.lua"))}
+    assert list(flown) == ["1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros"]
+    assert flown["1_thrust"] == fly(str(STAGES / "1_thrust.py"), steps=60)
+    for stage in ("2_elevation", "3_yaw", "4_pitch", "5_roll"):
+        assert flown[stage][-1] == pytest.approx((0, 0, 0.8), abs=0.01)
+    assert flown["6_ros"] == fly("tutorial_v3", steps=60)
+    assert flown["6_ros"][-1][0] > 1

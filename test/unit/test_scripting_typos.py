@@ -5,6 +5,7 @@ import pytest
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.python.helpers import BUILT_IN
 
 PARAMETERS = parameters.load()
 
@@ -113,6 +114,40 @@ def test_a_phase_that_python_would_not_run_is_refused(load, source):
 def test_a_misspelt_call_type_is_refused(load, word):
     said, path = load("lua", f"-- sim_childscriptcall_nonsense\nif sim_call_type==sim_childscriptcall_{word} then\nend")
     assert said.startswith(f"[load] {path}:2: there is no sim_childscriptcall_{word}; near names are childscriptcall_")
+
+
+# ---- two forms in one script
+
+TEMPLATE = (BUILT_IN / "template_v4.lua").read_text()
+SEEDS = """
+if (sim_call_type==sim_childscriptcall_sensing) then
+    pos=simGetObjectPosition(d,-1)
+end
+"""
+
+
+def test_a_script_in_the_forms_of_two_generations_is_refused_with_the_lines_of_both(load):
+    function = TEMPLATE[: TEMPLATE.index("function sysCall_init")].count("\n") + 1
+    block = TEMPLATE.count("\n") + 2
+    said, path = load("lua", TEMPLATE + SEEDS)
+    assert said.startswith(f"[load] {path}:{block}: line {function} defines a function sysCall_")
+    assert f"line {block} compares sim_call_type" in said and "template_v3" in said
+    commented = TEMPLATE.replace("function sysCall_init", "--[[ one\ntwo ]]\nfunction sysCall_init")
+    said, path = load("lua", SEEDS + commented)
+    assert f":{SEEDS.count(chr(10)) + function + 2}: " in said and "line 2 compares sim_call_type" in said
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        TEMPLATE,
+        (BUILT_IN / "template_v3.lua").read_text(),
+        TEMPLATE + f"--[[{SEEDS}]]\n-- sim_call_type",
+        "function sysCall_init() end\nif sim_call_type==sim_childscriptcall_initialization then sysCall_init() end",
+    ],
+)
+def test_a_script_of_one_form_or_that_calls_its_own_functions_is_loaded(load, source):
+    assert load("lua", source)[0] == ""
 
 
 # ---- parameters of the propellers

@@ -3,7 +3,6 @@
 import gc
 import os
 from itertools import pairwise
-from pathlib import Path
 
 import pybullet
 import pytest
@@ -16,7 +15,6 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.run.stepping import Diverged
 from drone_sim.scripting.errors import ScriptError
 
-SCRIPTS = Path(__file__).parent / "scripts"
 RUNS = 100
 LEAK = 20 * 30_000  # bytes that 20 runs may add to the process: 30 kB a run
 SMALL = {name: {"width": 16, "height": 12} for name in ("front", "track")}
@@ -105,7 +103,7 @@ def test_worlds_beside_each_other_do_not_meddle(simulate):
     assert fly(second, 20) == alone
 
 
-@pytest.mark.parametrize("script", ["", SCRIPTS / "tutorial_v3.lua", SCRIPTS / "tutorial_v4.lua"])
+@pytest.mark.parametrize("script", ["", "tutorial_v3", "tutorial_v4"])
 def test_a_snapshot_brings_the_flight_back_bit_for_bit(simulate, script):
     """In the middle of a manoeuvre, a push under way, things of the scene tumbling."""
     simulation = simulate(script, scene={"objects": CLUTTER})
@@ -287,3 +285,20 @@ def test_what_a_script_held_goes_back_to_the_system(tmp_path):
     simulation.close()
     assert eaten > 30e6
     assert resources()[0] - before < eaten / 4
+
+
+def test_a_scene_that_cannot_be_restored_at_stop_is_not_the_beginning_of_the_next_flight(simulate, tmp_path, caplog):
+    mesh = tmp_path / "wedge.obj"
+    wedge = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+    mesh.write_text(wedge)
+    thing = {"name": "Wedge", "shape": "mesh", "file": str(mesh), "position": [3, 0, 0.5]}
+    simulation = simulate(
+        scene={"objects": [thing, {"name": "Crate", "shape": "box", "size": [0.2] * 3, "position": [2, 0, 1]}]}
+    )
+    simulation.operations.remove([simulation.object_handles["Crate"]])
+    mesh.unlink()
+    simulation.stop()
+    assert any("wedge.obj" in one.getMessage() for one in caplog.records)
+    mesh.write_text(wedge)
+    simulation.start()
+    assert "Crate" in simulation.object_handles

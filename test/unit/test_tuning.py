@@ -339,6 +339,15 @@ def test_the_flight_of_a_dump_is_the_flight_that_was_tuned(simulate, tmp_path):
     assert second.parameters.control.recovery_margin is None
 
 
+def test_a_dump_of_a_hexacopter_has_its_six_propellers(simulate, tmp_path):
+    type_of = "package://drone_sim/config/hexacopter.yaml"
+    first = simulate(config=type_of, sensors={})
+    tuning_of(first).change({"faults/propellers/right": 0.9})
+    file = dumped(tuning_of(first).values(), tmp_path / "six.yaml")
+    second = simulate(config=f"{type_of},{file}", sensors={})
+    assert second.drone.faults.now.propellers == (1, 1, 1, 1, 0.9, 1)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -208,7 +208,7 @@ def test_every_sensor_gives_colours_and_depths():
             near = depths[box].min()
             assert 1.4 < near < 1.8 and depths[box].max() < near + 0.01
             assert np.isinf(depths[-1]).all(), "the sky"
-            _, values = sim.readVisionSensor(handle)
+            _, values, _ = sim.readVisionSensor(handle)
             assert values[4] == pytest.approx(sim.getVisionSensorDepthBuffer(handle)[depths.argmin()])
             assert values[6] > 0.5, "the reddest"
     finally:

@@ -10,7 +10,8 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-from cockpit_page import wait_until
+from cockpit_page import Panel, open_page, wait_until
+from scene_builder import Builder
 
 SOCKET = """path => new Promise(said => {
     const socket = new WebSocket(`ws://${path}`, "drone_sim");
@@ -126,3 +127,36 @@ def test_a_script_in_our_page_can_neither_load_nor_tell_what_is_not_from_here(co
         is None
     )
     opened.troubles.clear()
+
+
+# Each is also the name of a file, so none has a slash.
+MARKUP = "<img src=x onerror=alert(1)>"
+WEDGE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+FAILS = f"print({MARKUP!r})\ndef sysCall_init():\n    raise ValueError({MARKUP!r})\n"
+
+
+def test_markup_in_names_of_scripts_models_objects_and_scenes_is_text(cockpit, browser):
+    """Nothing of it becomes an element: the page's policy would stop the script, but not the picture."""
+    cockpit.start_afresh()
+    cockpit.scripts.mkdir(exist_ok=True)
+    content = {".py": FAILS, ".lua": f"print('{MARKUP}')", ".obj": WEDGE, ".yaml": "objects: []\n"}
+    files = [cockpit.scripts / f"{MARKUP}{ending}" for ending in content]
+    for file in files:
+        file.write_text(content[file.suffix])
+    box = {"name": MARKUP, "shape": "box", "size": [0.2] * 3}
+    with open_page(cockpit, browser) as page:
+        builder, panel = Builder(page), Panel(page)
+        edit = {"edit": [{"do": "add", "objects": [box], "position": [2, 0, 1]}]}
+        assert page.evaluate("edit => scene.editing.ask('edit', edit)", edit)["handles"]
+        builder.select(MARKUP)
+        page.select_option("#script", f"mine/{MARKUP}.py")
+        wait_until(page, lambda: "raise ValueError" in page.inner_text("#text .cm-content"))
+        page.click("#run")
+        wait_until(page, lambda: MARKUP in page.inner_text("#said"))
+        for name in ("View", "Cameras", "Plots", "Tune", "Log", "Edit"):
+            panel.show(name)
+        assert page.evaluate("name => document.body.textContent.split(name).length", MARKUP) > 5
+        assert page.locator("img[src=x]").count() == 0
+    for file in files:
+        file.unlink()
+    cockpit.start_afresh()

@@ -76,6 +76,8 @@ def _number(kind: type, marks: Sequence[Any], here: ParameterField) -> Parameter
 
 def _parts(arguments: Sequence[Any], marks: Sequence[Any], here: ParameterField) -> Iterator[ParameterField]:
     names = next((one.names for one in marks if isinstance(one, Parts)), tuple(map(str, range(len(arguments)))))
+    if arguments[-1] is Ellipsis:
+        arguments = [arguments[0]] * len(names)
     for index, (name, argument) in enumerate(zip(names, arguments)):
         part = here._replace(location=(*here.location, index), part=name, none=None)
         for parameter in _of(argument, (), part):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import threading
 from pathlib import Path
 from typing import NamedTuple
@@ -11,6 +12,7 @@ from drone_sim.files import writing
 from drone_sim.files.resources import read_bytes
 from drone_sim.files.yaml_files import MAX_SIZE
 
+_LOG = logging.getLogger(__name__)
 _HEAD = "# A draft of "
 _NO_FILE = "a new scene"
 
@@ -33,6 +35,7 @@ class Drafts:
         self._lock = threading.Lock()
         self._writing: threading.Thread | None = None
         self._number = 0  # of the last text that was to be written
+        self._has_failed = False
         self.offered: Draft | None = None
         self.offer()
 
@@ -44,7 +47,10 @@ class Drafts:
         self.offered = _read(self._left) if self._left else None
 
     def keep(self, file: str, text: str) -> None:
-        """Write a draft, in a thread; where that fails, there is none."""
+        """Write a draft, in a thread. If that fails, log a warning, unless the draft before failed, too.
+
+        The cockpit shows a warning with the words "no effect" as a notice.
+        """
         path = self._file
         if path is None:
             return
@@ -52,10 +58,17 @@ class Drafts:
         number = self._number
 
         def write() -> None:
-            with self._lock, contextlib.suppress(OSError):
-                if number == self._number:  # no later one is there
+            with self._lock:
+                if number != self._number:  # a later draft replaces this one
+                    return
+                try:
                     path.parent.mkdir(parents=True, exist_ok=True)
                     writing.write(path, f"{_HEAD}{file or _NO_FILE}\n{text}")
+                    self._has_failed = False
+                except OSError as error:
+                    if not self._has_failed:
+                        _LOG.warning("draft of unsaved changes: no effect: %s; save the scene", error)
+                    self._has_failed = True
 
         self._writing = threading.Thread(target=write, name="draft")
         self._writing.start()

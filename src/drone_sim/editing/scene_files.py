@@ -86,6 +86,8 @@ class SceneFiles:
         path = self._path(name)
         scripts = self._scene.simulation.scene.scripts
         entries = [operations.entry(one) for one in operations.model(handle) if self._scene.vehicle_of(one) is None]
+        if not entries:
+            raise ValueError(f"'{tree[handle].name}' is part of a vehicle, which is no model of the scene")
         base = placed(entries[0], "", tree.matrix(handle))
         path.parent.mkdir(parents=True, exist_ok=True)
         models.write(path, [base, *entries[1:]], [scripts[one.name] for one in entries if one.name in scripts])

@@ -70,11 +70,12 @@ class Gusts:
 
     def at(self, way: float, deviations: Vector, lengths: Vector) -> Vector:
         """Return the gust (m/s) after a way (m), of so large deviations (m/s) and lengths (m)."""
-        along, across, up = (
-            deviation * one.at(way / length) if deviation else 0.0
-            for one, deviation, length in zip(self._series, deviations, lengths)
+        (along, across, up), (x, y, z) = self._series, deviations
+        return (
+            x * along.at(way / lengths[0]) if x else 0.0,
+            y * across.at(way / lengths[1]) if y else 0.0,
+            z * up.at(way / lengths[2]) if z else 0.0,
         )
-        return along, across, up
 
 
 def _normal(random: Generator) -> Iterator[float]:

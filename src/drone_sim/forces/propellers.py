@@ -115,7 +115,8 @@ class Propellers(Force):
 
         Those for which there is no number are sound.
         """
-        self.effectiveness = (*effectiveness, *[1.0] * (len(self.air) - len(effectiveness)))
+        count = len(self.air)
+        self.effectiveness = (*effectiveness, *[1.0] * count)[:count]
         if all(share == 1 for share in effectiveness):
             self._commanded, (self._slowest, self._fastest) = self._given, self._limits
         else:

@@ -17,7 +17,7 @@ from drone_sim.grading.flight_recorder import FlightRecorder, OfflineBackend
 from drone_sim.grading.permissions import Permissions
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
-from drone_sim.grading.rules import Rules
+from drone_sim.grading.rules import Rules, ScriptWatch
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import first_step
 from drone_sim.run.simulation import Simulation
@@ -26,7 +26,6 @@ from drone_sim.scripting.api.calls import Api
 from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.breakpoints import Breakpoints
 from drone_sim.scripting.door.simulation_end import SimulationEnd
-from drone_sim.scripting.load import DEFAULT
 from drone_sim.scripting.time_limit import TimeLimit
 
 
@@ -75,26 +74,26 @@ class Flight:
         scene runs here.
         """
         self._plan, self._seed, self._changes = plan, seed, changes or {}
-        parameters = plan.parameters(seed, None, changes)
-        self._script = plan.script_of(script) or (parameters.script if script is None else "")
+        parameters = plan.parameters(seed, "" if script == "" else None, changes)
+        self._script = plan.script_of(script) or parameters.script
         self._timeline = plan.timeline_of(parameters)
         self._steps = first_step(plan.duration, parameters.time_step)
         backend = OfflineBackend(plan.topics_of(parameters))
-        flown = self._script or DEFAULT
+        watch = ScriptWatch()
         self._simulation = Simulation(
             parameters,
-            script=flown,
+            script=self._script,
             backend=backend if backend.wanted else None,
             started=False,
-            load_script=load.load if door is None else _through(door, flown),
+            load_script=_loader(door, self._script, watch),
         )
-        backend.clock = lambda: self._simulation.time
-        self._permissions = Permissions(plan, self._simulation, flown)
-        if door is not None:
-            door.begin(self._simulation.context.objects, self._is_quiet, self._permissions)
+        backend.clock, backend.is_scene = lambda: self._simulation.time, lambda: watch.is_scene
         try:
             self._recorder = FlightRecorder(plan, self._simulation, backend)
-            self._rules = Rules(plan, self._simulation)
+            self._permissions = Permissions(plan, self._simulation, self._script, self._recorder.goals)
+            self._rules = Rules(plan, self._simulation, watch)
+            if door is not None:
+                door.begin(self._simulation.context.objects, self._is_quiet, self._permissions)
         except BaseException:
             self._simulation.close()
             raise
@@ -167,15 +166,17 @@ def random_of(seed: int) -> int:
     return int.from_bytes(hashlib.sha256(b"what scripts draw, %d" % seed).digest()[:8], "little")
 
 
-def _through(door: SimulationEnd, submission: str) -> load.Loader:
-    """Return a function that loads the submission through a door, and any other script in this process."""
+def _loader(door: SimulationEnd | None, submission: str, watch: ScriptWatch) -> load.Loader:
+    """Return a function that loads the submission through a door, if there is one, and other scripts here."""
 
     def load_script(
         path: str, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns, breakpoints: Breakpoints | None = None
     ) -> load.Script:
-        if path == submission:
-            return door.load(path, modules, limit, turns)
-        return load.load(path, modules, limit, turns, breakpoints)
+        if path == submission and door is not None:
+            return watch.watched(door.load(path, modules, limit, turns), False)
+        is_scene = path != submission
+        loaded = watch.run(is_scene, load.load, path, modules, limit, turns, breakpoints)
+        return watch.watched(loaded, is_scene)
 
     return load_script
 

@@ -43,6 +43,7 @@ class FlightRecorder:
         self._values: dict[str, list[ValueChange]] = {}
         self._other_poses: dict[str, list[tuple[float, ...]]] = {}
         self._found: dict[str, list[str]] = {}
+        self.goals: list[int] = []  # handles of the objects that criteria name, and of such vehicles' objects
         self.look: Callable[[int], None] | None = None  # for Simulation.step
         self._each_step: list[Callable[[], None]] = [functools.partial(self._recording.add, simulation)]
         self._add_recorders(plan, backend)
@@ -64,10 +65,13 @@ class FlightRecorder:
             self._found[path] = [one.name for one in object_paths.every(objects, path)] or [path]
         named = (self._found.get(other, [other]) for other in others)
         for other in dict.fromkeys(itertools.chain.from_iterable(named)):
-            if other not in self._simulation.vehicles:
-                objects.handle(other)  # raises ValueError where there is none
+            vehicle = self._simulation.vehicles.get(other)
+            # Followed by its handle: another object may get the name later. Raises ValueError where there is none.
+            handle = objects.handle(other) if vehicle is None else objects.handle_of(vehicle.object)
+            self.goals.append(handle)
             self._other_poses[other] = []
-            self._each_step.append(lambda name=other: self._other_poses[name].append(self._pose(name)))  # type: ignore[misc]
+            pose = functools.partial(self._pose, other if vehicle is not None else "", handle)
+            self._each_step.append(lambda name=other, pose=pose: self._other_poses[name].append(pose()))  # type: ignore[misc]
 
     def record_step(self) -> None:
         """Record what there is now: before the first step, and after each."""
@@ -124,15 +128,15 @@ class FlightRecorder:
 
         self._each_step.append(look)
 
-    def _pose(self, name: str) -> tuple[float, ...]:
+    def _pose(self, vehicle_name: str, handle: int) -> tuple[float, ...]:
         """Return position (m) and quaternion (xyzw) of a vehicle or object, in the world; NaN once it is gone."""
-        vehicle = self._simulation.vehicles.get(name)
+        vehicle = self._simulation.vehicles.get(vehicle_name)
         if vehicle is not None:
             return (*vehicle.body.state.position, *vehicle.body.state.orientation)
-        objects = self._simulation.context.objects
-        if name not in objects:
+        one = self._simulation.context.objects.get(handle)
+        if one is None or vehicle_name:
             return _NOWHERE
-        matrix = objects.matrix(objects.handle(name))
+        matrix = one.matrix()
         return (*position(matrix), *to_quaternion(matrix))
 
 
@@ -158,6 +162,8 @@ class OfflineBackend:
         self.wanted = wanted
         self.last: dict[str, Any] = {}  # the last message, by the topic's full name
         self.clock: Callable[[], float] = lambda: 0.0  # simulated time in s
+        self.is_scene: Callable[[], bool] = lambda: False  # whether the script that runs is one of the scene's
+        self._scenes: set[str] = set()  # topics that the scene's scripts have advertised
         self._parameters: dict[str, Any] = {}
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
@@ -165,12 +171,18 @@ class OfflineBackend:
         return lambda: None
 
     def advertise(self, topic: str, kind: str, queue: int, latch: bool) -> OfflinePublisher:
-        """Keep what will be published, if it is asked for."""
-        return OfflinePublisher(self.last if topic in self.wanted.values() else {}, topic)
+        """Keep what will be published, if it is asked for; of a topic of the scene's only what its scripts publish."""
+        is_scene = self.is_scene()
+        if is_scene and topic not in self._scenes:
+            self._scenes.add(topic)
+            self.last.pop(topic, None)
+        return OfflinePublisher(
+            self.last if topic in self.wanted.values() else {}, topic, lambda: is_scene or topic not in self._scenes
+        )
 
     def advertise_image(self, topic: str, queue: int) -> OfflinePublisher:
         """Keep nothing: no criterion reads pictures."""
-        return OfflinePublisher({}, topic)
+        return OfflinePublisher({}, topic, lambda: True)
 
     def time(self) -> float:
         """Return what messages are stamped with, in s."""
@@ -203,12 +215,14 @@ class OfflineBackend:
 class OfflinePublisher:
     """An advertised topic."""
 
-    def __init__(self, last: dict[str, Any], topic: str):
+    def __init__(self, last: dict[str, Any], topic: str, may_publish: Callable[[], bool]):
         """Leave the last message on `topic` in `last`."""
-        self._last, self._topic = last, topic
+        self._last, self._topic, self._may_publish = last, topic, may_publish
 
     def publish(self, message: Any) -> None:
-        """Keep a message as it is now."""
+        """Keep a message as it is now. Raises ValueError for a submission's on a topic of the scene's scripts."""
+        if not self._may_publish():
+            raise ValueError(f"{self._topic}: scripts of the scene publish on this topic, so a submission may not")
         self._last[self._topic] = copy.deepcopy(message)
 
     def subscribers(self) -> int:

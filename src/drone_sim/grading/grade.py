@@ -83,7 +83,7 @@ class _Grading:
         store = unpacked(results_folder(options))
         given = [one for name in options.script for one in submissions_of(name, store)]
         seeds = seeds_of(options.seeds or self._plan.seeds, options.secret)
-        jobs = jobs_of(self._plan, given or [Submission(self._plan.script_of(None))], seeds)
+        jobs = jobs_of(self._plan, given or [Submission(self._plan.default_script)], seeds)
         self._submissions, self._names = list(jobs), names_of(jobs)
         self._jobs = [job for some in jobs.values() for job in some]
         _check_outputs(options, len(jobs))

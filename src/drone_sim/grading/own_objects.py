@@ -30,7 +30,7 @@ class OwnObjects:
         self._objects, self._collections = context.objects, context.collections
         roots = [self._objects[self._objects.handle(name)] for name in names]
         self._from_the_start = {*self._objects}
-        self._own = {
+        self.handles = {  # of the vehicles' objects
             handle
             for handle, one in ((handle, self._objects[handle]) for handle in self._objects)
             if any(one is root or one.hangs_on(root) for root in roots)
@@ -53,7 +53,7 @@ class OwnObjects:
         return None if one is None or self._is_own(handle, one) else one.name
 
     def _is_own(self, handle: int, one: SceneObject) -> bool:
-        return handle in self._own or (handle not in self._from_the_start and one.kind in _MADE)
+        return handle in self.handles or (handle not in self._from_the_start and one.kind in _MADE)
 
 
 def _entities(function: str, arguments: list[Any]) -> Iterator[Any]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PlainValidator, PrivateAttr, TypeAdapter, ValidationError
+from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, TypeAdapter, ValidationError
 
 from drone_sim.config.errors import line_of, problems
 from drone_sim.config.types import (
@@ -38,6 +39,8 @@ MAX_DURATION = 20_000.0  # s
 MAX_SEEDS = 1_000_000
 MAX_CRITERIA = 200
 MAX_ENTRIES = 10_000  # of the timeline
+MAX_CALLS = 100
+_NOT_CALLED = re.compile(r"sysCall_|sim[A-Z]")
 _MOST_LOADED = 16  # parameters, each of other changes, that are kept
 
 
@@ -56,6 +59,15 @@ def _config(value: Any) -> Any:
 _Config = Annotated[Mapping[str, Any] | str, PlainValidator(_config)]
 
 
+def _function(name: str) -> str:
+    if _NOT_CALLED.match(name):
+        raise ValueError("must be a function that a script of the scene defines, not a phase or one of the API")
+    return name
+
+
+_Function = Annotated[Name, AfterValidator(_function)]
+
+
 class Plan(Checked):
     """What a plan's file says, checked; made by `read`. It can be pickled."""
 
@@ -72,6 +84,8 @@ class Plan(Checked):
     allowed: Annotated[list[Literal["move", "push", "change"]], Field(max_length=3)] = Field(
         default_factory=list
     )  # see `rules`
+    # Functions of the scene's scripts that a submission may call.
+    calls: Annotated[list[_Function], Field(max_length=MAX_CALLS)] = Field(default_factory=list)
     reads: Literal["all", "own"] = "all"  # what a submission may ask about: all objects, or its own vehicle's alone
     criteria: Annotated[list[AnyCriterion], Field(min_length=1, max_length=MAX_CRITERIA)]
 
@@ -124,6 +138,11 @@ class Plan(Checked):
         if script is not None:
             return script
         return str(named_in(self.folder, self.script)) if Path(self.script).suffix else self.script
+
+    @property
+    def default_script(self) -> str:
+        """The script that flies if none is given: the plan's, or its config's, '' for none. Raises ParameterError."""
+        return self.script_of(None) or self.parameters().script
 
     def parameters(
         self, seed: int = 0, script: str | None = None, changes: Mapping[str, Any] | None = None

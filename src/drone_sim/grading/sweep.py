@@ -71,7 +71,8 @@ class _Sweep:
         self._options = options
         self._guardian = guardian
         self._plan = plans.read(tasks.find(options.plan))
-        self._script = script_path(self._plan.script_of(options.script))
+        script = self._plan.default_script if options.script is None else options.script
+        self._script = script and script_path(script)
         self._contents = contents_of(self._plan, self._script)
         self._seeds = options.seeds or self._plan.seeds
         self._ranges = ranges_of(options.param)

@@ -6,7 +6,7 @@ import copy
 import logging
 from abc import ABC, abstractmethod
 from collections import ChainMap
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from drone_sim.context import SimulationContext
@@ -46,6 +46,7 @@ class HostedScript(ABC):
         self.context = context
         self.script: load.Script = load.no_script()
         self.path = ""  # of the script that is loaded
+        self.flat_names: Collection[str] = ()  # functions that it calls by their names of 3.x
         self._filters = False  # whether its script is to see every picture of the vision sensor that it is on
 
     @abstractmethod
@@ -108,6 +109,7 @@ class HostedScript(ABC):
             **make_plugins(self),
         }
         script = context.load_script(path, modules, limit, turns, context.breakpoints)
+        self.flat_names = script.flat_names
         self._filters = filters_pictures(context, self.own_script, script)
         self.script, self.path = guarded(script), load.script_path(path)
         context.scripts.attached_to(self.own_script).loaded(self.script, context.clock.time)
@@ -243,6 +245,7 @@ class AttachedScript(HostedScript):
         self._heard = bus
         if self.vehicle:
             self.vehicle.commands.listening.append(bus)
+            self.vehicle.flight_state.script_errors.append(self.error)
         # The parameters that V-REP's script has there; a propeller's built-in law gives way to it.
         law = self.vehicle.propulsion.give_way(self.own_script) if self.vehicle else None
         self.parameters: dict[str, Any] = {} if law is None else law
@@ -279,10 +282,9 @@ class AttachedScript(HostedScript):
             _LOG.warning("%s, on %s: %s", path, self.own_script, self.script.idle)
         self._call_init()
 
-    @property
-    def has_failed(self) -> bool:
-        """Whether its script is not called any more."""
-        return self.failure is not None or (isinstance(self.script, GuardedScript) and self.script.failure is not None)
+    def error(self) -> ScriptError | None:
+        """Return the error after which its script is not called any more; None while it is called."""
+        return self.failure or (self.script.failure if isinstance(self.script, GuardedScript) else None)
 
     @property
     def is_loaded(self) -> bool:
@@ -300,6 +302,7 @@ class AttachedScript(HostedScript):
         self._has_left = True
         if self.vehicle and self._heard in self.vehicle.commands.listening:
             self.vehicle.commands.listening.remove(self._heard)
+            self.vehicle.flight_state.script_errors.remove(self.error)
 
     def split_off(self) -> AttachedScript:
         """Return what still runs of it, with its messages, to be ended later; this one calls nothing any more."""

@@ -7,7 +7,7 @@ which are changed most often, go without their key: Kzref.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, get_args
 
@@ -18,8 +18,11 @@ from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.imperfections import Imperfections
 from drone_sim.sensors.sensor import Failure
 from drone_sim.vehicles.parameters import ControlParameters, EquipmentParameters, FaultParameters, VehicleParameters
+from drone_sim.vehicles.types import propeller_places
+from drone_sim.vehicles.types.quadricopter import Quadricopter
 
 CONTROL, SCRIPT = "control", "script_parameters"
+_PROPELLERS = "faults", "propellers"
 LONGEST = 1000  # characters of a text
 _LIMITS = ("takeoff_height", "cmd_vel_timeout", "cmd_vel_limits", "push", "position_limit")
 _OF_CAMERAS = ("every", "horizontal_fov")
@@ -44,21 +47,31 @@ def tunables(vehicle: VehicleParameters, declared: Mapping[str, Any]) -> dict[st
         location = "faults", "sensors", name
         found.append(ParameterField(location, str, choices=get_args(Failure), said="whether and how it fails"))
     script = _of_script({**vehicle.script_parameters, **declared})
-    return {**common(), **{one.name: one for one in found}, **script}
+    return {**common(vehicle.type), **{one.name: one for one in found}, **script}
 
 
 def _is_imperfection(field: ParameterField) -> bool:
     return field.location[2] in Imperfections.model_fields and field.location[-1] not in _LEFT_OUT
 
 
-@lru_cache(maxsize=1)
-def common() -> dict[str, ParameterField]:
-    """Return what every vehicle has, by name."""
+@lru_cache(maxsize=16)
+def common(type_name: str = Quadricopter.name) -> dict[str, ParameterField]:
+    """Return what every vehicle of a type has, by name."""
     own = (*fields_of(ControlParameters, (CONTROL,)), *fields_of(EquipmentParameters))
     around = (*fields_of(WeatherParameters, ("weather",)), *fields_of(FaultParameters, ("faults",)))
     keys = (CONTROL, *_LIMITS, "weather", "faults")
     chosen = (one for one in (*own, *around) if one.location[0] in keys and one.location[-1] not in _LEFT_OUT)
-    return {one.name.removeprefix(f"{CONTROL}/"): _explained(one) for one in chosen}
+    return {one.name.removeprefix(f"{CONTROL}/"): _explained(one) for one in _of_type(type_name, chosen)}
+
+
+def _of_type(type_name: str, fields: Iterable[ParameterField]) -> Iterator[ParameterField]:
+    """Yield the fields with one effectiveness for each propeller that the type has, in place of a quadricopter's."""
+    for one in fields:
+        if one.location[:2] != _PROPELLERS:
+            yield one
+        elif one.location[2] == 0:
+            for index, place in enumerate(propeller_places(type_name)):
+                yield one._replace(location=(*_PROPELLERS, index), part=place)
 
 
 def _of_script(parameters: Mapping[str, Any]) -> dict[str, ParameterField]:

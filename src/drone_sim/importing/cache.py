@@ -19,7 +19,7 @@ from drone_sim.vrep_files.model import VrepFileError
 
 _LOG = logging.getLogger(__name__)
 _LOG.setLevel(logging.INFO)
-_FORM = b"7"  # of what is written: another one, and files are imported anew
+_FORM = b"8"  # of what is written: another one, and files are imported anew
 
 
 def imported_scene(path: Path) -> Path:

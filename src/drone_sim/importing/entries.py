@@ -26,6 +26,7 @@ _NEAREST, _FARTHEST = 1e-4, 1e5  # m
 _LARGEST_FORCE = 1e9  # N m or N
 _WITHOUT_LOSS = {"force sensor": "force_sensor", "script": "script"}
 _LEAST_MASS, _LEAST_MOMENT = 1e-6, 1e-12
+_LEAST_FACTOR = 1e-6
 
 
 class Entries:
@@ -55,12 +56,12 @@ class Entries:
         if parent:
             keys["parent"] = parent
         place = pose_keys(local)
-        return {**keys, **(own or {"kind": "dummy"}), "position": [0.0, 0.0, 0.0], **place}
+        return {**keys, **(own or {"kind": "dummy"}), "position": [0.0, 0.0, 0.0], **place, **size_factor(one)}
 
     def frame(self, one: Placed, parent: str) -> dict[str, Any]:
         """Return an entry that is only a place on `parent`, for what is seen as a part of that."""
         alias = {"alias": one.alias} if one.alias else {}
-        return {"name": one.name, **alias, "parent": parent, "kind": "dummy"}
+        return {"name": one.name, **alias, "parent": parent, "kind": "dummy", **size_factor(one)}
 
     # ---- shapes
 
@@ -170,6 +171,12 @@ class Entries:
         if kind not in (*_WITHOUT_LOSS, "light"):
             self._report.add(one.name, f"a {kind}: only its pose is imported")
         return {"kind": _WITHOUT_LOSS.get(kind, "dummy")}
+
+
+def size_factor(one: Placed) -> dict[str, float]:
+    """Return the key `size_factor` of an object that was scaled in V-REP, for scripts that ask for it."""
+    factor = number(one.object.size_factor)
+    return {"size_factor": factor} if factor != 1 and _LEAST_FACTOR <= factor <= 1 / _LEAST_FACTOR else {}
 
 
 def _is_only_carried(one: Placed) -> bool:

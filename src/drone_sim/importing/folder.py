@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from drone_sim.files import writing
+from drone_sim.files.resources import read_bytes, resolve
 from drone_sim.mechanics import frames
 from drone_sim.message_text import MAX_NAME
 
@@ -77,12 +78,27 @@ class Folder:
             file.write(content)
 
 
+LIST = "IMPORT.txt"
+_HOLE = "WILL NOT WORK: "
+_LONGEST_LIST = 1 << 20  # bytes
+
+
+def holes(scene_file: str) -> list[str]:
+    """Return what the import of a scene file says that will not work; nothing for a scene that is no import."""
+    try:
+        text = read_bytes(resolve(scene_file).with_name(LIST), _LONGEST_LIST).decode("utf-8", "replace")
+    except (OSError, ValueError):
+        return []
+    return [line.removeprefix(_HOLE) for line in text.splitlines() if line.startswith(_HOLE)]
+
+
 class Report:
     """Lines for the end of an import, by what they say; objects of which the same is said share one."""
 
     def __init__(self) -> None:
         """Begin with nothing to say."""
         self.notes: list[str] = []  # what is the same by other means
+        self.holes: list[str] = []  # what will not work
         self._said: dict[str, list[str]] = {}
 
     def add(self, name: str, what: str) -> None:
@@ -93,10 +109,11 @@ class Report:
 
     def __len__(self) -> int:
         """How much there is to say."""
-        return len(self._said)
+        return len(self._said) + len(self.holes)
 
     def lines(self, most: int | None = None) -> Iterator[str]:
-        """Yield one line for everything that is said, with all of its objects, or the first so many."""
+        """Yield one line for everything that is said, with all of its objects, or the first so many; holes first."""
+        yield from (f"{_HOLE}{one}" for one in self.holes)
         for what, names in self._said.items():
             more = f" and {len(names) - most} more" if most is not None and len(names) > most else ""
             yield f"{', '.join(names[:most])}{more}: {what}" if names != [""] else what

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 from drone_sim.files import yaml_files
 from drone_sim.importing import object_collections
 from drone_sim.importing.entries import Entries
-from drone_sim.importing.folder import Folder, Report, label, number, pose_keys
+from drone_sim.importing.folder import LIST, Folder, Report, label, number, pose_keys
 from drone_sim.importing.placing import Placed, floor_parts, floor_size, placed
 from drone_sim.importing.quadricopters import find, plain_name
-from drone_sim.importing.scripts import ScriptFiles, asked_for, bring, values
+from drone_sim.importing.scripts import ScriptFiles, asked_for, bring, values, without_comments
 from drone_sim.importing.shapes import MeshWriter
 from drone_sim.importing.vehicles import ImportedVehicle, suffixes, vehicle_names
 from drone_sim.mechanics import frames
@@ -78,10 +78,21 @@ class UniqueNames:
         return name
 
 
-SCENE, LIST = "scene.yaml", "IMPORT.txt"
+SCENE = "scene.yaml"
 _STEP, _SUB_STEP, _GRAVITY = 0.05, 0.005, -9.81  # which a scene file need not say
 _FARTHEST = 1e5  # m
 _ONLY_LOOKED_THROUGH = ("light", "graph")
+
+
+# In a customization script, which also has phases in which no simulation runs.
+_ACTS = re.compile(
+    r"\bsysCall_(?:actuation|sensing|thread|threadmain)\b|\bcustomizationscriptcall_simulation(?:actuation|sensing)\b"
+)
+_LINKS = re.compile(r"\bsim(?:\.s|S)etLinkDummy\b")
+
+
+def _is_on_a_body(dummy: Placed) -> bool:
+    return dummy.above is not None and dummy.above.is_dynamic
 
 
 class Imported(NamedTuple):
@@ -139,6 +150,7 @@ class _Import:
         tools = self._folder, self._writer, self.script_files, self._report
         vehicles = {name: one.entry(*tools) for name, one in zip(self._vehicle_names, self._vehicles)}
         content["vehicles"] = vehicles
+        self._find_holes()
         if not vehicles:
             self._report.notes.append("The file has no quadricopter: nothing flies unless you add `vehicles`")
         entries = list(self._entries())
@@ -178,6 +190,29 @@ class _Import:
         elif settings.time_step is not None:
             self._report.add("", "the file has no floor at z = 0: drone_sim's floor is added")
         return world
+
+    # ---- what will not work
+
+    def _find_holes(self) -> None:
+        """Report customization scripts that act in a simulation, and links of dummies that would hold bodies."""
+        for script in self._file.scripts:
+            on = self._by_handle.get(script.object)
+            if on is None or not script.is_enabled:
+                continue
+            code = without_comments(script)
+            if script.kind == "customization" and _ACTS.search(code):
+                problem = "its customization script acts in flight, and is not imported: what it drives stays still"
+                self._report.holes.append(f"{on.name}: {problem}")
+            if script.kind in ("child", "customization") and _LINKS.search(code):
+                problem = "its script links dummies (setLinkDummy): links hold nothing here, so the bodies stay apart"
+                self._report.holes.append(f"{on.name}: {problem}")
+        for one in self._objects:
+            of = one.object.of
+            other = self._by_handle.get(of.linked) if isinstance(of, VrepDummy) and of.holds else None
+            is_second = other is not None and other.object.handle < one.object.handle
+            if other is not None and not is_second and (_is_on_a_body(one) or _is_on_a_body(other)):
+                problem = "this link of dummies holds two bodies together; it is not imported, so they come apart"
+                self._report.holes.append(f"{one.name}, {other.name}: {problem}")
 
     # ---- scripts
 

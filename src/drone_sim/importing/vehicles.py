@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from drone_sim.importing.entries import size_factor
 from drone_sim.importing.folder import Folder, Report, label, number, numbers, pose_keys, word
 from drone_sim.importing.placing import Placed
 from drone_sim.importing.quadricopters import Propeller, VrepQuadricopter, built_in_law, plain_name, swings_on
@@ -157,7 +158,7 @@ class ImportedVehicle:
             keys.update({"parent": "", "position": [0.0, 0.0, 0.0], **pose_keys(one.matrix)})
         elif ours != DRONE:
             keys.update({"position": [0.0, 0.0, 0.0], **pose_keys(frames.relative(self._above(ours), one.matrix))})
-        return keys
+        return {**keys, **size_factor(one)}
 
     def _above(self, ours: str) -> Matrix:
         """Return the pose, in the world, of the parent of one of our objects."""

@@ -69,8 +69,12 @@ def to_rpy(m: Sequence[float]) -> Vector:
 def to_quaternion(m: Sequence[float]) -> Quaternion:
     """Return the unit quaternion (x, y, z, w), w >= 0, of a transform (Shepperd's method)."""
     xx, yy, zz = m[0], m[5], m[10]
+    ww = 1 + xx + yy + zz
+    if ww > 2:  # the largest: this is a turn of less than a right angle, as most are
+        scale = 0.5 / sqrt(ww)
+        return (m[9] - m[6]) * scale, (m[2] - m[8]) * scale, (m[4] - m[1]) * scale, ww * scale
     # Four squares that sum to 4; dividing by the largest keeps every digit.
-    squares = (1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz)
+    squares = (1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, ww)
     largest = squares.index(max(squares))
     rows = (
         (squares[0], m[1] + m[4], m[2] + m[8], m[9] - m[6]),

@@ -53,6 +53,7 @@ class SceneObject:
         self.local = local
         self.body = body
         self.is_model = False  # whether it is the base of a model
+        self.size_factor = 1.0  # how much it had been scaled when the simulation began
         self.kind = kind or ("dummy" if body is None else "shape")
         self._above: Matrix | None = None
         self._below: Matrix | None = None

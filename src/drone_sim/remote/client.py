@@ -83,7 +83,7 @@ class Client:
         except RequestRefused:
             raise
         except Exception as error:
-            raise RequestRefused(one_line(request.function, function, arguments, error)) from None
+            raise RequestRefused(one_line(request.function, function, arguments, error)) from error
         finally:
             script_log.end_call()
         return _values(request.function, values)

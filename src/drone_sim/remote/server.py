@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -16,6 +17,7 @@ from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
 from drone_sim.scripting.api.backend import Backend
 
+_LOG = logging.getLogger(__name__)
 _MOST_CLIENTS = 100
 _MOST_TASKS = 16  # of one socket: a client's function may call functions itself
 _BATCH = 64  # messages; then a step may be due
@@ -136,6 +138,7 @@ class RemoteApiServer(RemoteApi):
             except ValueError as error:
                 reply = messages.failure(str(error))
         except Exception as error:  # whatever it is, the flight goes on
+            _LOG.debug("a request failed:", exc_info=True)
             tasks.pop()
             reply = messages.failure(" ".join(str(error).split()))
         if not tasks:

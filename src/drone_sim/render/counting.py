@@ -8,28 +8,28 @@ import moderngl
 import numpy as np
 
 
-def fragments(gl: moderngl.Context, numbers: np.ndarray, draw: Callable[[int], None]) -> np.ndarray:
-    """Return the nearest fragments of each of `numbers`, by number, (largest + 1,).
+def covered(gl: moderngl.Context, numbers: np.ndarray, draw: Callable[[int], None]) -> np.ndarray:
+    """Return how many pixels each of `numbers` covers alone, indexed by number, (largest + 1,).
 
-    `draw` draws that object, with a depth test, and nothing else; it clears nothing.
+    `draw` draws that object and nothing else, without clearing, and with the same depth for all of its fragments.
+    The depth test `<` then passes one fragment of each pixel, however many parts of the object lie there.
     """
     counts = np.zeros(int(numbers.max(initial=0)) + 1, dtype=np.int64)
     query = gl.query(samples=True)
+    gl.depth_func = "<"
     for number in numbers:
         gl.fbo.clear()
-        draw(int(number))  # first, so that only what is nearest counts
-        gl.depth_func = "=="
         with query:
             draw(int(number))
-        gl.depth_func = "<="
         counts[number] = query.samples
+    gl.depth_func = "<="
     return counts
 
 
 def pixels(
     instances: np.ndarray, poses: np.ndarray, mask: Callable[[np.ndarray, np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """Return the same where a lens makes pixels of fragments; slower.
+    """Return the same through a lens, from a picture of each object alone; slower.
 
     instances, poses: the object's number of each visual, (N,), and its pose, (N, 4, 4). `mask` draws the picture of
     instances, given other numbers and poses.

@@ -14,7 +14,6 @@ pixels of these. plumb_bob and rational_polynomial, with r² = x² + y² and D =
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,7 +25,7 @@ MODELS = {"plumb_bob": 5, "rational_polynomial": 8, "equidistant": 4}  # and how
 _ROUNDS = 30  # of Newton's method
 _CLOSE = 1e-9  # of x' and y', which are about 1 at the edge
 _STEP = 1e-6
-_WIDEST = math.radians(110.0)  # from the axis
+WIDEST = 3.84  # rad, the largest horizontal_fov of an equidistant lens: 220 degrees
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class Distorted(Intrinsics):
     """A camera whose lens bends straight lines.
 
     model: one of `MODELS`; D: its coefficients, filled up with zeros. horizontal_fov: rad, of the same camera without
-    coefficients, so that it says the focal length; up to 220 degrees with an equidistant lens.
+    coefficients, so that it says the focal length; up to `WIDEST` with an equidistant lens.
     Raises ValueError for what `Intrinsics` does, an unknown model, too many coefficients, and a lens that folds the
     picture, so that pixels have no ray.
     """
@@ -52,8 +51,8 @@ class Distorted(Intrinsics):
         object.__setattr__(self, "D", (*self.D, *(0.0,) * (most - len(self.D))))
         if not self.is_fisheye:
             super().__post_init__()
-        elif not 0.0 < self.horizontal_fov <= math.radians(220.0):
-            raise ValueError(f"horizontal_fov {self.horizontal_fov}: must lie between 0 and 3.84 rad (220 degrees)")
+        elif not 0.0 < self.horizontal_fov <= WIDEST:
+            raise ValueError(f"horizontal_fov {self.horizontal_fov}: must lie between 0 and {WIDEST} rad (220 degrees)")
         middle = self.rays[self.height // 2] if self.is_fisheye else self.rays
         if not np.isfinite(middle).all():
             raise ValueError(f"{list(self.D)}: this {self.model} lens is impossible: some pixels would have no ray")
@@ -132,7 +131,7 @@ class Distorted(Intrinsics):
 
     def _fisheye_rays(self, seen: np.ndarray) -> np.ndarray:
         """Look the angle up in a table, and make it exact by Newton's method."""
-        table = np.linspace(0.0, _WIDEST, 2000)
+        table = np.linspace(0.0, WIDEST / 2, 2000)
         falls = np.flatnonzero(_slope(table, self.D) <= 0)
         table = table[: falls[0] if len(falls) else None]
         reached = _polynomial(table, self.D)

@@ -16,7 +16,7 @@ LOOKS = {"plain": (), "textured": ("TEXTURED",), "floor": ("TEXTURED", "FLAT")} 
 _SOURCES = {
     "surface": (shaders.SURFACE_VERTEX, shaders.SURFACE_FRAGMENT),
     "bare": (shaders.BARE_VERTEX, shaders.BARE_FRAGMENT),
-    "alone": (shaders.ALONE_VERTEX, shaders.BARE_FRAGMENT),
+    "alone": (shaders.ALONE_VERTEX, shaders.ALONE_FRAGMENT),
     "shadow": (shaders.SHADOW_VERTEX, shaders.SHADOW_FRAGMENT),
     "sky": (shaders.SKY_VERTEX, shaders.SKY_FRAGMENT),
 }

@@ -178,7 +178,7 @@ class Renderer:
                 only.value = float(number)
                 self._draw_batches(gl, self._batches.all, ALONE)
 
-            return counting.fragments(gl, np.unique(instances), draw)
+            return counting.covered(gl, np.unique(instances), draw)
 
     def close(self) -> None:
         """Free the context and all it holds; the renderer cannot be used after. May be called twice."""

@@ -103,7 +103,7 @@ void main() {
 }
 """
 
-# One object alone, whose fragments are counted.
+# One object alone, for counting its pixels: its fragments have one depth, and are clipped by that of the vertices.
 ALONE_VERTEX = (
     INPUTS
     + """
@@ -114,6 +114,11 @@ void main() {
 }
 """
 )
+
+ALONE_FRAGMENT = """
+#version 330 core
+void main() { gl_FragDepth = 0.5; }
+"""
 
 # Every vertex slides along the light onto the floor; what lies below the floor casts nothing beyond itself.
 SHADOW_VERTEX = (

@@ -12,6 +12,7 @@ from drone_sim.files import yaml_files
 from drone_sim.files.resources import read_bytes
 from drone_sim.hosting.tunable import SCRIPT, common, nested
 from drone_sim.message_text import shown
+from drone_sim.vehicles.types import TYPES
 
 _BEGIN = b"!!python/object/new:dynamic_reconfigure.encoding.Config"
 _VALUES = "dictitems"
@@ -46,10 +47,9 @@ def read_config(path: Path, below: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _keys(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    known = {
-        **common(),
-        **{name: ParameterField(_location(name), float) for name in values if name not in common()},
-    }
+    of_type = {name: sum(one in common(name) for one in values) for name in TYPES}  # its propellers tell the type
+    shared = common(max(of_type, key=lambda name: of_type[name]))
+    known = {**shared, **{name: ParameterField(_location(name), float) for name in values if name not in shared}}
     try:
         return nested(known, {}, values)
     except KeyError as missing:

@@ -148,6 +148,10 @@ class Player:
                 self.simulation.stop()
             except ScriptError as second:  # mostly because of the first: whoever shows an error shows that one
                 _LOG.warning(f"then a second script error, in cleanup: {second}")
+            if isinstance(error, ScriptError):  # shown until the next start
+                failed = error
+                for vehicle in self.simulation.vehicles.values():
+                    vehicle.flight_state.script_errors.append(lambda: failed)
             self._say_that_the_clock_stands("stopped; `start` runs the edited file")
             raise
         finally:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from drone_sim.hosting.child_scripts import ChildScript
+from drone_sim.importing.folder import holes
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.object_tree import NO_HANDLES, Handles
 from drone_sim.mechanics.saved_state import Restore
@@ -100,6 +101,8 @@ class Simulation:
         for path in (*flown, *(one.script for one in parameters.scene.scripts)):  # one that is not there needs no world
             load.script_path(path)
         self._take(self._set_up(parameters, _world(parameters, gui)))
+        self.holes: list[str] = []  # what will not work in an imported scene
+        self._find_holes()
         self.document = SceneDocument(parameters, self.object_handles)
         try:
             if started:
@@ -214,9 +217,18 @@ class Simulation:
 
     def _read(self, scene_file: str) -> None:
         self._rebuild(self.parameters.in_scene(scene_file), NO_HANDLES)
+        self._find_holes()
         self.document = SceneDocument(self.parameters, self.object_handles)
         self._is_arranged = False
         self.scenes_read += 1
+
+    def _find_holes(self) -> None:
+        """Warn of what will not work in a scene that was imported from V-REP, unless it was said before."""
+        file, before = self.parameters.scene_file, self.holes
+        self.holes = holes(file) if file else []
+        for one in self.holes:
+            if one not in before:
+                LOG.warning("%s: %s", file, one)
 
     def arrange(self, parameters: Parameters, rebuild: bool = True) -> None:
         """While it is stopped: begin as these parameters say from now on, with the handles that objects have, or had.
@@ -266,17 +278,19 @@ class Simulation:
         try:
             self._clean_up()
         finally:
-            if not self.scene.is_changed or not self._undo_changes():
+            # False even if the scene cannot be rebuilt: the next start must not take the flown scene as its beginning.
+            is_changed, self.scene.is_changed = self.scene.is_changed, False
+            if not is_changed or not self._undo_changes():
                 self._setup.begin_anew()
                 self._begin()
 
     def _undo_changes(self) -> bool:
-        """Build the scene as it began; return whether its files are still there."""
+        """Rebuild the scene as it began; return whether that was possible: its files may be missing by now."""
         self.clock.steps = 0  # whatever is made begins there
         try:
             self._rebuild(self.parameters, self._handles)
         except ValueError as error:
-            LOG.error("the scene stays as it is: %s", error)
+            LOG.error("the scene could not be restored and stays as it was flown; `start` tries again: %s", error)
             return False
         return True
 
@@ -299,9 +313,10 @@ class Simulation:
     # ---- stepping
 
     @property
-    def failed_scripts(self) -> list[str]:
-        """Names of the objects whose attached scripts have failed and are not called any more."""
-        return [one.own_script for one in self._setup.scripts.attached if one.has_failed]
+    def failed_scripts(self) -> dict[str, ScriptError]:
+        """Errors of attached scripts that have failed and are not called any more, by their objects' names."""
+        errors = ((one.own_script, one.error()) for one in self._setup.scripts.attached)
+        return {name: error for name, error in errors if error is not None}
 
     @property
     def steps(self) -> int:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from drone_sim.config.types import Angles, Checked, Label, ParameterError, Point, Switch
+from drone_sim.config.types import Angles, Checked, Finite, Label, ParameterError, Point, Switch, Within
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, from_rpy, to_quaternion
 from drone_sim.mechanics.joint import FORCE, POSITION, SPHERICAL, VELOCITY, Joint
@@ -30,7 +30,8 @@ class EntryParameters(Checked):
 
     No other object has its `name` (V-REP 3.x); siblings may share the `alias` (4.x), which is the name where none is
     given. `model`: it is the base of a model, from which paths with a colon begin (`:/`). `category`: of its pixels and
-    boxes in a camera's truth, the name without its number where none is given.
+    boxes in a camera's truth, the name without its number where none is given. `size_factor` is what
+    sim.getObjectSizeFactor returns; it scales nothing.
     """
 
     name: Label = ""
@@ -40,6 +41,7 @@ class EntryParameters(Checked):
     parent: Label = ""
     position: Point
     rpy: Angles = (0.0, 0.0, 0.0)
+    size_factor: Annotated[Finite, Within(1e-6, 1e6)] = 1.0
 
     def model_post_init(self, _context: Any) -> None:
         """Refuse what scripts could not find under a name."""

@@ -424,8 +424,10 @@ class SceneOperations:
 
     def factors(self, handle: int) -> tuple[float, float, float]:
         """Return how many times as large an object is as it was, along x, y and z."""
-        index = self._index_of(self._scene.tree[handle])
-        return (1.0, 1.0, 1.0) if index is None else self._scene.factors.get(index, (1.0, 1.0, 1.0))
+        found = self._scene.tree[handle]
+        index = self._index_of(found)
+        x, y, z = (1.0, 1.0, 1.0) if index is None else self._scene.factors.get(index, (1.0, 1.0, 1.0))
+        return x * found.size_factor, y * found.size_factor, z * found.size_factor
 
     def exchange(self, entries: Mapping[int, EntryParameters]) -> None:
         """Let other entries take the place of objects', whose names and places they have. Raises ParameterError."""

@@ -205,7 +205,7 @@ class Scene:
     def exchange(self, index: int, handle: int, entry: KindParameters, place: Place) -> None:
         """Make an object anew of an entry, in the place of the one that is there."""
         made = entry.make(place, self._context)
-        made.is_model = entry.model
+        made.is_model, made.size_factor = entry.model, entry.size_factor
         before, self.objects[index] = self.objects[index], made
         if isinstance(made, Joint) and isinstance(before, Joint):
             made.turn = before.turn
@@ -244,7 +244,7 @@ class Scene:
         else:
             follow = self._context.carried.follow
             added = ShapeObject(place, self._world, self._changed, follow, self._solid(index, place.local))
-        added.is_model = one.model
+        added.is_model, added.size_factor = one.model, one.size_factor
         try:
             self.tree.insert(added)
         except ValueError as error:

@@ -21,6 +21,7 @@ class GuardedScript:
         self._script = script
         self.failure: ScriptError | None = None
         self.language, self.idle, self.is_empty = script.language, script.idle, script.is_empty
+        self.flat_names = script.flat_names
         self._calls = 0  # that have not returned
 
     @property
@@ -40,6 +41,11 @@ class GuardedScript:
     def take_turn(self) -> None:
         """Let its thread run until it is left."""
         self._attempt(self._script.take_turn)
+
+    def defines(self, name: str) -> bool:
+        """Return whether the script's own file defines a global function of this name. Raises ScriptError."""
+        self._refuse_if_failed(name)
+        return self._script.defines(name)
 
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function for another script; an error counts as that script's. Raises ScriptError."""

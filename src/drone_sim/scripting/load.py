@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -18,6 +18,7 @@ from drone_sim.scripting.python.helpers import BUILT_IN
 from drone_sim.scripting.python.script import PythonScript
 from drone_sim.scripting.time_limit import TimeLimit
 
+_ENDINGS = (".py", ".lua")
 DEFAULT = "pilot"
 NO_SCRIPT = "none"  # what a vehicle says that has none, for others to fly it: the one that is given, or a client
 
@@ -28,6 +29,7 @@ class Script(Protocol):
     language: str  # lua or python
     idle: str  # why none of its phases is ever called, '' where one is
     is_empty: bool
+    flat_names: Collection[str]  # functions that it calls by their names of 3.x
 
     @property
     def threaded(self) -> bool:
@@ -38,6 +40,9 @@ class Script(Protocol):
 
     def take_turn(self) -> None:
         """Let its thread run until it is left; raises ScriptError."""
+
+    def defines(self, name: str) -> bool:
+        """Return whether the script's own file defines a global function of this name. Raises ScriptError."""
 
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
@@ -93,7 +98,7 @@ def script_path(script: str) -> str:
         if name not in known:
             raise ScriptError("load", name, 0, f"there is no built-in script with this name; {near_names(name, known)}")
         return known[name]
-    if Path(name).suffix not in (".py", ".lua"):
+    if Path(name).suffix not in _ENDINGS:
         raise ScriptError("load", name, 0, "the name of a child script must end in .py or .lua")
     try:
         return str(resolve(name))
@@ -104,7 +109,7 @@ def script_path(script: str) -> str:
 @functools.cache  # asked several times for every flight
 def _built_in() -> dict[str, str]:
     """Return the paths of the built-in scripts, by name."""
-    return {path.stem: str(path) for path in BUILT_IN.glob("*.py") if path.stem != "__init__"}
+    return {path.stem: str(path) for path in BUILT_IN.glob("*") if path.suffix in _ENDINGS and path.stem != "__init__"}
 
 
 def load(

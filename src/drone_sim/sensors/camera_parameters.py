@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from drone_sim.config.types import TOPIC, Checked, Finite, Name, ParameterError, Switch, Unit, Within
+from drone_sim.render.distortion import WIDEST as WIDEST_FISHEYE
 from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.sensors.imperfections import Imperfections
@@ -24,7 +25,7 @@ TRUTH = (
     *("detections", "detections_3d"),  # where vision_msgs is installed
 )
 _lens = lru_cache(maxsize=MAX_CAMERAS)(Distorted)  # whose rays are found once
-WIDEST, WIDEST_FISHEYE = 3.1, 3.839724  # rad; the latter is 220 degrees
+WIDEST = 3.1  # rad, without an equidistant lens
 
 
 class LensParameters(Checked):

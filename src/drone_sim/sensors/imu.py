@@ -107,9 +107,11 @@ class Imu(Instrument):
         if self._jumps != self.carrier.jumps:  # put there at rest: that was neither acceleration nor turn
             self._jumps, last, before = self.carrier.jumps, _ZERO, axes
         change = velocity[0] - last[0], velocity[1] - last[1], velocity[2] - last[2] - fallen
-        self._gained = _sum(self._gained, rotate_back(axes, change), 1.0)
+        (gx, gy, gz), (cx, cy, cz) = self._gained, rotate_back(axes, change)
+        self._gained = gx + cx, gy + cy, gz + cz
         # The axis of a turn has the same components before and after.
-        self._turned = _sum(self._turned, rotation_vector(relative_turn(before, axes)), 1.0)
+        (tx, ty, tz), (rx, ry, rz) = self._turned, rotation_vector(relative_turn(before, axes))
+        self._turned = tx + rx, ty + ry, tz + rz
         self._axes, self._velocity = axes, velocity
         self._passed += step
         super().look(count)
@@ -124,8 +126,9 @@ class Imu(Instrument):
     def _point_velocity(self, axes: Matrix) -> Vector:
         """Return the velocity (m/s, world) of the vehicle's point where the sensor sits."""
         place, _, linear, angular = self.carrier.state
-        x, y, z = position(axes)
-        return _sum(linear, cross(angular, (x - place[0], y - place[1], z - place[2])), 1.0)
+        (x, y, z), (vx, vy, vz) = position(axes), linear
+        sx, sy, sz = cross(angular, (x - place[0], y - place[1], z - place[2]))
+        return vx + sx, vy + sy, vz + sz
 
     def save_state(self) -> Restore:
         """Return a function that brings it back, in the middle of a sample."""

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drone_sim.mechanics.frames import to_quaternion
+from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.outputs import COLOR
 from drone_sim.render.renderer import Moment
@@ -50,9 +51,12 @@ class Box2D(NamedTuple):
 class Seen(NamedTuple):
     """An object that the picture shows.
 
-    visible: around its pixels; full: around all of it, as if nothing hid it and the picture were larger. occlusion: the
-    share of what the picture would show of it alone that something hides; truncation: the share of `full` that is
-    outside the picture, both 0 to 1. pose: the optical frame from the middle of its box (4, 4); size: of that box, m.
+    visible: around its pixels. full: around all of it, as if nothing hid it and the picture were larger, and around
+    `visible`, which can be larger by part of a pixel. For a pinhole, the object ends at the near plane. Through a
+    plumb_bob or rational_polynomial lens, an object that reaches behind the camera has no other `full` than `visible`.
+    occlusion: the share of what the picture would show of it alone that something hides; truncation: the share of
+    `full` that is outside the picture, both 0 to 1. pose: the optical frame from the middle of its box (4, 4); size: of
+    that box, m.
     """
 
     number: int
@@ -168,7 +172,7 @@ class PictureTruth:
             (top, bottom), (left, right) = (np.flatnonzero(one)[[0, -1]] for one in (rows, columns))
             visible = Box2D(left - 0.5, top - 0.5, right + 0.5, bottom + 0.5)
             pose, size, corners = self._solid(number)
-            full = self._around(corners, visible)
+            full = self._around(number, corners, visible)
             inside = Box2D(
                 max(full.left, -0.5), max(full.top, -0.5),
                 min(full.right, self.intrinsics.width - 0.5), min(full.bottom, self.intrinsics.height - 0.5),
@@ -184,28 +188,34 @@ class PictureTruth:
 
         The box stands as the object's first visual does.
         """
-        members = np.flatnonzero(self.numbered.instances == number)
-        poses = self.moment.poses[members]
+        corners = self._optical(number, _outline)
         optical = np.linalg.inv(self.moment.camera_pose)
-        corners = np.concatenate([
-            _outline(self._visuals[one].shape) @ pose[:3, :3].T + pose[:3, 3] for one, pose in zip(members, poses)
-        ])  # fmt: skip
-        frame = poses[0].copy()
+        frame = optical @ self.moment.poses[np.flatnonzero(self.numbered.instances == number)[0]]
         frame[:3, :3] /= np.linalg.norm(frame[:3, :3], axis=0)
         own = (corners - frame[:3, 3]) @ frame[:3, :3]
         low, high = own.min(axis=0), own.max(axis=0)
         frame[:3, 3] += frame[:3, :3] @ ((low + high) / 2)
-        return optical @ frame, high - low, corners @ optical[:3, :3].T + optical[:3, 3]
+        return frame, high - low, corners
 
-    def _around(self, corners: np.ndarray, visible: Box2D) -> Box2D:
-        """Return the box around corners in the picture; of what reaches behind the camera, around what is visible."""
-        pixels = self.intrinsics.project(corners)
+    def _optical(self, number: int, points: Callable[[DrawnShape], np.ndarray]) -> np.ndarray:
+        """Return an object's points in the optical frame, (n, 3), from those of each of its shapes."""
+        optical = np.linalg.inv(self.moment.camera_pose)
+        found = []
+        for one in np.flatnonzero(self.numbered.instances == number):
+            pose = optical @ self.moment.poses[one]
+            found.append(points(self._visuals[one].shape) @ pose[:3, :3].T + pose[:3, 3])
+        return np.concatenate(found)
+
+    def _around(self, number: int, corners: np.ndarray, visible: Box2D) -> Box2D:
+        """Return the box in the picture around an object's corners and around `visible`, as `Seen.full`."""
+        lens = self.intrinsics
+        if not isinstance(lens, Distorted) and (corners[:, 2] < lens.near).any():
+            corners = _cut(self._optical(number, _triangle_corners).reshape(-1, 3, 3), lens.near)
+        pixels = lens.project(corners)
         if not np.isfinite(pixels).all():
             return visible
-        (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
-        return Box2D(
-            min(left, visible.left), min(top, visible.top), max(right, visible.right), max(bottom, visible.bottom)
-        )
+        pixels = np.concatenate([pixels, [visible[:2], visible[2:]]])
+        return Box2D(*map(float, (*pixels.min(axis=0), *pixels.max(axis=0))))
 
 
 def described(objects: Sequence[Seen]) -> list[dict[str, Any]]:
@@ -232,5 +242,19 @@ def quaternion_of(one: Seen) -> tuple[float, ...]:
 @lru_cache(maxsize=1024)
 def _outline(shape: DrawnShape) -> np.ndarray:
     """Return the corners of a shape's triangles, each once, (n, 3), m."""
-    corners = np.concatenate([part.corners.reshape(-1, 3) for part in shape.triangles()])
-    return np.asarray(np.unique(corners, axis=0))
+    return np.asarray(np.unique(_triangle_corners(shape), axis=0))
+
+
+@lru_cache(maxsize=64)
+def _triangle_corners(shape: DrawnShape) -> np.ndarray:
+    """Return the corners of a shape's triangles, three in a row for each, (n, 3), m."""
+    return np.concatenate([part.corners.reshape(-1, 3) for part in shape.triangles()])
+
+
+def _cut(triangles: np.ndarray, near: float) -> np.ndarray:
+    """Return the corners, (n, 3), of the parts of triangles (m, 3, 3) whose z is at least `near`."""
+    starts, ends = triangles.reshape(-1, 3), np.roll(triangles, -1, axis=1).reshape(-1, 3)
+    crossing = (starts[:, 2] < near) != (ends[:, 2] < near)
+    starts_crossing, along = starts[crossing], (ends - starts)[crossing]
+    cuts = starts_crossing + along * ((near - starts_crossing[:, 2:]) / along[:, 2:])
+    return np.concatenate([starts[starts[:, 2] >= near], cuts])

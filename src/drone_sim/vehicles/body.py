@@ -37,6 +37,7 @@ class Body:
 
     state: State  # after the last sub-step that was looked at, or move
     matrix: Matrix  # world from root link
+    _read: State | None = None  # that `matrix` was computed from
     propellers: Propellers  # that drive it, as long as the run lasts
 
     def __init__(self, rigid: RigidBody, start: Pose, context: SimulationContext):
@@ -86,8 +87,10 @@ class Body:
 
     def refresh(self) -> None:
         """Read the state back from the world."""
-        self.state = self._world.state(self.number)
-        self.matrix = self.state.matrix
+        state = self._world.state(self.number)
+        if state is not self._read:
+            self._read = self.state = state
+            self.matrix = state.matrix
 
     def move(self, pose: Pose) -> None:
         """Put it somewhere else, at rest."""

@@ -10,6 +10,7 @@ from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.scripting.api.messages import MessageBus
+from drone_sim.scripting.errors import ScriptError
 from drone_sim.vehicles.radio_link import RadioLink
 
 
@@ -130,8 +131,15 @@ class FlightState:
     def begin(self) -> None:
         """Forget which requests no script answered: another script may be there."""
         self.is_flown = False  # by a child script, which is loaded
+        # For each script of the vehicle that may have failed: returns its error, or None while it is called.
+        self.script_errors: list[Callable[[], ScriptError | None]] = []
         self._missing = ""
         self._told: set[str] = set()  # topics that had no effect
+
+    @property
+    def script_error(self) -> ScriptError | None:
+        """The error of a script of the vehicle that has failed and is not called any more; None if there is none."""
+        return next((error for one in self.script_errors if (error := one()) is not None), None)
 
     def __str__(self) -> str:
         """Return the state, as a script says it; `unknown` where none does."""

@@ -49,12 +49,12 @@ class Faults:
     def change(self, changes: Mapping[str, Any]) -> None:
         """Lay other values over some of the present ones, as in YAML. Raises ParameterError."""
         new = changed(self.now, changes)
-        new.check([*self._instruments.by_name, *self._cameras])
+        new.check([*self._instruments.by_name, *self._cameras], len(self._propellers.air))
         self._be(new)
 
     def _be(self, now: FaultParameters) -> None:
-        self.now = now
         self._propellers.weaken(now.propellers)
+        self.now = now = now.model_copy(update={"propellers": self._propellers.effectiveness})
         self._instruments.fail(now.sensors)
         for name, camera in self._cameras.items():
             camera.failure = now.sensors.get(name, "ok")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, PrivateAttr
+from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo
 
 from drone_sim.config.types import (
     Angle,
@@ -35,9 +35,10 @@ from drone_sim.sensors import AnySensor
 from drone_sim.sensors.camera_parameters import MAX_CAMERAS, CameraParameters
 from drone_sim.sensors.sensor import Failure
 from drone_sim.sensors.validation import check_sensors
-from drone_sim.vehicles.quadricopter_objects import OWN_NAMES, REMOVABLE, ObjectPlace
+from drone_sim.vehicles.quadricopter_objects import REMOVABLE, ObjectPlace, own_names
 from drone_sim.vehicles.radio_link import LinkParameters
-from drone_sim.vehicles.types import TYPES
+from drone_sim.vehicles.types import TYPES, propeller_places
+from drone_sim.vehicles.types.quadricopter import Quadricopter
 
 UNPREFIXED = "drone"  # the name with which the only vehicle has frames without a prefix
 MAX_FORCES = 16
@@ -83,27 +84,35 @@ class FaultParameters(Checked):
     """What is wrong: `commands` and `images` are the radio link's two directions, `sensors` are cameras, too."""
 
     propellers: Annotated[
-        tuple[Fraction, Fraction, Fraction, Fraction],
-        Parts(("front_left", "back_left", "back_right", "front_right")),
-        Field(description="4 numbers from 0 to 1, the fraction of its thrust that each propeller still has"),
+        tuple[Fraction, ...],
+        Parts(propeller_places(Quadricopter.name)),
+        Field(description="numbers from 0 to 1, the fraction of its thrust that each propeller still has"),
     ]
     commands: LinkParameters
     images: LinkParameters
     sensors: Annotated[dict[Name, Failure], Field(max_length=MAX_FAILURES)]
     seed: Annotated[int, Within(0, 2**63 - 1)]
 
-    def check(self, names: Collection[str]) -> None:
-        """Raise ParameterError for a sensor that is not among the names."""
+    def check(self, names: Collection[str], propellers: int) -> None:
+        """Raise ParameterError for a sensor that is not among the names, or a wrong number of propellers.
+
+        The numbers of config/drone.yaml, as many as a quadricopter has, are allowed for every vehicle.
+        """
+        if len(self.propellers) not in (propellers, len(Quadricopter.rotors)):
+            given = f"[{', '.join(f'{share:g}' for share in self.propellers)}]"
+            must = f"must be {propellers} numbers from 0 to 1, the share that each propeller still gives"
+            raise ParameterError(must, ("faults", "propellers"), given)
         for name in self.sensors:
             if name not in names:
                 said = f"no such sensor or camera; {near_names(name, names)}" if names else "there are no sensors"
                 raise ParameterError(said, ("faults", "sensors", name))
 
 
-def _own(places: Mapping[str, ObjectPlace | None]) -> Mapping[str, ObjectPlace | None]:
+def _own(places: Mapping[str, ObjectPlace | None], info: ValidationInfo) -> Mapping[str, ObjectPlace | None]:
+    known = own_names(len(propeller_places(info.data.get("type", Quadricopter.name))))
     for name, place in places.items():
-        if name not in OWN_NAMES:
-            raise ValueError(f"'{name}' is not an object of a vehicle; {near_names(name, OWN_NAMES)}")
+        if name not in known:
+            raise ValueError(f"'{name}' is not an object of a vehicle; {near_names(name, known)}")
         if place is None and name not in REMOVABLE:
             raise ValueError(f"'{name}': a vehicle needs it; null removes only {', '.join(REMOVABLE)}")
     return places
@@ -167,8 +176,12 @@ class EquipmentParameters(Checked):
         self.check_faults()
 
     def check_faults(self) -> None:
-        """Raise ParameterError for a fault of a sensor that it has not."""
-        self.faults.check([*self.sensors, *self.cameras])
+        """Raise ParameterError for a fault of a sensor or propeller that the vehicle does not have.
+
+        The keys at the top of a file belong to vehicles of any type, so their number of propellers is not checked.
+        """
+        propellers = len(propeller_places(getattr(self, "type", ""))) or len(self.faults.propellers)
+        self.faults.check([*self.sensors, *self.cameras], propellers)
 
 
 class VehicleParameters(EquipmentParameters, PlaceParameters):
@@ -182,7 +195,9 @@ class VehicleParameters(EquipmentParameters, PlaceParameters):
         """Return the only vehicle of a simulation."""
         place = {key: getattr(drone, key) for key in DroneParameters.model_fields}
         carried = {key: getattr(equipment, key) for key in EquipmentParameters.model_fields}
-        return cls.model_construct(**place, **carried).alone()
+        made = cls.model_construct(**place, **carried).alone()
+        made.check_faults()
+        return made
 
     def alone(self) -> VehicleParameters:
         """Return the same for a vehicle that flies alone."""

@@ -22,8 +22,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Annotated
 
-from drone_sim.config.types import Angles, Checked, Label, ParameterError, Point
+from drone_sim.config.types import Angles, Checked, Finite, Label, ParameterError, Point, Within
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, from_rpy
 from drone_sim.mechanics.object_tree import ObjectTree
@@ -33,13 +34,17 @@ from drone_sim.sensors.sensor import SensorParameters
 
 
 class ObjectPlace(Checked):
-    """Another name, to which no suffix is added, alias, parent ('' is the world), and place (m, rad) in its frame."""
+    """Another name, to which no suffix is added, alias, parent ('' is the world), and place (m, rad) in its frame.
+
+    `size_factor` is what sim.getObjectSizeFactor returns.
+    """
 
     name: Label = ""
     alias: Label = ""
     parent: Label | None = None
     position: Point | None = None
     rpy: Angles | None = None
+    size_factor: Annotated[Finite, Within(1e-6, 1e6)] = 1.0
 
     def local(self, default: Matrix) -> Matrix:
         """Return the parent's frame from its own: as given, or the default."""
@@ -62,31 +67,25 @@ OPTICAL_FROM_SENSOR = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # o
 
 
 def respondable(number: int) -> str:
-    """Return the name of propeller 1 to 4's body: forces act on it, its script takes particleVelocity."""
+    """Return the name of a propeller's body, counted from 1: forces act on it, its script takes particleVelocity."""
     return f"Quadricopter_propeller_respondable{number}"
 
 
 def seen(number: int) -> str:
-    """Return the name of what is seen of propeller 1 to 4 beside its blades."""
+    """Return the name of the visible part of a propeller, counted from 1, without its blades."""
     return f"Quadricopter_propeller_body{number}"
 
 
 def joint(number: int) -> str:
-    """Return the name of the joint that turns the blades of propeller 1 to 4."""
+    """Return the name of the joint that turns the blades of a propeller, counted from 1."""
     return f"Quadricopter_propeller_joint{number}"
 
 
-_PROPELLERS = [name(n) for n in (1, 2, 3, 4) for name in ("Quadricopter_propeller{}".format, respondable, seen, joint)]
-OWN_NAMES = (
-    DRONE,
-    "Quadricopter_base",
-    TRACK_BASE,
-    TARGET,
-    FLOOR_CAMERA,
-    FRONT_CAMERA,
-    SCRIPT,
-    *_PROPELLERS,
-)  # of every vehicle
+def own_names(propellers: int) -> tuple[str, ...]:
+    """Return the names of the objects of a vehicle with this number of propellers, without cameras and sensors."""
+    names = ("Quadricopter_propeller{}".format, respondable, seen, joint)
+    of_propellers = [name(number) for number in range(1, propellers + 1) for name in names]
+    return DRONE, "Quadricopter_base", TRACK_BASE, TARGET, FLOOR_CAMERA, FRONT_CAMERA, SCRIPT, *of_propellers
 
 
 REMOVABLE = (FLOOR_CAMERA, FRONT_CAMERA, TRACK_BASE)  # without which a vehicle flies
@@ -176,6 +175,7 @@ class QuadricopterObjects:
         except ValueError as error:  # one of the scene has that name
             raise ParameterError(str(error)) from None
         self._objects[handle].is_model = name == DRONE
+        self._objects[handle].size_factor = place.size_factor
         self._handles.append(handle)
 
     def _add_sensor(self, links: Mapping[str, Matrix], name: str, sensor: SensorParameters) -> None:

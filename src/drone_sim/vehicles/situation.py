@@ -14,7 +14,7 @@ from drone_sim.vehicles.body import Body
 from drone_sim.vehicles.commands import UNKNOWN
 from drone_sim.vehicles.vehicle import Vehicle
 
-FLYING, HELD, UPSIDE_DOWN = "flying", "held", "upside down"
+FLYING, HELD, UPSIDE_DOWN, SCRIPT_FAILED = "flying", "held", "upside down", "script failed"
 _CARRIES = 0.7  # upward part of a unit normal: steeper than 45 degrees nothing stands
 _SLIDES = 0.05  # m/s
 _FLOOR = "Floor"
@@ -51,7 +51,13 @@ def _hardest(touched: Sequence[Contact]) -> str:
 
 
 def doing(vehicle: Vehicle) -> str:
-    """Return what a vehicle does: the script's own state, or its body's where the script says `flying`, or nothing."""
+    """Return what a vehicle does, in words.
+
+    This is `script failed`, if a script of the vehicle has failed; else the state that the script publishes; else, or
+    if that is `flying`, the state of its body.
+    """
+    if vehicle.flight_state.script_error is not None:
+        return SCRIPT_FAILED
     said = str(vehicle.flight_state)
     return situation(vehicle.body) if said == FLYING or said.startswith(UNKNOWN) else said
 

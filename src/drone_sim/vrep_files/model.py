@@ -109,11 +109,12 @@ class VrepJoint:
 class VrepDummy:
     """A frame; the handle of the dummy that it is linked to, -1 for none; the points of a path of 4.x.
 
-    Each is x, y, z (m) and a quaternion x, y, z, w.
+    Each is x, y, z (m) and a quaternion x, y, z, w. `holds`: the dynamics keeps both linked dummies at one place.
     """
 
     size: float
     linked: int = -1
+    holds: bool = False
     path: tuple[tuple[float, ...], ...] = ()
 
 

@@ -108,9 +108,13 @@ def _mode(own: Level) -> str:
     return "position" if switches & _POSITION_CONTROL else "velocity"
 
 
+_LOOP_CLOSURE = 0  # type of a link between dummies: sim_dummy_linktype_dynamics_loop_closure
+
+
 def _dummy(own: Level) -> Kind:
     size = own.numbers("_y2", "Dy2", 1) or (0.01,)
-    return VrepDummy(size[0], own.integer("Lli", default=-1))
+    linked = own.integer("Lli", default=-1)
+    return VrepDummy(size[0], linked, linked >= 0 and own.integer("Dl2") == _LOOP_CLOSURE)
 
 
 def _vision_sensor(own: Level) -> Kind:

@@ -9,6 +9,7 @@ from typing import Any
 import pybullet
 
 from drone_sim.mechanics.state import Pose
+from drone_sim.shapes.plane import Plane
 from drone_sim.shapes.shape import Geometry, SceneShape, UrdfFile
 from drone_sim.shapes.visual import GROUND
 from drone_sim.world.bullet_files import BulletFiles
@@ -16,7 +17,6 @@ from drone_sim.world.bullet_files import BulletFiles
 TILE = 2.0  # m covered by one texture
 _THICKNESS = 0.1  # m, below z = 0
 GROUND_REACH = 2000.0  # m from the origin, along either axis
-_BELOW = 1e-3  # m that the ground is drawn below the floor, for PyBullet's own renderer to tell them apart
 
 
 # Number of the collision and of the visual shape of what was made, by what it was made of: PyBullet frees neither when
@@ -92,20 +92,27 @@ def _collision(told: Geometry) -> dict[str, Any]:
 # ---- the floor, and the ground around it
 
 
-def create_floor(client: int, files: BulletFiles, size: float, ground: bool) -> int:
-    """Add a square floor with its top at z = 0, `size` metres a side; return its body id.
+def floor_planes(size: float, ground: bool) -> list[Plane]:
+    """Return what is drawn of a floor of `size` metres a side, at z = 0: the floor, and the ground around it.
 
-    With `ground`, bare ground surrounds it at the same height. It is of the same body, as its second visual shape:
-    every body costs a step some 4 % of its time, whether anything comes near it or not.
+    The two meet at the floor's edge and do not overlap. Without `ground`, or if the floor is as large, there is none.
     """
-    half, depth = size / 2, _THICKNESS / 2
+    floor, reach = Plane(size, TILE), 2 * GROUND_REACH
+    return [floor, Plane(reach, TILE, hole=size)] if ground and size < reach else [floor]
+
+
+def create_floor(client: int, files: BulletFiles, planes: Sequence[Plane]) -> int:
+    """Add the floor of `floor_planes`, and the ground if there is one; return their body id.
+
+    The ground is the second visual shape of the same body: every body costs a step some 4 % of its time, whether
+    anything comes near it or not.
+    """
+    half, depth = planes[0].size / 2, _THICKNESS / 2
     boxes = [(half, half, 0.0, 0.0)]  # half lengths in x and y, and centre
-    seen = [(_mesh(size), (1.0, 1.0, 1.0, 1.0), 0.0)]
-    if ground:
-        reach, wide = GROUND_REACH, (GROUND_REACH - half) / 2
+    for ground in planes[1:]:
+        reach, wide = ground.size / 2, (ground.size / 2 - half) / 2
         boxes += [(reach, wide, 0.0, half + wide), (reach, wide, 0.0, -half - wide)]
         boxes += [(wide, half, half + wide, 0.0), (wide, half, -half - wide, 0.0)]
-        seen.append((_mesh(2 * reach), (*GROUND, 1.0), -_BELOW))
     solid = pybullet.createCollisionShapeArray(
         shapeTypes=[pybullet.GEOM_BOX] * len(boxes),
         halfExtents=[[x, y, depth] for x, y, _, _ in boxes],
@@ -113,20 +120,20 @@ def create_floor(client: int, files: BulletFiles, size: float, ground: bool) -> 
         physicsClientId=client,
     )
     visual = pybullet.createVisualShapeArray(
-        shapeTypes=[pybullet.GEOM_MESH] * len(seen),
-        fileNames=[files.write(mesh, ".obj") for mesh, _, _ in seen],
-        rgbaColors=[color for _, color, _ in seen],
-        visualFramePositions=[[0, 0, z] for _, _, z in seen],
+        shapeTypes=[pybullet.GEOM_MESH] * len(planes),
+        fileNames=[files.write(_mesh(plane), ".obj") for plane in planes],
+        rgbaColors=[(1.0, 1.0, 1.0, 1.0), (*GROUND, 1.0)][: len(planes)],
         physicsClientId=client,
     )
     return int(pybullet.createMultiBody(0, solid, visual, physicsClientId=client))
 
 
-def _mesh(size: float) -> bytes:
-    """Return a square whose texture repeats every TILE metres, centred, as an OBJ file."""
-    half, reach = size / 2, size / 2 / TILE
-    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
-    lines = [f"v {x * half} {y * half} 0" for x, y in corners]
-    lines += [f"vt {x * reach} {y * reach}" for x, y in corners]
-    lines += ["vn 0 0 1", "f 1/1/1 2/2/1 3/3/1", "f 1/1/1 3/3/1 4/4/1", ""]
-    return "\n".join(lines).encode()
+def _mesh(plane: Plane) -> bytes:
+    """Return a plane with its texture's coordinates as an OBJ file."""
+    (part,) = plane.triangles()
+    assert part.uv is not None, "a plane has them"
+    lines = [f"v {x} {y} {z}" for x, y, z in part.corners.reshape(-1, 3)]
+    lines += [f"vt {u} {v}" for u, v in part.uv.reshape(-1, 2)]
+    lines += ["vn 0 0 1"]
+    lines += [f"f {n}/{n}/1 {n + 1}/{n + 1}/1 {n + 2}/{n + 2}/1" for n in range(1, 3 * len(part.corners), 3)]
+    return "\n".join([*lines, ""]).encode()

@@ -7,30 +7,37 @@ sub-step of length h, without a look at what comes after: a tumble gains energy.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 
 import pybullet
 
 from drone_sim.mechanics.frames import Quaternion, Vector, cross, turned
 
-_SLOW = 1e-8  # (rad/s)²; slower, the term is below the noise of what moves
+SLOW = 1e-8  # (rad/s)²; slower, the term is below the noise of what moves
 _ROUND = 1e-9  # of its largest moment of inertia by which others may differ: a cube or a sphere has no such term
 _turn, _ALONG_AXES = pybullet.applyExternalTorque, pybullet.LINK_FRAME
 _ITERATIONS = 6  # each leaves h |ω| / 2 of the error: 1e-10 of it at 9 rad/s and 5 ms
 
 
 class NoGyroscopicTerm:
-    """Takes the term out of what PyBullet does in a sub-step."""
+    """Cancels the term that PyBullet applies. Dynamics does so itself for the bodies that it pushes."""
+
+    acts_after_steps = False  # whether `end_sub_step` has an effect
 
     def __init__(self, client: int):
-        """Take PyBullet's client."""
+        """Start with no bodies in PyBullet's `client`."""
         self._client = client
         self._roots: dict[int, Vector] = {}  # moments of inertia (kg m², along the principal axes), by body
         self._links: dict[int, dict[int, Vector]] = {}  # the same of all other links, by PyBullet's number
-        self._before: Mapping[int, Quaternion] = {}  # attitudes a step of PyBullet's ago, in the same `advance`
+        self._unpushed: dict[int, Vector] = {}  # of _roots, those that Dynamics does not push in this step
+
+    @property
+    def moments_to_cancel(self) -> Mapping[int, Vector]:
+        """Moments of inertia (kg m², along the principal axes) of the roots whose term `torque_of_turn` cancels."""
+        return self._roots
 
     def add(self, body: int) -> None:
-        """Know a body."""
+        """Add a body whose term is to be cancelled."""
         links = {}
         for number in range(-1, pybullet.getNumJoints(body, self._client)):
             mass, _, moments, *_ = pybullet.getDynamicsInfo(body, number, self._client)
@@ -42,29 +49,26 @@ class NoGyroscopicTerm:
             self._links[body] = links
 
     def forget(self, body: int) -> None:
-        """Know nothing of a body any more."""
+        """Remove a body."""
         self._roots.pop(body, None)
         self._links.pop(body, None)
 
-    def begin_step(self) -> None:
-        """Forget earlier attitudes, so that the next step of PyBullet's reads the velocities themselves."""
-        self._before = {}
+    def begin_step(self, pushed: Container[int]) -> bool:
+        """Take the bodies that Dynamics pushes in this step; return whether `begin_sub_step` has anything to do."""
+        self._unpushed = {body: moments for body, moments in self._roots.items() if body not in pushed}
+        return bool(self._unpushed or self._links)
 
-    def begin_sub_step(self, attitudes: Mapping[int, Quaternion], duration: float) -> None:
-        """Let torques act in the step of PyBullet's that comes, as long (s) as the last one since `begin_step`.
-
-        `attitudes` are those of roots that need not be asked for; they are kept until the next step.
-        """
-        client, past, self._before = self._client, self._before, attitudes
-        for body, moments in self._roots.items():
-            if body in attitudes and body in past:
-                torque = _torque_of_turn(moments, past[body], attitudes[body], duration)
-            else:
-                torque = self._torque_of_velocity(moments, body, attitudes.get(body), duration)
+    def begin_sub_step(self, duration: float) -> None:
+        """Apply torques for the next PyBullet step of `duration` (s) to all that Dynamics does not push."""
+        for body, moments in self._unpushed.items():
+            torque = self.torque_of_velocity(moments, body, None, duration)
             if torque is not None:
-                _turn(body, -1, torque, _ALONG_AXES, client)
+                _turn(body, -1, torque, _ALONG_AXES, self._client)
         if self._links:
             self._begin_sub_step_of_links(duration)
+
+    def end_sub_step(self, duration: float) -> None:
+        """Do nothing: the whole torque acted before the step."""
 
     def _begin_sub_step_of_links(self, duration: float) -> None:
         for body, links in self._links.items():
@@ -74,15 +78,18 @@ class NoGyroscopicTerm:
                     torque = self._torque(moments, _seen_from(state[1], state[7]), duration)
                     _turn(body, number, torque, _ALONG_AXES, self._client)
 
-    def _torque_of_velocity(
-        self, moments: Vector, body: int, turn: Quaternion | None, duration: float
+    def torque_of_velocity(
+        self, moments: Vector, body: int, attitude: Quaternion | None, duration: float
     ) -> Vector | None:
-        """Return the torque of a root as PyBullet has it turn, None where it hardly does."""
+        """Return the torque of a root (N m, principal axes) from its velocity, None if it hardly turns.
+
+        `attitude` saves a call of PyBullet where it is known.
+        """
         velocity = pybullet.getBaseVelocity(body, self._client)[1]
         if not _turns(velocity):
             return None
-        turn = turn or pybullet.getBasePositionAndOrientation(body, self._client)[1]
-        return self._torque(moments, _seen_from(turn, velocity), duration)
+        attitude = attitude or pybullet.getBasePositionAndOrientation(body, self._client)[1]
+        return self._torque(moments, _seen_from(attitude, velocity), duration)
 
     def _torque(self, moments: Vector, velocity: Vector, _duration: float) -> Vector:
         """Return ω × Iω (N m), everything along the principal axes."""
@@ -98,15 +105,25 @@ class GyroscopicTerm(NoGyroscopicTerm):
     Links below a joint have PyBullet's own term: nobody can set their velocities after a step.
     """
 
+    acts_after_steps = True
+
+    @property
+    def moments_to_cancel(self) -> Mapping[int, Vector]:
+        """None: half of the term remains, and an attitude does not show the half that acts after a step."""
+        return {}
+
     def add(self, body: int) -> None:
-        """Know a body's root."""
+        """Add a body; the term acts on its root."""
         super().add(body)
         self._links.pop(body, None)
+
+    def begin_step(self, pushed: Container[int]) -> bool:
+        """Do as the base class, but for all roots: Dynamics leaves the ones that it pushes to `begin_sub_step`, too."""
+        return super().begin_step(())
 
     def end_sub_step(self, duration: float) -> None:
         """Turn every root's velocity by the second half of the term."""
         client = self._client
-        self._before = {}  # attitudes do not tell of this half
         for body, moments in self._roots.items():
             linear, velocity = pybullet.getBaseVelocity(body, client)
             if _turns(velocity):
@@ -127,7 +144,7 @@ class GyroscopicTerm(NoGyroscopicTerm):
 
 def _turns(velocity: Vector) -> bool:
     x, y, z = velocity
-    return x * x + y * y + z * z > _SLOW
+    return x * x + y * y + z * z > SLOW
 
 
 def _seen_from(turn: Quaternion, vector: Vector) -> Vector:
@@ -136,7 +153,7 @@ def _seen_from(turn: Quaternion, vector: Vector) -> Vector:
     return turned((-x, -y, -z, w), vector)
 
 
-def _torque_of_turn(moments: Vector, before: Quaternion, now: Quaternion, duration: float) -> Vector | None:
+def torque_of_turn(moments: Vector, before: Quaternion, now: Quaternion, duration: float) -> Vector | None:
     """Return ω × Iω of a body by how it has turned, None where it hardly has: quicker than to ask for its velocity.
 
     Bullet turns it by the whole of that in one go; the axis is the same before and after. All in one function, which
@@ -147,7 +164,7 @@ def _torque_of_turn(moments: Vector, before: Quaternion, now: Quaternion, durati
     y = w0 * y1 - w1 * y0 - z0 * x1 + x0 * z1
     z = w0 * z1 - w1 * z0 - x0 * y1 + y0 * x1
     square = x * x + y * y + z * z
-    if square < _SLOW * duration * duration / 4 or square >= 1.0:
+    if square < SLOW * duration * duration / 4 or square >= 1.0:
         return None
     sine = math.sqrt(square)
     scale = 2.0 * math.asin(sine) / (sine * duration)

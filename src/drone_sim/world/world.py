@@ -12,12 +12,11 @@ import pybullet
 
 from drone_sim.mechanics.frames import Matrix, Vector, cross, multiply_quaternions, turned
 from drone_sim.mechanics.inertia import Inertia
-from drone_sim.mechanics.state import Pose, State, compose, inverse
+from drone_sim.mechanics.state import Motion, Pose, State, compose, inverse
 from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.shapes.compound import parts_of
 from drone_sim.shapes.mass import inertia_of
-from drone_sim.shapes.plane import Plane
 from drone_sim.shapes.shape import WHITE, DrawnShape, Rgba, SceneShape
 from drone_sim.shapes.urdf import Urdf
 from drone_sim.world import assemblies, bodies
@@ -81,13 +80,18 @@ class World:
         pybullet.setTimeStep(self._sub_step, client)
         self._inertial_frames: dict[int, tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._made: bodies.Made = {}
+        self._states: dict[int, tuple[Motion, State]] = {}  # the last ones that were asked for, by body
         self.pictures = Pictures(client, self._files, window=self._gui)
         self.joints = Joints(client, self.pictures.look_anew)
-        self.collision_filter = CollisionFilter(client, self.pictures.moved)
+        self.collision_filter = CollisionFilter(client, self._moved)
         self.queries = Queries(client, self.collision_filter)
         self._dynamics = Dynamics(client, self._sub_step, self.queries, gyroscopic=self._gyroscopic)
         self.shape_forces = self._dynamics.shape_forces
         self.saved_states = SavedStates(client, self._all_moved)
+
+    def _moved(self, body: int) -> None:
+        self._dynamics.moved(body)
+        self.pictures.moved(body)
 
     def _all_moved(self) -> None:
         self._dynamics.all_moved()
@@ -107,12 +111,12 @@ class World:
 
         Returns its body id.
         """
-        body = bodies.create_floor(self._client, self._files, size, ground)
+        planes = bodies.floor_planes(size, ground)
+        body = bodies.create_floor(self._client, self._files, planes)
         self.pictures.cover(body, texture, visual=0)
         self._know(body)
         self.set_material(body, -1, friction=1.0, restitution=1.0)  # of two that touch, what falls on it has the say
-        seen = [(Plane(size, bodies.TILE), texture), (Plane(2 * bodies.GROUND_REACH, bodies.TILE), "")]
-        self.pictures.set_floor(body, seen if ground else seen[:1])
+        self.pictures.set_floor(body, list(zip(planes, (texture, ""))))
         return body
 
     def add_object(
@@ -172,6 +176,7 @@ class World:
         self.saved_states.forget_snapshots()
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
+        self._states.pop(body, None)
         self.saved_states.forget(body)
         self.joints.forget(body)
         self.collision_filter.forget(body)
@@ -224,14 +229,20 @@ class World:
         return Inertia((a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c), Pose(place, turn).matrix)
 
     def state(self, body: int) -> State:
-        """Return pose and velocity of a body's root link."""
-        centre, turn, (vx, vy, vz), angular = self._dynamics.motion(body)
+        """Return pose and velocity of a body's root link: the same object until it moves."""
+        motion = self._dynamics.motion(body)
+        known, state = self._states.get(body, (None, None))
+        if known is motion and state is not None:
+            return state
+        centre, turn, (vx, vy, vz), angular = motion
         inertial, backwards = self._inertial_frames[body]
         orientation = turn if backwards.orientation is _NO_TURN else multiply_quaternions(turn, backwards.orientation)
         arm = turned(orientation, inertial.position)  # from the root link to the centre of mass
         sx, sy, sz = cross(angular, arm)
         position = (centre[0] - arm[0], centre[1] - arm[1], centre[2] - arm[2])
-        return State(position, orientation, (vx - sx, vy - sy, vz - sz), angular)
+        state = State(position, orientation, (vx - sx, vy - sy, vz - sz), angular)
+        self._states[body] = motion, state
+        return state
 
     def is_finite(self) -> bool:
         """Whether the poses and velocities of all bodies are finite."""
@@ -242,8 +253,7 @@ class World:
         """Move a body's root link to `pose` and stop it."""
         inertial = self._inertial_frames[body][0]
         centre, turn = compose(pose, inertial)
-        self._dynamics.moved(body)
-        self.pictures.moved(body)
+        self._moved(body)
         pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
         pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
 

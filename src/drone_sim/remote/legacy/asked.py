@@ -41,7 +41,7 @@ class Asked:
         try:
             return called(*arguments)
         except Exception as error:
-            raise Refused(one_line(self.name, called, arguments, error)) from None
+            raise Refused(one_line(self.name, called, arguments, error)) from error
 
     def take(self, layout: str) -> tuple[Any, ...]:
         """Return the numbers in the data, such as "3f". Raises Refused where they are not so many."""

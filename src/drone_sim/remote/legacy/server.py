@@ -249,6 +249,7 @@ class LegacyServer(RemoteApi):
             self._let_go(guest, str(error))
             return
         except Exception as error:  # whatever it is, the flight goes on
+            _LOG.debug("a request failed:", exc_info=True)
             self._let_go(guest, " ".join(str(error).split()) or type(error).__name__)
             return
         self._unheard[guest.connection.fileno()] = None

@@ -187,6 +187,7 @@ class Session:
             data = do(ask)
             self._size += len(data or b"")
         except Refused as refused:
+            _LOG.debug("a command failed:", exc_info=True)
             if str(refused):
                 self._tell(str(refused))
             return Answer(command, None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, wait
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # it imports rospy, which this file does without
     from drone_sim.ros.core.intervention import Intervention
 
+_LOG = logging.getLogger(__name__)
 _PATIENCE = 30.0  # s; a step, or a scene that is read anew, takes far less
 
 
@@ -69,9 +71,15 @@ class Inbox:
         self._sleep(seconds)
 
     def empty(self) -> None:
-        """Carry out all that has come by now. The simulation's thread calls it."""
+        """Run all jobs that have arrived by now. The simulation's thread calls it.
+
+        A job that raises an exception is logged with its traceback: a message from outside must not end the node.
+        """
         if not self._came.is_set():
             return
         self._came.clear()
         for _ in range(self._jobs.qsize()):  # what comes meanwhile waits: a flood must not hold up the step
-            self._jobs.get_nowait()()
+            try:
+                self._jobs.get_nowait()()
+            except Exception:
+                _LOG.exception("a request could not be executed")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -139,7 +140,8 @@ def message_class(kind: str) -> type[genpy.Message]:
     """Return the class of a message type such as sensor_msgs/Imu; raises ValueError where it is not installed."""
     found = _installed(roslib.message.get_message_class, kind)
     if found is None:
-        raise ValueError(f"message type '{kind}' is not installed{_near_types(kind)}")
+        why = _not_generated(kind, "msg") or f"is not installed{_near_types(kind)}"
+        raise ValueError(f"message type '{kind}' {why}")
     return found
 
 
@@ -147,7 +149,7 @@ def service_class(kind: str) -> Any:
     """Return the class of a service type such as std_srvs/Trigger; raises ValueError where it is not installed."""
     found = _installed(roslib.message.get_service_class, kind)
     if found is None:
-        raise ValueError(f"service type '{kind:.80}' is not installed")
+        raise ValueError(f"service type '{kind:.80}' {_not_generated(kind, 'srv') or 'is not installed'}")
     return found
 
 
@@ -156,6 +158,17 @@ def _installed(find: Callable[[str], Any], kind: str) -> Any:
         return find(kind)
     except (ImportError, ValueError):
         return None
+
+
+def _not_generated(kind: str, ending: str) -> str:
+    """Return what to do for a type whose .msg or .srv file is there, but not its Python class; '' for another type."""
+    package, _, name = kind.partition("/")
+    try:
+        file = f"{rospkg.RosPack().get_path(package)}/{ending}/{name}.{ending}"
+    except rospkg.ResourceNotFound:
+        return ""
+    cure = f"build the package {package}, and source the setup.bash of its workspace"
+    return f"is in {file}, but its Python code was never generated: {cure}" if os.path.isfile(file) else ""
 
 
 def _near_types(kind: str) -> str:

@@ -137,6 +137,9 @@ def reported(name: str, action: Callable[[], Any]) -> int:
     return 1
 
 
+NOT_GIVEN = "default"  # the default of launch arguments whose parameters a scene or config may set, too
+
+
 def from_shell(name: str) -> str:
     """Return a file's name so that it is valid in any folder; a built-in script's ("target") unchanged; '' for "none".
 
@@ -148,6 +151,11 @@ def from_shell(name: str) -> str:
     if not name or name.startswith(("package://", "~", "/")) or ("/" not in name and not Path(name).suffix):
         return name
     return str(Path(os.environ.get("PWD") or os.getcwd()) / name)
+
+
+def script_from_shell(name: str) -> str:
+    """Return a script's name or file as `from_shell` does; '' for a launch file's default, and `none` unchanged."""
+    return {NOT_GIVEN: "", "none": "none"}.get(name, from_shell(name))
 
 
 # ---- one name, one node

@@ -15,7 +15,7 @@ from drone_sim.files import yaml_files
 from drone_sim.mechanics.state import Pose
 from drone_sim.message_text import shown
 from drone_sim.ros.core.message_conversion import WORLD_FRAME, xyz, xyzw
-from drone_sim.ros.core.startup import from_shell
+from drone_sim.ros.core.startup import NOT_GIVEN, from_shell, script_from_shell
 from drone_sim.run import parameters as parameters_module
 from drone_sim.run.parameters import Parameters
 from drone_sim.vehicles import checks
@@ -23,6 +23,8 @@ from drone_sim.vehicles.checks import Refused
 from drone_sim.vehicles.parameters import EquipmentParameters
 
 _DEEPEST, _LONGEST = 4, 1000  # keys, characters
+# What a launch file's defaults leave in the parameters if the user gives no such argument.
+_DEFAULTS = {**dict.fromkeys(("script", "start", "gui", "real_time_factor"), NOT_GIVEN), "scene_file": "none"}
 
 
 def read_changes(message: KeyValue, model: Checked) -> dict[str, Any]:
@@ -68,15 +70,19 @@ def check_frame(frame: str) -> None:
 def parameters_of(name: str, **others: Any) -> Parameters:
     """Return the private parameters of the simulator that has this name, `others` in place of some.
 
-    Raises ParameterError.
+    A default of the launch file does not override a config or a scene. Raises ParameterError.
     """
     given: dict[str, Any] = rospy.get_param(name, {})
     if not isinstance(given, dict):
         raise ParameterError(f"must be a namespace with parameters such as {name}/script", (name,), str(given)[:80])
-    for key in ("config", "script", "scene_file"):
+    given = {key: value for key, value in given.items() if value != _DEFAULTS.get(key, ...)}
+    remote = given.get("remote_api")
+    if isinstance(remote, dict) and remote.get("serve") == NOT_GIVEN:
+        given["remote_api"] = {key: value for key, value in remote.items() if key != "serve"}
+    for key, read in (("config", from_shell), ("script", script_from_shell), ("scene_file", from_shell)):
         if isinstance(given.get(key), str):
             names = given[key].split(",") if key == "config" else [given[key]]
-            given[key] = ",".join(map(from_shell, names))
+            given[key] = ",".join(map(read, names))
     return parameters_module.load({**given, **others})
 
 

@@ -17,7 +17,10 @@ from std_msgs.msg import Float32MultiArray, String
 from visualization_msgs.msg import MarkerArray
 
 from drone_sim.grading.flight_record import ContactEvent, FlightRecord, ValueChange
+from drone_sim.grading.permissions import MOST_TRIED
 from drone_sim.grading.plan import Plan
+from drone_sim.message_text import printable
+from drone_sim.ros.core.intervention import sender
 from drone_sim.ros.core.message_conversion import odometry_row, xyz
 from drone_sim.ros.grading.simulator import Mismatch
 from drone_sim.run.parameters import Parameters
@@ -37,7 +40,7 @@ class FlightListener:
 
         `follow` is called with the time (s) of each step, after it.
         """
-        self._follow = follow
+        self._follow, self._simulator = follow, simulator
         self._lock = threading.Lock()
         self._subscribers: list[rospy.Subscriber] = []
         self._vehicle = plan.vehicle_of(parameters)
@@ -76,8 +79,26 @@ class FlightListener:
         )
         raise Mismatch(f"criterion {criterion}: {said}")
 
-    def _subscribe(self, topic: str, kind: type, take: Callable[[Any], None]) -> None:
-        self._subscribers.append(rospy.Subscriber(topic, kind, take, queue_size=_QUEUE, tcp_nodelay=True))
+    def _subscribe(self, topic: str, kind: type, take: Callable[[Any], None], anybodys: bool = False) -> None:
+        """Hear a topic; messages of other nodes than the simulator are forged, unless the topic is anybody's."""
+
+        def hear(message: Any) -> None:
+            by = sender(message)
+            if anybodys or by == self._simulator:
+                take(message)
+                return
+            with self._lock:
+                if len(self._forged) < MOST_TRIED:
+                    said = f"tried to forge {topic} at {self.time:.2f} s (by {printable(by)})"
+                    self._forged.setdefault((topic, by), said)
+
+        self._subscribers.append(rospy.Subscriber(topic, kind, hear, queue_size=_QUEUE, tcp_nodelay=True))
+
+    @property
+    def forged(self) -> list[str]:
+        """What other nodes have published as if they were the simulator: a line for each topic and node."""
+        with self._lock:
+            return [*self._forged.values()]
 
     def is_connected(self) -> bool:
         """Whether everything that has to be there is heard. A script's own topics may come later."""
@@ -86,6 +107,7 @@ class FlightListener:
     def clear(self) -> None:
         """Forget what has been heard."""
         with self._lock:
+            self._forged: dict[tuple[str, str], str] = {}  # by topic and node
             self.went_back = False  # somebody has started the simulation anew
             self.time = 0.0  # s, the latest stamp of odometry
             self._odometry: list[_Row] = []
@@ -142,7 +164,7 @@ class FlightListener:
             kind, name, _ = rostopic.get_topic_class(topic)
             if kind is not None:
                 del self._topics[called]
-                self._subscribe(name, kind, partial(self._say, called))
+                self._subscribe(name, kind, partial(self._say, called), anybodys=True)
 
     # ---- the flight
 

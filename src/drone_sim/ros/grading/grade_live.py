@@ -119,11 +119,11 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
         rospy.logwarn(f"the timeline came up to {late} steps late: a lower real_time_factor gives it more time")
     flown, put = live.within_rules(flown)
     if flown is None:
-        return flight.ungraded(plan, script, seed, {}, put).with_tried(live.rules.tried), None
+        return flight.ungraded(plan, script, seed, {}, put).with_tried([*live.rules.tried, *live.listener.forged]), None
     outcomes = tuple(one.judge(flown) for one in plan.criteria)
     digest = flight.digest_of(flown.rows)
     result = result_of(plan.name, script, seed, {}, outcomes, flown.end, put or error or None, digest)
-    return result.with_tried(live.rules.tried), flown
+    return result.with_tried([*live.rules.tried, *live.listener.forged]), flown
 
 
 class _Live:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import rospy
 from std_msgs.msg import String
 
-from drone_sim.grading.permissions import MOST_TRIED
+from drone_sim.grading.permissions import CALL, MOST_TRIED
 from drone_sim.grading.plan import Plan
 
 _QUEUE = 1000  # messages
@@ -16,7 +16,7 @@ class LiveRules:
 
     def __init__(self, plan: Plan, simulator: str):
         """Hear what a `plan` does not allow of the node `simulator`."""
-        self._allowed = {*plan.allowed}
+        self._allowed, self._calls = {*plan.allowed}, {*plan.calls}
         self.tried: list[str] = []
         self._topic = rospy.Subscriber(f"{simulator}/interventions", String, self._hear, queue_size=_QUEUE)
 
@@ -31,5 +31,8 @@ class LiveRules:
     def _hear(self, message: String) -> None:
         said = message.data
         is_own = said.endswith(f", by {rospy.get_name()})")
-        if not is_own and said.partition(" ")[0] not in self._allowed and len(self.tried) < MOST_TRIED:
+        if not is_own and not self._is_allowed(*said.split(" ", 2)) and len(self.tried) < MOST_TRIED:
             self.tried.append(f"tried to {said}")
+
+    def _is_allowed(self, action: str, what: str = "", *_rest: str) -> bool:
+        return what in self._calls if action == CALL else action in self._allowed

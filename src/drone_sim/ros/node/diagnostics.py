@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import threading
 import time
+import traceback
 from collections.abc import Callable
 
+import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.network import FAILURES, call
 from drone_sim.run.diagnosis.finding import ERROR, Finding
+from drone_sim.run.pacing import Throttle
 
 PERIOD = 1.0  # s of real time
 PATIENCE = 2.0  # s, for the simulation's answer
+_SELDOM = 5.0  # s of real time, between two questions to the master
+_TWIST = "geometry_msgs/Twist"
 _LONGEST = 600  # characters of a value
 _BUSY = "simulation"  # the finding that says that there is no answer
 
@@ -36,6 +42,8 @@ class Diagnostics(threading.Thread):
         self._answered.set()
         self._asked = 0.0  # s, of the monotonic clock
         self._stamped = rospy.Time()
+        self.unheard: dict[str, list[str]] = {}  # what unheard_twists returned last
+        self._seldom = Throttle(_SELDOM)
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
         rospy.on_shutdown(self.close)
 
@@ -48,6 +56,8 @@ class Diagnostics(threading.Thread):
         while not self._ended.wait(PERIOD):
             if not self._publisher.get_num_connections():
                 continue
+            if self._seldom.passes():
+                self.unheard = unheard_twists()
             self._ask()
             try:
                 message = DiagnosticArray(status=[_status(one) for one in self._findings.values()])
@@ -74,7 +84,28 @@ class Diagnostics(threading.Thread):
             self._stamped = self._stamp()
         except Exception as error:  # a flight does not end because it could not be described
             self._findings = {_BUSY: Finding(_BUSY, ERROR, f"cannot be diagnosed: {error!r}", {})}
+            rospy.logdebug(traceback.format_exc())
         self._answered.set()
+
+
+def unheard_twists() -> dict[str, list[str]]:
+    """Ask the master for topics of Twists that other nodes publish and nobody receives, with the publishers' names.
+
+    A node that was started without a remapping publishes commands on such a topic. If the master does not answer,
+    there are none.
+    """
+    uri = rosgraph.get_master_uri()
+    try:
+        published, subscribed, _ = map(dict, call(uri, "getSystemState"))
+        kinds = dict(call(uri, "getTopicTypes"))
+    except (*FAILURES, TypeError):  # TypeError: an answer of another shape
+        return {}
+    others = {topic: [one for one in nodes if one != rospy.get_name()] for topic, nodes in published.items()}
+    return {
+        topic: nodes
+        for topic, nodes in sorted(others.items())
+        if nodes and kinds.get(topic) == _TWIST and not subscribed.get(topic)
+    }
 
 
 def _status(found: Finding) -> DiagnosticStatus:

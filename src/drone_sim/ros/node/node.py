@@ -117,6 +117,7 @@ class Node:
             self._time.simulated,
             frames_below=rospy.get_namespace().lstrip("/"),
             held=lambda: self._outside.holds,
+            unheard=lambda: self._diagnostics.unheard,
         )
         self._diagnostics = Diagnostics(diagnosis.look, self._time.stamp, self._inbox)
         self._beat = Beat(_SOON, _SELDOM)
@@ -284,10 +285,10 @@ class Node:
 
 
 class _ToRosout(logging.Handler):
-    """Hands what the modules without ROS log to rosout."""
+    """Log handler that passes the records of modules without ROS to rosout, with their tracebacks."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        logging.getLogger("rosout").log(record.levelno, record.getMessage())
+        logging.getLogger("rosout").log(record.levelno, self.format(record))
 
 
 def main(guardian: Guardian) -> int:

@@ -23,6 +23,7 @@ from drone_sim.editing.editor import SceneEditor
 from drone_sim.editing.rows import SceneRows
 from drone_sim.files.resources import locate, package_path
 from drone_sim.grading.permissions import CHANGE
+from drone_sim.message_text import encodable
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.core.intervention import intervention
 from drone_sim.ros.node.inspection import LatchedText
@@ -78,7 +79,8 @@ class SceneEditing:
         try:
             return True, self._inbox.ask(job, done)
         except _REFUSED as error:
-            return False, " ".join((error.text if isinstance(error, ParameterError) else str(error)).split())
+            said = error.text if isinstance(error, ParameterError) else str(error)
+            return False, encodable(" ".join(said.split()))
 
     def _do(self, said: Any) -> str:
         before = self.editor.scene_file

@@ -13,7 +13,7 @@ from std_srvs.srv import SetBool, Trigger
 from drone_sim.grading.permissions import CHANGE
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.core.intervention import intervention
-from drone_sim.ros.core.startup import MASTER_GONE, from_shell
+from drone_sim.ros.core.startup import MASTER_GONE, from_shell, script_from_shell
 from drone_sim.run.parameters import ParameterError, Parameters
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Snapshot
@@ -41,11 +41,13 @@ class Services:
         self._vehicles = VehiclesParameter()
         self._vehicles.tell(player.simulation.parameters)
         self._snapshot: Snapshot | None = None
+        # The scene of the config, if the parameter scene_file did not replace it.
+        self._config_scene = "" if scene_parameter() else player.simulation.parameters.scene_file
         jobs = ("start", "stop", "restart", "step", "load_scene", "set_vehicles", "snapshot", "restore")
         for name in jobs:
             rospy.Service(f"~{name}", Trigger, partial(self._answer, name, getattr(self, name)))
         rospy.Service(
-            "~pause", SetBool, lambda request: self._answer("pause", lambda: player.pause(request.data), request)
+            "~pause", SetBool, lambda request: self._answer("pause", lambda: self.pause(request.data), request)
         )
 
     def close(self) -> None:
@@ -82,13 +84,21 @@ class Services:
         self._take_script()
         return self._begun(self._player.restart())
 
+    def pause(self, on: bool) -> str:
+        """Pause, or resume, if not `on`. `rosservice call ... pause "{}"` means False, so a flight is not paused."""
+        if not on and self._player.playing:
+            said = f"not paused: `rosservice call {rospy.resolve_name('~pause')} true` pauses, false resumes"
+            rospy.logwarn(f"pause: no effect: {said}")
+            return said
+        return self._player.pause(on)
+
     def step(self) -> str:
         """Run one step while paused."""
         return self._player.one_step()
 
     def load_scene(self) -> str:
         """Start anew in the scene of `scene_file`."""
-        file = scene_parameter()
+        file = scene_parameter(self._config_scene)
         self._take_script()
         return f"{self._begun(self._player.start(file))} in {file or 'the scene of the parameters'}"
 
@@ -98,7 +108,7 @@ class Services:
 
     def _take_script(self) -> None:
         """Let the script fly that the parameter `script` names now. Raises ScriptError where it is not there."""
-        script = from_shell(str(rospy.get_param("~script", "")))
+        script = script_from_shell(str(rospy.get_param("~script", "")))
         script_path(script)
         self._player.simulation.script = script
 
@@ -125,9 +135,10 @@ class Services:
         return f"restored t = {self._player.simulation.time:.2f} s"
 
 
-def scene_parameter() -> str:
-    """Return the file that the private parameter `scene_file` names, '' for none."""
-    return from_shell(str(rospy.get_param("~scene_file", "")))
+def scene_parameter(otherwise: str = "") -> str:
+    """Return the file that the private parameter `scene_file` names; `otherwise` if it is not set, or is `none`."""
+    given = str(rospy.get_param("~scene_file", "none"))
+    return otherwise if given == "none" else from_shell(given)
 
 
 class VehiclesParameter:

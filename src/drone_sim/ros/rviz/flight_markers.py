@@ -101,9 +101,9 @@ class StateText(FleetMarkers):
 
     def _say(self, vehicle: Vehicle) -> str:
         simulation, state = self._simulation, vehicle.body.state
-        if not simulation.running:
-            return "stopped"
         doing = situation.doing(vehicle)
+        if not simulation.running:
+            return f"stopped, {doing}" if doing == situation.SCRIPT_FAILED else "stopped"
         doing = f"paused, {doing}" if self._player.paused else doing
         speed = math.hypot(*state.linear_velocity)
         who = "" if vehicle.parameters.is_alone else f"{vehicle.name}  "

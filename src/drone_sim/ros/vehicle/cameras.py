@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import traceback
 from collections import deque
 from typing import Any
 
@@ -22,6 +23,7 @@ from drone_sim.sensors.camera import Camera
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.vehicles.parameters import VehicleParameters
 
+_SELDOM = 5.0  # s, between two errors in the log
 _ENCODINGS = {"color": "rgb8", "depth": "32FC1"}
 _COMPRESSION = {
     "format": ParameterField(("format",), str, choices=("jpeg", "png"), said="compression format"),
@@ -100,7 +102,7 @@ class CompressedPublisher:
     """Publishes `<base>/compressed` as image_transport's C++ plugin does: formats, and parameters beside it.
 
     A thread of its own encodes: PNG at the plugin's default level takes longer than a step. Pictures that come
-    while it is busy are left out, but for the latest.
+    while it is busy are left out, but for the latest. A picture that cannot be encoded is logged and left out.
     """
 
     def __init__(self, base: str, new_subscribers: NewSubscribers):
@@ -140,11 +142,13 @@ class CompressedPublisher:
             self._came.wait()
             self._came.clear()
             while self._waiting:
-                message = _encoded(*self._waiting.popleft(), self._settings)
                 try:
-                    self.publisher.publish(message)
+                    self.publisher.publish(_encoded(*self._waiting.popleft(), self._settings))
                 except rospy.ROSException:  # the node ends, and has closed the topic
                     return
+                except Exception as error:  # the topic must not fall silent because of one picture
+                    rospy.logerr_throttle(_SELDOM, f"{self.publisher.name}: a picture could not be encoded: {error}")
+                    rospy.logdebug(traceback.format_exc())
 
 
 def _encoded(header: Header, image: np.ndarray, settings: dict[str, Any]) -> CompressedImage:

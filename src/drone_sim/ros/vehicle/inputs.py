@@ -95,22 +95,28 @@ class VehicleInputs:
         def take(message: Any) -> None:
             try:
                 job = read(message)
-            except (checks.Refused, ParameterError) as refused:
-                said = refused.text if isinstance(refused, ParameterError) else str(refused)
-                self.log.refuse(topic, sender(message), said)
-                if throttle.passes():
-                    rospy.logwarn(f"{topic} refused{kept}: {said}")
+            except (checks.Refused, ParameterError) as error:
+                refuse(message, error)
                 return
             self.log.take(topic, sender(message))
             done = intervention(action, self._name, f"{self._name}/{topic}", message) if action else None
-            self._inbox.put(lambda: self._carry_out(job), done)
+            self._inbox.put(lambda: execute(job, message), done)
+
+        def execute(job: _Job, message: Any) -> None:
+            vehicle = self._simulation.vehicles.get(self._name)  # may have been removed or replaced since the check
+            try:
+                if vehicle is not None:
+                    job(vehicle)
+            except (checks.Refused, ParameterError) as error:
+                refuse(message, error)
+
+        def refuse(message: Any, error: ValueError) -> None:
+            why = error.text if isinstance(error, ParameterError) else str(error)
+            self.log.refuse(topic, sender(message), why)
+            if throttle.passes():
+                rospy.logwarn(f"{topic} refused{kept}: {why}")
 
         return take
-
-    def _carry_out(self, job: _Job) -> None:
-        vehicle = self._simulation.vehicles.get(self._name)
-        if vehicle is not None:  # it may have gone meanwhile
-            job(vehicle)
 
     # ---- what a message asks for; raise Refused
 

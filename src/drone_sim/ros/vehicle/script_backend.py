@@ -11,7 +11,6 @@ from typing import Any
 import genpy
 import rospy
 from geometry_msgs.msg import TransformStamped
-from rosgraph.names import is_legal_name
 from sensor_msgs.msg import Image as ImageMessage
 from tf2_msgs.msg import TFMessage
 
@@ -86,11 +85,9 @@ class RosBackend:
     def serve(self, name: str, kind: str, ask: Ask) -> Callable[[], None]:
         """Offer a service, each of whose requests is handed to `ask` in a thread of rospy's; return what ends that.
 
-        Raises ValueError where the type is not installed, or the name is none, or is this node's already.
+        Raises ValueError if the type is not installed, or the node has a service of this name already.
         """
         found = service_class(kind)
-        if not is_legal_name(name) or name.endswith("/"):
-            raise ValueError(f"'{name:.80}' is not the name of a service: only letters, digits, _ and / are allowed")
 
         def handle(request: genpy.Message) -> genpy.Message:
             try:

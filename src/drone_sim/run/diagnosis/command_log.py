@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
+
+_ALTERNATING = 4  # changes of the sender within _RECENT, after which several senders send at the same time
+_RECENT = 3.0  # s
 
 
 class Taken(NamedTuple):
@@ -33,11 +37,22 @@ class CommandLog:
         self.clock, self.senders = clock, senders
         self.taken: dict[str, Taken] = {}  # by topic
         self.refused: dict[str, Refusal] = {}
+        self._changes: dict[str, deque[Taken]] = {}  # by topic: the last messages from another sender than before
         self._lock = threading.Lock()
 
     def take(self, topic: str, sender: str) -> None:
         """Note a good message."""
-        self.taken[topic] = Taken(sender, self.clock())
+        before, now = self.taken.get(topic), Taken(sender, self.clock())
+        self.taken[topic] = now
+        if before is None or before.sender != sender:
+            self._changes.setdefault(topic, deque(maxlen=_ALTERNATING)).append(now)
+
+    def rivals(self, topic: str) -> list[str]:
+        """Return the senders whose messages on a topic alternate; none, if one took over from the other just once."""
+        changes = list(self._changes.get(topic, ()))
+        if len(changes) < _ALTERNATING or self.clock() - changes[0].at > _RECENT:
+            return []
+        return sorted({one.sender for one in changes})
 
     def refuse(self, topic: str, sender: str, why: str) -> None:
         """Note one that was refused."""

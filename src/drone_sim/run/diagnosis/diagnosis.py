@@ -10,7 +10,7 @@ from drone_sim.message_text import shown
 from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.diagnosis.counts import Counts, Since, between, count
 from drone_sim.run.diagnosis.finding import ERROR, WARN, Finding, Problem, finding
-from drone_sim.run.diagnosis.vehicles import VehicleDiagnosis
+from drone_sim.run.diagnosis.vehicles import VehicleDiagnosis, is_unmoved
 from drone_sim.run.pacing import Pacer
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
@@ -18,6 +18,7 @@ from drone_sim.sensors.vision import TINY
 
 _ENOUGH = 0.9  # of the nominal rate, and of the pace that is asked for
 _FEW = 2  # pictures that fall into this look or the next
+_MOST_HOLES = 3  # of what an import has left out
 _LATE = 0.1  # of the steps; a few are late on any busy computer
 
 
@@ -62,6 +63,8 @@ def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool
     asked = simulation.parameters.real_time_factor
     factor = since.steps * simulation.parameters.time_step / since.seconds if since else None
     problems = [Problem(ERROR, f"stopped: {player.why_stopped}")] if player.why_stopped and not player.playing else []
+    problems += [Problem(ERROR, f"script of {on} failed: {error}") for on, error in simulation.failed_scripts.items()]
+    problems += [Problem(WARN, f"will not work here: {one}") for one in simulation.holes[:_MOST_HOLES]]
     if simulated_time and not player.playing:
         problems.append(Problem(WARN, f"{player.state}: /clock stands still, and nodes that use simulated time wait"))
     if held and since and not since.steps:
@@ -110,28 +113,44 @@ class Diagnosis:
         clock: Callable[[], float] = time.monotonic,
         frames_below: str = "",
         held: Callable[[], bool] = lambda: False,
+        unheard: Callable[[], Mapping[str, list[str]]] = dict,
     ):
         """Take what plays and paces, what returns the commands that came in, by vehicle, and a monotonic clock (s).
 
         The names of the vehicles' frames begin with `frames_below`; `held` tells whether a step waits for a client.
+        `unheard` returns the topics on which Twists are published and nobody listens, with the publishers' names.
         """
+        self._unheard = unheard
         self._frames_below, self._held = frames_below, held
         self._player, self._pacer, self._logs = player, pacer, logs
         self._simulated_time = simulated_time
         self._clock = clock
         self._before: Counts | None = None
+        self._unmoved: dict[str, float] = {}  # s of simulated time during which a vehicle's commands have moved nothing
 
     def look(self) -> list[Finding]:
         """Return what is found: the simulation's, the cameras', and each vehicle's."""
         now = count(self._player, self._pacer, self._clock())
         since, self._before = between(self._before, now), now
-        logs = self._logs()
+        logs, unheard = self._logs(), self._unheard()
+        simulation = self._player.simulation
+        flown = since.steps * simulation.parameters.time_step if since else 0.0
+        self._unmoved = {
+            name: self._unmoved.get(name, 0.0) + flown if flown and is_unmoved(vehicle) else 0.0
+            for name, vehicle in simulation.vehicles.items()
+        }
         return [
             pace(self._player, self._pacer, since, self._simulated_time, self._held()),
             cameras(self._player.simulation, since),
             *(
                 VehicleDiagnosis(
-                    vehicle, self._player, logs.get(name) or CommandLog(self._clock), since, self._frames_below
+                    vehicle,
+                    self._player,
+                    logs.get(name) or CommandLog(self._clock),
+                    since,
+                    self._frames_below,
+                    self._unmoved[name],
+                    unheard,
                 ).finding()
                 for name, vehicle in self._player.simulation.vehicles.items()
             ),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from drone_sim.mechanics.state import Twist
 from drone_sim.run.diagnosis.command_log import CommandLog
@@ -21,18 +23,29 @@ _LEANING = math.radians(60)  # no flight of the tutorial's needs half as much
 _SHARE = 0.5  # of the steps with a propeller at its limit, after which it is a problem
 _SLOW = 0.1  # of the speed that is commanded
 _MOVES = 0.1  # m/s, of a command that means to
+_IGNORED_FOR = 3.0  # s of simulated time
 _DEAF = "this script does not subscribe to commands: the tutorial's scripts do from stage 6 on, and `pilot` does"
 
 
 class VehicleDiagnosis:
     """Looks at one vehicle, between two steps."""
 
-    def __init__(self, vehicle: Vehicle, player: Player, log: CommandLog, since: Since | None, frames_below: str = ""):
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        player: Player,
+        log: CommandLog,
+        since: Since | None,
+        frames_below: str = "",
+        unmoved: float = 0.0,
+        unheard: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    ):
         """Take what is to be looked at; `since` is what was counted since the last look, None where nothing was.
 
-        The names of the vehicles' frames begin with `frames_below`.
+        The names of the vehicles' frames begin with `frames_below`; `is_unmoved` has been true for `unmoved` s.
+        `unheard` has the topics on which Twists are published and that have no subscriber, with the publishers' names.
         """
-        self._frames_below = frames_below
+        self._frames_below, self._unmoved, self._unheard = frames_below, unmoved, unheard
         self._vehicle, self._player, self._log, self._since = vehicle, player, log, since
         self._now = log.clock()
         self._tilt = tilt(vehicle.body)
@@ -43,12 +56,16 @@ class VehicleDiagnosis:
         """Return what was found."""
         problems = [
             *self._stands(),
+            *self._has_failed(),
             *self._rests(),
             *self._refuses(),
             *self._leans(),
             *self._lies(),
             *self._cannot(),
             *self._is_on_its_own(),
+            *self._has_rivals(),
+            *self._misses(),
+            *self._ignores(),
         ]
         return finding(f"vehicle {self._vehicle.name}", self._fine(), problems, self._values())
 
@@ -65,6 +82,11 @@ class VehicleDiagnosis:
         if taken is not None and self._now - taken.at < _RECENT:
             return [Problem(WARN, f"{taken.sender} sends commands, but the simulation is {player.state}: {cure}")]
         return []
+
+    def _has_failed(self) -> list[Problem]:
+        """Report a script on an object of the vehicle that has failed, while the simulation goes on."""
+        error = self._vehicle.flight_state.script_error
+        return [Problem(ERROR, f"script failed: {error}")] if error and not self._player.why_stopped else []
 
     def _rests(self) -> list[Problem]:
         """Tell of commands that do not move it, for it has landed or crashed."""
@@ -122,6 +144,31 @@ class VehicleDiagnosis:
             return [Problem(WARN, f"{said}: publish a zero Twist, or set cmd_vel_timeout")]
         return []
 
+    def _has_rivals(self) -> list[Problem]:
+        """Report several nodes that send commands at the same time: the drone obeys the last one before each step."""
+        rivals = self._log.rivals(COMMAND)
+        said = f"{' and '.join(rivals)} send {COMMAND} at the same time, and each overrides the other: stop all but one"
+        return [Problem(WARN, said)] if rivals else []
+
+    def _misses(self) -> list[Problem]:
+        """Report Twists on topics without a subscriber, while no command reaches the vehicle."""
+        taken = self._log.taken.get(COMMAND)
+        if taken is not None and self._now - taken.at < _RECENT:
+            return []
+        own = f"{self._vehicle.name}/{COMMAND}"
+        return [
+            Problem(WARN, f"no command comes: {', '.join(nodes)} publishes {topic}, which nobody receives, not {own}")
+            for topic, nodes in self._unheard.items()
+        ]
+
+    def _ignores(self) -> list[Problem]:
+        """Return a problem if the script hears commands, but the vehicle has not followed them for some time."""
+        if self._unmoved < _IGNORED_FOR or not hears_commands(self._vehicle):
+            return []
+        said = f"receives {_shown(self._vehicle.commands.now)}, but its velocity has not followed for"
+        cure = "does the script use the command, or overwrite it in each step (twist[1] = 0)?"
+        return [Problem(WARN, f"{said} {self._unmoved:.0f} s: {cure}")]
+
     # ---- what is so
 
     def _fine(self) -> str:
@@ -175,6 +222,16 @@ class VehicleDiagnosis:
     def _clipped(self) -> str:
         since = self._since
         return f"{since.clipped[self._vehicle.name]} of the last {since.steps} steps" if since else "not known"
+
+
+def is_unmoved(vehicle: Vehicle) -> bool:
+    """Return whether a vehicle that flies freely neither moves nor turns, though its command says so."""
+    command, state = vehicle.commands.now, vehicle.body.state
+    wanted, turn = math.hypot(*command.linear), abs(command.angular.z)
+    if max(wanted, turn) < _MOVES or doing(vehicle) != FLYING or vehicle.body.contacts():
+        return False
+    asked_and_done = (wanted, math.hypot(*state.linear_velocity)), (turn, abs(state.angular_velocity[2]))
+    return all(asked < _MOVES or done <= _SLOW * asked for asked, done in asked_and_done)
 
 
 def _names(contacts: list[Contact]) -> list[str]:

@@ -76,7 +76,7 @@ class Backend(Protocol):
         """Offer a service of any installed type; return a function that ends the service.
 
         Any thread may pass a request to `ask`, with a function that makes the response from the script's fields; `ask`
-        returns the response. Raises ValueError also for an invalid name, or one that this process offers already.
+        returns the response. Raises ValueError also for a name that this process offers already.
         """
 
     def advertise_image(self, topic: str, queue: int) -> MessageSender:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections import deque
 from collections.abc import Callable
@@ -207,7 +208,7 @@ class DrawingFunctions:
         rgb = numbers(color, 3) if color else _GREY
         above = None if parent == WORLD else self._objects[parent]
         if not self._drawings.shown:
-            self._ignored.say("addDrawingObject", _IGNORED)
+            self._ignored.say("addDrawingObject", _IGNORED, level=logging.DEBUG)
             return self._drawings.new_handle()
         if maxItemCount > MOST:
             self._ignored.say("addDrawingObject", f"maxItemCount = {maxItemCount}: at most {MOST} are kept")
@@ -223,7 +224,7 @@ class DrawingFunctions:
         if self._drawings.shown:
             self._drawings.add(handle, values)
         else:
-            self._ignored.say("addDrawingObjectItem", _IGNORED)
+            self._ignored.say("addDrawingObjectItem", _IGNORED, level=logging.DEBUG)
 
     @sim("345")
     def removeDrawingObject(self, handle: Handle) -> None:

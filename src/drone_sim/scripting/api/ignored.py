@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import ast
 import copy
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
-from drone_sim.scripting.api.calls import Function, Module
+from drone_sim.scripting.api.calls import Function, Module, flat_name
 from drone_sim.scripting.script_log import LOG
 
+_HELD = ("setLinkDummy",)  # without which bodies that belong together fall apart: a warning
 HANDLE = object()  # a new handle of something that is not there
 
 # By module and the reason, as the log says it: behind the generations that have them (-: none) functions that do
@@ -42,7 +44,8 @@ _TABLE = {
             - setUIButtonTexture
         """,
         "there is no window to select objects or press keys in": """
-            345 addObjectToSelection removeObjectFromSelection getObjectSelection=[] getSimulatorMessage=-1
+            345 addObjectToSelection removeObjectFromSelection getObjectSelection=[]
+                getSimulatorMessage=(-1,[0,0,0,0],[])
             5 setObjectSel getObjectSel=[]
             35 getObjectLastSelection=-1
         """,
@@ -115,17 +118,25 @@ PLUGINS = tuple(name for name in MODULES if name != "sim")
 class Ignored:
     """The functions of one script that do nothing, and what says so."""
 
-    def __init__(self, script: str, new_handle: Callable[[], int]):
-        """`script`: the name of the object that it is on; `new_handle` gives a handle that nothing else has."""
+    def __init__(
+        self, script: str, new_handle: Callable[[], int], flat_names: Callable[[], Collection[str]] = frozenset
+    ):
+        """`script`: the name of the object that it is on; `new_handle` gives a handle that nothing else has.
+
+        `flat_names` returns the functions that the script calls by their names of 3.x, such as simSetObjectColor.
+        """
         self._script = script
         self._new_handle = new_handle
+        self._flat_names = flat_names
         self._said: set[tuple[str, str]] = set()
 
-    def say(self, name: str, what: str, module: str = "sim") -> None:
-        """Write to the log that something is ignored, once."""
+    def say(self, name: str, what: str, module: str = "sim", level: int = logging.INFO) -> None:
+        """Write to the log, once, that something is ignored, with the function's name as the script writes it."""
         if (name, what) not in self._said:
             self._said.add((name, what))
-            LOG.info("%s.%s: %s (in the script of %s)", module, name, what, self._script)
+            flat = flat_name(module, name)
+            written = flat if flat in self._flat_names() else f"{module}.{name}"
+            LOG.log(level, "%s: %s (in the script of %s)", written, what, self._script)
 
     def functions(self, module: str) -> dict[str, Function]:
         """Return every one of them in a module, by name."""
@@ -136,9 +147,11 @@ class Ignored:
         }
 
     def _function(self, module: str, name: str, said: str, generations: str, returned: Any) -> Function:
+        level = logging.WARNING if name in _HELD else logging.INFO
+
         def call(*_arguments: Any) -> Any:
-            self.say(name, said, module)
-            return self._new_handle() if returned is HANDLE else copy.copy(returned)
+            self.say(name, said, module, level)
+            return self._new_handle() if returned is HANDLE else copy.deepcopy(returned)
 
         call.__name__ = name
         return Module(module)(generations)(call)

@@ -29,6 +29,7 @@ _OWN_TOPICS = {
     "parameter_updates": "dynamic_reconfigure/Config",
 }
 _TYPE = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
+_NAME = re.compile(r"(/[A-Za-z0-9_]+)+")  # rosgraph.names.is_legal_name, of resolved names, without other alphabets
 
 
 class _Publisher(NamedTuple):
@@ -64,7 +65,7 @@ class MessageBus:
 
         A second call with the same topic, type and callback returns the same handle.
         """
-        resolved = self.resolve(topic)
+        resolved = self.resolved("topic", topic)
         there = self._subscriptions.same(resolved, kind, callback)
         if there is not None:
             return there
@@ -84,7 +85,7 @@ class MessageBus:
 
     def offer(self, name: str, kind: str, callback: Callback) -> int:
         """Offer a service, which a callback answers; return a handle. Raises ValueError."""
-        service = self.resolve(name)
+        service = self.resolved("service", name)
         if self._subscriptions.has(SERVICE.format(service)):
             raise ValueError(f"this script already offers the service {service}")
         if not _TYPE.fullmatch(kind):
@@ -108,7 +109,7 @@ class MessageBus:
 
     def advertise(self, topic: str, kind: str, queue: int = 1, latch: bool = False) -> int:
         """Advertise a topic; return a handle. Raises ValueError."""
-        resolved = self.resolve(topic)
+        resolved = self.resolved("topic", topic)
 
         def begin() -> MessageSender | None:
             if resolved in self._own_topics:
@@ -120,7 +121,7 @@ class MessageBus:
 
     def advertise_image(self, topic: str, queue: int = 1) -> int:
         """Advertise a topic of images; return a handle. Raises ValueError."""
-        resolved = self.resolve(topic)
+        resolved = self.resolved("topic", topic)
         return self._add_publisher(
             lambda: self.backend.advertise_image(resolved, _length(queue)) if self.backend else None
         )
@@ -214,6 +215,13 @@ class MessageBus:
             raise ValueError(f"a script may have at most {_MOST} subscriptions and publishers")
         self._last_handle += 1
         return self._last_handle
+
+    def resolved(self, what: str, name: str) -> str:
+        """Return the full name of a topic, service or parameter (`what`). Raises ValueError for an impossible name."""
+        full = self.resolve(name)
+        if not _NAME.fullmatch(full):
+            raise ValueError(f"{name[:80]!r} is no name of a {what}: letters, digits, _ and / are allowed")
+        return full
 
     def resolve(self, topic: str) -> str:
         """Return the full name of a topic or parameter: a relative one stands in the drone's namespace."""

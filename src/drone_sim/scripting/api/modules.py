@@ -160,4 +160,4 @@ def make_plugins(host: Host) -> dict[str, Api]:
 
 
 def _ignored(host: Host) -> Ignored:
-    return Ignored(host.own_script, host.context.drawings.new_handle)
+    return Ignored(host.own_script, host.context.drawings.new_handle, lambda: getattr(host, "flat_names", ()))

@@ -22,6 +22,9 @@ class Callee(Protocol):
 
     language: str  # lua or python
 
+    def defines(self, name: str) -> bool:
+        """Return whether the script's own file defines a global function of this name; imported ones do not count."""
+
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Return what a global function returns: None, a value, or a tuple of several. Raises ScriptError."""
 
@@ -58,6 +61,13 @@ class Attachment:
         self.script, self.began = script, time
 
 
+PermitCall = Callable[[Attachment, Attachment, str], None]
+
+
+def _all_permitted(_caller: Attachment, _callee: Attachment, _function: str) -> None:
+    pass
+
+
 class Scripts:
     """Attachments by handle (a number that nothing else of the run has had) and by object.
 
@@ -68,6 +78,8 @@ class Scripts:
 
     def __init__(self) -> None:
         """Start with none."""
+        # Raises ValueError if a script (the first) may not call a function of another; '' stands for running a text.
+        self.permit: PermitCall = _all_permitted
         self.clear()
 
     def clear(self) -> None:

@@ -167,7 +167,8 @@ class RosFunctions:
     @simROS()
     def searchParam(self, name: Name) -> tuple[bool, str]:
         """Return whether a parameter is set in the drone's namespace or above it, and its full name ('' for none)."""
-        space = self._name("x").rpartition("/")[0]
+        space = "" if name.startswith("/") else self._name("x").rpartition("/")[0]
+        name = name.lstrip("/")
         while True:
             full = f"{space}/{name}"
             if self._read(full)[0]:
@@ -192,7 +193,7 @@ class RosFunctions:
         """Return the full name; raises WrongValue for what is none."""
         if not isinstance(name, str) or not name.strip("/"):
             raise WrongValue("expected the name of a parameter")
-        return self._bus.resolve(name)
+        return self._bus.resolved("parameter", name)
 
     # ---- services of others
 
@@ -202,7 +203,7 @@ class RosFunctions:
         if len(self._clients) >= _MOST:
             raise ValueError(f"a script may have at most {_MOST} service clients")
         handle = len(self._clients) + 1
-        self._clients[handle] = self._bus.resolve(name), kind
+        self._clients[handle] = self._bus.resolved("service", name), kind
         return handle
 
     @simROS()

@@ -271,6 +271,7 @@ class ScriptCalls(_OnScripts):
         callee = self._of_type(self._find(of), script) if at else self._script(script)
         values = list(arguments)
         refuse_if_too_large(values)
+        self._scripts.permit(self._own, callee, name)
         return self._call(callee, lambda one: one.call_function(name, values), lambda one: one.call_own(name, values))
 
     @sim("345")
@@ -288,6 +289,7 @@ class ScriptCalls(_OnScripts):
             raise WrongValue("expected a string and the handle of a script")
         refuse_if_too_large([text])
         callee, text = self._executing(text, script)
+        self._scripts.permit(self._own, callee, "")
         found = self._call(callee, lambda one: one.execute(text), lambda one: one.execute_own(text))
         if found is None:
             return 0, []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from drone_sim.scripting.api.calls import sim
@@ -36,6 +36,15 @@ class Signals:
     def find(self, name: str) -> Any:
         """Return the value of a signal of any kind, None where it is not set."""
         return next((values[name] for kind in (int, float, str) if name in (values := self._values[kind])), None)
+
+    def of_name(self, name: str) -> tuple[Any, ...] | None:
+        """Return the values of the signals of a name, one of each kind; None where none of them is set."""
+        found = tuple(values.get(name) for values in self._values.values())
+        return None if all(one is None for one in found) else found
+
+    def names(self) -> list[str]:
+        """Return the names of all signals that are set."""
+        return [name for values in self._values.values() for name in values]
 
     def numbers(self) -> dict[str, float]:
         """Return the values of all float and integer signals, by name; of two of a name the float."""
@@ -154,6 +163,10 @@ class Tubes:
         """Close one end. Raises ValueError for a handle that there is not."""
         self.waiting(handle)
         del self._ends[handle]
+
+    def __iter__(self) -> Iterator[int]:
+        """Yield the handle of every end that is open."""
+        return iter(self._ends)
 
     def waiting(self, handle: int) -> deque[Any]:
         """Return what waits at an end. Raises ValueError for a handle that there is not."""

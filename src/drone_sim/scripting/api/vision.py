@@ -21,6 +21,9 @@ from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.sensors import EVERY_SENSOR, EVERYTHING
 from drone_sim.scripting.api.types import Handle, Number, WrongValue, numbers
 
+# A state, then packets. An empty tuple stands for a documented packet that the sensor does not have; Lua gets nil.
+VisionReading = tuple[Any, ...]
+
 _GREY, _DEPTH_IN_METRES = 1, 1  # options of 4.x
 _ALL = (0, 0)  # the corner and size of a whole picture
 NO_OBJECT = 0xFFFFFF  # the handle where a picture of handles shows nothing: white, as in V-REP
@@ -119,33 +122,34 @@ class VisionSensors(Functions):
         return [width, height]
 
     @sim("345")
-    def handleVisionSensor(self, handle: Handle) -> tuple[Any, ...]:
+    def handleVisionSensor(self, handle: Handle) -> VisionReading:
         """Do what readVisionSensor does; for sim.handle_all, and _all_except_explicit, count those that trigger."""
         if handle not in EVERY_SENSOR:
             return self.readVisionSensor(handle)
         every = [self._objects[one] for one in self._objects]
-        return (sum(one.detected.trigger for one in every if isinstance(one, Eye)),)
+        return sum(one.detected.trigger for one in every if isinstance(one, Eye)), (), ()
 
     @sim("345")
-    def readVisionSensor(self, handle: Handle) -> tuple[Any, ...]:
+    def readVisionSensor(self, handle: Handle) -> VisionReading:
         """Return whether the sensor's own script triggers (1 or 0), 15 numbers, and the packets of that script.
 
         They are intensity, red, green, blue and depth (0 to 1): the least, the largest, and the mean of each. Depth is
         0 at the near plane, and 1 at the far one. Where colours are handles, the numbers are those of what is seen.
+        In Python there are three values at least, as CoppeliaSim documents: the third is empty without such a script.
         """
         detected = self._detected(handle)
-        packets = (np.frombuffer(one, "<f4").tolist() for one in detected.packets)
-        return int(detected.trigger), self._statistics(handle), *packets
+        packets = [np.frombuffer(one, "<f4").tolist() for one in detected.packets]
+        return int(detected.trigger), self._statistics(handle), *(packets or [()])
 
     @sim("345")
-    def checkVisionSensor(self, handle: Handle, entity: Handle) -> tuple[int, list[float]]:
+    def checkVisionSensor(self, handle: Handle, entity: Handle) -> VisionReading:
         """Return whether a sensor would see an object or collection if there were nothing else, 1 or 0, and 15 numbers.
 
         They are those of readVisionSensor, of that picture. The sensor's script is not asked: V-REP's is, and triggers.
         """
         only = self._names(entity)
         is_seen = np.isfinite(self._picture(handle, "depth", only)).any()
-        return int(is_seen), self._statistics(handle, only)
+        return int(is_seen), self._statistics(handle, only), ()
 
     @sim("345")
     def checkVisionSensorEx(self, handle: Handle, entity: Handle, returnImage: bool) -> list[float]:

@@ -37,8 +37,9 @@ class Checker:
         except ImportError:
             return []
         found = source.LuaSource(text.encode("utf-8", "replace"))
-        said = state.syntax_error(found.text, found.flat or "phases" in found.form)
-        return check_lua(text, self._known, self._flat, said)
+        said = state.syntax_error(found.text, bool(found.flat_names) or "phases" in found.form)
+        mixed = [Finding(max(found.mixed), 1, 0, source.mixed_forms(*found.mixed))] if found.mixed else []
+        return [*mixed, *check_lua(text, self._known, self._flat, said)]
 
 
 def main() -> None:

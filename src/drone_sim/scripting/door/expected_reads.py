@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -13,6 +14,7 @@ from drone_sim.scripting.door.values import NoMessage
 if TYPE_CHECKING:
     from drone_sim.scripting.door.simulation_end import SimulationEnd
 
+_LOG = logging.getLogger(__name__)
 _MOST = 200  # reads that are expected, at a time, and lists of them
 _LONGEST = 1000  # characters of a phase
 _PLACED = f"sim.{effects.PLACED[-1]}"  # which reads all of an object's place
@@ -62,7 +64,8 @@ class ExpectedReads:
         for function, arguments in reads:
             try:
                 found.append(values.outgoing(function(*arguments)))
-            except Exception:
+            except Exception:  # raised again if the script makes the call
+                _LOG.debug("an expected read failed:", exc_info=True)
                 found.append(...)
         objects = self._door.objects
         if objects is None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from time import monotonic
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -59,6 +59,7 @@ class ScriptThere:
         self._has_gone_on = False  # after a sensing, with the next actuation
         self.language = "python" if path.endswith(".py") else "lua"
         self.idle, self.is_empty, self.threaded = "", False, False
+        self.flat_names: Collection[str] = ()
 
     def load(self) -> None:
         """Load it. Raises ScriptError."""
@@ -77,6 +78,10 @@ class ScriptThere:
     def take_turn(self) -> None:
         """Let its thread run until it is left; raises ScriptError."""
         self._do("take_turn", [])
+
+    def defines(self, name: str) -> bool:
+        """Return False: only scripts in this process are asked, because the other process could lie."""
+        return False
 
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
@@ -230,8 +235,10 @@ class ScriptThere:
         if not _ALL_PLAIN(map(type, arguments)):
             arguments = [one if type(one) in _PLAIN else self._value(one) for one in arguments]
         try:
-            self._door.permit(name, arguments)
+            done = self._door.permit(name, arguments)
             function(*arguments)
+            if done is not None:
+                done(None)
         except Exception as error:
             self._failure = name, error
 
@@ -263,8 +270,11 @@ class ScriptThere:
             return self._waits.step(*given)
         if function is None:
             raise NoMessage("unknown function of the API")
-        self._door.permit(name, _in_order(function, given, by_name))
-        return function(*given, **by_name)
+        done = self._door.permit(name, _in_order(function, given, by_name))
+        found = function(*given, **by_name)
+        if done is not None:
+            done(found)
+        return found
 
     def _value(self, value: Any) -> Any:
         return values.unmarked(value, self._function_there)

@@ -18,7 +18,7 @@ from drone_sim.scripting.door.script_there import ScriptThere
 from drone_sim.scripting.time_limit import TimeLimit
 
 _LOOK = 0.5  # s between two looks at the clock, while nothing comes
-Permit = Callable[[str, list[Any]], None]
+Permit = Callable[[str, list[Any]], Callable[[Any], None] | None]
 
 
 def _all_permitted(_function: str, _arguments: list[Any]) -> None:
@@ -47,7 +47,8 @@ class SimulationEnd:
     def begin(self, objects: ObjectTree, is_quiet: Callable[[], bool], permit: Permit | None = None) -> None:
         """Take the objects of a flight, before its scripts are loaded.
 
-        `permit` raises ValueError for a call that a script may not make: it gets its name, and what it is called with.
+        `permit` gets the name of a function and what it is called with. It raises ValueError for a call that a script
+        may not make; it may return a function that is to be called with the result.
 
         `is_quiet` tells whether a script will receive nothing between the sensing that is due and the next actuation:
         then it may run that actuation right after the sensing.

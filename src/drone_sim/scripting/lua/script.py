@@ -12,7 +12,7 @@ import difflib
 import logging
 import re
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from drone_sim.message_text import near_names
@@ -25,7 +25,7 @@ from drone_sim.scripting.breakpoints import Breakpoints, Scope
 from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.lua import functions, state
 from drone_sim.scripting.lua.helpers import LuaHelpers
-from drone_sim.scripting.lua.source import LuaSource
+from drone_sim.scripting.lua.source import LuaSource, mixed_forms
 from drone_sim.scripting.lua.thread import MOST_LEFT, Executor, LeftBehind, LuaThread, SameThread, left_behind
 from drone_sim.scripting.lua.variables import read_rows
 from drone_sim.scripting.time_limit import Labels, TimeLimit
@@ -67,13 +67,14 @@ class LuaScript:
         self._limit, self._labels = limit, Labels(path, limit)
         text = LuaSource(source)
         self.is_empty = not text.text.strip()
+        self.flat_names: Collection[str] = text.flat_names
         self._modules = modules
         self._end = ""  # why nothing can be called any more
         self._phases = 0
         self.idle = ""  # why nothing of it is ever called
         self._helpers = LuaHelpers(path)
         self._breakpoints = breakpoints if breakpoints is not None else Breakpoints()
-        self._check_call_types(text)
+        self._check_form(text)
         if text.loops_in_c and left_behind() >= MOST_LEFT:
             raise self._error(
                 "load",
@@ -81,7 +82,7 @@ class LuaScript:
             )
         self._thread: Executor = LuaThread(limit) if text.loops_in_c else SameThread(limit)
         try:
-            dialect = state.dialect_for(text.text, text.flat or "phases" in text.form)
+            dialect = state.dialect_for(text.text, bool(text.flat_names) or "phases" in text.form)
             self._has_coroutines = text.coroutines
             self._lua = self._thread.run(self._build, dialect, text.threads)
             if self._breakpoints:
@@ -103,8 +104,10 @@ class LuaScript:
 
     # ---- the script
 
-    def _check_call_types(self, text: LuaSource) -> None:
-        """Raise ScriptError for a phase that does not exist: Lua would compare sim_call_type with nil."""
+    def _check_form(self, text: LuaSource) -> None:
+        """Raise ScriptError for two forms in one script, or a phase that does not exist: Lua would compare with nil."""
+        if text.mixed:
+            raise self._error("load", mixed_forms(*text.mixed), max(text.mixed))
         known = [name for name in CONSTANTS if name.startswith("childscriptcall_")]
         for name in text.call_types:
             if name not in known:
@@ -149,6 +152,11 @@ class LuaScript:
     def take_turn(self) -> None:
         """Let its thread run until it is left; raises ScriptError."""
         self._run("thread", self._lua.get("phase"), _NUMBERS["thread"])
+
+    def defines(self, name: str) -> bool:
+        """Return whether the script's own file defines a global function of this name. Raises ScriptError."""
+        path, _ = self._named_functions().get(name, ("", 0))
+        return path == self._path
 
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""

@@ -9,7 +9,7 @@ import functools
 import inspect
 import reprlib
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from types import CodeType
 from typing import TYPE_CHECKING, Any
 
@@ -73,6 +73,7 @@ class PythonScript:
         self._path = path
         self._limit, self._labels = limit, Labels(path, limit)
         self.is_empty = not source.strip()
+        self.flat_names: Collection[str] = ()
         self._modules = modules
         self._thread = self._new_thread(turns) if _NAMES_THREAD in source else None
         self._found = {name: _waiting(one, turns, self._called) for name, one in modules.items()}
@@ -148,6 +149,11 @@ class PythonScript:
         """Let its thread run until it is left; raises ScriptError."""
         if self._thread is not None:
             self._run("thread", self._thread.take_turn, self._thread_function())
+
+    def defines(self, name: str) -> bool:
+        """Return whether the script's own file defines a global function of this name; imported ones do not count."""
+        function = self._globals.get(name)
+        return inspect.isfunction(function) and function.__code__.co_filename == self._path
 
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""

@@ -7,6 +7,12 @@ by the shot noise, of variance μ; reading it adds the dark noise, of variance �
 
 So white as it is drawn fills the well at the reference exposure. The shot noise is Poisson's, here by its normal
 approximation: of a mean below some ten electrons the shape is another one, mean and variance are the same.
+
+A picture cannot hold values below black or above white: they are cut off after all imperfections. In the dark, this
+makes the mean larger and the deviation smaller. A value of mean m and standard deviation s that is cut at 0 has, with
+the normal density φ and the normal distribution function Φ at m / s:
+
+    mean = m Φ + s φ,  variance = (m² + s²) Φ + m s φ - mean²
 """
 
 from __future__ import annotations

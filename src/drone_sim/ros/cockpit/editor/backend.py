@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,10 @@ from drone_sim.ros.cockpit.editor.script_store import OWN, ScriptFile, ScriptSto
 from drone_sim.ros.cockpit.editor.task_flights import Grader, TimelinePlayer
 from drone_sim.ros.cockpit.server.page_socket import Answer
 from drone_sim.ros.core.simulator import FAILURES, Simulator, script_failure
+from drone_sim.ros.core.startup import script_from_shell
 from drone_sim.scripting.api.listing import for_editors
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.load import script_path
 
 _Message = Mapping[str, Any]
 
@@ -74,11 +78,11 @@ class EditorBackend:
         }
 
     def _flown(self) -> str:
-        flown = str(self._simulator.parameter("script", "") or "pilot")
+        flown = script_from_shell(str(self._simulator.parameter("script", ""))) or "pilot"
+        with contextlib.suppress(ScriptError):  # one that is not there has its file's name
+            flown = script_path(flown)
         script = self._store.of_file(flown)
-        if script is not None:
-            return script.name
-        return Path(flown).name if "/" in flown else f"built-in/{flown}.py"
+        return Path(flown).name if script is None else script.name
 
     def _script(self, message: _Message) -> ScriptFile:
         return self._store.find(message.get("script"))

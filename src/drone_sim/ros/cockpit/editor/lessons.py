@@ -81,10 +81,13 @@ class Lessons:
     def of_script(self, script: ScriptFile) -> Lesson | None:
         """Return the text that a script belongs to: one of the user's by its name, such as 2_elevation_mine.py.
 
+        A stage in Lua belongs to the text of the same stage in Python.
+
         A solution, or a copy of one, belongs to the stage of its number.
         """
         texts = [one for one in self.all() if one.script]
-        shipped = next((one for one in texts if one.script == script.name), None)
+        in_python = str(Path(script.name).with_suffix(".py"))
+        shipped = next((one for one in texts if one.script in (script.name, in_python)), None)
         if shipped or not (script.is_own or script.group == SOLUTIONS):
             return shipped
         stem = Path(script.file_name).stem

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import itertools
 import json
+import logging
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
@@ -19,6 +20,7 @@ from drone_sim.ros.cockpit.teleop import HeldCommands, read_command
 Answer = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 Taken = Callable[[int, Mapping[str, Any]], None]
 SceneSince = Callable[[int], tuple[int, bytes]]
+_LOG = logging.getLogger(__name__)
 _MESSAGES = 32  # after which the oldest go: this browser does not take them
 _SCENE = "scene"  # the name under which a browser says that it has shown a message of the scene
 _UNSHOWN = 2  # messages of the scene that are on their way at most: over a slow line one is shown while another comes
@@ -141,7 +143,9 @@ def _finite(text: str) -> float:
 def _answered(ask: Answer, message: Mapping[str, Any]) -> str:
     try:
         return json.dumps({"id": message.get("id"), **ask(message)})
-    except (ValueError, RecursionError) as error:
+    except Exception as error:  # an OSError for an impossible name, or a fault of our own: the socket stays open
+        if not isinstance(error, (ValueError, OSError, RecursionError)):
+            _LOG.exception("the question '%s' could not be answered", message.get("ask"))
         return json.dumps(
             {"id": message.get("id"), "error": " ".join(str(error).split()), "kind": type(error).__name__}
         )
