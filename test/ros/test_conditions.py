@@ -114,7 +114,7 @@ class Conditions(unittest.TestCase):
             held = client.update_configuration(wrong)
             self.assertEqual((held["Kzref"], held["thrust_limits/lowest"]), (4.0, 3.0))
             line = self.log.wait_for(lambda line, said=said: said in line.msg, after=0).msg
-            self.assertTrue(line.startswith("/drone refused, nothing is changed: "), line)
+            self.assertTrue(line.startswith("/drone refused"), line)
         self.faults.publish("propellers", "[1, 0.99, 1, 1]")
         told.wait_for(lambda m: any(one.name.endswith("back_left") and one.value == 0.99 for one in m.doubles), after=0)
         with tempfile.TemporaryDirectory() as folder:
@@ -135,7 +135,7 @@ class Conditions(unittest.TestCase):
         for key, value, said in (
             ("propellers", "[1, 2]", "propellers/1 = 2: input should be less than or equal to 1"),
             ("images/loss", "{", "value '{'"),
-            ("", "5", "key '': names none of propellers, commands, images"),
+            ("", "5", "key '': must be one of propellers"),
             ("a/" * 1000, "5", "too long"),
             ("commands", "[" * 500, "value"),
             ("commands/loss", ".nan", "commands/loss = nan: input should be a finite number"),

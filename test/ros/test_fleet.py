@@ -118,7 +118,7 @@ class Fleet(unittest.TestCase):
         self.assertIn("position", self.set_vehicles({"drone1": {"position": [0]}}).message)
         for name in THREE:
             self.odometry[name].wait_for()  # they fly on
-        self.assertEqual(self.set_vehicles(3).message, "all are as they were")
+        self.assertEqual(self.set_vehicles(3).message, "no vehicle was added or removed")
 
 
 if __name__ == "__main__":

@@ -123,7 +123,7 @@ class Interface(unittest.TestCase):
 
     def test_3_a_look_before_any_command_says_that_none_has_come(self):
         listener = Listener("/diagnostics", DiagnosticArray)
-        listener.wait_for(lambda m: any("no command has come yet" in one.message for one in m.status), after=0)
+        listener.wait_for(lambda m: any("no command has been received" in one.message for one in m.status), after=0)
         listener.close()
 
     def test_3_rates_and_frames_are_those_of_the_page(self):
@@ -206,7 +206,7 @@ class Interface(unittest.TestCase):
         self.assertEqual(values["connected commanders"], own)
         command.linear.x = 50.0
         commands.publish(command)
-        values = told("vehicle drone", DiagnosticStatus.WARN, f"refused what {own} sends on cmd_vel")
+        values = told("vehicle drone", DiagnosticStatus.WARN, f"refused a message of {own} on cmd_vel")
         self.assertIn("linear.x = 50.0: must lie within", values["why refused"])
         command.linear.x = 0.5
         self.call("pause", True)
@@ -222,7 +222,7 @@ class Interface(unittest.TestCase):
         commands.publish(command)
         told("vehicle drone", DiagnosticStatus.OK, f"as {own} commands")
         commands.unregister()
-        told("vehicle drone", DiagnosticStatus.WARN, f"flies on by the last command of {own}, which has gone")
+        told("vehicle drone", DiagnosticStatus.WARN, f"still obeys the last command of {own}")
         camera = Listener("/drone/front", roslib.message.get_message_class("sensor_msgs/Image"))
         camera.wait_for()
         values = told("cameras", None, "")
@@ -231,7 +231,7 @@ class Interface(unittest.TestCase):
         camera.close()
         self.script.write_text(BROKEN)
         self.call("restart")
-        told("vehicle drone", DiagnosticStatus.ERROR, f"stands still: script error: [actuation] {self.script}:2")
+        told("vehicle drone", DiagnosticStatus.ERROR, f"stopped: script error: [actuation] {self.script}:2")
         listener.close()
 
     def test_6_a_simulation_that_does_not_answer_is_told(self):
@@ -262,7 +262,7 @@ class Interface(unittest.TestCase):
         self.assertIn("script error", next(line.said for line in lines if line.what == "vehicle drone"))
         hint = next(line for line in lines if line.what == "commands")
         self.assertEqual(hint.mark, HINT)
-        self.assertIn("/cmd_vel, which nobody receives: start it with cmd_vel:=/drone/cmd_vel", hint.said)
+        self.assertIn("start it with cmd_vel:=/drone/cmd_vel", hint.said)
 
 
 def links(message):

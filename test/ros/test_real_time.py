@@ -79,7 +79,7 @@ class RealTime(unittest.TestCase):
         )
         said = other.stdout + other.stderr
         self.assertEqual(other.returncode, 1, said)
-        self.assertIn("vehicle drone flies already, in /drone_sim: give one of the two a namespace", said)
+        self.assertIn("already flies in /drone_sim: give one of the two a namespace", said)
         self.assertNotIn("Traceback", said)
 
 

@@ -313,7 +313,7 @@ class Toolbar(unittest.TestCase):
         refused = one(json.dumps({"edit": [{"do": "remove", "objects": ["Gat"]}]}))
         self.assertFalse(refused.success)
         self.assertIn("near names are Gate", refused.message)
-        self.assertIn("no JSON", other("{").message)
+        self.assertIn("not JSON", other("{").message)
         self.assertEqual(json.loads(one(json.dumps({"save": str(self.scene)})).message)["file"], str(self.scene))
         self.assertEqual(rospy.get_param("~scene_file"), str(self.scene))
         told.close()

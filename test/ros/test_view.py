@@ -71,9 +71,9 @@ class View(unittest.TestCase):
 
     def test_mistakes_get_a_line(self):
         for topic, line in (
-            ("/drone/frnt", "/drone/frnt: nobody publishes it; near names are /drone/front"),
-            ("/drone/name", "/drone/name: is a std_msgs/String, no image"),
-            ("/drone/floor/image", "/drone/floor/image: is published, but no picture came in 3 s"),
+            ("/drone/frnt", "/drone/frnt: no node publishes it; near names are /drone/front"),
+            ("/drone/name", "/drone/name: is a std_msgs/String, not an image"),
+            ("/drone/floor/image", "/drone/floor/image: is published, but no picture came within 3 s"),
         ):
             with self.subTest(topic):
                 self.assertIn(line, self.view(topic, "--png", "none.png", status=1))

@@ -16,10 +16,10 @@ POSE = f"{{1,2,3, 0,0,{HALF},{HALF}}}"
 POSE_BACK = [-2, 1, -3, 0, 0, -HALF, HALF]
 STRING = "'\\1\\0\\0\\0\\2\\0\\0\\0'"
 NO_THREAD = "in sysCall_thread, sysCall_threadmain, or a coroutine"
-NO_FUNCTION = "the script has no function 'nothing' to call back"
+NO_FUNCTION = "no function 'nothing' for this callback"
 ANY = object()  # whatever comes
 STEP_STAYS = "`time_step` in the scene file sets it"
-NO_SCENE_FILE = "a model must be in the folder of the scene file, and there is no scene file"
+NO_SCENE_FILE = "a model must be in the folder of the scene file, but the simulation has no scene file"
 
 
 class Example(NamedTuple):
@@ -281,11 +281,11 @@ SIM: dict[str, list[Example]] = {
     # ---- motions, which wait for steps; and trajectories, which a script follows by itself
     "moveToConfig": [Example("REFUSED(NAME, {pos={0}, targetPos={1}})", [NO_THREAD], "REFUSED(NAME, PARAMETERS)")],
     "moveToPose": [
-        Example("REFUSED(NAME, {pos={0}})", ["`object` or `pose` is expected"], "REFUSED(NAME, PARAMETERS)")
+        Example("REFUSED(NAME, {pos={0}})", ["`object` or `pose` must be given"], "REFUSED(NAME, PARAMETERS)")
     ],
     "moveToConfig_init": [Example("NAME({pos={0}, targetPos={1}}).timeLeft", [0], "NAME(PARAMETERS)['timeLeft']")],
     "moveToPose_init": [
-        Example("REFUSED(NAME, {pos={0}})", ["`object` or `pose` is expected"], "REFUSED(NAME, PARAMETERS)")
+        Example("REFUSED(NAME, {pos={0}})", ["`object` or `pose` must be given"], "REFUSED(NAME, PARAMETERS)")
     ],
     "moveToConfig_step": [
         Example(

@@ -18,7 +18,7 @@ ROS: dict[str, list[Example]] = {
         Example("NAME('serve', 'std_srvs/Trigger', 'served')", [4]),
         Example(
             "REFUSED(NAME, 'serve', 'std_srvs/Trigger', 'served')",
-            ["this script offers the service /drone/serve already"],
+            ["this script already offers the service /drone/serve"],
         ),
     ],
     "serviceServerTreatUInt8ArrayAsString": [Example("NAME(4)", [])],
@@ -39,6 +39,6 @@ ROS: dict[str, list[Example]] = {
     "deleteParam": [Example("NAME('b')", []), Example("simROS.hasParam('b')", [False])],
     "serviceClient": [Example("NAME('reset', 'std_srvs/Trigger')", [1])],
     "serviceClientTreatUInt8ArrayAsString": [Example("NAME(1)", [])],
-    "call": [Example("REFUSED(NAME, 1)", ["there is no ROS here, and no service"])],
+    "call": [Example("REFUSED(NAME, 1)", ["this flight runs without ROS, so there are no services"])],
     "shutdownServiceClient": [Example("NAME(1)", [])],
 }

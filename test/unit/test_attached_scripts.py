@@ -127,8 +127,8 @@ def test_a_script_that_fails_is_told_once_with_file_line_and_phase_and_the_other
         assert simulation.context.signals.get(float, "n") == 3
         assert list(simulation.failed_scripts) == ["Floor"]
         (said,) = [one.getMessage() for one in caplog.records if one.levelname == "ERROR"]
-        assert said.startswith(f"[sensing] {tmp_path}/0.lua:2: sim.getObject: no object '/Nobody'")
-        assert said.endswith("; this script is not called any more")
+        assert said.startswith(f"[sensing] {tmp_path}/0.lua:2: sim.getObject: there is no object '/Nobody'")
+        assert said.endswith("; this script is no longer called")
         caplog.clear()
         simulation.restore(before)
 
@@ -144,14 +144,14 @@ def test_one_that_fails_while_it_is_loaded_leaves_the_flight_as_it_is(build, cap
 def test_nobody_calls_a_script_that_has_failed(build):
     fails = "function f() end function sysCall_init() error('x') end"
     own = "function ask() end function sysCall_actuation() sim.callScriptFunction('f@Floor', 1) end"
-    with pytest.raises(ScriptError, match="the script has failed, and is not called any more"):
+    with pytest.raises(ScriptError, match="the script has failed"):
         build({"Floor": fails}, own).step()
 
 
 @pytest.mark.parametrize(
     "name, words",
     [
-        ("Quadricopter", "'Quadricopter' already has a script: that of the key `script` of its vehicle"),
+        ("Quadricopter", "'Quadricopter' already has a script"),
         ("DronePositon", "no object named 'DronePositon'; near names are DronePosition"),
     ],
 )
@@ -163,7 +163,9 @@ def test_a_wrong_object_gets_one_line(build, name, words):
 def test_an_object_has_one_script(tmp_path):
     scene = tmp_path / "scene.yaml"
     scene.write_text("scripts:\n- {object: Floor, script: a.lua}\n- {object: Floor, script: b.lua}\n")
-    with pytest.raises(ParameterError, match=r"scene.yaml: line 3: parameter scripts/1/object = 'Floor': comes twice"):
+    with pytest.raises(
+        ParameterError, match=r"scene.yaml: line 3: parameter scripts/1/object = 'Floor': is used twice"
+    ):
         parameters.load({"scene_file": str(scene)})
 
 
@@ -275,11 +277,11 @@ def test_scripts_call_each_other_by_value(build, asking, answering):
     "call, words",
     [
         ("'fails@DronePosition', 1", r"1.lua:4: no"),
-        ("'nothing@DronePosition', 1", "the script has no function 'nothing' to call"),
+        ("'nothing@DronePosition', 1", "no function 'nothing'"),
         ("'add@Drone_Position', 1", "no object named 'Drone_Position'; near names are DronePosition"),
-        ("'f@Quadricopter_propeller_respondable1', 1", "is a built-in law, and has no functions"),
-        ("'back@DronePosition', 1", "is being called already: it waits for this call to end"),
-        ("'add', 99", "no script has the handle 99"),
+        ("'f@Quadricopter_propeller_respondable1', 1", "which has no functions"),
+        ("'back@DronePosition', 1", "cannot be called back"),
+        ("'add', 99", "no script with the handle 99"),
         ("'hangs@DronePosition', 1", "stopped after 0.2 s"),
     ],
 )
@@ -333,7 +335,7 @@ def test_a_script_calls_its_own_functions(build, language):
     *told, _ = simulation.context.signals.get(str, "told").split(";")
     failed, nothing, deep, customization = told
     assert failed.endswith("no")
-    assert "the script has no function 'nothing' to call back" in nothing
+    assert "no function 'nothing'" in nothing
     assert "deep" in deep, "and it ends"
     assert customization.endswith("'Floor': V-REP's are not imported")
 
@@ -395,13 +397,13 @@ def test_a_text_is_run_in_another_script(build, asks, answers):
     "text, answers, words",
     [
         ("'while true do end', sim.getScriptHandle('DronePosition')", LUA_RUNS, "stopped after 0.2 s"),
-        ("'1', sim.getScriptHandle('DronePosition')", PYTHON_RUNS, "in Python: only Python scripts run a text"),
+        ("'1', sim.getScriptHandle('DronePosition')", PYTHON_RUNS, "only Python scripts may"),
         ("'1@python', sim.getScriptHandle('DronePosition')", LUA_RUNS, "'DronePosition' is in Lua, not Python"),
         ("'1@', sim.scripttype_sandboxscript", LUA_RUNS, "every script belongs to an object"),
         ("'1@Floor', sim.scripttype_customizationscript", LUA_RUNS, "no customization script is attached to 'Floor'"),
         ("'return return', sim.getScriptHandle('DronePosition')", LUA_RUNS, "unexpected symbol"),
         ("'\\27Lua', sim.getScriptHandle('DronePosition')", LUA_RUNS, "precompiled code"),
-        ("1, 2", LUA_RUNS, "a text and the handle of a script are expected"),
+        ("1, 2", LUA_RUNS, "expected a string and the handle of a script"),
     ],
 )
 def test_a_text_that_is_not_run_gets_one_line(build, text, answers, words):
@@ -445,7 +447,7 @@ def test_special_handles_stand_for_several_scripts(build):
     assert said["DronePosition"] == {"everybody", "below", "above"}
     assert said["Floor"] == {"everybody"} and said[PROPELLERS[0]] == {"everybody", "below"}
     assert simulation.context.signals.get(float, "found") == 2
-    assert "the main script is the simulation itself" in simulation.context.signals.get(str, "main")
+    assert "is its own main script" in simulation.context.signals.get(str, "main")
 
 
 # ---- propellers

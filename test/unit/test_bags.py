@@ -186,8 +186,8 @@ def test_a_damaged_picture_among_others_is_left_out(tmp_path, capsys):
     [
         (b"", "is empty"),
         (b"#ROSBAG V2.0\n", "was cut off"),
-        (b"#ROSBAG V9.0\n", "is not a bag that can be read"),
-        (b"picture", "is not a bag that can be read"),
+        (b"#ROSBAG V9.0\n", "cannot be read as a bag"),
+        (b"picture", "cannot be read as a bag"),
         (4096 + 2000, "was cut off"),
         (0.5, "was cut off"),
         (0.999, "was cut off"),
@@ -214,7 +214,7 @@ def test_what_is_no_whole_bag_gets_one_line(flown, tmp_path, capsys, content, sa
         (plot_flight, ["BAG", "out.wrong"], "matplotlib does not write .wrong"),
         (plot_flight, ["nowhere.bag"], "nowhere.bag: No such file"),
         (plot_flight, ["flight.mp3"], "'flight.mp3': must end in .csv, .txt or .bag"),
-        (plot_flight, ["flight.csv", "--vehicle", "drone"], "--vehicle 'drone': a table is of one vehicle"),
+        (plot_flight, ["flight.csv", "--vehicle", "drone"], "--vehicle 'drone': only works with a bag"),
         (bag_video, ["BAG", "out.avi"], "out.avi: must end in .mp4"),
         (bag_video, ["BAG", "out.mp4", "--topic", "/drone/front"], "near names are /drone/front/compressed"),
         (bag_video, [".", "out.mp4"], ".: is not a regular file"),
@@ -233,7 +233,7 @@ def test_no_class_is_made_from_what_a_bag_says(tmp_path):
     other = genpy.dynamic.generate_dynamic("nav_msgs/Odometry", "string data\n")["nav_msgs/Odometry"]
     with rosbag.Bag(path, "w") as bag:
         bag.write("/drone/odom", other(data="x"), rospy.Time(1))
-    with pytest.raises(BagError, match="no message on /drone/odom that can be read"):
+    with pytest.raises(BagError, match="no readable message on /drone/odom"):
         BagFlight(Bag(path))
 
 
@@ -277,15 +277,16 @@ def test_topics_of_another_kind_are_left_out(tmp_path, capsys, program, out):
         bag.write("/drone/imu/data", raw, rospy.Time(4), raw=True)
     status = program.main([path, str(tmp_path / out)])
     said = capsys.readouterr().err
-    refusal = "nothing was commanded in it on /drone/cmd_vel and the like" if program is bag_commands else ""
-    assert (status, said.partition(".bag: ")[2].strip()) == (1 if refusal else 0, refusal)
+    refusal = "it has no commands on /drone/cmd_vel" if program is bag_commands else ""
+    assert status == (1 if refusal else 0)
+    assert said.partition(".bag: ")[2].startswith(refusal)
 
 
 def test_what_unpacks_to_too_much_is_refused(flown, tmp_path, monkeypatch, capsys):
     path, out = str(tmp_path / "large.bag"), str(tmp_path / "out.mp4")
     monkeypatch.setattr(bags, "MAX_CHUNK", 1000)
     assert plot_flight.main([flown[0], str(tmp_path / "out.png")]) == 1
-    assert "bytes; at most 1000 are unpacked" in capsys.readouterr().err
+    assert "bytes; at most 1000 are" in capsys.readouterr().err
     monkeypatch.undo()
     size = np.array([5000, 5000], ">u4").tobytes()  # of a PNG, in its header
     header = b"IHDR" + size + b"\x08\x02\0\0\0"
@@ -333,4 +334,4 @@ def test_record_says_once_what_it_waits_for(monkeypatch, capsys):
     monkeypatch.setattr(record.time, "sleep", lambda _: None)
     monkeypatch.setattr(record.time, "monotonic", lambda: 0.1 * Master.asked)
     assert record._kinds("/drone_sim") == {}
-    assert capsys.readouterr().err == "record: waits for /drone_sim, which does not run yet\n"
+    assert capsys.readouterr().err.startswith("record: waiting for /drone_sim")

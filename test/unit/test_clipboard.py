@@ -126,7 +126,7 @@ def test_what_names_an_object_of_the_scene_hangs_on_it(editor):
         ("TODO: buy milk", "unknown key 'TODO'; known are objects, scripts, vehicles"),
         ("objects: 3", "objects = 3: must be objects"),
         ("objects: [3]", "must be objects"),
-        ("def f(x):\n    return {x: [1", "no YAML"),
+        ("def f(x):\n    return {x: [1", "not YAML"),
         ("- {shape: bax}", "'bax': must be one of 'box'"),
         ("- {name: A, shape: box, size: [1, 1, 0], position: [0, 0, 0]}", "size"),
         ("- {name: A, kind: dummy, parent: Nobody, position: [0, 0, 0]}", "Nobody"),

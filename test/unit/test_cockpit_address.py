@@ -58,7 +58,7 @@ def test_ports_for_root_are_told(monkeypatch):
 
 def test_where_no_port_is_free_it_is_told(monkeypatch):
     monkeypatch.setattr(address, "_is_free", lambda family, host, port: port == 0)
-    with pytest.raises(address.AddressError, match=r"^port = 65500: neither this one nor any other up to 65535"):
+    with pytest.raises(address.AddressError, match=r"^port = 65500: all ports from 65500 to 65535"):
         address.free_place("127.0.0.1", 65500)
 
 
@@ -92,10 +92,10 @@ def test_scripts_are_relative_to_the_shell(monkeypatch):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"prot": 8081}, "prot: is no parameter of the cockpit; near names are port"),
+        ({"prot": 8081}, "prot: is not a parameter of the cockpit; near names are port"),
         ({"scripts": 5}, "scripts = 5: must be the name of a folder"),
         ({"scripts": ""}, "scripts = '': must be the name of a folder"),
-        ({"scripts": "~nobody_at_all/x"}, "no such home: '~nobody_at_all/x'"),
+        ({"scripts": "~nobody_at_all/x"}, "'~nobody_at_all/x': this user's home folder does not exist"),
         ({"simulator": "bad name!"}, "simulator = 'bad name!': must be the name of a node, such as drone_sim"),
         ({"simulator": [1]}, "simulator = [1]: must be the name of a node, such as drone_sim"),
         (5, "the node's parameters: must be a mapping, not 5"),

@@ -77,7 +77,7 @@ def test_the_file_of_one_that_was_killed_is_made_anew_and_another_ones_is_left(h
 def test_a_home_that_holds_no_file_is_told_in_one_line(home):
     home.write_text("no folder")
     with address_file(ADDRESS, 8080) as where:
-        assert re.fullmatch(r"the token that opens it is on the terminal alone: .*cockpit_8080.txt: .+", where)
+        assert re.fullmatch(r"the address with the token is only in the terminal, .*cockpit_8080.txt .+", where)
 
 
 @pytest.mark.parametrize("inside", [True, False])

@@ -137,7 +137,7 @@ def test_signals_have_charts_as_they_come(plots, board):
 
 @pytest.mark.parametrize("wrong", [None, [], {"height": 3}, {"height": [1]}, {"height": [True, "x"]}])
 def test_what_is_no_question_for_plots_is_refused_in_one_line(plots, wrong):
-    with pytest.raises(ValueError, match=r"^charts = [^\n]*: must be \[run, time\] by name"):
+    with pytest.raises(ValueError, match=r"^charts = [^\n]*: must be a mapping"):
         plots.answer({"charts": wrong})
     assert plots.answer({"charts": {"no such chart": [0, 0.0]}})["charts"]["no such chart"]["rows"] == []
 

@@ -55,5 +55,5 @@ def test_a_request_that_nobody_hears_says_so(monkeypatch, vehicle):
     monkeypatch.setattr(teleop.rospy, "Publisher", Publisher)
     told = teleop.CommandPublisher(patience=0.0)
     told.choose(vehicle)
-    with pytest.raises(ValueError, match=r"^land: nobody listens$"):
+    with pytest.raises(ValueError, match=r"^no subscriber on land$"):
         told.request("land")

@@ -96,5 +96,5 @@ def test_a_gigabyte_is_refused_before_it_is_taken(served, said, parts):
         code, why = ended(one)
         plain.detach()
     assert code == 1009 and "8388608" in why
-    assert said().startswith("a browser at 127.0.0.1 is sent away: frame")
+    assert said().startswith("a browser at 127.0.0.1 is refused: frame")
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100 << 10  # KiB

@@ -93,7 +93,7 @@ def test_depths_are_coloured_and_say_what_the_colours_mean(encoding, unit):
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.0])
 def test_depths_of_nothing_are_black(value):
     content, note = packed(message(np.full((10, 10), value, np.float32), "32FC1"))
-    assert picture(content).max() == 0 and note == "nothing within its range"
+    assert picture(content).max() == 0 and note == "nothing within range"
 
 
 def test_colours_and_greys_of_any_size():

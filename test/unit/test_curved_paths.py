@@ -232,7 +232,7 @@ def test_more_points_than_can_be_kept_are_brought_as_fewer(imported):
     scene = imported(path_object(0, "Way", *points))
     (entry,) = yaml.safe_load(scene.read_text())["objects"]
     assert len(entry["control_points"]) == 1500 and entry["control_points"][7]["count"] == 66
-    assert "Way: a path: its curves have fewer points" in imported.said
+    assert "Way: a path: its curves are drawn with fewer points" in imported.said
     parameters.load({"scene_file": str(scene)})
 
 
@@ -242,7 +242,7 @@ def test_a_control_point_that_is_nowhere_is_left_out(imported, place):
     scene = imported(path_object(0, "Way", *points))
     (entry,) = yaml.safe_load(scene.read_text())["objects"]
     assert [one["position"] for one in entry["control_points"]] == [[0, 0, 0], [3, 0, 0]]
-    assert "Way: a path: 1 of its control points are nowhere: left out" in imported.said
+    assert "Way: a path: 1 of its control points are not finite" in imported.said
 
 
 FOLLOW = """

@@ -161,7 +161,7 @@ def test_what_belongs_to_a_collection(sim):
     sim.emptyCollection(most)
     assert sim.getCollectionObjects(most) == []
     sim.removeCollection(most)
-    with pytest.raises(ValueError, match=f"no collection has the handle {most}"):
+    with pytest.raises(ValueError, match=f"no collection with the handle {most}"):
         sim.getCollectionObjects(most)
     sim.destroyCollection(sim.handle_all)
 
@@ -171,7 +171,7 @@ def test_collections_of_3_x_have_names(sim):
     assert sim.addObjectToCollection(made, sim.getObject("/Wall"), sim.handle_single, 0) == 1
     assert sim.getCollectionHandle("walls") == sim.getCollectionHandle("walls#") == made
     assert sim.getCollectionName(made) == "walls" and paths(sim, made) == ["/Wall"]
-    with pytest.raises(ValueError, match="a collection named 'walls' is there already"):
+    with pytest.raises(ValueError, match="a collection named 'walls' already exists"):
         sim.createCollection("walls", 0)
     with pytest.raises(ValueError, match="no collection named 'wall'; near names are walls"):
         sim.getCollectionHandle("wall")
@@ -211,11 +211,17 @@ def test_a_collection_collides_where_one_of_its_objects_does(simulation, sim):
     ("call", "said"),
     [
         ("sim.addItemToCollection(sim.createCollection(0), 7, sim.getObject('/Wall'), 0)", "handle_single, _tree"),
-        ("sim.addItemToCollection(4711, sim.handle_single, sim.getObject('/Wall'), 0)", "no collection has the handle"),
-        ("sim.addItemToCollection(sim.createCollection(0), sim.handle_tree, 4711, 0)", "no object has the handle 4711"),
+        (
+            "sim.addItemToCollection(4711, sim.handle_single, sim.getObject('/Wall'), 0)",
+            "no collection with the handle",
+        ),
+        (
+            "sim.addItemToCollection(sim.createCollection(0), sim.handle_tree, 4711, 0)",
+            "no object with the handle 4711",
+        ),
         ("sim.checkCollision(sim.getObject('/Wall'), sim.getObject('/Wall'))", "parts of one rigid body"),
         ("sim.checkDistance(sim.getObject('/Near'), sim.handle_all)", "'Near' is a point"),
-        ("sim.checkDistance(99999, sim.handle_all)", "no object has the handle 99999"),
+        ("sim.checkDistance(99999, sim.handle_all)", "no object with the handle 99999"),
         ("sim.checkDistance(sim.getObject('/Near'), sim.getObject('/Wall'), float('nan'))", "finite numbers"),
     ],
 )

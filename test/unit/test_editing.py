@@ -241,7 +241,7 @@ def test_vehicles_floor_and_weather_are_edited_in_flight_until_stop(editor):
 def test_what_no_flight_can_go_on_with_is_refused(editor, said):
     editor.simulation.start()
     key = said.partition(":")[0]
-    with pytest.raises(ValueError, match=f"{key}: is changed while the simulation is stopped: stop it first"):
+    with pytest.raises(ValueError, match=f"{key}: can only be changed while"):
         editor.answer({"write": f"{text_of(editor)}{said}\n"})
     editor.simulation.stop()
     editor.follow()
@@ -325,10 +325,10 @@ def test_a_script_is_attached_and_taken_away(course):
             "color = 'red'",
         ),
         ({"redo": True}, "nothing to redo"),
-        ({"save": "/tmp/scene.txt"}, ".yaml file"),
+        ({"save": "/tmp/scene.txt"}, "must end in .yaml"),
         ({"write": "objects: ["}, "line"),
         ({"write": "objects:\n  - {name: A, shape: bax}\n"}, "line 2.*'bax'"),
-        ({"write": "objects: []\n", "revision": 77}, "changed meanwhile"),
+        ({"write": "objects: []\n", "revision": 77}, "has changed since"),
         ({"draft": "take"}, "no draft"),
     ],
 )
@@ -416,7 +416,7 @@ def test_in_flight_it_is_saved_as_it_stands_and_stays_the_scene_that_it_was(cour
     course.simulation.drone.body.move(Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0)))
     said = course.answer({"save": True})["said"]
     file = course.scene.document.file
-    assert said == f"saved {file} as it is in flight"
+    assert "in flight" in said and said.endswith(str(file))
     was, now = changed_lines(COURSE, file.read_text(encoding="utf-8"))
     assert (was, now) == (["drone: {position: [0, 0, 1.50]}"], ["drone: {position: [1, 2, 3]}"])
     course.simulation.stop()
@@ -428,7 +428,7 @@ def test_saved_as_another_file_in_flight_it_is_a_copy_and_the_answer_says_so(cou
     course.simulation.start()
     other = tmp_path / "other.yaml"
     said = course.answer({"save": str(other)})["said"]
-    assert said == f"saved {other} as it is in flight: a copy. To save the scene itself, stop first"
+    assert str(other) in said and "This is a copy" in said
     assert course.scene.document.file == tmp_path / "course.yaml"
 
 

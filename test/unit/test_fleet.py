@@ -85,8 +85,8 @@ def test_entries_change_what_they_name_alone(fly):
     [
         ({"a": {"controll": {}}}, r"parameter vehicles/a/controll: unknown key; near names are control"),
         ({"a": {"control": {"Kzref": -1}}}, r"parameter vehicles/a/control/Kzref = -1: .*greater than or equal to 0"),
-        ({"a b": {}}, r"parameter vehicles/a b.*: must be a letter and then letters, digits or _"),
-        ({"a": {"name": "b"}}, r"parameter vehicles/a/name: unknown key; the key of the entry is its name"),
+        ({"a b": {}}, r"parameter vehicles/a b.*: must begin with a letter"),
+        ({"a": {"name": "b"}}, r"parameter vehicles/a/name: unknown key"),
         ({"a": 3}, r"parameter vehicles/a = 3: must hold `key: value` lines"),
         (2.5, r"parameter vehicles = 2\.5: must be a whole number from 0 to 256"),
         (257, r"parameter vehicles = 257: must be a whole number from 0 to 256"),
@@ -266,7 +266,7 @@ def test_snapshots_bring_all_back_until_one_comes(fly):
     simulation.restore(snapshot)
     assert [path(simulation, "drone1", 20), [vehicle.body.state for vehicle in simulation.vehicles.values()]] == flown
     simulation.set_vehicles(4)
-    with pytest.raises(ValueError, match="a vehicle or shape that comes or goes"):
+    with pytest.raises(ValueError, match="from an earlier run"):
         simulation.restore(snapshot)
 
 

@@ -188,7 +188,7 @@ def test_settings_are_what_is_flown(tmp_path):
         (["--plot", "out.wrong"], "wrong"),
         (["--sped", "2"], "unrecognized arguments: --sped 2"),
         (["--script", "nowhere.py"], "nowhere.py"),
-        (["--script", "script.txt"], "a child script's name ends in .py or .lua"),
+        (["--script", "script.txt"], "must end in .py or .lua"),
         (["--plot", "out.txt"], "out.txt: matplotlib does not write .txt; it writes "),
         (["--plot", "."], ".: is a folder"),
         (["--csv", "."], ".: is a folder"),
@@ -202,9 +202,9 @@ def test_settings_are_what_is_flown(tmp_path):
         (["--video", "nowhere/out.mp4"], "nowhere/out.mp4"),
         (["--video", "out.mp4", "--camera", "trak"], "--camera 'trak': no such camera; near names are track"),
         (["--video", "out.mp4", "--set", "time_step=0.001", "sub_step=0.001"], "1000 pictures a second; at most 240"),
-        (["--camera", "track"], "--camera track: is of --video or --truth, and neither is given"),
+        (["--camera", "track"], "--camera track: only works with --video or --truth"),
         (["--truth", "nowhere/out"], "nowhere/out: no such folder"),
-        (["--csv", "a.txt", "--plot", "./a.txt"], "--csv a.txt: is the file of --plot as well"),
+        (["--csv", "a.txt", "--plot", "./a.txt"], "--csv a.txt: must not be the same file"),
     ],
 )
 def test_a_mistake_ends_with_one_line_and_status_1(tmp_path, monkeypatch, capsys, arguments, says):
@@ -359,9 +359,7 @@ def test_what_a_script_leaves_behind_does_not_keep_it(script, left):
         check=True,
     )
     assert done.stdout.startswith("flew 0.10 s in")
-    assert (
-        done.stderr == "fly: ended without what a script left: a thread, or a function of atexit, that does not end\n"
-    )
+    assert done.stderr == "fly: ended without waiting for a thread or atexit function of a script that does not end\n"
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])

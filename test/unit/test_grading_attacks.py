@@ -120,7 +120,7 @@ SEARCHES = {  # each would find something, were it there
 ENDS = {  # what ends the flight, and what is said of it
     "a forged end": (
         "os.write(3, struct.pack('<I', 12) + b'[[\"end\",1,1]]')\n    os._exit(0)",
-        "has sent what is no message: no JSON",
+        "sent an invalid message: not JSON",
     ),
     "a forged result": (
         "for number in range(64):\n"
@@ -132,12 +132,12 @@ ENDS = {  # what ends the flight, and what is said of it
     "a function that is none": (
         'say = b\'[["call","os.system",-1,[],"id"]]\'\n    os.write(3, struct.pack(\'<I\', len(say)) + say)\n'
         "    time.sleep(9)",
-        "no function of the API",
+        "unknown function of the API",
     ),
     "an order for the judge": (
         'say = b\'[["call","sim.addForce",-1,[["handle"]]]]\'\n    os.write(3, struct.pack(\'<I\', len(say)) + say)\n'
         "    time.sleep(9)",
-        "no arguments by name",
+        "malformed named arguments",
     ),
     "the door closed": ("os.close(3)", "before the flight was over"),
     "a stop": ("os.kill(os.getpid(), signal.SIGSTOP)", "did not return after 3 s (script_time_limit)"),

@@ -365,7 +365,7 @@ WRONG = {
 }
 BESIDE = {
     "duratoin: 5": "line 1: duratoin: unknown key; near names are duration",
-    "name: a b": "line 1: name = 'a b': must be a letter and then",
+    "name: a b": "line 1: name = 'a b': must begin with a letter",
     "calls: [sysCall_init]": "line 1: calls/0 = 'sysCall_init': must be a function that a script of the scene defines",
     "calls: [simRemoveObject]": "line 1: calls/0 = 'simRemoveObject': must be a function that a script",
     "scene: nix.yaml": "no such file: ",

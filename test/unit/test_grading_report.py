@@ -109,7 +109,7 @@ def test_another_report_takes_the_place_of_the_first_and_nothing_else(tmp_path):
     [
         ("nonsense\n", "a table of `fly --csv` begins with"),
         (",".join(COLUMNS) + "\n", "nothing was flown"),
-        (",".join(COLUMNS) + "\n1,2\n", "line 2: is cut off"),
+        (",".join(COLUMNS) + "\n1,2\n", "line 2: has 2 of"),
         (",".join(COLUMNS) + "\n" + ",".join(["nan"] * len(COLUMNS)) + "\n", "line 2: must hold numbers below"),
     ],
 )

@@ -32,11 +32,11 @@ def test_streams_are_bounded_and_a_wrong_handle_gets_one_line():
     graphs = Graphs()
     with pytest.raises(ValueError, match=r"^the graph 7 has no stream with the handle 1$"):
         graphs.set(7, 1, 2.0)
-    with pytest.raises(ValueError, match="has at most 200 characters, not 201"):
+    with pytest.raises(ValueError, match="at most 200 characters, not 201"):
         graphs.add(1, 7, "x" * 201)
     for number in range(1000):
         graphs.add(number, 7, str(number))
-    with pytest.raises(ValueError, match=r"^1000 streams of graphs are there already: destroy some$"):
+    with pytest.raises(ValueError, match=r"^at most 1000 streams of graphs"):
         graphs.add(1000, 7, "one more")
 
 

@@ -56,7 +56,7 @@ def test_at_an_edge_it_falls_and_is_told_so_once(caplog):
         for _ in range(100):
             simulation.step()
     assert simulation.drone.body.state.position[2] < -1.0
-    assert [record.getMessage() for record in caplog.records if "edge" in record.getMessage()] == [
+    assert [record.getMessage() for record in caplog.records if "left the floor" in record.getMessage()] == [
         caplog.records[0].getMessage()
     ]
     simulation.close()

@@ -108,7 +108,7 @@ def test_what_does_not_look_is_killed_after_one_line(ended, where):
     status, errors = ended(where)
     assert status == -signal.SIGKILL
     assert errors.splitlines() == [
-        "it: killed: a script, a file or the ROS master kept it busy for 2.5 s when it had to end"
+        "it: killed: it did not end within 2.5 s: a script, a file or the ROS master kept it busy"
     ]
 
 
@@ -117,7 +117,7 @@ def test_a_script_that_nothing_can_stop_is_killed_after_one_line(ended, which):
     status, errors = ended(which)
     assert status == -signal.SIGKILL
     assert errors.splitlines() == [
-        "it: killed: [init] some.py: did not return after 0.5 s (script_time_limit), nor could it be stopped"
+        "it: killed: [init] some.py: did not return after 0.5 s (script_time_limit), and could not be stopped"
     ]
 
 
@@ -127,7 +127,7 @@ def test_the_simulators_own_time_and_that_after_a_script_are_not_the_scripts(end
 
 @pytest.mark.parametrize("which", ["ends beside a thread", "ends with atexit"])
 def test_what_a_script_leaves_behind_does_not_keep_the_process(ended, which):
-    left = "it: ended without what a script left: a thread, or a function of atexit, that does not end\n"
+    left = "it: ended without waiting for a thread or atexit function of a script that does not end\n"
     assert ended(which) == (3, left)
 
 

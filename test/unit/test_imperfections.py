@@ -221,7 +221,7 @@ def test_it_is_tuned_in_flight_and_fails():
     tuning.change({"cameras/front/exposure/time": 0.0, "cameras/front/noise/full_well": 0.0})
     np.testing.assert_array_equal(camera.take(), perfect)
     tuning.change({"cameras/front/noise/full_well": 1e4})
-    with pytest.raises(ParameterError, match="cameras/front/noise/read = 3: needs full_well"):
+    with pytest.raises(ParameterError, match="cameras/front/noise/read = 3: needs `full_well`"):
         tuning.change({"cameras/front/noise/full_well": 0.0, "cameras/front/noise/read": 3.0})
     kept = camera.look()
     simulation.drone.change_faults({"sensors": {"front": "frozen"}})
@@ -237,9 +237,12 @@ def test_it_is_tuned_in_flight_and_fails():
 @pytest.mark.parametrize(
     ("front", "said"),
     [
-        ({"noise": {"read": 3}}, "cameras/front/noise/read = 3: needs full_well, the electrons of a white pixel"),
-        ({"exposure": {"automatic": True}}, "exposure/automatic = true: needs time, the longest that it takes"),
-        ({"kind": "depth", "shutter": {"readout": 0.01}}, "cameras/front/shutter: is of cameras of kind color"),
+        ({"noise": {"read": 3}}, "cameras/front/noise/read = 3: needs `full_well`"),
+        ({"exposure": {"automatic": True}}, "exposure/automatic = true: needs `time`"),
+        (
+            {"kind": "depth", "shutter": {"readout": 0.01}},
+            "cameras/front/shutter: only works with cameras of kind color",
+        ),
     ],
 )
 def test_a_mistake_gets_one_line(front, said):

@@ -57,7 +57,7 @@ def test_who_asks_gets_the_answer_or_the_error():
 
 def test_a_request_that_timed_out_is_not_carried_out_later():
     inbox, done = Inbox(patience=0.05), []
-    with pytest.raises(TimeoutError, match=r"no answer within 0\.05 s: it will not be carried out"):
+    with pytest.raises(TimeoutError, match=r"no answer within 0\.05 s: it will not be executed"):
         inbox.ask(lambda: done.append(1) or "")
     inbox.empty()
     assert not done
@@ -72,7 +72,7 @@ def test_a_request_that_has_begun_is_said_to_be_under_way():
     thread.join(10)
     answered.set()
     worker.join(10)
-    assert "it is still being carried out" in str(said[0])
+    assert "still being executed" in str(said[0])
 
 
 def test_where_others_are_heard_meanwhile_a_job_wakes_their_sleep():

@@ -140,7 +140,7 @@ def test_shapes_are_grouped_and_parted(tmp_path):
     names = [tree[one].name for one in operations.model(top)]
     assert names == ["Post#0", "Hinge#0", "Rod#0"] and tree[tree.handle("Hinge#0")].drive is not None
     operations.save_model(top, file)
-    with pytest.raises(ValueError, match=r"scene\.yaml: is no model that was saved here, and is not written over"):
+    with pytest.raises(ValueError, match=r"scene\.yaml: is not overwritten"):
         operations.save_model(top, "scene.yaml")
     assert yaml.safe_load((tmp_path / "scene.yaml").read_text(encoding="utf-8")) == SCENE
     simulation.close()
@@ -151,20 +151,20 @@ def test_shapes_are_grouped_and_parted(tmp_path):
     [
         (lambda do, tree: do.remove([tree.handle("Drone")]), "'Drone' is a part of a vehicle"),
         (lambda do, tree: do.remove([tree.handle("Floor")]), "'Floor' is the floor"),
-        (lambda do, tree: do.remove([999]), "no object has the handle 999"),
-        (lambda do, tree: do.add([{"name": "Ball", **KINDS["free"]}]), "an object named 'Ball' is there already"),
+        (lambda do, tree: do.remove([999]), "no object with the handle 999"),
+        (lambda do, tree: do.add([{"name": "Ball", **KINDS["free"]}]), "an object named 'Ball' already exists"),
         (lambda do, tree: do.add([{"name": "x", "shape": "box", "size": [1, 1]}]), "size"),
         (lambda do, tree: do.add([{"name": "x", "shape": "wedge"}]), "shape = 'wedge': must be one of"),
         (lambda do, tree: do.add([{"name": "x", "parent": "Bal", **KINDS["free"]}]), "no object is named 'Bal'"),
-        (lambda do, tree: do.rename(tree.handle("Ball"), "Post"), "an object named 'Post' is there already"),
-        (lambda do, tree: do.scale([tree.handle("Ball")], (1, 2, 1)), "'Ball' is a sphere: it stays round"),
-        (lambda do, tree: do.scale([tree.handle("Ball")], (0, 0, 0)), "must be more than 0"),
+        (lambda do, tree: do.rename(tree.handle("Ball"), "Post"), "an object named 'Post' already exists"),
+        (lambda do, tree: do.scale([tree.handle("Ball")], (1, 2, 1)), "'Ball' is a sphere: it must stay round"),
+        (lambda do, tree: do.scale([tree.handle("Ball")], (0, 0, 0)), "must be greater than 0"),
         (lambda do, tree: do.paint(tree.handle("Mark"), (1, 0, 0, 1)), "'Mark' has no color of its own"),
         (lambda do, tree: do.change(tree.handle("Ball"), mass=-1.0), "mass = -1"),
         (lambda do, tree: do.set_parent(tree.handle("Ball"), tree.handle("Sign"), True), "cannot be its own ancestor"),
-        (lambda do, tree: do.load_model("../model.yaml"), "beside the scene file is expected"),
+        (lambda do, tree: do.load_model("../model.yaml"), "in the folder of the scene file"),
         (lambda do, tree: do.load_model("robot.ttm"), "robot.ttm: No such file"),
-        (lambda do, tree: do.load_model("robot.ttt"), "name of a .yaml or .ttm file beside the scene file is expected"),
+        (lambda do, tree: do.load_model("robot.ttt"), "name of a .yaml or .ttm file in the folder of the scene file"),
         (lambda do, tree: do.add_mesh("x", [0, 0, 0], [0, 1, 2]), "indices: each must be from 0 to 0"),
     ],
 )

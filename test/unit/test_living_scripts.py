@@ -105,7 +105,7 @@ def test_the_script_of_a_copy_begins_and_ends_with_it(build):
     (copy,) = operations.copy([tree.handle("Gate")])
     attached = simulation.context.scripts.attached_to("Gate#0")
     assert attached.parameters == {"step": 2.0} and attached.script is None
-    with pytest.raises(ValueError, match="or a script on one, forget it"):
+    with pytest.raises(ValueError, match="from an earlier run"):
         simulation.restore(snapshot)
     simulation.step()
     assert told(simulation) == ["Gate#0:init", "Gate:sensing", "Gate#0:sensing"]

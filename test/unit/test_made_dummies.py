@@ -43,7 +43,7 @@ def test_a_script_makes_dummies_and_takes_them_away(tmp_path, caplog):
     [
         ("[sim.createDummy(0.01) for _ in range(3000)]", "a scene has at most 2000 objects"),
         ("sim.removeObject(sim.getObject('/Floor'))", "'Floor' is the floor"),
-        ("sim.removeObjects(3)", "a table of handles is expected"),
+        ("sim.removeObjects(3)", "expected a table of handles"),
         ("sim.createDummy('large')", "a number is expected"),
         ("sim.createPureShape(3, 0, [1, 1, 1], 1)", "primitiveType = 3: must be one of"),
     ],

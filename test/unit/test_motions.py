@@ -327,21 +327,21 @@ def test_what_a_snapshot_brings_back(tmp_path):
 
 
 WRONG = {
-    "sim.moveToConfig{joints={hinge}, targetPos={1}, maxVel={1}}": "`maxAccel`: a list of 1 numbers is expected",
+    "sim.moveToConfig{joints={hinge}, targetPos={1}, maxVel={1}}": "`maxAccel`: a list of 1 numbers",
     "sim.moveToConfig{joints={hinge}, targetPos={1, 2}}": "`targetPos`: a number is expected, not 2",
     "sim.moveToConfig{joints={box}, targetPos={1}}": "'Box' is not a joint of the scene; there are: Hinge, Lift",
     "sim.moveToConfig{joints={sim.getObject('/Ball')}, targetPos={1}}": "'Ball' is spherical",
     "sim.moveToConfig{joints={hinge}, targetPos={1}, maxVel={0}, maxAccel={1}, maxJerk={1}}": "greater than 0",
-    "sim.moveToConfig('fast')": "a table of parameters is expected",
+    "sim.moveToConfig('fast')": "expected a table of parameters",
     "sim.moveToConfig{pos={0}, targetPos={1}, callback='none'}": "the script has no function 'none'",
-    "sim.moveToConfig_step{}": "what moveToConfig_init or moveToPose_init returned is expected",
-    "sim.moveToPose{ik={tip=1, target=2}, targetPose={1}}": "there is no inverse kinematics",
-    "sim.moveToPose{object=box, targetPose={1}}": "a pose of 7 numbers or a matrix of 12 is expected, not 1 numbers",
-    "sim.moveToPosition(box, -1, nil, nil, 1)": "a position or an orientation is expected",
+    "sim.moveToConfig_step{}": "expected the value that moveToConfig_init",
+    "sim.moveToPose{ik={tip=1, target=2}, targetPose={1}}": "inverse kinematics is not supported",
+    "sim.moveToPose{object=box, targetPose={1}}": "a pose of 7 numbers or a matrix of 12",
+    "sim.moveToPosition(box, -1, nil, nil, 1)": "a position or an orientation",
     "sim.moveToPosition(box, -1, {1, 2, 3}, nil, 0)": "greater than 0",
     "sim.followPath(box, hinge, 3, 0, 1)": "'Hinge' is not a path; there are: Line",
-    "sim.ruckigPos(2, 0.001, -1, {0}, {1}, {1}, {1})": "6 numbers are expected in maxVelAccelJerk",
-    "sim.ruckigStep(9, 0.05)": "no trajectory has the handle 9",
+    "sim.ruckigPos(2, 0.001, -1, {0}, {1}, {1}, {1})": "maxVelAccelJerk must have 6 numbers",
+    "sim.ruckigStep(9, 0.05)": "no trajectory with the handle 9",
 }
 
 

@@ -45,7 +45,7 @@ def test_copies_share_aliases(objects):
 
 
 def test_a_name_is_given_once(objects):
-    with pytest.raises(ValueError, match="an object named 'Floor' is there already"):
+    with pytest.raises(ValueError, match="an object named 'Floor' already exists"):
         objects.add("Ceiling", also=("Floor",))
     assert names(objects) == ["Floor"] and "Ceiling" not in objects
 
@@ -54,7 +54,7 @@ def test_a_name_is_free_again_but_no_handle(objects):
     first, second, third = (add_model(objects, suffix) for suffix in ("", "#0", "#1"))
     objects.remove(second)
     assert names(objects) == ["Floor", "Drone", "base", "target", "Drone#1", "base#1", "target#1"]
-    with pytest.raises(ValueError, match=f"no object has the handle {second[0]}"):
+    with pytest.raises(ValueError, match=f"no object with the handle {second[0]}"):
         objects[second[0]]
     with pytest.raises(ValueError, match="no object named 'base#0'; near names are"):
         objects.handle("base#0")

@@ -122,7 +122,9 @@ def test_what_is_no_response_is_refused_and_said(served, caplog):
     simulation, ros = served
     with caplog.at_level(logging.ERROR):
         answer = answer_of(simulation, ros.asking("/drone/number"))
-    assert answer == caplog.messages[-1] == "a service's callback returns a table of the response's fields, not 7"
+    assert (
+        answer == caplog.messages[-1] == "the callback of a service must return a table of the response's fields, not 7"
+    )
     simulation.step()
 
 
@@ -157,9 +159,9 @@ def test_who_waits_in_vain_is_refused_and_the_script_is_not_asked_later():
     ("arguments", "said"),
     [
         ("'count', 'no/Type', 'f'", "'no/Type' is not installed"),
-        ("'count', 'Trigger', 'f'", "'Trigger' is no service type; one is, for example, std_srvs/Trigger"),
+        ("'count', 'Trigger', 'f'", "'Trigger' is not a service type"),
         ("'a b\\n', 'std_srvs/Trigger', 'counted'", "is no name of a service"),
-        ("'count', 'std_srvs/Trigger', 'counter'", "no function 'counter' to call back; near names are counted"),
+        ("'count', 'std_srvs/Trigger', 'counter'", "no function 'counter' for this callback; near names are counted"),
         ("'count', 'std_srvs/Trigger'", "wrong number of values"),
     ],
 )

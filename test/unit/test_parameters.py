@@ -12,7 +12,7 @@ BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
 @pytest.mark.parametrize(
     "overrides, message",
     [
-        ({"Kzref": 4}, "parameter Kzref: unknown key; there is control/Kzref"),
+        ({"Kzref": 4}, "parameter Kzref: unknown key; did you mean control/Kzref"),
         ({"control": {"position": 4}}, "parameter control/position: unknown key; known are "),  # not `drone/position`
         ({"control": {"Kzreff": 4}}, "parameter control/Kzreff: unknown key; near names are Kzref"),
         ({"time_step": 0.012}, "parameter time_step = 0.012: must be a whole multiple of sub_step = 0.005"),
@@ -54,7 +54,7 @@ BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
         ({"drone": {"name": "a" * 100}}, "string should have at most 64 characters"),
         ({"drone": {"urdf": "x" * 300}}, "no such file"),
         ({"drone": {"urdf": "a\0b"}}, "no such file"),
-        ({"drone": {"urdf": "~nobody_at_all/x"}}, "no such home"),
+        ({"drone": {"urdf": "~nobody_at_all/x"}}, "home folder does not exist"),
         ({"cameras": {"front": {"horizontal_fov": 5e-324}}}, "horizontal_fov = 5e-324: input should be greater than"),
         ({"cameras": {"front": {"width": 640.5}}}, "cameras/front/width = 640.5: input should be a valid integer"),
         ({"cameras": {"front": {"topic": "odom"}}}, "'odom': its image would be odom, which is the drone's own"),
@@ -64,10 +64,13 @@ BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
         ({"cameras": {"track": {"topic": "rear/camera_info"}}}, "which is the image of cameras/track"),
         ({"cameras": {"track": {"topic": "front/compressed"}}}, "which is the compressed of cameras/front"),
         ({"cameras": {"track": {"topic": "track"}}}, "'track': its camera_info would be camera_info, which is the"),
-        ({"cameras": {"track": {"object": "FrontVision"}}}, "object = 'FrontVision': is that of cameras/front too"),
+        (
+            {"cameras": {"track": {"object": "FrontVision"}}},
+            "object = 'FrontVision': is also the name of cameras/front",
+        ),
         ({"cameras": {"track": {"width": 4096, "height": 4096}}}, "at most 16777216 are allowed"),
         ({"cameras": {f"c{n}": {} for n in range(20)}}, "parameter cameras"),
-        ({"scene": {"objects": [BALL, BALL]}}, "scene/objects/1/name = 'Ball': comes twice"),
+        ({"scene": {"objects": [BALL, BALL]}}, "scene/objects/1/name = 'Ball': is used twice"),
         ({"scene": {"objects": [{**BALL, "mass": 1e-300}]}}, "mass = 1e-300: must be 0, or from 1e-06 to 1e+06"),
         ({"scene": {"objects": [{**BALL, "mass": float("nan")}]}}, "mass = nan: input should be a finite number"),
         ({"config": 5}, "config = 5: must be the name of a file"),
@@ -95,11 +98,11 @@ def test_every_wrong_key_of_a_config_file_is_named_with_its_line(tmp_path):
         f"{file}: line 1: parameter gui = 1: must be true or false",
         "3: parameter control/Kzreff: unknown key; near names are Kzref, Dzref",
         "4: parameter control/thrust_limits = [1]: must be 2 numbers, [lowest, highest] in m/s, or none",
-        "6: parameter cameras/9x = '9x': must be a letter and then letters, digits or _",
+        "6: parameter cameras/9x = '9x': must begin with a letter and contain only letters, digits and _",
         "6: parameter cameras/9x = 5: must hold `key: value` lines with shutter, vignette, exposure, noise, object, "
         "topic, kind, frame, mount, every, width, height, horizontal_fov, lens, near, far, baseline, truth",
         "7: parameter cameras/rear/topic = '/a': must be like rear/image: "
-        "letters, digits and _, a letter first, parted by /",
+        "letters, digits and _, beginning with a letter, separated by /",
         "7: parameter cameras/rear/mount = 3: must hold `key: value` lines with parent, position, rpy",
         "7: parameter cameras/rear: kind, frame, every, width, height, horizontal_fov, near, far are missing; "
         "and 1 more",
@@ -167,7 +170,7 @@ def test_what_yaml_1_1_takes_for_a_text_is_a_number():
 
 @pytest.mark.parametrize("name", ["Floor", "Drone", "target", "Track_base"])
 def test_a_camera_is_not_called_like_an_object_that_there_is(name):
-    with pytest.raises(parameters.ParameterError, match=f"an object named '{name}' is there already"):
+    with pytest.raises(parameters.ParameterError, match=f"an object named '{name}' already exists"):
         Simulation(parameters.load({"cameras": {"front": {"object": name}}}))
 
 
@@ -196,9 +199,9 @@ def test_the_files_that_a_config_file_names_lie_beside_it(tmp_path):
     "text, words",
     [
         ("gravity: 1:30", "config.yaml: line 1: parameter gravity = '1:30'"),
-        ("gravity: 1\ngravity: 2", "config.yaml: key 'gravity' comes twice (line 2, column 1)"),
+        ("gravity: 1\ngravity: 2", "config.yaml: key 'gravity' is given twice (line 2, column 1)"),
         ("gravty: 1", "config.yaml: line 1: parameter gravty: unknown key; near names are gravity"),
-        ("config: other.yaml", "config.yaml: a config file names no other `config`"),
+        ("config: other.yaml", "config.yaml: a config file must not have the key `config`"),
         ("- 1", "config.yaml: must hold `key: value` lines"),
     ],
 )

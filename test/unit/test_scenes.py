@@ -135,7 +135,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
             "boxes: []",
             "line 1: parameter boxes: unknown key; near names are objects",
         ),
-        ("1: 2", "key '1' must be a text (line 1, column 1)"),
+        ("1: 2", "key '1' must be a string (line 1, column 1)"),
         ("objects: {}", "scene.yaml: line 1: parameter objects = {}: input should be a valid list"),
         (
             "objects: [5]",
@@ -181,7 +181,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         ("objects: [{shape: urdf, file: nonsense.urdf, position: [0, 0, 0]}]", "nonsense.urdf: syntax error"),
         (
             "objects: [{name: Drone, shape: sphere, size: [1], position: [9, 0, 0]}]",
-            "scene.yaml: line 1: an object named 'Drone' is there already",
+            "scene.yaml: line 1: an object named 'Drone' already exists",
         ),
     ],
 )
@@ -235,7 +235,7 @@ def test_a_wrong_key_behind_a_merge_is_told_where_it_is_merged(write):
     file = write(f"objects:\n  - {thing}\n  -\n    <<: *a\n")
     with pytest.raises(ParameterError) as refused:
         parameters.load({"scene_file": file})
-    assert str(refused.value) == f"{file}: line 4: parameter objects/1/name = 'A': comes twice"
+    assert str(refused.value) == f"{file}: line 4: parameter objects/1/name = 'A': is used twice"
 
 
 def test_what_is_not_the_scene_files_has_no_line_of_it(write):
@@ -244,7 +244,7 @@ def test_what_is_not_the_scene_files_has_no_line_of_it(write):
         parameters.load({"scene_file": file, "drone": {"position": 5}, "floor": 3})
     assert str(refused.value) == (
         "parameter drone/position = 5: must be 3 numbers, [x, y, z] in m; "
-        "parameter floor: unknown key; there is scene/floor"
+        "parameter floor: unknown key; did you mean scene/floor?"
     )
 
 
@@ -353,5 +353,5 @@ def test_a_heap_that_would_take_seconds_a_step_is_refused():
     box = {"shape": "box", "size": [1, 1, 1], "position": [0, 0, 5], "mass": 1}
     assert Simulation(parameters.load({"scene": {"objects": [box] * 20}})).world.queries.overlaps() == 190
     Simulation(parameters.load({"scene": {"objects": [{**box, "mass": 0}] * 100}})).close()  # what stands may
-    with pytest.raises(ParameterError, match="4950 pairs of moving ones touch or overlap, at most 500 may"):
+    with pytest.raises(ParameterError, match="4950 pairs of moving objects"):
         Simulation(parameters.load({"scene": {"objects": [box] * 100}}))

@@ -207,20 +207,20 @@ def test_what_is_drawn_is_kept(drawings, sim, caplog):
     assert list(drawings.objects) == [last]
     assert not caplog.records
     sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 10**9)
-    assert "1000000000 items are too many: 2000 are kept" in caplog.text
+    assert "maxItemCount = 1000000000" in caplog.text
     sim.addParticleObject(sim.particle_points1, 1)
     assert "accepted and ignored" in caplog.text
 
 
 def test_what_cannot_be_drawn_is_refused(drawings, sim):
     lines = sim.addDrawingObject(sim.drawing_lines, 1, 0, -1, 10)
-    with pytest.raises(ValueError, match="an item of lines has 6 numbers, not 3"):
+    with pytest.raises(ValueError, match="an item of lines must have 6 numbers, not 3"):
         sim.addDrawingObjectItem(lines, [1, 2, 3])
     with pytest.raises(TypeError, match="finite numbers are expected"):
         sim.addDrawingObjectItem(lines, [float("nan")] * 6)
-    with pytest.raises(ValueError, match="no drawing object has the handle 99"):
+    with pytest.raises(ValueError, match="no drawing object with the handle 99"):
         sim.addDrawingObjectItem(99, [1, 2, 3])
-    with pytest.raises(ValueError, match="no drawing object has the type 31; known are"):
+    with pytest.raises(ValueError, match="31 is not a type of drawing object"):
         sim.addDrawingObject(31, 1)
 
 

@@ -201,7 +201,7 @@ def sysCall_thread():
 def test_lua_flies_the_same_behind_a_door(plan, tmp_path):
     path = tmp_path / "flies.lua"
     path.write_text(LUA)
-    assert "no object has the handle 99" in same(plan, path).outcomes[0].said
+    assert "no object with the handle 99" in same(plan, path).outcomes[0].said
 
 
 @pytest.mark.parametrize(
@@ -272,24 +272,27 @@ def test_all_that_is_said_of_functions_is_of_functions_that_there_are():
 # ---- what comes from a process that has been taken over
 
 SAID = {
-    "no JSON": (b"\x80\x04N.", "no message: no JSON"),
-    "a text": (b'"x"', "no message: no list of items"),
-    "items that are none": (b'[1, "x", []]', "no message: no list of items"),
-    "no end of it": (b"[" * 100_000, "no message: no JSON"),
-    "numbers without end": (b"[" + b"9" * 100_000 + b"]", "no message: no JSON"),
-    "a function that is none": (json.dumps([["call", "os.system", -1, [], "id"]]).encode(), "no function of the API"),
-    "a function by a list": (json.dumps([["call", ["x"], -1, []]]).encode(), "no function of the API"),
-    "an attribute": (json.dumps([["call", "sim.__class__", -1, []]]).encode(), "no function of the API"),
-    "an order": (json.dumps([["quit"]]).encode(), "'quit' is none"),
-    "a call without all": (json.dumps([["call"]]).encode(), "no call"),
-    "a question not waited for": (json.dumps([["set", "sim.stopSimulation"]]).encode(), "has to be waited for"),
+    "no JSON": (b"\x80\x04N.", "invalid message: not JSON"),
+    "a text": (b'"x"', "invalid message: no list of items"),
+    "items that are none": (b'[1, "x", []]', "invalid message: no list of items"),
+    "no end of it": (b"[" * 100_000, "invalid message: not JSON"),
+    "numbers without end": (b"[" + b"9" * 100_000 + b"]", "invalid message: not JSON"),
+    "a function that is none": (
+        json.dumps([["call", "os.system", -1, [], "id"]]).encode(),
+        "unknown function of the API",
+    ),
+    "a function by a list": (json.dumps([["call", ["x"], -1, []]]).encode(), "unknown function of the API"),
+    "an attribute": (json.dumps([["call", "sim.__class__", -1, []]]).encode(), "unknown function of the API"),
+    "an order": (json.dumps([["quit"]]).encode(), "unknown reply 'quit'"),
+    "a call without all": (json.dumps([["call"]]).encode(), "malformed call"),
+    "a question not waited for": (json.dumps([["set", "sim.stopSimulation"]]).encode(), "unexpected call that waits"),
     "reads that are calls": (json.dumps([["reads", "x", 0, [["sim.stopSimulation"]], []]]).encode(), "no read"),
     "too many reads": (json.dumps([["reads", "x", 0, [["sim.getSimulationTime"]] * 201, []]]).encode(), "too many"),
-    "an end with more": (json.dumps([["end", 1, 2, 3, 4]]).encode(), "no end of a call"),
-    "a failure of numbers": (json.dumps([["failed", 1, 2, 3, 4, 5]]).encode(), "no failure"),
-    "a mark that is none": (json.dumps([["end", True, {"x": 1}]]).encode(), "no mark"),
-    "fields of its own": (json.dumps([["end", True, {"o": [["__class__", 1]]}]]).encode(), "no field"),
-    "a mapping of lists": (json.dumps([["end", True, {"d": [[[1], 1]]}]]).encode(), "no key"),
+    "an end with more": (json.dumps([["end", 1, 2, 3, 4]]).encode(), "malformed end of a call"),
+    "a failure of numbers": (json.dumps([["failed", 1, 2, 3, 4, 5]]).encode(), "malformed failure"),
+    "a mark that is none": (json.dumps([["end", True, {"x": 1}]]).encode(), "unknown mark"),
+    "fields of its own": (json.dumps([["end", True, {"o": [["__class__", 1]]}]]).encode(), "unknown field"),
+    "a mapping of lists": (json.dumps([["end", True, {"d": [[[1], 1]]}]]).encode(), "not a valid key"),
 }
 
 

@@ -97,7 +97,7 @@ def _fails(tmp_path):
             "'particleVelocity',{})",
             "load",
             1,
-            ["a number is expected"],
+            ["expected a number"],
         ),
         (
             "function on_twist(m)\n error('x')\nend\nsimROS.subscribe('cmd_vel','geometry_msgs/Twist','on_twist')",
@@ -120,7 +120,7 @@ def test_lua_may_give_more_values_than_a_function_takes(tmp_path, caplog):
     script.write_text(f"function sysCall_actuation()\n  {call}\n  print(result, mass)\nend")
     run(script)
     said = [one for one in caplog.messages if "Object" in one or "0.12" in one]
-    assert said == ["simGetObjectFloatParameter: 4 values given, 2 taken: the others are ignored", *["1\t0.12"] * 3]
+    assert said == ["simGetObjectFloatParameter: got 4 values and uses 2: the others are ignored", *["1\t0.12"] * 3]
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_lua_may_give_more_values_than_a_function_takes(tmp_path, caplog):
         ("float('x')", "load", 1, ["ValueError: could not convert"]),
         ("simROS.advertise(3, 'T')", "load", 1, ["simROS.advertise: ", "got (3, 'T', 1, False)"]),
         ("sim.getObjectPosition('Drone')", "load", 1, ["wrong kind of value: got ('Drone', -1)"]),
-        ("sim.getObjectPosition(99)", "load", 1, ["no object has the handle 99"]),
+        ("sim.getObjectPosition(99)", "load", 1, ["no object with the handle 99"]),
         ("def f(m):\n    undefined\nsimROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'f')", "f", 2, ["NameError"]),
         ("\nrequire('foo')", "load", 2, ["no module 'foo'"]),
         ("import sys\nsys.exit(1)", "load", 2, ["SystemExit"]),
@@ -203,16 +203,16 @@ def test_a_callback_that_does_not_exist_is_named(tmp_path):
     for ending in ("py", "lua"):
         path = tmp_path / f"script.{ending}"
         path.write_text("simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'on_twst')", encoding="utf-8")
-        assert run(path) == [f"[on_twst] {path}: the script has no function 'on_twst' to call back"]
+        assert run(path) == [f"[on_twst] {path}: no function 'on_twst' for this callback"]
 
 
 @pytest.mark.parametrize(
     "name, words",
     [
-        ("script.txt", "ends in .py or .lua"),
+        ("script.txt", "must end in .py or .lua"),
         ("missing.lua", "no such file"),
         ("missing.py", "no such file"),
-        ("turtorial", "no built-in script of that name; near names are tutorial"),
+        ("turtorial", "near names are tutorial"),
         pytest.param("package://no_such_package_/x.lua", "no ROS package", marks=pytest.mark.ros),
     ],
 )

@@ -54,7 +54,7 @@ def test_names_stand_in_the_drones_namespace(caplog):
     bus.post("cmd_vel", 1)
     heard += bus.take()
     assert heard == [("relative", 1), ("absolute", 1)]
-    said = "/other/cmd_vel: no message will come: without ROS, nobody publishes it"
+    said = "/other/cmd_vel: no message will be received, because this flight runs without ROS"
     assert [one.getMessage() for one in caplog.records] == [said]
 
 
@@ -85,7 +85,7 @@ def test_the_last_messages_are_kept(queue, kept):
     heard += [message for _, message in bus.take() + bus.take()]
     assert heard == kept
     bus.end_subscription(handle)
-    with pytest.raises(ValueError, match=f"no subscription has the handle {handle}"):
+    with pytest.raises(ValueError, match=f"no subscription with the handle {handle}"):
         bus.end_subscription(handle)
 
 
@@ -102,12 +102,12 @@ def test_what_is_published(backend):
         ("/drone/front", "sensor_msgs/Image", Image(bytes([6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5]), 2, 2, "here")),
     ]
     assert [bus.subscribers(one) for one in (handle, image)] == ([0, 0] if backend is None else [1, 1])
-    with pytest.raises(ValueError, match="an image of 2 x 2 has 12 bytes, not 3"):
+    with pytest.raises(ValueError, match="an image of 2 x 2 must have 12 bytes, not 3"):
         sim_ros.imageTransportPublish(image, b"abc", 2, 2, "here")
     bus.end_publisher(handle)
     sim_ros.imageTransportShutdownPublisher(image)
     for call in (lambda: bus.publish(handle, {}), lambda: bus.subscribers(handle)):
-        with pytest.raises(ValueError, match="no publisher has the handle"):
+        with pytest.raises(ValueError, match="no publisher with the handle"):
             call()
 
 

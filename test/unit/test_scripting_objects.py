@@ -127,7 +127,7 @@ def test_a_proxy_is_where_relative_paths_begin(find, objects):
     assert find("..", proxy=propeller) == "Drone" and find(".", proxy=propeller) == "Quadricopter_propeller3"
     assert find(":/base", proxy=propeller) == "Quadricopter_base", "from the model that it is part of"
     assert find("/base", proxy=propeller) == "Quadricopter_base", "that from the root stays"
-    with pytest.raises(ValueError, match="no object has the handle 4711"):
+    with pytest.raises(ValueError, match="no object with the handle 4711"):
         find("./joint", proxy=4711)
 
 
@@ -160,7 +160,7 @@ def test_no_object_hangs_too_deep(objects, upwards):
     """However a script puts a chain together."""
     made = [objects.add(f"o{number}") for number in range(999)]
     pairs = list(zip(made[1:], made))
-    with pytest.raises(ValueError, match=r"'o\d+' cannot hang there: more than 200 objects above each other"):
+    with pytest.raises(ValueError, match=r"'o\d+' cannot be moved there"):
         for below, above in reversed(pairs) if upwards else pairs:
             objects.set_parent(below, above, True)
     assert len(objects.matrix(made[-1])) == 12

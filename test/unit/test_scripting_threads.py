@@ -166,7 +166,7 @@ def test_it_waits_for_a_signal(fly):
         ("function sysCall_thread()\n sim.wait('x')\nend", "script.lua:2: sim.wait: a number is expected"),
         ("function sysCall_thread() while true do end end", "stopped after 0.2 s"),
         ("def sysCall_thread():\n  while True: pass", "script.py:2: stopped after 0.2 s"),
-        ("def sysCall_thread():\n  yield", "sysCall_thread would not run: it has a `yield`"),
+        ("def sysCall_thread():\n  yield", "sysCall_thread would not run, because it has a `yield`"),
         (
             "function sysCall_init() c = coroutine.create(f) end function f()\n sim.wait(0.01)\n error('oh') end\n"
             "function sysCall_actuation()\n local _, e = coroutine.resume(c)\n"
@@ -194,8 +194,8 @@ def test_what_is_restored_says_that_threads_go_on(tmp_path, caplog):
     simulation.restore(simulation.snapshot())
     simulation.step()
     simulation.close()
-    assert [record.getMessage() for record in caplog.records if "goes on" in record.getMessage()] == [
-        f"{path}: its thread goes on where it is: a coroutine cannot be brought back"
+    assert [record.getMessage() for record in caplog.records if "coroutine" in record.getMessage()] == [
+        f"{path}: its thread continues where it is now, because a coroutine cannot be restored"
     ]
 
 

@@ -69,9 +69,9 @@ def test_a_name_of_the_scripts_own_is_its_own(load, caplog, ending, name):
 def test_what_coppeliasim_calls_and_nobody_here_is_said_once(load, caplog, ending):
     said, path = load(ending, "".join(define(ending, f"sysCall_{name}") for name in ("init", "msg", "joint")))
     assert said == ""
-    phases = "sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup are"
+    phases = "these are: sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup"
     assert [record.getMessage() for record in caplog.records] == [
-        f"{path}: sysCall_{name} is not called here; {phases}" for name in ("joint", "msg")
+        f"{path}: sysCall_{name} is never called here; {phases}" for name in ("joint", "msg")
     ]
 
 
@@ -80,18 +80,18 @@ def test_an_old_version_beside_the_phase_is_left_alone_but_told(load, caplog, en
     said, _ = load(ending, define(ending, "sysCall_actuation") + define(ending, "sysCall_actuation_old"))
     assert said == ""
     assert [record.getMessage().partition(": ")[2] for record in caplog.records] == [
-        "sysCall_actuation_old is not called; sysCall_actuation is"
+        "sysCall_actuation_old is never called; did you mean sysCall_actuation?"
     ]
 
 
 IDLE = (
-    "has none of sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup, sysCall_thread: "
-    "nothing flies the drone"
+    "has none of the functions sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup, sysCall_thread, "
+    "so nothing flies the drone"
 )
 
 
 @ENDINGS
-@pytest.mark.parametrize("name, more", [("fly", ""), ("actuation", "; actuation would have to be sysCall_actuation")])
+@pytest.mark.parametrize("name, more", [("fly", ""), ("actuation", "; rename actuation to sysCall_actuation")])
 def test_a_script_without_phases_is_refused(load, ending, name, more):
     said, path = load(ending, define(ending, name))
     assert said == f"[load] {path}: {IDLE}{more}"
@@ -107,7 +107,7 @@ def test_an_empty_script_says_that_nothing_flies(load, caplog, ending):
 @pytest.mark.parametrize("source", ["def sysCall_actuation():\n    yield", "async def sysCall_actuation():\n    pass"])
 def test_a_phase_that_python_would_not_run_is_refused(load, source):
     said, path = load("py", source)
-    assert said == f"[load] {path}:1: sysCall_actuation would not run: it has a `yield` or is `async`"
+    assert said == f"[load] {path}:1: sysCall_actuation would not run, because it has a `yield` or is `async`"
 
 
 @pytest.mark.parametrize("word", ["actuaton", "init", "Sensing"])
@@ -210,7 +210,7 @@ def test_a_callback_may_be_defined_later_in_the_file(load, ending):
 def test_a_callback_that_is_not_there_is_told_after_init_with_near_names(load, ending):
     subscribe = define(ending, "sysCall_init", "simROS.subscribe('/x', 'std_msgs/Int32', 'on_twst')")
     said, path = load(ending, subscribe + define(ending, "on_twist"))
-    assert said == f"[on_twst] {path}: the script has no function 'on_twst' to call back; near names are on_twist"
+    assert said == f"[on_twst] {path}: no function 'on_twst' for this callback; near names are on_twist"
 
 
 @ENDINGS
@@ -231,11 +231,11 @@ def test_a_callback_that_is_subscribed_in_flight_is_checked_in_the_next_step(tmp
         (
             "cmd_vel",
             "geometry_msgs/Twst",
-            "messages on /drone/cmd_vel are of the type geometry_msgs/Twist, not 'geometry_msgs/Twst'",
+            "messages on /drone/cmd_vel have the type geometry_msgs/Twist, not 'geometry_msgs/Twst'",
         ),
-        ("/drone/cmd_vel", "std_msgs/Float32", "messages on /drone/cmd_vel are of the type geometry_msgs/Twist"),
-        ("/x", "Twist", "'Twist' is no message type; one is, for example, geometry_msgs/Twist"),
-        ("/x", "geometry_msgs.msg.Twist", "is no message type"),
+        ("/drone/cmd_vel", "std_msgs/Float32", "messages on /drone/cmd_vel have the type geometry_msgs/Twist"),
+        ("/x", "Twist", "'Twist' is not a message type"),
+        ("/x", "geometry_msgs.msg.Twist", "is not a message type"),
     ],
 )
 def test_a_wrong_message_type_is_refused(load, ending, topic, kind, words):

@@ -72,7 +72,7 @@ def test_a_person_sees_and_answers(fly):
     windows.answer(height["handle"], "ok", "1.5")
     assert windows.changes > changes and len(windows.state()["dialogs"]) == 1
     assert result(simulation) == repr((4, 1, "1.5"))
-    with pytest.raises(ValueError, match="no open dialog has the handle"):
+    with pytest.raises(ValueError, match="no open dialog with the handle"):
         windows.answer(land["handle"], "yes")
     for _ in range(5):
         simulation.step()

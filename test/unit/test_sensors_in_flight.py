@@ -247,9 +247,9 @@ def test_a_script_reads_any_sensor_by_its_message(sim):
 @pytest.mark.parametrize(
     "call, words",
     [
-        (lambda sim: sim.readProximitySensor(sim.getObject("/imu")), "'imu' is no sensor of the kind range"),
-        (lambda sim: sim.readSensor(sim.getObject("/Box")), "there are: down, imu, odd"),
-        (lambda sim: sim.readSensor(9999), "no object has the handle 9999"),
+        (lambda sim: sim.readProximitySensor(sim.getObject("/imu")), "'imu' is neither a range sensor"),
+        (lambda sim: sim.readSensor(sim.getObject("/Box")), "known are down, imu, odd"),
+        (lambda sim: sim.readSensor(9999), "no object with the handle 9999"),
     ],
 )
 def test_a_script_s_mistake(sim, call, words):

@@ -53,8 +53,14 @@ def refused(overrides):
             "sensors/imu/topic = 'imu': its data would be imu/data",
         ),
         ({"range": {**RANGE, "topic": "front"}}, "which is the image of cameras/front"),
-        ({"a": IMU, "b": {**IMU, "topic": "b", "object": "a"}}, "sensors/b/object = 'a': is that of sensors/a too"),
-        ({"a": {**IMU, "object": "FrontVision"}}, "sensors/a/object = 'FrontVision': is that of cameras/front too"),
+        (
+            {"a": IMU, "b": {**IMU, "topic": "b", "object": "a"}},
+            "sensors/b/object = 'a': is also the name of sensors/a",
+        ),
+        (
+            {"a": {**IMU, "object": "FrontVision"}},
+            "sensors/a/object = 'FrontVision': is also the name of cameras/front",
+        ),
         ({"range": {**RANGE, "min_range": 4.0}}, "sensors/range/min_range = 4: must be less than max_range = 4"),
         ({"range": {**RANGE, "radiation": "sound"}}, "radiation = 'sound': input should be 'ultrasound' or 'infrared'"),
         ({"battery": {**BATTERY, "empty": 5.0}}, "sensors/battery/empty = 5: must not be more than full = 4.2"),
@@ -67,9 +73,9 @@ def refused(overrides):
         ({"a": {**IMU, "frame": "Track_base"}}, "sensors/a/frame = 'Track_base': is that of the vehicle"),
         ({"a": {**IMU, "frame": "track_optical"}}, "sensors/a/frame = 'track_optical': is that of cameras/track"),
         ({f"s{number}": {} for number in range(70)}, "parameter sensors"),
-        ({"a": {**IMU, "frame": "base_link", "mount": DOWN}}, "sensor a: the URDF has the place of base_link"),
+        ({"a": {**IMU, "frame": "base_link", "mount": DOWN}}, "sensor a: the URDF already has a link base_link"),
         ({"a": {**IMU, "mount": {**DOWN, "parent": "Nobody"}}}, "sensor a: no object is named Nobody"),
-        ({"Drone": IMU}, "sensor Drone: an object named 'Drone' is there already"),
+        ({"Drone": IMU}, "sensor Drone: an object named 'Drone' already exists"),
     ],
 )
 def test_a_mistake_gets_one_line(sensors, words):

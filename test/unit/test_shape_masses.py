@@ -99,5 +99,5 @@ def test_the_form_of_a_shape(simulation, sim, name, info):
 
 
 def test_what_is_no_shape_has_no_form(simulation, sim):
-    with pytest.raises(TypeError, match="'Goal' is no shape"):
+    with pytest.raises(TypeError, match="'Goal' is not a shape"):
         sim.getShapeGeomInfo(simulation.context.objects.handle("Goal"))

@@ -219,7 +219,7 @@ def test_a_scene_that_cannot_be_built_leaves_the_last_one_standing(simulate, tmp
     scene.write_text("objects: [{name: Drone, shape: sphere, size: [1], position: [9, 0, 1]}]")
     before = resources()[1:]
     for _ in range(3):
-        with pytest.raises(parameters.ParameterError, match="named 'Drone' is there already"):
+        with pytest.raises(parameters.ParameterError, match="named 'Drone' already exists"):
             simulation.start(scene_file=str(scene))
     assert simulation.world is world and simulation.drone is drone and resources()[1:] == before
     simulation.start()
@@ -264,7 +264,7 @@ def test_a_world_with_a_window_is_filled_anew_and_flies_alike(simulate, tmp_path
     world, path = simulation.world, fly(simulation, 10)
     scene = tmp_path / "scene.yaml"
     scene.write_text("objects: [{name: Drone, shape: sphere, size: [1], position: [9, 0, 1]}]")
-    with pytest.raises(parameters.ParameterError, match="named 'Drone' is there already"):
+    with pytest.raises(parameters.ParameterError, match="named 'Drone' already exists"):
         simulation.start(scene_file=str(scene))
     simulation.start()
     assert simulation.world is world

@@ -149,7 +149,7 @@ def test_a_twist_does_not_move_what_has_landed_and_says_why_once(landed, caplog)
         after = fly(landed, 0.2)[-1].position
     assert after == pytest.approx(before, abs=1e-3)
     assert [one.getMessage() for one in caplog.records] == [
-        "cmd_vel does not move the drone: it is landed; `takeoff` first"
+        "cmd_vel does not move the drone: it is landed; send `takeoff` first"
     ]
 
 
@@ -175,7 +175,7 @@ def test_goto_is_refused_on_the_ground(landed, caplog):
         landed.drone.ask("goto", Pose((1.0, 0.0, 1.0)))
         fly(landed, 3.0)
     assert [one.getMessage() for one in caplog.records] == 2 * [
-        "goto does not move the drone: it is landed; `takeoff` first"
+        "goto does not move the drone: it is landed; send `takeoff` first"
     ]
 
 
@@ -291,9 +291,9 @@ def test_requests_at_the_wrong_moment(landed, caplog):
     for topic in ("land", "takeoff", "home"):
         landed.drone.ask(topic)
     fly(landed, 0.1)
-    crashed = "does not move the drone: it is crashed; `reset` puts it back"
+    crashed = "does not move the drone: it is crashed; `reset` puts it back at its start"
     assert [one.getMessage() for one in caplog.records if one.levelno == logging.WARNING] == [
-        "goto does not move the drone: it is taking off; wait until it flies",
+        "goto does not move the drone: it is taking off; wait until it is flying",
         *(f"{topic} {crashed}" for topic in ("takeoff", "land", "home")),
     ]
 
@@ -319,9 +319,9 @@ def test_another_script_has_no_states_and_that_is_said(caplog):
         simulation.drone.ask(topic)
     assert str(simulation.drone.flight_state) == "unknown: the script does not subscribe to takeoff"
     assert [one.getMessage() for one in caplog.records] == [
-        "takeoff: no effect: the child script does not subscribe to it; `pilot` does",
-        "land: no effect: the child script does not subscribe to it; `pilot` does",
-        "reset: no effect: the child script does not subscribe to it; `pilot` does",
+        "takeoff: no effect: the child script does not subscribe to this topic; `pilot` does",
+        "land: no effect: the child script does not subscribe to this topic; `pilot` does",
+        "reset: no effect: the child script does not subscribe to this topic; `pilot` does",
     ]
     simulation.close()
 
@@ -377,8 +377,8 @@ def test_the_diagnosis_says_the_state(landed):
     landed.drone.commands.receive(FORWARD)
     found = VehicleDiagnosis(landed.drone, player, log, None).finding()
     assert found.values["flight state"] == "landed"
-    assert found.message == "landed: commands of /pilot do not move it; `takeoff` first"
+    assert found.message == "landed: commands of /pilot do not move it; send `takeoff` first"
     landed.drone.body.move(ON_ITS_BACK)
     until(landed, "crashed")
     found = VehicleDiagnosis(landed.drone, player, log, None).finding()
-    assert found.message.startswith("crashed: `reset` puts it back where it began")
+    assert found.message.startswith("crashed: `reset` puts it back")

@@ -30,16 +30,16 @@ def test_a_table_is_drawn_as_the_flight_was(tmp_path, monkeypatch):
     [
         (b"", "is empty"),
         (b"a,b\n1,2\n", "line 1 is 'a,b': a table of `fly --csv` begins with t [s],x [m],..."),
-        (HEADER, "has a header and no rows"),
+        (HEADER, "has a header but no rows"),
         (HEADER[:50], "line 1 is "),
-        (HEADER + ROW + ROW[:20], "line 3: is cut off"),
-        (HEADER + ROW[:-1], "line 2: is cut off"),
+        (HEADER + ROW + ROW[:20], "line 3: has"),
+        (HEADER + ROW[:-1], "line 2: has"),
         (HEADER + ROW.replace("0.8", "high"), "line 2: could not convert string to float: 'high'"),
         (HEADER + ROW.replace("0.8", "nan"), "line 2: must hold numbers below 1e+09"),
         (HEADER + ROW.replace("0.8", "-1e300"), "line 2: must hold numbers below 1e+09"),
         (HEADER + ROW + ROW, "line 3: the time 0 s is not after 0 s"),
-        (HEADER + "1" * 100_000, "line 2: is cut off"),
-        (b"\x89PNG\r\n\xff\xfe\n", "is no text"),
+        (HEADER + "1" * 100_000, "line 2: has"),
+        (b"\x89PNG\r\n\xff\xfe\n", "is not a text file"),
     ],
 )
 def test_what_is_no_table_gets_one_line(tmp_path, capsys, content, said):

@@ -86,7 +86,7 @@ def test_a_flight_that_fails_leaves_its_film_and_one_that_cannot_begin_the_last_
     for wrong in (["--script", "nowhere.py"], ["--duration", "0"]):
         assert main([*wrong, *arguments]) == 1
         assert out.read_bytes() == before
-    assert "no picture came" in capsys.readouterr().err
+    assert "no picture was received" in capsys.readouterr().err
 
 
 # ---- pictures of any kind
@@ -111,7 +111,7 @@ def test_depth_is_grey_and_colours_are_what_they_are():
 
 def test_a_film_that_cannot_be_written_whole_is_told(tmp_path):
     path = tmp_path / "out.mp4"
-    said = r"out\.mp4: 0 of 3 pictures could be written"
+    said = r"out\.mp4: only 0 of 3 pictures were written"
     with pytest.raises(OSError, match=said), video.writing_to(str(path), 20) as film:
         film.add(grey(), None, times=3)
         film._path = str(tmp_path / "elsewhere.mp4")

@@ -251,21 +251,21 @@ def _chain(length):
 
 REFUSED = {
     "empty": (b"", "is empty"),
-    "foreign": (b"solid cube" * 200, "is no file of V-REP"),
+    "foreign": (b"solid cube" * 200, "is not a file of V-REP"),
     "no header": (b"VREP1234", "is cut"),
     "too new": (container(b"", version=30)[:8] + struct.pack("<i", 30) + container(b"")[12:], "has format"),
     "too old": (container(b"", version=12), "has format 12"),
     "compressed otherwise": (container(b"")[:12] + b"\7" + container(b"")[13:], "has compression 7"),
-    "negative length": (container(b"", length=-5), "says that it has -5 bytes"),
+    "negative length": (container(b"", length=-5), "has -5 bytes"),
     "huge": (container(b"", length=2**31 - 1), "at most"),
-    "longer than it is": (container(b"EOF", length=1000), "is cut: 3 of 1000 bytes"),
-    "no end": (container(b""), "has no EOF"),
+    "longer than it is": (container(b"EOF", length=1000), "is cut off: it has 3 of 1000 bytes"),
+    "no end": (container(b""), "EOF, is missing"),
     "one leaf": (container(b"x" * 100, compressed=True)[:1021] + b"\xff" * 100, "Huffman tree of one leaf"),
     "endless tree": (container(b"x" * 100, compressed=True)[:1021] + b"\0" * 5000, "Huffman tree of more than"),
     "a loop of parents": (file(scene_object("DMY", 0, "A", 1), scene_object("DMY", 1, "B", 0)), "object A: is its own"),
     "its own parent": (file(scene_object("DMY", 0, "A", 0)), "object A: is its own ancestor"),
     "no such parent": (file(scene_object("DMY", 0, "A", 7)), "object A: its parent 7 is not in the file"),
-    "a handle twice": (file(scene_object("DMY", 0, "A"), scene_object("DMY", 0, "B")), "has its handle 0"),
+    "a handle twice": (file(scene_object("DMY", 0, "A"), scene_object("DMY", 0, "B")), "has the same handle 0"),
     "not a number": (file(scene_object("DMY", 0, "A", at=(math.nan, 0, 0))), "object A: Cfq: the number nan"),
     "no rotation": (file(scene_object("DMY", 0, "A", turned=(0, 0, 0, 0))), "object A: _fq: its quaternion has"),
     "no such vertex": (
@@ -278,7 +278,7 @@ REFUSED = {
         "object A: Par: 1073741824 script parameters",
     ),
     "deep compounds": (_nested(100), "deeper than 16"),
-    "a deep tree": (_chain(300), "deeper than 200"),
+    "a deep tree": (_chain(300), "more than 200 ancestors"),
 }
 
 

@@ -133,8 +133,14 @@ def refuse(topic):
     now = sim.getSimulationTime()
     if now - self.refused.get(topic, -math.inf) >= AGAIN:
         self.refused[topic] = math.inf if topic == "cmd_vel" else now
-        cures = {LANDED: "`takeoff` first", CRASHED: "`reset` puts it back", LANDING: "`takeoff` breaks that off"}
-        said = f"{topic} does not move the drone: it is {self.state}; {cures.get(self.state, 'wait until it flies')}"
+        cures = {
+            LANDED: "send `takeoff` first",
+            CRASHED: "`reset` puts it back at its start",
+            LANDING: "`takeoff` interrupts the landing",
+        }
+        said = (
+            f"{topic} does not move the drone: it is {self.state}; {cures.get(self.state, 'wait until it is flying')}"
+        )
         sim.addLog(sim.verbosity_scriptwarnings, said)
 
 

@@ -194,7 +194,7 @@ def _wrong_choice(choice: _Choice, location: Location, value: Mapping[str, Any])
     if key in value:
         return ParameterProblem((*location, key), _must_be_one_of(choice, key), shown(value[key]))
     meant = difflib.get_close_matches(key, map(str, value), 1)
-    instead = f" (there is {shown(meant[0])})" if meant else ""
+    instead = f" (did you mean {key} instead of {shown(meant[0])}?)" if meant else ""
     return ParameterProblem((*location, key), f"missing{instead}; {_must_be_one_of(choice)}", or_above=True)
 
 
@@ -231,5 +231,5 @@ def _below(model: type[BaseModel], key: str) -> str:
     """Return 'there is a/key' where the key belongs into a mapping of the model, '' where into none."""
     for name, field in model.model_fields.items():
         if key in getattr(_bare(field.annotation), "model_fields", {}):
-            return f"there is {field.alias or name}/{key}"
+            return f"did you mean {field.alias or name}/{key}?"
     return ""

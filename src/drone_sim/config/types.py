@@ -202,9 +202,9 @@ NAME = r"^[A-Za-z][A-Za-z0-9_]*$"
 TOPIC = r"^[A-Za-z][A-Za-z0-9_]*(/[A-Za-z0-9_]+)*$"
 ADDRESS = r"^(\*|[A-Za-z0-9.:\[\]-]+)$"
 PATTERNS = {
-    NAME: "must be a letter and then letters, digits or _",
-    TOPIC: "must be like rear/image: letters, digits and _, a letter first, parted by /",
-    ADDRESS: "must be like 127.0.0.1, or * for all of this machine's addresses",
+    NAME: "must begin with a letter and contain only letters, digits and _",
+    TOPIC: "must be like rear/image: letters, digits and _, beginning with a letter, separated by /",
+    ADDRESS: "must be an address such as 127.0.0.1, or * for all addresses of this machine",
 }
 Name = Annotated[str, Field(pattern=NAME, max_length=MAX_NAME)]
 

@@ -78,7 +78,7 @@ def _parsed(text: str) -> Any:
             return yaml_files.parse(one)
         except yaml_files.YamlError as error:
             troubles.append(error)
-    raise ParameterError(f"the pasted text {shown(text)} is no YAML, {troubles[0]}: it {_LIKE}")
+    raise ParameterError(f"the pasted text {shown(text)} is not YAML ({troubles[0]}): it {_LIKE}")
 
 
 def _with_files(value: Any, name: Callable[[FoundFile], str]) -> Any:

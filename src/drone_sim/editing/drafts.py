@@ -88,7 +88,7 @@ class Drafts:
     def take(self) -> Draft:
         """Return the offered draft, and offer it no longer. Raises ValueError where there is none."""
         if self.offered is None or self._left is None:
-            raise ValueError("there is no draft")
+            raise ValueError("there is no draft of a scene")
         taken, self.offered = self.offered, None
         with contextlib.suppress(OSError):
             self._left.unlink(missing_ok=True)

@@ -159,7 +159,7 @@ class EditOperations:
         handle = self._scene.handle(op.object)
         if self._scene.is_root(handle):
             if not op.script:
-                raise ValueError("a vehicle's script is its key `script`: attach_script needs the file")
+                raise ValueError("attach_script to a vehicle needs a file, which becomes its key `script`")
             self._vehicles.set(handle, {"script": op.script})
         else:
             scripts.attach(self._scene, handle, op.script, op.language, op.parameters)
@@ -168,7 +168,7 @@ class EditOperations:
 def _unit(quaternion: Quaternion) -> Quaternion:
     length = math.hypot(*quaternion)
     if length < _SHORTEST:
-        raise ValueError(f"quaternion: has the length {length:g}: must be about 1")
+        raise ValueError(f"quaternion: its length is {length:g}: must be about 1")
     x, y, z, w = (one / length for one in quaternion)
     return x, y, z, w
 

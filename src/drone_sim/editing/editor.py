@@ -184,7 +184,9 @@ class SceneEditor:
 
     def _write(self, request: records.Write) -> dict[str, Any]:
         if request.revision not in (None, self.revision):
-            raise ValueError(f"the scene has changed meanwhile (revision {self.revision}): look at its text again")
+            raise ValueError(
+                f"the scene has changed since this text was read (revision {self.revision}): read its text again"
+            )
         return self._take_text(request.write)
 
     def _take_text(self, written: str) -> dict[str, Any]:
@@ -217,8 +219,12 @@ class SceneEditor:
     def _save(self, request: records.Save) -> dict[str, Any]:
         path = self.files.save(None if request.save is True else str(request.save))
         if self.simulation.running:
-            copied = "" if path == self.scene.document.file else ": a copy. To save the scene itself, stop first"
-            return self._answer(f"saved {path} as it is in flight{copied}", file=str(path))
+            copied = (
+                ""
+                if path == self.scene.document.file
+                else ". This is a copy: to save the scene itself, stop the simulation first"
+            )
+            return self._answer(f"saved the scene as it is in flight to {path}{copied}", file=str(path))
         self._saved = self.revision
         return self._answer(f"saved {path}", file=str(path))
 
@@ -242,10 +248,10 @@ class SceneEditor:
     def _draft(self, word: str) -> dict[str, Any]:
         draft = self._drafts.take()
         if word == "drop":
-            return self._answer("the draft is dropped")
+            return self._answer("the draft was discarded")
         self._open(draft.file if draft.file and Path(draft.file).is_file() else None)
         self._take_text(draft.text)
-        return self._answer("the draft is taken", file=self.scene_file)
+        return self._answer("the draft was opened", file=self.scene_file)
 
 
 def _name(operations: list[Any]) -> str:

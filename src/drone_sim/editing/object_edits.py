@@ -84,7 +84,9 @@ class ObjectEdits:
         operations = self._scene.operations
         whole = [*dict.fromkeys(part for one in handles for part in operations.model(one))]
         if len(places) * len(whole) > scene_parameters.MAX_OBJECTS:
-            raise ValueError(f"{len(places) * len(whole)} copies: a scene has at most {scene_parameters.MAX_OBJECTS}")
+            raise ValueError(
+                f"{len(places) * len(whole)} copies: a scene has at most {scene_parameters.MAX_OBJECTS} objects"
+            )
         made = []
         for place in places:
             new = dict(zip(whole, operations.copy(whole)))
@@ -153,7 +155,7 @@ class ObjectEdits:
         """Set the values that need no new body in the world; return the values that are left."""
         for key, word in _OTHERWISE.items():
             if key in values:
-                raise ParameterError(f"{key}: `{word}` changes it")
+                raise ParameterError(f"{key}: cannot be set here; use the operation `{word}`")
         operations, values = self._scene.operations, dict(values)
         parameters = values.pop("script_parameters", None)
         if parameters is not None:
@@ -211,7 +213,7 @@ class ObjectEdits:
 def _default(entry: EntryParameters, key: str) -> Any:
     field = type(entry).model_fields.get(key)
     if field is None or field.is_required():
-        raise ParameterError(f"{key}: has no default")
+        raise ParameterError(f"{key}: cannot be reset, because it has no default")
     return field.get_default(call_default_factory=True)
 
 

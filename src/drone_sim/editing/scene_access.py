@@ -110,7 +110,7 @@ class SceneAccess:
         """Refuse what no flight can go on with."""
         for key in _FIXED:
             if settings.get(key) != self.settings.get(key):
-                raise ValueError(f"{key}: is changed while the simulation is stopped: stop it first")
+                raise ValueError(f"{key}: can only be changed while the simulation is stopped: stop it first")
 
     def _only_moves(self, settings: Settings, parameters: Parameters) -> bool:
         """Tell whether only the places of vehicles differ."""

@@ -97,11 +97,11 @@ class SceneFiles:
         if name is not None:
             path = locate(name)
             if path.suffix not in (".yaml", ".yml"):
-                raise ParameterError(f"{name[:80]}: a scene is saved as a .yaml file")
+                raise ParameterError(f"{name[:80]}: the name of a scene must end in .yaml")
             if not path.is_absolute():
                 path = self._scene.folder / path
             if _is_kept(path):
-                raise ParameterError(f"{name[:80]}: the files of the package stay as they are: give another name")
+                raise ParameterError(f"{name[:80]}: files of the package cannot be overwritten: give another name")
             return path.resolve()
         file = self._scene.document.file
         if file is not None and not _is_kept(file):

@@ -65,7 +65,7 @@ def _new(folder: Path, name: str, language: str) -> str:
         if not path.exists():
             writing.write_new(path, _TEXTS[language])
             return path.name
-    raise ValueError(f"{folder}: has a thousand scripts of the name {stem}")
+    raise ValueError(f"{folder}: already has a thousand scripts named {stem}")
 
 
 def set_parameters(scene: SceneAccess, handle: int, parameters: Any) -> None:

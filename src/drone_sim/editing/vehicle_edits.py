@@ -73,7 +73,7 @@ class VehicleEdits:
         """Return the name of a vehicle, and the entry that a copy of it would have."""
         vehicle = self._vehicle(handle)
         if not self._scene.is_root(handle):
-            raise ValueError(f"'{self._scene.tree[handle].name}' is a part of a vehicle: copy that")
+            raise ValueError(f"'{self._scene.tree[handle].name}' is a part of a vehicle: copy the vehicle instead")
         own = self._said()[vehicle.name]
         return vehicle.name, {key: value for key, value in own.items() if key not in ("suffix", "objects")}
 
@@ -117,7 +117,7 @@ class VehicleEdits:
             self._set_part(handle, name=name, alias=name)
             return [handle]
         if name != vehicle.name and name in said:
-            raise ParameterError(f"a vehicle named '{name}' is there already")
+            raise ParameterError(f"a vehicle named '{name}' already exists")
         self._say({name if one == vehicle.name else one: values for one, values in said.items()})
         return [self.root(scene.simulation.vehicles[name])]
 
@@ -169,7 +169,9 @@ class VehicleEdits:
         part = self._part(handle)
         if part is not None:
             where = f"{part.among}/{part.key}/mount"
-            raise ValueError(f"'{name}' is a part of '{vehicle.name}': where it sits is written in the text, {where}")
+            raise ValueError(
+                f"'{name}' is a part of '{vehicle.name}': change its pose in the text of the scene, at {where}"
+            )
         own["objects"] = merged(own.get("objects") or {}, {name: values})
         self._say(said)
 
@@ -214,7 +216,7 @@ class VehicleEdits:
     def _vehicle(self, handle: int) -> Vehicle:
         found = self._scene.vehicle_of(handle)
         if found is None:
-            raise ValueError(f"'{self._scene.tree[handle].name}' is the floor: its size can be changed, and no more")
+            raise ValueError(f"'{self._scene.tree[handle].name}' is the floor: only its size can be changed")
         return found
 
 

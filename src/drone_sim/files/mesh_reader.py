@@ -115,7 +115,7 @@ def _check_text(content: bytes, kind: str) -> None:
             raise ValueError("must have no DOCTYPE")
     for word, (pattern, most) in _MOST.get(kind, {}).items():
         if len(re.findall(pattern, content)) > most:
-            raise ValueError(f"more than {most} times `{word}`")
+            raise ValueError(f"must not contain more than {most} `{word}`")
 
 
 def _placed(loaded: Any) -> Iterator[trimesh.Trimesh]:

@@ -57,7 +57,7 @@ def locate(name: str) -> Path:
     try:
         return Path(name).expanduser()
     except RuntimeError:
-        raise FileNotFoundError(f"no such home: {shown(name)}") from None
+        raise FileNotFoundError(f"{shown(name)}: this user's home folder does not exist") from None
 
 
 def resolve(name: str) -> Path:

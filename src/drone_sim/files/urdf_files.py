@@ -148,7 +148,7 @@ def _check_tree(links: Sequence[Xml.Element], joints: Sequence[Xml.Element], kin
             raise ValueError(f"{_called(joint)}: type {kind!s:.60}: must be {', '.join(kinds[:-1])} or {kinds[-1]}")
         ends = {end: _end(joint, end, names) for end in ("parent", "child")}
         if ends["child"] in parents:
-            raise ValueError(f"link {ends['child']}: hangs on two joints, one of them {joint.get('name')}")
+            raise ValueError(f"link {ends['child']}: is the child of two joints, one of them {joint.get('name')}")
         parents[ends["child"]] = ends["parent"]
     roots = [name for name in names if name not in parents]
     if len(roots) != 1:
@@ -167,7 +167,7 @@ def _names(elements: Sequence[Xml.Element]) -> list[str]:
         if not name or len(name) > MAX_NAME or not name.isprintable():
             raise ValueError(f"{element.tag} name={shown(name)}: must be a name of 1 to {MAX_NAME} characters")
         if name in names:
-            raise ValueError(f"{element.tag} {name}: comes twice")
+            raise ValueError(f"{element.tag} {name}: is defined twice")
         names[name] = None
     return list(names)
 
@@ -176,7 +176,7 @@ def _end(joint: Xml.Element, end: str, links: Sequence[str]) -> str:
     element = joint.find(end)
     name = "" if element is None else element.get("link", "")
     if element is None:
-        raise ValueError(f"{_called(joint)}: no {end}")
+        raise ValueError(f"{_called(joint)}: {end} is missing")
     if name not in links:
         raise ValueError(f"{_called(joint)}: {end} {shown(name)}: there is no such link")
     return name

@@ -20,7 +20,7 @@ MAX_SIZE = MEBIBYTE  # bytes of a file
 MAX_DEPTH = 32  # lists and mappings within each other
 MAX_VALUES = 100_000  # keys and values, each alias counted with all that it stands for
 _MAX_DIGITS = 400  # of a number
-_TOO_DEEP = f"lists and mappings are more than {MAX_DEPTH} deep"
+_TOO_DEEP = f"lists and mappings are nested more than {MAX_DEPTH} deep"
 _OTHER = ("int", "float", "timestamp")  # what YAML 1.1 reads in ways of its own
 _INT = re.compile(r"[-+]?(?:[0-9]+|0x[0-9a-fA-F]+)$")
 _FLOAT = re.compile(
@@ -164,7 +164,7 @@ def _too_deep(node: Any) -> yaml.MarkedYAMLError:
 
 
 def _too_much(node: Any) -> yaml.MarkedYAMLError:
-    return _refused(node, f"more than {MAX_VALUES} values, aliases counted with what they stand for")
+    return _refused(node, f"holds more than {MAX_VALUES} values once its aliases are expanded")
 
 
 def _number(loader: _Loader, node: Any) -> float:
@@ -174,7 +174,7 @@ def _number(loader: _Loader, node: Any) -> float:
     if _INT.match(text):
         return int(text, 16 if "x" in text else 10)
     if not _FLOAT.match(text):
-        raise _refused(node, f"{shown(text)} is no number")
+        raise _refused(node, f"{shown(text)} is not a number")
     return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
 
 
@@ -215,9 +215,9 @@ def _check_keys(node: yaml.MappingNode) -> None:
         if key.tag == "tag:yaml.org,2002:merge":
             continue
         if key.tag != "tag:yaml.org,2002:str":
-            raise _refused(key, f"key {shown(key.value) if isinstance(key, yaml.ScalarNode) else '?'} must be a text")
+            raise _refused(key, f"key {shown(key.value) if isinstance(key, yaml.ScalarNode) else '?'} must be a string")
         if key.value in seen:
-            raise _refused(key, f"key {shown(key.value)} comes twice")
+            raise _refused(key, f"key {shown(key.value)} is given twice")
         seen.add(key.value)
 
 

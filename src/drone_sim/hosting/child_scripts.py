@@ -86,7 +86,7 @@ class HostedScript(ABC):
         """
         reached = [one.propulsion for one in self.reached()]
         if not reached:
-            raise ValueError(f"'{name}' is not a part of a vehicle: no vehicle flies")
+            raise ValueError(f"'{name}' is not a part of a vehicle: the scene has no vehicle")
         return next(filter(has, reached), reached[0])
 
     @property

@@ -85,12 +85,14 @@ class ScriptScheduler:
         """Return the object of a script; None for one of a vehicle that may still come. Raises ParameterError."""
         objects = self._context.objects
         if name not in objects and (objects.is_copied(plain(name)) or (plain(name) != name and plain(name) in objects)):
-            _LOG.warning("no object is named '%s' now: its script waits for a vehicle with that object", name)
+            _LOG.warning(
+                "there is no object named '%s' yet: its script starts once a vehicle with such an object is added", name
+            )
             return None
         try:
             handle = objects.handle(name)
             if any(objects[handle] is one.object for one in self._vehicles.values()):
-                raise ValueError(f"'{name}' already has a script: that of the key `script` of its vehicle")
+                raise ValueError(f"'{name}' already has a script, which the key `script` of its vehicle names")
         except ValueError as error:
             place = self._place(("scripts", index, "object"))
             raise ParameterError(f"{place}: scripts/{index}/object: {error}") from None

@@ -22,7 +22,7 @@ TOPIC = "parameter_updates"
 _CONDITIONS = ("weather", "faults")  # of a flight: the next one begins with its own
 _HEIGHT = "takeoff_height"  # which scripts read, too
 _READ = (CONTROL, _HEIGHT)  # what is of no effect where the script does not read it
-_TEXT = f"a text of at most {LONGEST} characters"
+_TEXT = f"a string of at most {LONGEST} characters"
 _WORDS = {float: "a finite number", int: "a whole number", bool: "true or false", str: _TEXT}
 
 
@@ -195,7 +195,7 @@ class Tuning:
         try:
             self.change({name: one for name, one in self.chosen.items() if name in known})
         except ParameterError as error:
-            _LOG.warning("%s does not keep all of its tuned values: %s", self._vehicle.name, error)
+            _LOG.warning("%s lost some of its tuned values: %s", self._vehicle.name, error)
 
     def begin(self, before: Mapping[str, Any]) -> None:
         """Give the script's parameters the values that files or tuning say: those of its init are only defaults.

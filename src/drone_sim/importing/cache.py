@@ -33,7 +33,7 @@ def imported_scene(path: Path) -> Path:
     else:
         renew(path.parent, folder)
     if (folder / LIST).is_file():
-        _LOG.warning("%s: imported into %s; some things differ from the file: see %s", path, folder, LIST)
+        _LOG.warning("%s: imported into %s; it differs from the file in some ways, listed in %s", path, folder, LIST)
     else:
         _LOG.info("%s: imported into %s", path, folder)
     return folder / SCENE

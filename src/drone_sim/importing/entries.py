@@ -70,14 +70,17 @@ class Entries:
         assert shape is not None  # for mypy: the table says so
         moves = one.is_dynamic and not _is_only_carried(one)
         if one.is_dynamic and not moves:
-            self._report.add(one.name, "hangs on a joint that only scripts move: carried by it, with no mass")
+            self._report.add(
+                one.name,
+                "is the child of a joint that only scripts move: imported without mass, and moves with the joint",
+            )
         try:
             keys = form(one.name, shape, self._writer, is_solid=moves)
         except TooLarge as error:
-            self._report.add(one.name, f"only its place is imported: {error}")
+            self._report.add(one.name, f"only its pose is imported: {error}")
             return None
         if keys is None:
-            self._report.add(one.name, "only its place is imported: it has no surface")
+            self._report.add(one.name, "only its pose is imported, because it has no surface")
             return None
         if moves:
             keys["mass"] = number(max(shape.mass, _LEAST_MASS))
@@ -101,7 +104,7 @@ class Entries:
             turns = [numbers([one / length for one in point[3:]]) for point, length in zip(of.path, lengths)]
             return {**points, "turns": turns}
         if of.linked >= 0:
-            self._report.add(one.name, "its link to another dummy is not imported")
+            self._report.add(one.name, "its link to another dummy is not imported: it holds nothing together")
         return {"kind": "dummy", "size": number(of.size)} if of.size > 0 else {"kind": "dummy"}
 
     def _path(self, one: Placed) -> dict[str, Any]:
@@ -113,12 +116,12 @@ class Entries:
         joint = one.object.of
         assert isinstance(joint, VrepJoint)
         if joint.kind == "screw":
-            self._report.add(one.name, "a screw: it turns without sliding")
+            self._report.add(one.name, "a screw joint is imported as a revolute joint: it turns without sliding")
         kind = "revolute" if joint.kind == "screw" else joint.kind
         keys: dict[str, Any] = {"kind": "joint", "type": kind}
         if joint.kind == "spherical":
             if abs(joint.turn.orientation[3]) < 1 - 1e-9:
-                self._report.add(one.name, "a spherical joint: it begins unturned")
+                self._report.add(one.name, "a spherical joint: its initial rotation is not imported")
             return keys
         if joint.limits is not None and joint.limits[0] < joint.limits[1]:
             keys["limits"] = numbers(joint.limits)
@@ -166,7 +169,7 @@ class Entries:
     def _other(self, one: Placed) -> dict[str, Any]:
         kind = getattr(one.object.of, "kind", "object")
         if kind not in (*_WITHOUT_LOSS, "light"):
-            self._report.add(one.name, f"a {kind}: only its place is imported")
+            self._report.add(one.name, f"a {kind}: only its pose is imported")
         return {"kind": _WITHOUT_LOSS.get(kind, "dummy")}
 
 

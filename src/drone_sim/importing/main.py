@@ -25,9 +25,9 @@ def _import(path: Path, out: str | None, force: bool) -> Imported:
         raise VrepFileError(f"{path}: must end in {' or '.join(SUFFIXES)}")
     folder = path.with_suffix("") if out is None else Path(out)
     if folder.exists() and not folder.is_dir():
-        raise VrepFileError(f"{folder}: is no folder")
+        raise VrepFileError(f"{folder}: is not a folder")
     if folder.is_dir() and any(folder.iterdir()) and not force:
-        raise VrepFileError(f"{folder}: is not empty; name another folder after the file, or give --force")
+        raise VrepFileError(f"{folder}: is not empty: give another folder as second argument, or --force")
     return import_file(path, folder)
 
 

@@ -39,9 +39,9 @@ def curved_path(name: str, path: VrepPath, report: Report) -> dict[str, Any]:
         report.add(name, "a path: its velocity profile is not imported")
     broken = path.broken + len(path.points) - len(there)
     if broken:
-        report.add(name, f"a path: {broken} of its control points are nowhere: left out")
+        report.add(name, f"a path: {broken} of its control points are not finite: left out")
     if share < 1:
-        report.add(name, f"a path: its curves have fewer points, of which a path has {MAX_LINE} at most")
+        report.add(name, f"a path: its curves are drawn with fewer points, because a path has {MAX_LINE} at most")
     if path.has_surface:
         report.add(name, "a path: the surface along it is not imported")
     return keys

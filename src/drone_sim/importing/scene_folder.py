@@ -152,7 +152,7 @@ class _Import:
         content["vehicles"] = vehicles
         self._find_holes()
         if not vehicles:
-            self._report.notes.append("No quadricopter is in the file: none flies, unless `vehicles` says so")
+            self._report.notes.append("The file has no quadricopter: nothing flies unless you add `vehicles`")
         entries = list(self._entries())
         content["objects"] = entries
         scripts = list(self._attached())
@@ -188,7 +188,7 @@ class _Import:
         if self._floor:
             world["floor"] = {"size": max(number(floor_size(self._floor), 3), 0.01)}
         elif settings.time_step is not None:
-            self._report.add("", "the file has no floor at z = 0: ours is there")
+            self._report.add("", "the file has no floor at z = 0: drone_sim's floor is added")
         return world
 
     # ---- what will not work
@@ -226,11 +226,14 @@ class _Import:
             name = on.object.name if on is not None else ""
             if script.kind == "main":
                 if not script.is_stock_main:
-                    self._report.add("", "the file's own main script is not imported: the phases are V-REP's")
+                    self._report.add(
+                        "",
+                        "its own main script is not imported: the phases run in V-REP's default order",
+                    )
             elif script.kind != "child" or on is None:
                 self._report.add(name, f"its {script.kind} script is not imported")
             elif not script.is_enabled or not on.runs_scripts:
-                self._report.add(name, "its child script does not run in the file: not imported")
+                self._report.add(name, "its child script is disabled in the file, and is not imported")
             else:
                 found[script.object].append(script)
         return found

@@ -77,7 +77,7 @@ class VehicleUrdf:
             return link
         mass = max(shape.mass, _LEAST_MASS)
         if shape.inertia is None or max(shape.inertia.moments) == 0:
-            self._report.add(body.name, "has no inertia in the file: that of a ball of 0.1 m is taken")
+            self._report.add(body.name, "has no inertia in the file: that of a ball of 0.1 m is used")
             moment = mass * _RADIUS_OF_GYRATION**2
             _add_inertial(link, mass, place, (moment, moment, moment))
         else:
@@ -135,7 +135,7 @@ class VehicleUrdf:
         try:
             file = self._writer.write(name, solid)
         except TooLarge as error:
-            self._report.add(name, f"{'is not seen' if kind == 'visual' else 'collides with nothing'}: {error}")
+            self._report.add(name, f"{'is not drawn' if kind == 'visual' else 'collides with nothing'}: {error}")
             return
         element = Xml.SubElement(link, kind)
         _add_origin(element, place)

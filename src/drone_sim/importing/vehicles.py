@@ -118,14 +118,14 @@ class ImportedVehicle:
         folder.write(urdf, VehicleUrdf(self.quadricopter, writer, report).build(self.parts, self.looks))
         for one in self.parts:
             swings = swings_on(one, self.root) is not None
-            what = "weighs where it hangs, but does not swing" if swings else "is of one piece with it"
+            what = "is rigidly attached: its mass counts, but it does not swing" if swings else "is rigidly attached"
             report.add(one.name, f"on {self.root.name}: {what}")
         entry: dict[str, Any] = {"urdf": urdf, "suffix": self.suffix, **self._place(report)}
         entry.update(self._script(files, report))
         if self.law is not None:
             entry["propellers"] = self.law
             report.notes.append(
-                f"{self.root.name}: its propellers' scripts are V-REP's own; the built-in law is the same"
+                f"{self.root.name}: the built-in thrust model, which is equal, replaces V-REP's scripts of propellers"
             )
         entry["objects"] = {ours: self._object(ours, one) for ours, one in self.objects.items()}
         cameras = {self._camera_key(one): self._camera(one) for one in self.cameras}
@@ -146,7 +146,7 @@ class ImportedVehicle:
             parameters = values(own[0].parameters or self.root.object.parameters)
             script = {"script": files.write(self.root.name, own[0])}
             return {**script, "script_parameters": parameters} if parameters else script
-        report.add(self.root.name, "has no child script: only one that is given, as in script:=pilot, flies it")
+        report.add(self.root.name, "has no child script: give one to fly it, such as script:=pilot")
         return {"script": "none"}
 
     def _object(self, ours: str, one: Placed) -> dict[str, Any]:

@@ -48,9 +48,9 @@ class Collections:
     def add(self, name: str = "") -> int:
         """Make an empty one; return its handle. Raises ValueError for a name that is taken, and for too many."""
         if name in self._names:
-            raise ValueError(f"a collection named '{name}' is there already")
+            raise ValueError(f"a collection named '{name}' already exists")
         if len(self._items) >= _MOST:
-            raise ValueError(f"{_MOST} collections are there already: remove some")
+            raise ValueError(f"at most {_MOST} collections are allowed: remove some")
         handle, self._next = self._next, self._next + 1
         self._items[handle] = ()
         if name:
@@ -111,7 +111,7 @@ class Collections:
 
     def _known(self, handle: int) -> tuple[Item, ...]:
         if handle not in self._items:
-            raise ValueError(f"no collection has the handle {handle}")
+            raise ValueError(f"there is no collection with the handle {handle}")
         return self._items[handle]
 
 

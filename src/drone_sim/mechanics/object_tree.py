@@ -87,7 +87,7 @@ class ObjectTree:
         """Add an object that has been made; return its handle. Raises ValueError for a name that is taken."""
         for one in added.names:
             if one in self._handles:
-                raise ValueError(f"an object named '{one}' is there already")
+                raise ValueError(f"an object named '{one}' already exists")
         handle = self._kept.get(added.name, self._next)
         if handle == self._next or handle in self._objects:
             handle, self._next = self._next, self._next + 1
@@ -120,7 +120,7 @@ class ObjectTree:
         """Give an object another name in the place of all that it has. Raises ValueError for a name that is taken."""
         renamed = self[handle]
         if name in self._handles and self._handles[name] != handle:
-            raise ValueError(f"an object named '{name}' is there already")
+            raise ValueError(f"an object named '{name}' already exists")
         for one in renamed.names:
             del self._handles[one]
         renamed.names = (name,)
@@ -195,8 +195,8 @@ class ObjectTree:
             return self._objects[handle]
         except (KeyError, TypeError):
             if isinstance(handle, (int, float)):
-                raise ValueError(f"no object has the handle {handle}") from None
-            raise TypeError("a handle is a whole number") from None
+                raise ValueError(f"there is no object with the handle {handle}") from None
+            raise TypeError("a handle must be a whole number") from None
 
     def save_state(self) -> Restore:
         """Return a function that puts every object back where it is now, under its present parent.
@@ -294,4 +294,4 @@ class ObjectTree:
             raise ValueError(f"'{moved.name}' cannot be its own ancestor")
         below = max(levels(one, moved) for one in self._objects.values() if one is moved or one.hangs_on(moved))
         if new is not None and levels(new) + 1 + below > DEEPEST:
-            raise ValueError(f"'{moved.name}' cannot hang there: more than {DEEPEST} objects above each other")
+            raise ValueError(f"'{moved.name}' cannot be moved there: it would have more than {DEEPEST} ancestors")

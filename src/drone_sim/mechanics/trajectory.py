@@ -104,5 +104,5 @@ class Trajectory:
             ruckig.Ruckig(count).calculate(given, found)
         except ruckig.RuckigError as error:
             said = " ".join(str(error).split()).removeprefix("[ruckig] ").partition(" input:")[0]
-            raise ValueError(f"there is no trajectory within these limits: {said}") from None
+            raise ValueError(f"ruckig finds no trajectory within these limits: {said}") from None
         return found

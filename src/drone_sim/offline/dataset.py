@@ -101,7 +101,7 @@ def check(folder: str) -> None:
         if os.path.lexists(folder):
             what = "is a file" if not os.path.isdir(folder) else "is not empty" if os.listdir(folder) else ""
             if what:
-                raise OSError(0, f"{what}; a dataset needs its own folder")
+                raise OSError(0, f"{what}: a dataset must be written to a new or empty folder")
         elif not os.path.isdir(os.path.dirname(os.path.abspath(folder))):
             raise OSError(0, f"no such folder: {os.path.dirname(os.path.abspath(folder))}")
 

@@ -136,7 +136,7 @@ def _check_outputs(options: argparse.Namespace, steps: int) -> None:
 
         plot.check(options.plot)
         if steps > _PLOTTED:
-            raise ValueError(f"--plot: {steps} steps; at most {_PLOTTED} are drawn")
+            raise ValueError(f"--plot: {steps} steps are too many; at most {_PLOTTED} can be drawn")
     for output in filter(None, (options.csv, options.video)):
         writing.check(output)
     if options.truth:
@@ -158,7 +158,9 @@ def _check_names(options: argparse.Namespace) -> None:
     files = {option: os.path.realpath(getattr(options, option)) for option in _FILES if getattr(options, option)}
     for output, other in itertools.permutations(files, 2):
         if output in _OUTPUTS and files[output] == files[other]:
-            raise ValueError(f"--{output} {_shown(getattr(options, output))}: is the file of --{other} as well")
+            raise ValueError(
+                f"--{output} {_shown(getattr(options, output))}: must not be the same file as that of --{other}"
+            )
 
 
 def _vehicle(name: str | None, parameters: Parameters) -> str:
@@ -174,7 +176,7 @@ def _camera(options: argparse.Namespace, parameters: Parameters, vehicle: str) -
     asked = "--video" if options.video else "--truth"
     if not (options.video or options.truth):
         if options.camera is not None:
-            raise ValueError(f"--camera {_shown(options.camera)}: is of --video or --truth, and neither is given")
+            raise ValueError(f"--camera {_shown(options.camera)}: only works with --video or --truth")
         return ""
     own = next(one for one in parameters.fleet if one.name == vehicle)
     camera = _camera_of(own, options.camera, asked)
@@ -272,10 +274,14 @@ def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog="fly", description="Fly the drone without ROS, as fast as possible.")
     parser.add_argument("--script", metavar="FILE", help="child script (default: the built-in script pilot)")
     parser.add_argument(
-        "--scene", metavar="FILE", help="floor, objects and the drone's place, .yaml or .ttt, as scene:="
+        "--scene",
+        metavar="FILE",
+        help="scene file (.yaml or .ttt) with floor, objects and the drone's pose, like scene:=",
     )
-    parser.add_argument("--config", metavar="FILE.yaml", help="the parameters that change, as config:=")
-    parser.add_argument("--commands", metavar="FILE.yaml", help="timeline of twists, poses and pushes")
+    parser.add_argument(
+        "--config", metavar="FILE.yaml", help="YAML file with the parameters that you change, like config:="
+    )
+    parser.add_argument("--commands", metavar="FILE.yaml", help="YAML timeline of twists, poses and pushes")
     parser.add_argument(
         "--duration",
         metavar="S",

@@ -111,7 +111,7 @@ def read_table(path: str | Path) -> Recording:
         try:
             rows = _rows(file)
         except UnicodeDecodeError:
-            raise TableRefused(f"{path}: is no text") from None
+            raise TableRefused(f"{path}: is not a text file") from None
         except TableRefused as refused:
             raise TableRefused(f"{path}: {refused}") from None
     recording = Recording()
@@ -135,14 +135,16 @@ def _rows(file: TextIO) -> list[_Row]:
         if number > 2 and rows[-1][0] <= rows[-2][0]:
             raise TableRefused(f"line {number}: the time {rows[-1][0]:g} s is not after {rows[-2][0]:g} s")
     if not rows:
-        raise TableRefused("has a header and no rows")
+        raise TableRefused("has a header but no rows")
     return rows
 
 
 def _row(line: str, number: int) -> _Row:
     fields = line.rstrip("\r\n").split(",")
     if len(fields) != len(COLUMNS) or not line.endswith("\n"):
-        raise TableRefused(f"line {number}: is cut off, or not of this table: {len(fields)} of {len(COLUMNS)} fields")
+        raise TableRefused(
+            f"line {number}: has {len(fields)} of {len(COLUMNS)} fields: it is cut off, or from another table"
+        )
     try:
         row = tuple(map(float, fields))
     except ValueError as error:

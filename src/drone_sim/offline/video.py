@@ -79,13 +79,13 @@ class Video:
     def finish(self) -> None:
         """Close it. Raises OSError without a picture, and where not all could be written."""
         if self._file is None:
-            raise OSError(0, "no picture came, nothing is written")
+            raise OSError(0, "no picture was received: no video is written")
         self.close()
         there = 0
         with contextlib.suppress(av.error.FFmpegError, IndexError), av.open(self._path) as made:
             there = made.streams.video[0].frames
         if there != self.pictures:
-            raise OSError(0, f"{there} of {self.pictures} pictures could be written; is the disk full?")
+            raise OSError(0, f"only {there} of {self.pictures} pictures were written; is the disk full?")
 
     def __str__(self) -> str:
         """Return what it is, in words."""

@@ -143,16 +143,16 @@ class Client:
         if dot and module in self._modules:
             _, functions, constants = contents(self._modules[module])
             if function_name in constants:
-                raise RequestRefused(f"{name} is no function")
+                raise RequestRefused(f"{name} is not a function")
             raise RequestRefused(not_there(f"{module}.", function_name, [*functions, *constants]))
-        raise RequestRefused(f"no function '{name:.80}'; {near_names(name[:80], [*self._functions, *own])}")
+        raise RequestRefused(f"there is no function '{name:.80}'; {near_names(name[:80], [*self._functions, *own])}")
 
     def require(self, module: Name) -> None:
         """Raise ValueError for a module that there is not."""
         if module in PLUGINS:
             raise ValueError(not_there("", module, ()))
         if module not in self._modules:
-            raise ValueError(f"no module '{module}'; {near_names(str(module), self._modules)}")
+            raise ValueError(f"there is no module '{module}'; {near_names(str(module), self._modules)}")
 
     def info(self, module: Name) -> dict[str, Any]:
         """Return the functions and constants of a module. Raises ValueError."""

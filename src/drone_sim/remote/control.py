@@ -154,7 +154,7 @@ class ClientControl:
         `remote_api: {scenes: ...}`. '' is the scene that there is without a file.
         """
         if self._simulation.running:
-            raise ValueError("a scene is loaded while the simulation is stopped: call stopSimulation first")
+            raise ValueError("a scene can only be loaded while the simulation is stopped: call stopSimulation first")
         self._simulation.load_scene(str(inside(self._folder(), filename, ".ttt")) if filename != "" else "")
         return 1
 
@@ -215,9 +215,9 @@ class ClientControl:
     def testCB(self, first: Any, callback: Any, second: Any, iterations: int = 99) -> Task:
         """Call a function of the client's with two values, `iterations` + 1 times; return its last result."""
         if not isinstance(callback, ClientFunction):
-            raise WrongValue("a function of the client's is expected")
+            raise WrongValue("expected a function of the client")
         if not 0 <= iterations <= _MOST_CALLS:
-            raise ValueError(f"a function is called at most {_MOST_CALLS} times, not {iterations}")
+            raise ValueError(f"iterations = {iterations}: must be at most {_MOST_CALLS}")
         answer: Any = []
         for _ in range(int(iterations) + 1):
             answer = yield Call(callback.name, [first, second])

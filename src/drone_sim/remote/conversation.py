@@ -52,7 +52,7 @@ class ClientFunction:
 
     def __call__(self, *_values: Any) -> Any:
         """Raise ValueError: a function that has to return at once cannot be called in a client."""
-        raise ValueError("a function of a client outside cannot be called from here")
+        raise ValueError("a function of a remote client cannot be called here, because its result is needed at once")
 
 
 def name_of(function: Any) -> str:

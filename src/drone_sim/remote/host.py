@@ -58,7 +58,7 @@ class ClientHost:
         Raises ValueError where no vehicle flies.
         """
         if not self._vehicles:
-            raise ValueError(f"'{name}' belongs to no vehicle, and no vehicle flies")
+            raise ValueError(f"'{name}' is not a part of a vehicle, and the scene has no vehicle")
         return next((one for one in self._vehicles if one.suffix and name.endswith(one.suffix)), self._vehicles[0])
 
 

@@ -46,9 +46,9 @@ def read(payload: bytes) -> ClientRequest:
     try:
         content = cbor2.loads(payload, tag_hook=_untagged, max_depth=DEEPEST + 2)
     except Exception as error:  # whatever the bytes made of a number, a date or a pattern
-        raise ValueError(f"no request: {' '.join(str(error).split())[:_LONGEST]}") from None
+        raise ValueError(f"not a request: {' '.join(str(error).split())[:_LONGEST]}") from None
     if not isinstance(content, dict):
-        raise ValueError(f"no request: a map with `func` and `args` is expected, not {shown(content)}")
+        raise ValueError(f"not a request: must be a map with `func` and `args`, not {shown(content)}")
     return ClientRequest(
         _text(content, "func"),
         _arguments(content.get("args")),
@@ -76,7 +76,7 @@ def call(function: str, arguments: Sequence[Any]) -> bytes:
 def _text(content: Mapping[Any, Any], key: str, default: str | None = None) -> str:
     value = content.get(key, default)
     if not isinstance(value, str) or len(value) > _LONGEST:
-        raise ValueError(f"no request: `{key}` = {shown(value)}: must be a text of at most {_LONGEST} characters")
+        raise ValueError(f"not a request: `{key}` = {shown(value)}: must be a string of at most {_LONGEST} characters")
     return value
 
 
@@ -84,7 +84,7 @@ def _arguments(given: Any) -> list[Any]:
     if not given and not isinstance(given, (str, bytes, int, float)):  # Lua writes an empty list as it likes
         return []
     if not isinstance(given, list):
-        raise ValueError(f"no request: `args` = {shown(given)}: must be a list")
+        raise ValueError(f"not a request: `args` = {shown(given)}: must be a list")
     refuse_if_too_large(given, _fields)
     return [None if one == _NOTHING else one for one in given]
 
@@ -95,7 +95,7 @@ def _fields(value: Any) -> Mapping[Any, Any] | None:
         return value
     if type(value) is list:
         return None
-    raise ValueError(f"a {type(value).__name__} is not a value that scripts have")
+    raise ValueError(f"a {type(value).__name__} cannot be passed to a script")
 
 
 def _seconds(given: Any) -> float:
@@ -106,7 +106,7 @@ def _seconds(given: Any) -> float:
 def _untagged(tag: cbor2.CBORTag, _immutable: bool) -> Any:
     kind = _NUMBERS.get(tag.tag)
     if kind is None:
-        raise ValueError(f"the tag {tag.tag} is not known")
+        raise ValueError(f"unknown CBOR tag {tag.tag}")
     return np.frombuffer(tag.value, kind).tolist()
 
 
@@ -114,7 +114,7 @@ def _written(reply: Mapping[str, Any]) -> bytes:
     try:
         return cbor2.dumps(reply, default=_encode)
     except (cbor2.CBOREncodeError, RecursionError) as error:
-        raise ValueError(f"what it returns cannot be sent: {' '.join(str(error).split())[:_LONGEST]}") from None
+        raise ValueError(f"the returned value cannot be sent: {' '.join(str(error).split())[:_LONGEST]}") from None
 
 
 def _encode(encoder: cbor2.CBOREncoder, value: Any) -> None:

@@ -123,7 +123,7 @@ class RemoteApiServer(RemoteApi):
         client.heard = self._clock()
         tasks = client.tasks.get(envelope)
         if not tasks:
-            self._endpoint.send(envelope, messages.failure("there is nothing that was to be executed"))
+            self._endpoint.send(envelope, messages.failure("no call of this client waits for a result"))
             return
         try:
             asked = tasks[-1].send(value)
@@ -161,7 +161,7 @@ class RemoteApiServer(RemoteApi):
         client = self._clients.get(name)
         if client is None:
             if len(self._clients) >= _MOST_CLIENTS:
-                raise ValueError(f"{_MOST_CLIENTS} clients are there already")
+                raise ValueError(f"{_MOST_CLIENTS} clients are already connected")
             client = Client(self._player, self._moved, self._backend, self.everybody, self._clock, self._watched)
             client.patience = request.patience
             self._clients[name] = client

@@ -55,7 +55,7 @@ class Distorted(Intrinsics):
             raise ValueError(f"horizontal_fov {self.horizontal_fov}: must lie between 0 and {WIDEST} rad (220 degrees)")
         middle = self.rays[self.height // 2] if self.is_fisheye else self.rays
         if not np.isfinite(middle).all():
-            raise ValueError(f"{list(self.D)}: such a {self.model} lens folds the picture: some pixels have no ray")
+            raise ValueError(f"{list(self.D)}: this {self.model} lens is impossible: some pixels would have no ray")
 
     @property
     def distortion(self) -> tuple[str, tuple[float, ...]]:

@@ -42,7 +42,7 @@ def read_config(path: Path, below: Mapping[str, Any]) -> dict[str, Any]:
     strange = [str(one) for one in keys.get("sensors", ()) if one not in below.get("sensors", ())]
     if strange:
         said = f"it was dumped from a drone with other sensors: {', '.join(map(shown, strange[:8]))}"
-        raise ParameterError(f"{path}: {said}; name the file that has them before it, config:=FILE,{path.name}")
+        raise ParameterError(f"{path}: {said}; give the file that defines them before it, config:=FILE,{path.name}")
     return keys
 
 
@@ -54,9 +54,11 @@ def _keys(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
         return nested(known, {}, values)
     except KeyError as missing:
         name = missing.args[0]
-        raise ParameterError(f"{path}: parameter {name}: missing; the other numbers of its list are there") from None
+        raise ParameterError(
+            f"{path}: parameter {name}: missing, but the other numbers of its list are given"
+        ) from None
     except (TypeError, AttributeError):
-        raise ParameterError(f"{path}: a name is the beginning of others, and has a value itself") from None
+        raise ParameterError(f"{path}: a name with a value of its own is also the beginning of other names") from None
 
 
 def _location(name: str) -> tuple[str, ...]:

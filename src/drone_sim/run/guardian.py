@@ -96,7 +96,7 @@ class Guardian:
         os._exit(status)
 
     def _give_up(self, status: int) -> None:
-        _say(f"{self._name}: ended without what a script left: a thread, or a function of atexit, that does not end")
+        _say(f"{self._name}: ended without waiting for a thread or atexit function of a script that does not end")
         os._exit(status)
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
@@ -169,7 +169,7 @@ class _Scripts:
         elif deadline != self._late:
             self._late, self._since = deadline, now
         elif now > self._since + _SCRIPTS_PATIENCE and time_limit.overdue(self._memory)[0] == deadline:
-            return f"{time_limit.text_of(self._memory, number)}, nor could it be stopped"
+            return f"{time_limit.text_of(self._memory, number)}, and could not be stopped"
         return ""
 
     def _is_halted(self) -> bool:
@@ -194,7 +194,7 @@ def _outlasts_its_time(pipe: int, scripts: _Scripts) -> str:
             elif deadline == math.inf and any(number in _SIGNALS for number in numbers):
                 deadline = time.monotonic() + PATIENCE
         if time.monotonic() >= deadline:
-            return f"a script, a file or the ROS master kept it busy for {PATIENCE:g} s when it had to end"
+            return f"it did not end within {PATIENCE:g} s: a script, a file or the ROS master kept it busy"
         if overdue := scripts.overdue():
             return overdue
 

@@ -118,7 +118,7 @@ class Parameters(PaceParameters, EquipmentParameters):
         """The first vehicle, most often the only one. Raises ParameterError where nobody flies."""
         if not self._fleet:
             raise ParameterError(
-                f"{self.scene_file}: no vehicle flies there (vehicles: {{}}); give some, such as vehicles: 1"
+                f"{self.scene_file}: the scene has no vehicle (vehicles: {{}}); add one, such as vehicles: 1"
             )
         return self._fleet[0]
 
@@ -163,7 +163,7 @@ class Parameters(PaceParameters, EquipmentParameters):
 
     def _at_the_same_step(self, found: Parameters, file: str) -> Parameters:
         if found.time_step != self.time_step:
-            said = f"a simulation that runs with {self.time_step:g} s goes on with that"
+            said = f"the time step cannot change while the simulation runs; it stays {self.time_step:g} s"
             raise ParameterError(f"{file or 'the scene'}: time_step = {found.time_step:g}: {said}", ("time_step",))
         return found
 
@@ -264,7 +264,7 @@ def _config(name: str, below: Mapping[str, Any]) -> dict[str, Any]:
         raise ParameterError(str(error), ("config",), shown(name)) from None
     values = read_config(path, below)
     if "config" in values:
-        raise ParameterError(f"{name}: a config file names no other `config`")
+        raise ParameterError(f"{name}: a config file must not have the key `config`")
     scene_parameters.find_files_beside(path.parent, values)
     for key in ("script", "scene_file"):
         if isinstance(values.get(key), str) and Path(values[key]).suffix:  # tutorial and target have none

@@ -94,7 +94,7 @@ class Player:
     def pause(self, on: bool) -> str:
         """Pause or resume. Raises ValueError when stopped."""
         if not self.simulation.running:
-            raise ValueError("is stopped: start it first")
+            raise ValueError("the simulation is stopped: start it first")
         self.paused = on
         self._tell_state()
         if on:
@@ -106,7 +106,7 @@ class Player:
     def one_step(self) -> str:
         """Run one step while paused. Raises ValueError when it is not, ScriptError."""
         if not self.simulation.running or not self.paused:
-            raise ValueError("is not paused: one step at a time needs `pause` first")
+            raise ValueError("the simulation is not paused: call `pause` before `step`")
         self.attempt(self._step)
         return f"t = {self.simulation.time:.2f} s"
 
@@ -129,7 +129,7 @@ class Player:
 
     def _obey(self, asked: str) -> bool:
         """Stop or pause, as a script asked for; return whether the simulation still runs."""
-        _LOG.info(f"a script asks to {asked}")
+        _LOG.info(f"a script has requested to {asked} the simulation")
         try:
             self.stop() if asked == STOP else self.pause(True)
         except ScriptError as error:
@@ -147,7 +147,7 @@ class Player:
             try:
                 self.simulation.stop()
             except ScriptError as second:  # mostly because of the first: whoever shows an error shows that one
-                _LOG.warning(f"script error in cleanup, after that: {second}")
+                _LOG.warning(f"then a second script error, in cleanup: {second}")
             if isinstance(error, ScriptError):  # shown until the next start
                 failed = error
                 for vehicle in self.simulation.vehicles.values():

@@ -160,7 +160,7 @@ class Simulation:
         """The first vehicle, most often the only one. Raises LookupError where nobody flies."""
         for first in self.vehicles.values():
             return first
-        raise LookupError("no vehicle flies in the scene")
+        raise LookupError("the scene has no vehicle")
 
     def set_vehicles(self, entries: Any) -> tuple[list[str], list[str]]:
         """Let the vehicles in `entries`, as in the parameter `vehicles`, fly; return which came and which went.
@@ -368,8 +368,8 @@ class Simulation:
         """
         is_same = snapshot.era == self.era and snapshot.scripts == self._setup.scripts.changes
         if not is_same or not self.world.saved_states.has_snapshot(snapshot.world):
-            said = "start, stop, and a vehicle or shape that comes or goes, or a script on one, forget it"
-            raise ValueError(f"the snapshot is of an earlier run: {said}")
+            said = "it is dropped at start and stop, and when a vehicle, a shape or a script of one is added or removed"
+            raise ValueError(f"the snapshot is from an earlier run: {said}")
         self.scene.drag.let_go_of_all()
         for vehicle in self.vehicles.values():
             vehicle.body.let_go()

@@ -176,7 +176,9 @@ class SimulationSetup:
         if parameters.suffix is not None:
             wanted = suffixed("", parameters.suffix)
             if wanted in taken:
-                raise ParameterError(f"vehicle {parameters.name}: suffix = {parameters.suffix}: another vehicle has it")
+                raise ParameterError(
+                    f"vehicle {parameters.name}: suffix = {parameters.suffix}: another vehicle has the same suffix"
+                )
             return wanted
         return next(one for one in itertools.chain([""], map("#{}".format, itertools.count())) if one not in taken)
 
@@ -196,7 +198,9 @@ class SimulationSetup:
             raise ParameterError("the scene as it begins: a position or a velocity is not finite")
         overlaps = self._world.queries.overlaps()
         if overlaps > MAX_OVERLAPS:
-            said = f"{overlaps} pairs of moving ones touch or overlap, at most {MAX_OVERLAPS} may"
+            said = (
+                f"{overlaps} pairs of moving objects touch or overlap at the start; at most {MAX_OVERLAPS} are allowed"
+            )
             raise ParameterError(f"scene/objects: {said}")
 
 

@@ -47,7 +47,7 @@ class DivergenceCheck:
         if vehicle.name not in self._past:
             self._past.add(vehicle.name)
             who = "the drone" if vehicle.parameters.is_alone else vehicle.name
-            LOG.warning("%s is past the edge of the floor, at %.2f %.2f m: there is nothing below it", who, x, y)
+            LOG.warning("%s left the floor at x=%.2f y=%.2f m: nothing is below it", who, x, y)
 
 
 class Stepper:

@@ -46,7 +46,7 @@ def check(scripts: Sequence[AttachedScriptParameters]) -> None:
     names: set[str] = set()
     for index, one in enumerate(scripts):
         for key, mistake in (
-            ("object", one.object in names and "comes twice"),
+            ("object", one.object in names and "is used twice"),
             ("script", not one.script and "no file"),
         ):
             if mistake:

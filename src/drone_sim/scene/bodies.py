@@ -188,7 +188,7 @@ class ShapeObject(SceneObject):
         if static == self.is_static or self.is_held:
             return
         if not self.mass:
-            raise ValueError(f"'{self.name}' has no mass in the scene file: it stays static")
+            raise ValueError(f"'{self.name}' has no mass in the scene file, so it stays static")
         matrix = self.matrix()
         self.body = None if static else SceneBody(self._world, self.number)
         self._world.collision_filter.freeze(self.number, static)
@@ -199,7 +199,7 @@ class ShapeObject(SceneObject):
         """Put it there, and its body. Raises ValueError for what is held."""
         if self.is_held:
             above = self.parent.name if self.parent is not None else ""
-            raise ValueError(f"'{self.name}' is held by '{above}': set that joint, or move its parent")
+            raise ValueError(f"'{self.name}' is held by '{above}': set that joint, or move the joint's parent")
         super().put(matrix)
         if self.is_static:
             self.carried.follow()

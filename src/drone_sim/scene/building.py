@@ -73,7 +73,7 @@ def _make_seem(world: World, one: EntryParameters, body: int, link: int) -> None
 
 
 def _alone(world: World, one: EntryParameters, matrix: Matrix) -> int:
-    assert isinstance(one, ObjectParameters), "a body is of shapes"
+    assert isinstance(one, ObjectParameters), "a body consists of shapes"
     shape = one.to_shape()
     pose = _pose(matrix)
     if isinstance(shape, Compound) or one.inertia is not None:
@@ -89,7 +89,7 @@ def _together(
     links, textures = [first], [getattr(root, "texture", "")]
     for hung in chain.hung:
         shape = entries[hung.shape]
-        assert isinstance(shape, ObjectParameters), "a chain holds shapes"
+        assert isinstance(shape, ObjectParameters), "a chain consists of joints and shapes"
         links.append(_link(shape, shape.local)._replace(hinge=_hinge(entries, hung)))
         textures.append(shape.texture)
     return world.add_assembly(links, _pose(_frame(entries, chain, matrices)), textures)
@@ -107,7 +107,7 @@ def _hinge(entries: Mapping[int, EntryParameters], hung: Hung) -> Hinge:
     joint = entries[hung.joint]
     if isinstance(joint, ForceSensorParameters):
         return Hinge(hung.above, hung.local, "fixed", None, 0.0)
-    assert isinstance(joint, JointParameters), "a chain hangs on joints"
+    assert isinstance(joint, JointParameters), "a chain consists of joints and shapes"
     return Hinge(hung.above, hung.local, joint.type, joint.limits, joint.value)
 
 

@@ -100,7 +100,7 @@ class _Search:
         if len(chain.hung) > MOST_HELD:
             name = self._entries[chain.hung[0].joint if chain.root is None else chain.root].name
             raise ParameterError(
-                f"{len(chain.hung)} joints and force sensors hang together, from '{name}' on: at most {MOST_HELD} may"
+                f"{len(chain.hung)} joints and force sensors in a chain from '{name}': at most {MOST_HELD} are allowed"
             )
 
     def _shapes_below(self, joints: Mapping[int, _Holding]) -> dict[int, list[int]]:
@@ -118,13 +118,13 @@ class _Search:
         if not _holds(joint) or (isinstance(joint, ForceSensorParameters) and not below):
             return ""
         if isinstance(joint, JointParameters) and joint.type == "spherical":
-            return "spherical ones are"
+            return "spherical joints are not part of the dynamics"
         if not below:
-            return "no shape with a mass hangs right on it"
+            return "they have no child shape with a mass"
         if len(below) > 1:
-            return f"{len(below)} shapes with a mass hang on it, not one"
+            return f"they have {len(below)} child shapes with a mass, not one"
         if any(self._is_urdf(index) for index in (below[0], self._holder(joint)[0])):
-            return "a urdf is not held by joints"
+            return "joints cannot hold a urdf"
         return ""
 
     def _is_urdf(self, index: int | None) -> bool:

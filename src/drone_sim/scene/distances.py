@@ -44,7 +44,9 @@ class Distances:
         own = self._sorted(ones)
         if others is None:
             if own.points and len(ones) == 1:
-                raise ValueError(f"'{ones[0].name}' is a point: its distance to one object can be measured, not to all")
+                raise ValueError(
+                    f"'{ones[0].name}' is a point: its distance can be measured to one object, but not to all objects"
+                )
             bodies = {body for body, _ in own.solids}
             ways = self._between(own, lambda *place: place[0] not in bodies, {}, reach)
             return min(ways, default=None)

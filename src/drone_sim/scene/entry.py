@@ -47,7 +47,7 @@ class EntryParameters(Checked):
         """Refuse what scripts could not find under a name."""
         if (self.parent or self.alias) and not self.name:
             key, value = ("parent", self.parent) if self.parent else ("alias", self.alias)
-            raise ParameterError("what has one needs a `name`, too", (key,), f"'{value}'")
+            raise ParameterError("an entry with a parent or alias needs a `name`", (key,), f"'{value}'")
 
     @property
     def pose(self) -> Pose:

@@ -39,7 +39,7 @@ def grouped(entries: Sequence[EntryParameters], frames_of: Sequence[Matrix]) -> 
     parts, mass = [], 0.0
     for one, matrix in zip(entries, frames_of):
         if not isinstance(one, ObjectParameters) or one.shape == "urdf":
-            raise ValueError(f"'{one.name}' is no shape that another can be grouped with")
+            raise ValueError(f"'{one.name}' is not a shape that can be grouped")
         local = frames.relative(frames_of[0], matrix)
         members = one.parts if isinstance(one, CompoundParameters) else [one]
         for member in members:
@@ -57,7 +57,7 @@ def grouped(entries: Sequence[EntryParameters], frames_of: Sequence[Matrix]) -> 
 def parted(entry: EntryParameters, matrix: Matrix) -> list[dict[str, Any]]:
     """Return what a scene file says of the parts of a shape, each alone in the world. Raises ValueError."""
     if not isinstance(entry, CompoundParameters):
-        raise ValueError(f"'{entry.name}' is no compound")
+        raise ValueError(f"'{entry.name}' is not a compound")
     volumes = [_volume(one) for one in entry.parts]
     kept = {key: getattr(entry, key) for key in ("static", "respondable", "visible")}
     return [
@@ -88,7 +88,7 @@ def _volume(part: PartParameters) -> float:
 def bounds(entry: EntryParameters) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest and the highest corner (m) of a shape in its own frame. Raises ValueError for what is none."""
     if not isinstance(entry, ObjectParameters) or entry.shape == "urdf":
-        raise ValueError(f"'{entry.name}' is not a shape with its own box around it")
+        raise ValueError(f"'{entry.name}' has no bounding box of its own")
     corners = []
     for shape, local, _ in parts_of(entry.to_shape(), entry.color):
         assert isinstance(shape, DrawnShape), "what is no urdf is drawn"
@@ -181,7 +181,7 @@ def write(path: Path, entries: Sequence[EntryParameters], scripts: Sequence[Atta
     Raises ValueError, in one line, where it cannot be.
     """
     if path.exists() and not (path.is_file() and path.read_bytes().startswith(_HEAD.encode())):
-        raise ParameterError(f"{path}: is no model that was saved here, and is not written over")
+        raise ParameterError(f"{path}: is not overwritten, because it is not a model that drone_sim saved")
     listed = {"objects": entries, "scripts": scripts}
     try:
         content = {key: [plain(one, path.parent) for one in several] for key, several in listed.items() if several}
@@ -211,18 +211,20 @@ def read(path: Path, imported: Callable[[Path], Path]) -> Model:
     objects, scripts = said["scene"].get("objects"), said["scene"].get("scripts", [])
     for name, several in (("objects", objects), ("scripts", scripts)):
         if not isinstance(several, list) or not all(isinstance(one, dict) for one in several):
-            raise ParameterError(f"{path}: a model has a list of `{name}`")
+            raise ParameterError(f"{path}: must have a list of `{name}`")
     if not objects:
-        raise ParameterError(f"{path}: has no objects")
+        raise ParameterError(f"{path}: its list of `objects` is empty")
     return Model(objects, scripts)
 
 
 def inside(folder: Path | None, name: str, *suffixes: str) -> Path:
     """Return a file in a folder, with .yaml or another suffix. Raises ValueError for what is none."""
     if folder is None:
-        raise ValueError(f"'{name[:80]}': a model must be in the folder of the scene file, and there is no scene file")
+        raise ValueError(
+            f"'{name[:80]}': a model must be in the folder of the scene file, but the simulation has no scene file"
+        )
     path = (folder / name).resolve()
     if path.suffix not in (".yaml", *suffixes) or not path.is_relative_to(folder.resolve()):
         known = " or ".join((".yaml", *suffixes))
-        raise ValueError(f"'{name[:80]}': the name of a {known} file beside the scene file is expected")
+        raise ValueError(f"'{name[:80]}': must be the name of a {known} file in the folder of the scene file")
     return path

@@ -48,7 +48,7 @@ def check(collections: Sequence[CollectionParameters]) -> None:
     names: set[str] = set()
     for index, one in enumerate(collections):
         if one.name in names:
-            raise ParameterError("comes twice", ("collections", index, "name"), f"'{one.name}'")
+            raise ParameterError("is used twice", ("collections", index, "name"), f"'{one.name}'")
         names.add(one.name)
 
 

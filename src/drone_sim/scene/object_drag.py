@@ -75,7 +75,7 @@ class ObjectDrag:
         half = self.floor / 2
         for axis, before, value, low, high in zip("xyz", now, wanted, (-half, -half, 0.0), (half, half, self.floor)):
             if not min(low, before) <= value <= max(high, before):
-                raise ValueError(f"position.{axis} = {value:g}: on this floor it may be within {low:g} and {high:g} m")
+                raise ValueError(f"position.{axis} = {value:g}: must be from {low:g} to {high:g} m on this floor")
 
 
 def _whole(one: SceneObject) -> SceneObject:
@@ -85,5 +85,5 @@ def _whole(one: SceneObject) -> SceneObject:
         while whole is not None and (not isinstance(whole, ShapeObject) or whole.is_held):
             whole = whole.parent
     if whole is None:
-        raise ValueError(f"'{one.name}' is held in its place: no shape of the scene is above it")
+        raise ValueError(f"'{one.name}' cannot be dragged: joints hold it, and no free shape holds these joints")
     return whole

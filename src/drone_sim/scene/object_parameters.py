@@ -66,7 +66,7 @@ class ObjectParameters(EntryParameters):
         """Refuse an inertia where the URDF says it."""
         super().model_post_init(context)
         if self.inertia is not None and self.shape == "urdf":
-            raise ParameterError("a urdf says its own", ("inertia",))
+            raise ParameterError("a urdf has its own", ("inertia",))
 
     @property
     def moves(self) -> bool:

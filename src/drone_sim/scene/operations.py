@@ -100,7 +100,7 @@ class SceneOperations:
         names: set[str] = set()
         for one in entries:
             if not one.name or one.name in tree or one.name in names:
-                why = f"an object named '{one.name}' is there already" if one.name else "an object needs a `name`"
+                why = f"an object named '{one.name}' already exists" if one.name else "an object needs a `name`"
                 raise ParameterError(why)
             if one.parent and one.parent not in tree and one.parent not in {other.name for other in entries}:
                 raise ParameterError(f"no object is named '{one.parent}', the parent of '{one.name}'")
@@ -183,7 +183,7 @@ class SceneOperations:
     def group(self, handles: Sequence[int]) -> int:
         """Make one rigid shape of several, with name and frame of the first; return its handle. Raises ValueError."""
         if len({*handles}) != len(handles) or len(handles) < 2:
-            raise ValueError("at least two shapes are expected, each once")
+            raise ValueError("must be at least two different shapes")
         entries = [self.entry(one) for one in handles]
         made = models.grouped(entries, [self._scene.tree.matrix(one) for one in handles])
         (handle,) = self.add([{**made, "name": self.free_name(entries[0].name)}])
@@ -235,7 +235,7 @@ class SceneOperations:
         scene, index = self._scene, self._index(handle)
         before = scene.entries[index]
         if name in scene.tree and scene.tree.handle(name) != handle:
-            raise ParameterError(f"an object named '{name}' is there already")
+            raise ParameterError(f"an object named '{name}' already exists")
         if not name:
             raise ParameterError("name = '': must have at least 1 character")
         renamed = changed(before, {"name": name})
@@ -370,7 +370,7 @@ class SceneOperations:
         entry, index = self.entry(handle), self._index(handle)
         before = self.color(handle)
         painted = [old if new is None else new for old, new in zip(before, rgba)]
-        assert isinstance(entry, ObjectParameters), "what has a color is a shape"
+        assert isinstance(entry, ObjectParameters), "only a shape has a color"
         color = changed(entry, {"color": painted}).color
         values: dict[str, Any] = {"color": color}
         if isinstance(entry, CompoundParameters):

@@ -24,7 +24,9 @@ _ROUND = ("cylinder", "capsule", "sphere")
 def scaled(entry: EntryParameters, factors: Vector) -> EntryParameters:
     """Return an entry so many times as large along x, y and z. Raises ValueError for what cannot be."""
     if not all(math.isfinite(one) and one > 0 for one in factors):
-        raise ValueError(f"'{entry.name}' is scaled by {', '.join(f'{one:g}' for one in factors)}: must be more than 0")
+        raise ValueError(
+            f"'{entry.name}' is scaled by {', '.join(f'{one:g}' for one in factors)}: must be greater than 0"
+        )
     values = _shape(entry, factors) if isinstance(entry, ObjectParameters) else _kind(entry, factors)
     checked = changed(entry, values)
     return entry.model_copy(update={key: getattr(checked, key) for key in values})
@@ -59,10 +61,12 @@ def _size(said: ObjectParameters | PartParameters, factors: Vector) -> list[floa
     size: tuple[float, ...] = getattr(said, "size", ())
     if said.shape not in _ROUND:
         if said.shape == "urdf":
-            raise ValueError(f"'{getattr(said, 'name', '')}' is a urdf, and the URDF file has its size")
+            raise ValueError(f"'{getattr(said, 'name', '')}' is a urdf: change its size in the URDF file")
         return [factor * one for factor, one in zip(factors, size)]
     if x != y or (said.shape == "sphere" and x != z):
-        raise ValueError(f"'{getattr(said, 'name', '')}' is a {said.shape}: it stays round, not {x:g}, {y:g}, {z:g}")
+        raise ValueError(
+            f"'{getattr(said, 'name', '')}' is a {said.shape}: it must stay round, not scaled by {x:g}, {y:g}, {z:g}"
+        )
     return [x * size[0], *(z * one for one in size[1:])]
 
 
@@ -94,5 +98,7 @@ def _curved_path(entry: CurvedPathParameters, factors: Vector) -> dict[str, Any]
 def _same(entry: EntryParameters, factors: Vector, what: str) -> float:
     if len({*factors}) > 1:
         x, y, z = factors
-        raise ValueError(f"'{entry.name}', {what}, is scaled alike along x, y and z, not by {x:g}, {y:g}, {z:g}")
+        raise ValueError(
+            f"'{entry.name}', {what}, must be scaled by the same factor along x, y and z, not by {x:g}, {y:g}, {z:g}"
+        )
     return factors[0]

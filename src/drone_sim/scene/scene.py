@@ -396,4 +396,8 @@ def _warn(entries: Mapping[int, object], reasons: Mapping[int, str]) -> None:
     """Say in one line for each reason which joints the dynamics does not move."""
     for reason in sorted({*reasons.values()}):
         names = [getattr(entries[index], "name", "") for index, one in reasons.items() if one == reason]
-        _LOG.warning("moved by scripts alone, as %s: %s", reason, ", ".join(names[:12]) + (" …" if names[12:] else ""))
+        _LOG.warning(
+            "only scripts move these joints, because %s: %s",
+            reason,
+            ", ".join(names[:12]) + (" …" if names[12:] else ""),
+        )

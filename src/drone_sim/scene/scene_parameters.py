@@ -100,7 +100,7 @@ class SceneParameters(Checked):
         names: set[str] = set()
         for index, one in enumerate(self.objects):
             if one.name in names:
-                raise _refused(index, "name", one.name, "comes twice")
+                raise _refused(index, "name", one.name, "is used twice")
             names.add(one.name)
         check_parents(self.objects)
         attached_scripts.check(self.scripts)
@@ -131,7 +131,7 @@ def check_parents(objects: Iterable[EntryParameters]) -> None:
         if one.name in above:
             raise _refused(index, "parent", one.parent, f"'{one.name}' would be its own ancestor")
         if len(above) > DEEPEST:
-            raise _refused(index, "parent", one.parent, f"more than {DEEPEST} objects above '{one.name}'")
+            raise _refused(index, "parent", one.parent, f"'{one.name}' has more than {DEEPEST} ancestors")
 
 
 def _above(one: EntryParameters, entries: Mapping[str, EntryParameters]) -> dict[str, None]:
@@ -222,7 +222,7 @@ def _check_textures(paths: set[str]) -> None:
         height, width = images.read(path).shape[:2]
         pixels += height * width
         if pixels > MAX_PIXELS:
-            raise ValueError(f"texture {path}: with it, the scene's textures have more than {MAX_PIXELS} pixels")
+            raise ValueError(f"texture {path}: the textures of the scene have more than {MAX_PIXELS} pixels together")
 
 
 def _check_meshes(shapes: list[ObjectParameters]) -> None:
@@ -230,7 +230,7 @@ def _check_meshes(shapes: list[ObjectParameters]) -> None:
     for path, scale in (mesh for one in shapes for mesh in one.to_shape().meshes()):
         count += mesh_files.triangles(path)
         if count > MAX_TRIANGLES:
-            raise ValueError(f"mesh {path}: with it, the scene's meshes have more than {MAX_TRIANGLES} triangles")
+            raise ValueError(f"mesh {path}: the meshes of the scene have more than {MAX_TRIANGLES} triangles together")
         reach = float(np.max(mesh_files.reach(path) * np.abs(scale)))
         if reach > MAX_REACH:
             raise ValueError(f"mesh {path}: reaches {reach:g} m from its origin; at most {MAX_REACH:g} m are allowed")

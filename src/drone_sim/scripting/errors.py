@@ -40,4 +40,4 @@ class ScriptError(Exception):
 def no_function(callback: Any, known: Iterable[str]) -> str:
     """Return the message on a callback that a script does not have, with the near ones of the functions that it has."""
     near = difflib.get_close_matches(str(callback), list(known))
-    return f"the script has no function '{callback}' to call back{'; near names are ' if near else ''}{', '.join(near)}"
+    return f"no function '{callback}' for this callback{'; near names are ' if near else ''}{', '.join(near)}"

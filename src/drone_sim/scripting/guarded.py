@@ -67,7 +67,7 @@ class GuardedScript:
 
     def _refuse_if_failed(self, name: str) -> None:
         if self.failure is not None:
-            raise ScriptError(name, self.failure.path, 0, "the script has failed, and is not called any more")
+            raise ScriptError(name, self.failure.path, 0, "the script has failed and is no longer called")
 
     def callback(self, callback: Callback, message: Any) -> None:
         """Call a function of the script with a message."""
@@ -80,7 +80,7 @@ class GuardedScript:
                 return self._called(self._script.answer, callback, request)
             except ScriptError as error:
                 self._fail(error)
-        raise Unanswered(f"the script has failed, and is not called any more: {self.failure}")
+        raise Unanswered(f"the script has failed and is no longer called: {self.failure}")
 
     def check(self, callback: Callback) -> None:
         """Fail where the script has no such function to call back."""
@@ -130,4 +130,4 @@ class GuardedScript:
 
 def tell_failure(error: ScriptError) -> None:
     """Say what went wrong, and that the flight goes on."""
-    LOG.error("%s; this script is not called any more", error)
+    LOG.error("%s; this script is no longer called", error)

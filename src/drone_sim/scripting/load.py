@@ -96,10 +96,10 @@ def script_path(script: str) -> str:
     if "/" not in name and not Path(name).suffix:
         known = _built_in()
         if name not in known:
-            raise ScriptError("load", name, 0, f"no built-in script of that name; {near_names(name, known)}")
+            raise ScriptError("load", name, 0, f"there is no built-in script with this name; {near_names(name, known)}")
         return known[name]
     if Path(name).suffix not in _ENDINGS:
-        raise ScriptError("load", name, 0, "a child script's name ends in .py or .lua")
+        raise ScriptError("load", name, 0, "the name of a child script must end in .py or .lua")
     try:
         return str(resolve(name))
     except FileNotFoundError as error:

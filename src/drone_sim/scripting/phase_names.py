@@ -45,17 +45,17 @@ def warn(path: str, functions: Collection[str]) -> None:
     """Say in the log which of a script's functions are not called here."""
     for name in sorted(functions):
         if name in _ELSEWHERE:
-            _LOG.warning("%s: %s is not called here; %s are", path, name, _listed())
+            _LOG.warning("%s: %s is never called here; these are: %s", path, name, _listed())
         elif _meant(name) is not None:
-            _LOG.warning("%s: %s is not called; %s is", path, name, _meant(name))
+            _LOG.warning("%s: %s is never called; did you mean %s?", path, name, _meant(name))
 
 
 def idle(functions: Collection[str]) -> str:
     """Return what to say of a script none of whose functions is called, '' for any other."""
     if any(name in functions for name in (*FUNCTIONS.values(), *THREADS, VISION)):
         return ""
-    bare = [f"{name} would have to be {FUNCTIONS[name]}" for name in PHASES if name in functions]
-    return "; ".join([f"has none of {_listed()}, {THREADS[0]}: nothing flies the drone", *bare])
+    bare = [f"rename {name} to {FUNCTIONS[name]}" for name in PHASES if name in functions]
+    return "; ".join([f"has none of the functions {_listed()}, {THREADS[0]}, so nothing flies the drone", *bare])
 
 
 @functools.lru_cache(1000)

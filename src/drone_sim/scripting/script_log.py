@@ -11,7 +11,7 @@ LOG = logging.getLogger("drone_sim.script")
 LOG.setLevel(logging.INFO)  # a script's print is wanted, whatever the level of the rest
 
 LONGEST = 1000  # characters of a line
-THREAD_GOES_ON = "{}: its thread goes on where it is: a coroutine cannot be brought back"
+THREAD_GOES_ON = "{}: its thread continues where it is now, because a coroutine cannot be restored"
 MOST = 500  # lines of one call of the script: of a phase, a callback, or its top level
 
 
@@ -34,7 +34,7 @@ def end_call() -> None:
     """Begin to count anew, after a call of the script; say how many lines were left out."""
     left_out, Lines.count = Lines.count - MOST, 0
     if left_out > 0:
-        LOG.info("… %d lines left out: a call of the script may write %d", left_out, MOST)
+        LOG.info("… %d lines were left out: one call of the script may write at most %d", left_out, MOST)
 
 
 def shown(value: Any) -> str:

@@ -96,7 +96,7 @@ def overdue(memory: Any) -> tuple[float, int]:
 def text_of(memory: Any, number: int) -> str:
     """Return, in the process outside, the error message for that number."""
     text = bytes(memoryview(memory)[16 + number * _LONGEST_TEXT :][:_LONGEST_TEXT]).rstrip(b"\0")
-    return text.decode("utf-8", "ignore") or "a script did not return in its time (script_time_limit)"
+    return text.decode("utf-8", "ignore") or "a script did not return within script_time_limit"
 
 
 def _write_text(number: int, text: str) -> None:

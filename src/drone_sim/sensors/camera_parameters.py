@@ -66,7 +66,7 @@ class CameraParameters(Imperfections):
     def _refuse_imperfections(self) -> None:
         for name in Imperfections.model_fields:
             if getattr(self, name).is_on:
-                raise ParameterError("is of cameras of kind color", (name,))
+                raise ParameterError("only works with cameras of kind color", (name,))
 
     def intrinsics(self) -> Intrinsics:
         """Return how it makes pixels of the world."""

@@ -55,7 +55,7 @@ def _check_cameras(cameras: Mapping[str, CameraParameters]) -> None:
 def _claim_object(taken: dict[str, str], who: tuple[str, str], name: str) -> None:
     here = "/".join(who)
     if name in taken:
-        raise ParameterError(f"is that of {taken[name]} too", (*who, "object"), f"'{name}'")
+        raise ParameterError(f"is also the name of {taken[name]}", (*who, "object"), f"'{name}'")
     taken[name] = here
 
 
@@ -65,7 +65,7 @@ def _claim_topics(taken: dict[str, str], who: tuple[str, str], given: str, topic
         if topic in taken:
             raise ParameterError(
                 f"its {what} would be {topic}, which is {taken[topic]}; "
-                "a topic such as rear/image has a namespace of its own",
+                "use a topic with a namespace, such as rear/image",
                 (*who, "topic"),
                 f"'{given}'",
             )

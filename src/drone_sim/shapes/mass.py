@@ -45,7 +45,7 @@ def principal(tensor: np.ndarray, centre: np.ndarray) -> PrincipalInertia:
 def _of_unit_density(part: Part) -> Inertial:
     """Return a part, filled with 1 kg/m³, in the frame of the whole."""
     if not isinstance(part.shape, DrawnShape):
-        raise ValueError(f"{part.shape}: its mass cannot be told from its form")
+        raise ValueError(f"{part.shape}: its mass cannot be computed from its shape")
     solid = part.shape.solid()
     local = np.reshape(part.local, (3, 4))
     turn, place = local[:, :3], local[:, 3]

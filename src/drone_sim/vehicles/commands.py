@@ -162,7 +162,7 @@ class FlightState:
             before()
         else:
             self._missing = self._missing or f"{UNKNOWN}: the script does not subscribe to {topic}"
-            self._tell(topic, "the child script does not subscribe to it; `pilot` does")
+            self._tell(topic, "the child script does not subscribe to this topic; `pilot` does")
         for bus in hearing:
             bus.post(topic, message)
 

@@ -86,7 +86,7 @@ class FaultParameters(Checked):
     propellers: Annotated[
         tuple[Fraction, ...],
         Parts(propeller_places(Quadricopter.name)),
-        Field(description="numbers from 0 to 1, the share that each propeller still gives"),
+        Field(description="numbers from 0 to 1, the fraction of its thrust that each propeller still has"),
     ]
     commands: LinkParameters
     images: LinkParameters
@@ -112,7 +112,7 @@ def _own(places: Mapping[str, ObjectPlace | None], info: ValidationInfo) -> Mapp
     known = own_names(len(propeller_places(info.data.get("type", Quadricopter.name))))
     for name, place in places.items():
         if name not in known:
-            raise ValueError(f"'{name}' is no object of a vehicle; {near_names(name, known)}")
+            raise ValueError(f"'{name}' is not an object of a vehicle; {near_names(name, known)}")
         if place is None and name not in REMOVABLE:
             raise ValueError(f"'{name}': a vehicle needs it; null removes only {', '.join(REMOVABLE)}")
     return places
@@ -222,7 +222,7 @@ def laid_over(entry: Mapping[str, Any], name: str, everything: Mapping[str, Any]
     Raises ParameterError.
     """
     if "name" in entry:
-        raise ParameterError("unknown key; the key of the entry is its name", ("vehicles", name, "name"))
+        raise ParameterError("unknown key; a vehicle is named by the key of its entry", ("vehicles", name, "name"))
     drone = everything.get("drone")
     base = {key: everything[key] for key in EquipmentParameters.model_fields if key in everything}
     place = {key: value for key, value in drone.items() if key != "name"} if isinstance(drone, Mapping) else {}

@@ -182,7 +182,7 @@ class QuadricopterObjects:
         """Add the object of a sensor. Raises ParameterError for one that cannot be where it is said to be."""
         if sensor.mount is not None and sensor.frame in links:
             raise ParameterError(
-                f"sensor {name}: the URDF has the place of {sensor.frame}; `mount` needs another frame"
+                f"sensor {name}: the URDF already has a link {sensor.frame}; `mount` needs another frame"
             )
         parent, matrix = sensor.placed(links)
         kind = "proximity_sensor" if sensor.kind == "range" else ""
@@ -193,7 +193,7 @@ class QuadricopterObjects:
         said = f"camera frame {camera.frame}"
         if camera.mount is None:
             if camera.frame not in links:
-                raise ParameterError(f"{said}: neither a link of the URDF, nor a `mount` given")
+                raise ParameterError(f"{said}: must be a link of the URDF, or have a `mount`")
             parent, optical = DRONE, links[camera.frame]
         else:
             parent, optical = camera.mount.parent or DRONE, camera.mount.optical
@@ -203,5 +203,5 @@ class QuadricopterObjects:
         if f"{parent}{self._suffix}" not in self._objects and parent not in self._objects:
             raise ParameterError(f"{said}: no object is named {parent}")
         if f"{name}{self._suffix}" in self._objects:
-            raise ParameterError(f"{said}: an object named '{name}' is there already")
+            raise ParameterError(f"{said}: an object named '{name}' already exists")
         self._add(name, parent, local, kind=kind)

@@ -96,7 +96,7 @@ class Texts:
         """Return the bytes that come next. Raises VrepFileError."""
         length = self.integer()
         if not 0 <= length <= len(self._data) - self._at:
-            raise VrepFileError(f"{self._tag}: a text of {length} bytes does not fit")
+            raise VrepFileError(f"{self._tag}: a text of {length} bytes does not fit into the chunk")
         self._at += length
         return self._data[self._at - length : self._at]
 
@@ -131,7 +131,7 @@ def finite(values: tuple[float, ...], tag: str) -> tuple[float, ...]:
     """Return the numbers. Raises VrepFileError for one that is not finite, or is absurd."""
     for value in values:
         if not abs(value) < _LARGEST:  # nor a NaN
-            raise VrepFileError(f"{tag}: the number {value} cannot be meant")
+            raise VrepFileError(f"{tag}: the number {value} makes no sense here")
     return values
 
 
@@ -168,7 +168,7 @@ def _chunks(data: bytes, must_end: bool = False) -> Iterator[Chunk | None]:
     for _ in range(_MOST_CHUNKS):
         if at == size:
             if must_end:
-                raise VrepFileError("is cut: it has no EOF")
+                raise VrepFileError("is cut off: its last chunk, EOF, is missing")
             return
         tag = data[at : at + 3]
         at += 3

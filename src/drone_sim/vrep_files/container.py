@@ -81,7 +81,7 @@ def _decoded(data: bytes, length: int) -> bytes:
         pieces.append(piece)
     decoded = b"".join(pieces)
     if len(decoded) < length:
-        raise VrepFileError(f"is cut: {len(decoded)} of {length} bytes are there")
+        raise VrepFileError(f"is cut off: it has {len(decoded)} of {length} bytes")
     return decoded[:length]
 
 
@@ -125,14 +125,14 @@ def open_container(content: bytes) -> Container:
     if not content:
         raise VrepFileError("is empty")
     if not content.startswith(_MAGIC):
-        raise VrepFileError("is no file of V-REP or CoppeliaSim (it does not begin with VREP)")
+        raise VrepFileError("is not a file of V-REP or CoppeliaSim (it does not begin with VREP)")
     if len(content) < _PAYLOAD_AT:
-        raise VrepFileError(f"is cut: {len(content)} bytes, and the header alone has {_PAYLOAD_AT}")
+        raise VrepFileError(f"is cut off: it has {len(content)} bytes, and the header alone needs {_PAYLOAD_AT}")
     _, version, oldest_reader, compression, length, _, program = _HEADER.unpack_from(content)
     if version < OLDEST or oldest_reader > NEWEST:
         raise VrepFileError(f"has format {version}; {OLDEST} (V-REP 3.0) to {NEWEST} (CoppeliaSim 4.9) can be read")
     if not 0 <= length <= MAX_PAYLOAD:
-        raise VrepFileError(f"says that it has {length} bytes; at most {MAX_PAYLOAD} are read")
+        raise VrepFileError(f"has {length} bytes according to its header; at most {MAX_PAYLOAD} are read")
     return Container(version, program, _payload(content[_PAYLOAD_AT:], compression, length))
 
 
@@ -142,5 +142,5 @@ def _payload(data: bytes, compression: int, length: int) -> bytes:
     if compression != 0:
         raise VrepFileError(f"has compression {compression}; 0 (none) and 1 (Huffman) can be read")
     if len(data) < length:
-        raise VrepFileError(f"is cut: {len(data)} of {length} bytes are there")
+        raise VrepFileError(f"is cut off: it has {len(data)} of {length} bytes")
     return data[:length]

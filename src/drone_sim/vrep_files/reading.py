@@ -124,7 +124,7 @@ def _tree(objects: list[VrepObject]) -> tuple[VrepObject, ...]:
     by_handle = {one.handle: one for one in objects}
     if len(by_handle) != len(objects):
         twice = next(handle for handle, count in Counter(one.handle for one in objects).items() if count > 1)
-        raise VrepFileError(f"object {by_handle[twice].name}: another one has its handle {twice}")
+        raise VrepFileError(f"object {by_handle[twice].name}: another object has the same handle {twice}")
     roots = []
     for one in objects:
         if one.parent == -1:
@@ -145,7 +145,7 @@ def _tree(objects: list[VrepObject]) -> tuple[VrepObject, ...]:
 
 def _add_below(one: VrepObject, ordered: list[VrepObject], depth: int) -> None:
     if depth > _DEEPEST:
-        raise VrepFileError(f"object {one.name}: hangs deeper than {_DEEPEST} objects below each other")
+        raise VrepFileError(f"object {one.name}: has more than {_DEEPEST} ancestors")
     ordered.append(one)
     for child in one.children:
         _add_below(child, ordered, depth + 1)

@@ -85,13 +85,13 @@ def _picked(
 def _vertices(data: bytes) -> np.ndarray:
     found = _triples(np.frombuffer(data[: len(data) // 4 * 4], "<f4"), "Ver").astype(float)
     if not (np.abs(found) < 1e6).all():  # nor a NaN
-        raise VrepFileError("Ver: a vertex that is not finite, or 1000 km away")
+        raise VrepFileError("Ver: a vertex is not finite, or 1000 km away")
     return found
 
 
 def _triples(values: np.ndarray, tag: str) -> np.ndarray:
     if len(values) % 3:
-        raise VrepFileError(f"{tag}: {len(values)} numbers, which are no triples")
+        raise VrepFileError(f"{tag}: {len(values)} numbers, not a multiple of 3")
     return values.reshape(-1, 3)
 
 
@@ -105,7 +105,7 @@ def _packed(data: bytes) -> np.ndarray:
         more = data[at] >> 6 if at < len(data) else 0
         piece = data[at : at + 1 + more]
         if len(piece) != 1 + more:
-            raise VrepFileError("In2: is cut")
+            raise VrepFileError("In2: is cut off")
         difference = piece[0] & 63
         for number, byte in enumerate(piece[1:]):
             difference += byte << (6 + 8 * number)

@@ -115,7 +115,7 @@ def _add_link(files: BulletFiles, robot: Xml.Element, index: int, link: Link) ->
     Xml.SubElement(inertial, "inertia", ixx=a, iyy=b, izz=c, ixy="0", ixz="0", iyz="0")
     for number, part in enumerate(link.parts):
         told = part.shape.for_bullet(files, moves=link.mass != 0)
-        assert isinstance(told, Geometry), "a URDF is no part of another"
+        assert isinstance(told, Geometry), "a URDF cannot be a part of another body"
         place = frames.multiply(link.local, part.local)
         seen = _add_shape(element, "visual", place, told)
         material = Xml.SubElement(seen, "material", name=f"m{index}_{number}")

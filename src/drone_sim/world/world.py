@@ -57,7 +57,7 @@ class World:
             _ahead.pop() if _ahead and not gui else pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         )
         if self._client < 0:
-            raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or leave out gui:=true")
+            raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or do not use gui:=true")
         # Of each file it reads PyBullet would keep the content for good, and none of ours is read twice.
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self._client)
         self._sub_step, self._gravity, self._gyroscopic = sub_step, gravity, gyroscopic

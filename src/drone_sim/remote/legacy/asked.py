@@ -49,7 +49,7 @@ class Asked:
             return struct.unpack(f"<{layout}", self.data)
         except struct.error:
             size = struct.calcsize(f"<{layout}")
-            raise self.refused(f"{len(self.data)} bytes of data, {size} are expected") from None
+            raise self.refused(f"has {len(self.data)} bytes of data, must have {size}") from None
 
     def handles(self) -> list[int]:
         """Return the whole numbers in the data. Raises Refused where it ends within one."""

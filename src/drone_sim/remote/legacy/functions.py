@@ -12,8 +12,10 @@ from drone_sim.remote.legacy.signals import SIGNALS
 from drone_sim.remote.legacy.simulator import SIMULATOR
 from drone_sim.remote.legacy.windows import WINDOWS
 
-_FILES = "no files are taken over: put it into the folder of the scene, and leave out the option for the client's side"
-_PAIRS = "there are no collision and distance objects; simxCheckCollision and simxCheckDistance take two objects"
+_FILES = (
+    "files are not transferred: put it into the folder of the scene, and do not set the option for a client-side file"
+)
+_PAIRS = "collision and distance objects are not supported; pass two objects to simxCheckCollision or simxCheckDistance"
 _WHY = {
     0x3004: ("simxTransferFile", _FILES),
     0x3006: ("simxEraseFile", _FILES),
@@ -21,8 +23,8 @@ _WHY = {
     0x300B: ("simxGetDistanceHandle", _PAIRS),
     0x1026: ("simxReadCollision", _PAIRS),
     0x1027: ("simxReadDistance", _PAIRS),
-    0x3005: ("simxLoadUI", "there are no user interfaces of V-REP 3.x"),
-    0x0005: ("simxCloseScene", "there is always one scene: simxLoadScene lets another take its place"),
+    0x3005: ("simxLoadUI", "user interfaces of V-REP 3.x are not supported"),
+    0x0005: ("simxCloseScene", "there is always exactly one scene: simxLoadScene replaces it"),
 }
 
 

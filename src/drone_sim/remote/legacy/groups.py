@@ -87,7 +87,7 @@ def _objects(ask: Asked, kind: int) -> Any:
 def _group(ask: Asked) -> bytes:
     kind, what = ask.key
     if not 0 <= what < len(_KINDS):
-        raise ask.refused(f"there are data of the kinds 0 to {len(_KINDS) - 1}, not {what}")
+        raise ask.refused(f"kind of data {what}: must be from 0 to {len(_KINDS) - 1}")
     handles = _objects(ask, kind)
     said = [_KINDS[what](ask, one) for one in handles]
     whole, real, texts = ([value for one in said for value in one[part]] for part in range(3))

@@ -39,7 +39,7 @@ def _parameter(function: str, write: str) -> Served:
     def read(ask: Asked) -> bytes:
         known, value = ask.sim(function, *ask.key)
         if not known:
-            raise ask.refused(f"the parameter {ask.key[1]} is not known here")
+            raise ask.refused(f"the parameter {ask.key[1]} is not supported")
         return floats(value) if write == "f" else ints(value)
 
     return Served(f"simxG{function[1:]}", read)

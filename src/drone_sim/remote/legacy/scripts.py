@@ -16,7 +16,7 @@ _CHILD = 1  # sim.scripttype_childscript
 def _call(ask: Asked) -> bytes:
     kind, name, function = ask.key
     if kind & 0xF != _CHILD:
-        raise ask.refused(f"there are only child scripts (sim_scripttype_childscript, {_CHILD}), not {kind}")
+        raise ask.refused(f"type of script {kind}: must be sim_scripttype_childscript ({_CHILD})")
     called, _, below = function.partition("@")  # older programs name the object behind the function
     script = ask.sim("getScriptHandle", name or below)
     returned = ask.sim("callScriptFunction", called, script, *_given(ask))
@@ -26,7 +26,7 @@ def _call(ask: Asked) -> bytes:
 def _given(ask: Asked) -> list[Any]:
     """Return whole numbers, numbers, texts and a buffer. Raises Refused where there are not so many."""
     if len(ask.data) < _COUNTS.size:
-        raise ask.refused(f"{len(ask.data)} bytes of data, which are no arguments")
+        raise ask.refused(f"{len(ask.data)} bytes of data are too few for the arguments")
     counts = whole, real, strings, size = _COUNTS.unpack_from(ask.data)
     texts_at = _COUNTS.size + 4 * (whole + real)
     *texts, buffer = ask.data[texts_at:].split(b"\0", strings) if min(counts) >= 0 else [b""]

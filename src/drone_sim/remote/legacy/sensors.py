@@ -45,7 +45,7 @@ def _force(ask: Asked) -> bytes:
 def _distance(ask: Asked) -> bytes:
     near, way, _ = ask.sim("checkDistance", *ask.key)
     if not near:
-        raise ask.refused("no way between the two is found")
+        raise ask.refused("the distance between the two objects cannot be measured")
     return floats(way[6])
 
 

@@ -136,7 +136,7 @@ class LegacyServer(RemoteApi):
             try:
                 known = self._doors.accept(door)
             except OSError as error:  # it has gone already, or there are too many files
-                self._say(f"a client cannot be let in: {error.strerror}")
+                self._say(f"cannot accept a client: {error.strerror}")
                 return
             if known is None:
                 return
@@ -145,13 +145,13 @@ class LegacyServer(RemoteApi):
                 self._seat(Connection(peer, name))
             else:
                 peer.close()
-                self._say(f"{name} is not let in: {_MOST_CLIENTS} clients are there already")
+                self._say(f"{name} is refused: {_MOST_CLIENTS} clients are already connected")
 
     def _make_room(self) -> bool:
         """Let go of somebody who has not said anything yet; return whether there was one."""
         for guest in self._guests.values():
             if not guest.has_spoken:
-                self._let_go(guest, f"{_MOST_CLIENTS} clients are there already, and it has said nothing")
+                self._let_go(guest, f"{_MOST_CLIENTS} clients are connected, and this one has not sent anything")
                 return True
         return False
 
@@ -173,7 +173,7 @@ class LegacyServer(RemoteApi):
         guest.session.leave()
         guest.connection.close()
         if why:
-            self._say(f"{guest.connection.name} is let go: {why}")
+            self._say(f"{guest.connection.name} is disconnected: {why}")
 
     def _forget_silent(self) -> None:
         for guest in list(self._guests.values()):
@@ -183,7 +183,7 @@ class LegacyServer(RemoteApi):
     def _say(self, line: str) -> None:
         """Write a line to the log, at most one per second, so that clients cannot flood it."""
         if self._rarely.passes():
-            more = f" ({self._unsaid} others before)" if self._unsaid else ""
+            more = f" ({self._unsaid} similar lines were left out)" if self._unsaid else ""
             self._unsaid = 0
             _LOG.warning("remote API: %s%s", printable(line), more)
         else:

@@ -149,7 +149,7 @@ class Session:
         if command.mode not in (wire.STREAMING, wire.STREAMING_SPLIT):
             return self._done(command, ask, function.do)
         if key not in self._streams and len(self._streams) >= _MOST_STREAMS:
-            self._tell(f"{function.name}: {_MOST_STREAMS} commands stream already")
+            self._tell(f"{function.name}: at most {_MOST_STREAMS} commands can stream at once")
             return Answer(command, None)
         self._streams[key] = _Stream(command, ask, function.do)
         return None
@@ -183,7 +183,7 @@ class Session:
     def _done(self, command: Command, ask: Asked, do: Handler) -> Answer | None:
         try:
             if self._size > _LARGEST:
-                raise ask.refused(f"an answer of more than {_LARGEST} bytes")
+                raise ask.refused(f"the reply has more than {_LARGEST} bytes")
             data = do(ask)
             self._size += len(data or b"")
         except Refused as refused:
@@ -198,7 +198,7 @@ class Session:
         self._errors.append(line)
         if line not in self._said and len(self._said) < _MOST_ERRORS:
             self._said.add(line)
-            _LOG.warning("%s (asked for by %s)", encodable(printable(line)), self.name)
+            _LOG.warning("%s (requested by %s)", encodable(printable(line)), self.name)
 
     def _stamp(self) -> wire.Stamp:
         simulation, player = self._player.simulation, self._player

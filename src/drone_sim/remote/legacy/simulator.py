@@ -11,7 +11,7 @@ _TOOLBAR = ("startSimulation", "pauseSimulation", "stopSimulation")  # by what t
 def _press(ask: Asked) -> bytes:
     (which,) = ask.key
     if not 0 <= which < len(_TOOLBAR):
-        raise ask.refused(f"0, 1 or 2 starts, pauses or stops, not {which}")
+        raise ask.refused(f"{which}: must be 0 (start), 1 (pause) or 2 (stop)")
     return nothing(ask.sim(_TOOLBAR[which]))
 
 

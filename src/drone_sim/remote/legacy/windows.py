@@ -29,7 +29,7 @@ def _show(ask: Asked) -> bytes:
 def _open_dialog(ask: Asked) -> bytes:
     said, end, rest = ask.data.partition(b"\0")
     if not end or len(rest) < struct.calcsize("<i") + 1 + _COLORS:
-        raise ask.refused(f"{len(ask.data)} bytes of data, which are no dialog")
+        raise ask.refused(f"{len(ask.data)} bytes of data are not a valid dialog")
     (style,) = struct.unpack_from("<i", rest)
     initial = rest[4:-_COLORS].rstrip(b"\0")
     texts = said.decode("utf-8", "replace"), initial.decode("utf-8", "replace")
@@ -39,7 +39,7 @@ def _open_dialog(ask: Asked) -> bytes:
 
 def _close_dialog(ask: Asked) -> bytes:
     if not ask.sim("endDialog", *ask.key):
-        raise ask.refused(f"no dialog has the handle {ask.key[0]}")
+        raise ask.refused(f"there is no dialog with the handle {ask.key[0]}")
     return b""
 
 

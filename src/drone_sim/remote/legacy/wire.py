@@ -131,13 +131,15 @@ class Packets:
 
     def _check(self, first: int, size: int, left: int) -> None:
         if first != 1:
-            raise ValueError(f"a packet begins with {first & _CODE:#06x}, not with 0x0001")
+            raise ValueError(f"malformed packet: it begins with {first & _CODE:#06x}, must begin with 0x0001")
         if size <= 0 or left < 0:
-            raise ValueError(f"a packet of {size} bytes, before {left} others")
+            raise ValueError(f"malformed packet: {size} bytes, followed by {left} packets")
         if self._left is not None and left != self._left - 1:
-            raise ValueError(f"a packet before {left} others, where {self._left - 1} are to follow")
+            raise ValueError(
+                f"malformed packet: {left} packets must follow it, but the one before announced {self._left - 1}"
+            )
         if len(self._message) + size > LARGEST:
-            raise ValueError(f"a message of more than {LARGEST} bytes")
+            raise ValueError(f"a message has more than {LARGEST} bytes")
 
 
 def packets(message: bytes, piece: int) -> bytes:
@@ -150,13 +152,13 @@ def packets(message: bytes, piece: int) -> bytes:
 def read(message: bytes) -> Message:
     """Return what a message says. Raises ValueError, in one line, for what is none."""
     if len(message) < _HEADER.size:
-        raise ValueError(f"a message of {len(message)} bytes: its header alone has {_HEADER.size}")
+        raise ValueError(f"malformed message: {len(message)} bytes, but a header alone has {_HEADER.size}")
     _, _, number, sent, *_ = _HEADER.unpack_from(message)
     commands: list[Command] = []
     for command in _commands(message):
         commands.append(command)
         if len(commands) > _MOST_COMMANDS:
-            raise ValueError(f"a message of more than {_MOST_COMMANDS} commands")
+            raise ValueError(f"a message has more than {_MOST_COMMANDS} commands")
     return Message(number, sent, commands)
 
 
@@ -164,20 +166,20 @@ def _commands(message: bytes) -> Iterator[Command]:
     at = _HEADER.size
     while at < len(message):
         if len(message) - at < _COMMAND.size:
-            raise ValueError(f"a message ends with {len(message) - at} bytes, which are no command")
+            raise ValueError(f"malformed message: its last {len(message) - at} bytes are not a command")
         size, whole, key_size, shift, code, delay, *_ = _COMMAND.unpack_from(message, at)
         begin, end = at + _COMMAND.size, at + size
         if size < _COMMAND.size or end > len(message) or key_size > end - begin:
             raise ValueError(
-                f"a command of {size} bytes, {key_size} of them its key, {len(message) - at} before the end"
+                f"malformed command: {size} bytes, key of {key_size} bytes, {len(message) - at} bytes left"
             )
         raw_key, data = message[begin : begin + key_size], message[begin + key_size : end]
         whole -= _COMMAND.size + key_size
         if not 0 <= shift <= whole - len(data) or whole > LARGEST:
-            raise ValueError(f"a command's {len(data)} bytes from {shift} on, of {whole}")
+            raise ValueError(f"malformed command: {len(data)} bytes at offset {shift} of {whole}")
         mode = code >> 16
         if mode not in _MODES:
-            raise ValueError(f"a command in the mode {mode}, which there is not")
+            raise ValueError(f"a command has the unknown mode {mode}")
         yield Command(code & _CODE, mode, delay, _key(code & _CODE, raw_key), raw_key, data, shift, whole)
         at = end
 
@@ -189,7 +191,7 @@ def _key(code: int, raw: bytes) -> _Key:
     size = 4 * count
     *parts, rest = raw[size:].split(b"\0", texts) if texts else [raw[size:]]
     if len(raw) < size or len(parts) != texts or rest:
-        raise ValueError(f"a command {code:#06x} with a key of {len(raw)} bytes, which is none of its kind")
+        raise ValueError(f"malformed payload for command {code:#06x}: a key of {len(raw)} bytes")
     return *struct.unpack_from(f"<{count}i", raw), *(part.decode("utf-8", "replace") for part in parts)
 
 

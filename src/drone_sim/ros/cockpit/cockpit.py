@@ -70,7 +70,7 @@ class Cockpit:
     def run(self) -> None:
         """Show what is new, again and again."""
         logging.getLogger("rosout").addFilter(_is_not_repeated)
-        MasterWatch(meanwhile="the page waits for one").start()
+        MasterWatch(meanwhile="the page waits for it").start()
         while not rospy.is_shutdown():
             began = time.monotonic()
             self._look(began)

@@ -35,7 +35,7 @@ def read_parameters(given: Any) -> CockpitParameters:
     if not isinstance(given, Mapping):
         raise ValueError(f"the node's parameters: must be a mapping, not {shown(given)}")
     for name in given.keys() - set(CockpitParameters._fields):
-        raise ValueError(f"{name}: is no parameter of the cockpit; {near_names(name, CockpitParameters._fields)}")
+        raise ValueError(f"{name}: is not a parameter of the cockpit; {near_names(name, CockpitParameters._fields)}")
     folder = given.get("scripts", str(CockpitParameters().scripts))
     if not isinstance(folder, str) or not folder:
         raise ValueError(f"scripts = {shown(folder)}: must be the name of a folder")

@@ -121,7 +121,7 @@ class CommandPublisher:
         until = time.monotonic() + self._patience
         while (publisher := self._requests.get(topic)) is None or not publisher.get_num_connections():
             if time.monotonic() >= until:
-                raise ValueError(f"{topic}: nobody listens")
+                raise ValueError(f"no subscriber on {topic}")
             time.sleep(0.05)
         publisher.publish(Empty())
         return f"{topic} sent to {self.vehicle}"

@@ -62,7 +62,7 @@ class Inbox:
 
         self.put(carry_out, intervention)
         if not wait([answer], self._patience).done:
-            late = "it will not be carried out" if answer.cancel() else "it is still being carried out"
+            late = "it will not be executed" if answer.cancel() else "it is still being executed"
             raise TimeoutError(f"no answer within {self._patience:g} s: {late}")
         return answer.result()
 

@@ -40,7 +40,9 @@ class _Peer(NamedTuple):
 class MasterWatch(threading.Thread):
     """Asks the master for its process number now and then; a daemon thread."""
 
-    def __init__(self, parameters: Callable[[], Iterable[str]] = tuple, meanwhile: str = "flying on") -> None:
+    def __init__(
+        self, parameters: Callable[[], Iterable[str]] = tuple, meanwhile: str = "the flight continues"
+    ) -> None:
         """Remember the master that the node is registered with.
 
         `parameters` returns the names of those that the node has set, beside its own; `meanwhile` is what the node
@@ -63,13 +65,13 @@ class MasterWatch(threading.Thread):
             pid = self._ask()
             if pid is None and not lost:
                 rospy.logwarn(
-                    f"the ROS master is gone: {self._meanwhile}; connected nodes stay connected, new ones cannot join"
+                    f"the ROS master does not answer: {self._meanwhile}; only nodes that are connected stay so"
                 )
             elif pid is not None and lost and pid == self._pid:
                 rospy.logwarn("the ROS master answers again")
             elif pid is not None and pid != self._pid and self._register_again():
                 self._pid = pid
-                rospy.logwarn("a new ROS master is there: registered again, with the parameters as they were")
+                rospy.logwarn("there is a new ROS master: registered this node and its parameters with it")
             lost = pid is None
             if not lost:
                 with contextlib.suppress(OSError, rosgraph.MasterException):  # it has gone meanwhile

@@ -46,7 +46,7 @@ def _answer(uri: str, method: str, arguments: tuple[Any, ...], patience: float |
     server = xmlrpc.client.ServerProxy(uri, transport=_Transport(patience or PATIENCE))
     answer = getattr(server, method)(*arguments)
     if not isinstance(answer, list) or len(answer) != 3:
-        raise ValueError("no answer of ROS's")
+        raise ValueError("the reply is not one of ROS's XML-RPC API")
     code, said, value = answer
     if code != 1:
         raise ValueError(str(said))
@@ -81,7 +81,7 @@ def addresses(host: str) -> set[str]:
     try:
         return {str(one[4][0]) for one in socket.getaddrinfo(host or " ", None)}
     except UnicodeError:
-        raise OSError("no name of a host") from None
+        raise OSError("not the name of a host") from None
 
 
 def check_master_uri(uri: str) -> None:
@@ -96,4 +96,4 @@ def check_master_uri(uri: str) -> None:
     try:
         addresses(host)
     except OSError:
-        raise ValueError(f"ROS_MASTER_URI = '{uri}': the host '{host}' is not known") from None
+        raise ValueError(f"ROS_MASTER_URI = '{uri}': the host '{host}' cannot be resolved") from None

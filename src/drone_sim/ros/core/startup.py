@@ -3,7 +3,7 @@
 A new node takes the place of an older one with the same name, once that has ended, as every ROS node does. But the
 master tells the older one to end only when the newer one is registered. If the older one still calls the master then
 (for a line on /rosout, rospy asks for a parameter), the master takes it for a new node, and ends the newer one, too.
-A simulator with which its launch, and the master, would end keeps its place.
+A node whose launch also runs the master keeps its place: if that launch is to end, the user ends it.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ def init_node(name: str, is_required: bool = False, **options: Any) -> bool:
     """Call rospy.init_node; return False, after one line on stderr, where it cannot become a node.
 
     rospy itself would wait for the master, or fail with a traceback, or be a node that nobody can reach. An older node
-    of the same name is ended first. If `is_required`, its roslaunch ends with it: an older one is left where the master
-    would end, too; and other processes that want the name wait until release_name. Log lines go to stdout at once:
-    without a terminal, Python would keep them until there are 8 KiB.
+    of the same name is ended first, except where its launch also runs the master: that launch is to stay as it is. If
+    `is_required`, other processes that want the name wait until release_name. Log lines go to stdout at once: without a
+    terminal, Python would keep them until there are 8 KiB.
     """
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
@@ -78,7 +78,7 @@ def _check_log(name: str) -> None:
     with contextlib.suppress(OSError):
         os.makedirs(folder, exist_ok=True)
     if not os.access(folder, os.W_OK):
-        said = f"no log is written: {folder} must not be written to; ROS_LOG_DIR names another folder"
+        said = f"no log is written, because {folder} is not writable; set ROS_LOG_DIR to another folder"
         print(f"{name}: {said}", file=sys.stderr, flush=True)
         mappings["__log"] = os.devnull
 
@@ -119,7 +119,9 @@ def _check_own_address() -> None:
         addresses(host)
     except OSError:
         what = f"{given or 'the name of this machine'} = '{host}'"
-        raise ValueError(f"{what}: is not known here; ROS_HOSTNAME=localhost works on one machine") from None
+        raise ValueError(
+            f"{what}: cannot be resolved; ROS_HOSTNAME=localhost works if all nodes run on this machine"
+        ) from None
 
 
 def reported(name: str, action: Callable[[], Any]) -> int:
@@ -128,7 +130,7 @@ def reported(name: str, action: Callable[[], Any]) -> int:
         action()
         return 0
     except MASTER_GONE as error:
-        said = f"the ROS master at {rosgraph.get_master_uri()} has gone, or refuses: {error}"
+        said = f"the ROS master at {rosgraph.get_master_uri()} does not answer, or refuses: {error}"
     except _EXPECTED as error:
         said = str(error)
     rospy.logfatal(f"{name}: {' '.join(said.split())}")
@@ -165,14 +167,19 @@ def _take_name(name: str, is_required: bool) -> None:
     """End the node of a name, so that this process may register with the master.
 
     Another process that is started at the same moment, on the same machine, waits until `release_name`. Raises OSError
-    where the older node does not end, does not answer, or would end the master with it.
+    where the older node does not end, does not answer, or was launched together with the master.
     """
     _wait_for_turn(name)
     uri = _node(name)
     if uri and _name(name, uri) == name:
-        if is_required and _launched_with_master(name):
-            raise OSError(f"{name} is there already, and the master ends with it: press Ctrl-C in its terminal first")
-        print(f"{name} is there already: it ends, and this one takes its place", file=sys.stderr, flush=True)
+        if _launched_with_master(name):
+            what = f"a {'simulator' if is_required else 'node'} named {name} is already running"
+            raise OSError(f"{what}, and its launch also runs the ROS master: stop it with Ctrl-C first")
+        print(
+            f"a node named {name} is already running: it is stopped, and this one replaces it",
+            file=sys.stderr,
+            flush=True,
+        )
         _end(name, uri)
 
 
@@ -197,7 +204,7 @@ def _wait_for_turn(name: str) -> None:
             if error.errno != errno.EADDRINUSE:  # not a Linux: there is no such socket
                 return None
         if time.monotonic() > end:
-            raise OSError(f"another node {name} has been about to start for {_STARTS:g} s: end that process")
+            raise OSError(f"another process has been starting as {name} for {_STARTS:g} s: end that process")
         time.sleep(_LOOK)
 
 
@@ -225,7 +232,9 @@ def _name(name: str, uri: str) -> str:
     try:
         return str(call(uri, "getName", patience=_PATIENCE))
     except TimeoutError:
-        said = f"{name} is there already, at {uri}, and does not answer: end that process, or take another __name:="
+        said = (
+            f"a node named {name} is already running at {uri} and does not answer: end it, or choose another __name:="
+        )
         raise OSError(said) from None
     except FAILURES:  # it is not one of ours: it is left to the master
         return ""
@@ -234,11 +243,11 @@ def _name(name: str, uri: str) -> str:
 def _end(name: str, uri: str) -> None:
     """Ask a node to end; return when it has. Raises OSError."""
     with contextlib.suppress(*FAILURES):  # it may be gone before it has answered
-        call(uri, "shutdown", "another node of this name has been started, and takes its place", patience=_PATIENCE)
+        call(uri, "shutdown", "another node with this name was started and replaces it", patience=_PATIENCE)
     end = time.monotonic() + _ENDS
     while reached(uri, _CONNECTS):
         if time.monotonic() > end:
-            raise OSError(f"{name} is there already, at {uri}, and does not end: end that process")
+            raise OSError(f"a node named {name} is already running at {uri} and does not stop: end that process")
         time.sleep(_LOOK)
 
 
@@ -260,6 +269,6 @@ def ask_master(tool: str, ask: Callable[[rosgraph.Master], _Answer | None], wait
             time.sleep(_ASKS)
             if not said and time.monotonic() - began > _STARTING:
                 said = True
-                print(f"{tool}: waits for {waits}", file=sys.stderr, flush=True)
+                print(f"{tool}: waiting for {waits}", file=sys.stderr, flush=True)
     except (OSError, rosgraph.MasterException) as error:
         raise OSError(f"the ROS master at {rosgraph.get_master_uri()} does not answer: {error}") from None

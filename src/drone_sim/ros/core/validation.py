@@ -42,7 +42,7 @@ def read_changes(message: KeyValue, model: Checked) -> dict[str, Any]:
     for part in reversed(parts):
         value = {part: value} if part else value
     if not isinstance(value, Mapping):
-        raise Refused(f"key '': names none of {', '.join(type(model).model_fields)}")
+        raise Refused(f"key '': must be one of {', '.join(type(model).model_fields)}")
     check_changes(value, model)
     return dict(value)
 
@@ -74,7 +74,7 @@ def parameters_of(name: str, **others: Any) -> Parameters:
     """
     given: dict[str, Any] = rospy.get_param(name, {})
     if not isinstance(given, dict):
-        raise ParameterError(f"must hold parameters, such as {name}/script", (name,), str(given)[:80])
+        raise ParameterError(f"must be a namespace with parameters such as {name}/script", (name,), str(given)[:80])
     given = {key: value for key, value in given.items() if value != _DEFAULTS.get(key, ...)}
     remote = given.get("remote_api")
     if isinstance(remote, dict) and remote.get("serve") == NOT_GIVEN:

@@ -36,7 +36,7 @@ def run_checks(thorough: bool = True) -> Iterator[Line]:
         ("host names", environment.across, _SECONDS),
         ("master", master.found, _SECONDS),
         ("clock", master.clocks, _SECONDS),
-        ("nodes", master.dead, 3 * _SECONDS),
+        ("nodes", master.dead, _SECONDS),
         ("commands", master.commands, _SECONDS),
         ("simulator", lambda: simulator(master), _SECONDS),
     ]
@@ -90,7 +90,7 @@ def main() -> int:
             marks.append(line.mark)
             print(line, flush=True)
         wrong, hints = marks.count(WRONG), marks.count(HINT)
-        print(f"{wrong} wrong, {hints} hints" if wrong or hints else "all is well", flush=True)
+        print(f"{wrong} wrong, {hints} hints" if wrong or hints else "everything is ok", flush=True)
     run_check("the end", _goodbye, _AT_THE_END)
     os._exit(1 if WRONG in marks else 0)  # a thread of rospy's may wait for a master that has gone
 

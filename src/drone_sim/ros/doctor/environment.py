@@ -14,7 +14,7 @@ from drone_sim.files.resources import package_path
 from drone_sim.ros.core.network import MASTER, PATIENCE, addresses
 from drone_sim.ros.doctor import HINT, OK, WRONG, Line
 
-_CURE = "on one machine `export ROS_HOSTNAME=localhost` will do"
+_CURE = "`export ROS_HOSTNAME=localhost` works if all nodes run on this machine"
 _OLDEST = (3, 10)
 _COMMANDS = ("roslaunch", "rosrun", "rosmaster")
 
@@ -23,11 +23,15 @@ def python() -> Iterator[Line]:
     """Is it a Python that will do, and the one that other packages' nodes find?"""
     version = "{}.{}.{}".format(*sys.version_info)
     if sys.version_info < _OLDEST:
-        yield Line(WRONG, "Python", f"{version}, but 3.10 is the oldest that works")
+        yield Line(WRONG, "Python", f"{version} is too old: 3.10 or newer is needed")
         return
     first, own = shutil.which("python3"), package_path() / ".venv/bin"
     if own.is_dir() and Path(sys.executable).parent != own:
-        yield Line(WRONG, "Python", f"the doctor runs on {sys.executable}, its package's modules are in {own.parent}")
+        yield Line(
+            WRONG,
+            "Python",
+            f"the doctor runs with {sys.executable}, but the package's modules are installed in {own.parent}",
+        )
     else:
         yield Line(OK, "Python", f"{version}, {sys.executable}")
     if own.is_dir() and (first is None or Path(first).parent != own):
@@ -39,7 +43,7 @@ def ros() -> Iterator[Line]:
     """Is a ROS 1 sourced, and this package in it?"""
     cure = f"`source {package_path()}/devel/setup.bash`"
     if os.environ.get("ROS_VERSION", "1") != "1":
-        said = f"ROS {os.environ['ROS_VERSION']} is sourced: take a fresh terminal, and there {cure} alone"
+        said = f"ROS {os.environ['ROS_VERSION']} is sourced: open a new terminal and run only {cure}"
         yield Line(WRONG, "ROS", said)
         return
     missing = [one for one in _COMMANDS if shutil.which(one) is None]
@@ -57,9 +61,9 @@ def _package(cure: str) -> Line:
     try:
         found = Path(rospkg.RosPack().get_path("drone_sim"))
     except rospkg.ResourceNotFound:
-        return Line(WRONG, "ROS", f"does not find the package drone_sim: {cure}")
+        return Line(WRONG, "ROS", f"ROS does not find the package drone_sim: {cure}")
     if found.resolve() != package_path().resolve():
-        return Line(WRONG, "ROS", f"roslaunch would start the drone_sim in {found}, not this one: {cure}")
+        return Line(WRONG, "ROS", f"roslaunch would start drone_sim from {found}, not from this folder: {cure}")
     return Line(OK, "ROS", f"{os.environ.get('ROS_DISTRO', 'ROS 1')}, drone_sim in {found}")
 
 
@@ -77,7 +81,11 @@ def _log_folder() -> Line:
     folder = Path(os.environ.get("ROS_LOG_DIR") or Path(home) / "log").expanduser()
     there = next(one for one in (folder, *folder.parents) if one.exists())
     if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
-        return Line(WRONG, "log folder", f"{there} cannot be written to: roslaunch will not start")
+        return Line(
+            WRONG,
+            "log folder",
+            f"{there} is not writable, so roslaunch will not start: make it writable, or set ROS_LOG_DIR",
+        )
     free = shutil.disk_usage(there).free / 2**20
     if free < 100:
         return Line(HINT, "log folder", f"{folder} has {free:.0f} MiB left: `rosclean purge` frees what old runs left")
@@ -104,7 +112,9 @@ def host_names() -> Iterator[Line]:
             raise OSError
     except OSError:
         yield Line(
-            WRONG, "host names", "'localhost' is not this machine: /etc/hosts needs the line '127.0.0.1 localhost'"
+            WRONG,
+            "host names",
+            "'localhost' does not resolve to this machine: add the line '127.0.0.1 localhost' to /etc/hosts",
         )
     host, given = own_host()
     if {"ROS_HOSTNAME", "ROS_IP"} <= os.environ.keys():
@@ -112,7 +122,7 @@ def host_names() -> Iterator[Line]:
     try:
         addresses(host)
     except OSError:
-        yield Line(WRONG, "host names", f"{given} = '{host}' is not known here: {_CURE}")
+        yield Line(WRONG, "host names", f"{given} = '{host}' cannot be resolved: {_CURE}")
         return
     yield _reaches_itself(host, given)
 
@@ -136,9 +146,11 @@ def across() -> Iterator[Line]:
     host, given = own_host()
     try:
         if is_loopback(host) and not is_loopback(master):
-            cure = "`export ROS_IP=` with an address that they can reach, and ROS_HOSTNAME unset"
+            cure = "`unset ROS_HOSTNAME`, and `export ROS_IP=` with an address of this machine that they can reach"
             yield Line(
-                WRONG, "host names", f"the master is on {master}, whose nodes cannot reach {given} = '{host}': {cure}"
+                WRONG,
+                "host names",
+                f"the master is on {master}, and nodes there cannot reach {given} = '{host}': {cure}",
             )
     except OSError:  # said by others
         return

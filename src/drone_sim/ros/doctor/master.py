@@ -1,4 +1,4 @@
-"""The ROS master, what it knows of, and what the simulator says of itself, where it runs."""
+"""The checks of the ROS master, its nodes and topics, and the /diagnostics of the simulator."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from collections.abc import Iterator
 from typing import Any
 from urllib.parse import urlsplit
 
-from drone_sim.ros.core.network import FAILURES, MASTER, answers, call, check_master_uri
+from drone_sim.ros.core.network import FAILURES, MASTER, PATIENCE, answers, call, check_master_uri
 from drone_sim.ros.doctor import HINT, OK, WRONG, Line
 
-_DIAGNOSTICS = 4.0  # s; it speaks once a second
+_DIAGNOSTICS = 4.0  # s, for the /diagnostics of all simulators; each publishes once a second
 _MARKS = {0: OK, 1: HINT}
 _APART = 1.0  # s, between this machine's clock and that of the simulator
-_ENOUGH = 5  # nodes that do not answer: each takes its time
+_ANSWERS = 2 * PATIENCE  # s, for the answers of all nodes; each takes two calls
 _START = "`roslaunch drone_sim drone.launch` starts one"
 
 Graph = dict[str, list[str]]  # nodes by topic, or by service
@@ -48,11 +48,11 @@ class Master:
             graph = call(self.uri, "getSystemState")
             self.published, self.subscribed, self.services = (dict(one) for one in graph)
         except ConnectionRefusedError:
-            return Line(HINT, "master", f"none at {self.uri}: {_START}")
+            return Line(HINT, "master", f"no master runs at {self.uri}: {_START}")
         except FAILURES as error:
             why = f"HTTP {error.errcode}" if isinstance(error, xmlrpc.client.ProtocolError) else str(error)
             said = f"port {port} of {self.uri} does not answer as a master ({why or type(error).__name__})"
-            cure = "end what listens there, or `export ROS_MASTER_URI=` with another port"
+            cure = "end the program that listens there, or `export ROS_MASTER_URI=` with another port"
             return Line(WRONG, "master", f"{said}: {cure}")
         self.there = True
         return Line(OK, "master", f"at {self.uri}, with {len(self.nodes())} nodes")
@@ -72,76 +72,91 @@ class Master:
             simulated = False
         tellers = self.published.get("/clock", [])
         if simulated is True and not tellers:
-            cure = "`rosparam set /use_sim_time false`, or use_sim_time:=true for drone.launch; then start them anew"
+            cure = "`rosparam set /use_sim_time false`, or use_sim_time:=true for drone.launch; then restart the nodes"
             yield Line(
-                WRONG, "clock", f"/use_sim_time is true, and nobody publishes /clock: nodes wait forever: {cure}"
+                WRONG, "clock", f"/use_sim_time is true, but no node publishes /clock, so nodes wait forever: {cure}"
             )
         elif simulated is True and len(tellers) > 1:
-            yield Line(WRONG, "clock", f"{', '.join(tellers)} all publish /clock: time jumps; end all but one")
+            yield Line(WRONG, "clock", f"{', '.join(tellers)} all publish /clock, so time jumps: stop all but one")
         elif simulated is True:
-            yield Line(OK, "clock", f"simulated time, from {tellers[0]}")
+            yield Line(OK, "clock", f"simulated time, published by {tellers[0]}")
         elif tellers:
-            said = f"{', '.join(tellers)} publishes /clock, but /use_sim_time is not true: nodes go by real time"
-            yield Line(HINT, "clock", f"{said}; set it before they start")
+            said = f"{', '.join(tellers)} publishes /clock, but /use_sim_time is not true, so nodes use real time"
+            yield Line(HINT, "clock", f"{said}: `rosparam set /use_sim_time true` before they start")
         else:
             yield Line(OK, "clock", "real time")
 
     def dead(self) -> Iterator[Line]:
-        """Are there nodes that have gone without a word?"""
-        gone = 0
-        for node in self.nodes() if self.there else ():
-            if not answers(self.uri, node):
-                gone += 1
-                cure = "`rosnode cleanup` removes it, if it is not just another machine that cannot be reached"
-                yield Line(HINT, "nodes", f"{node} is registered and does not answer: {cure}")
-            if gone == _ENOUGH:
-                return
+        """Yield a line that names the registered nodes that do not answer."""
+        dead = self._unanswered() if self.there else []
+        if dead:
+            nodes = f"{', '.join(dead)} {'is' if len(dead) == 1 else 'are'} registered and"
+            cure = "`rosnode cleanup` removes dead nodes; a node on a machine that you cannot reach may be alive"
+            yield Line(HINT, "nodes", f"{nodes} did not answer within {_ANSWERS:g} s: {cure}")
+
+    def _unanswered(self) -> list[str]:
+        """Ask all nodes at the same time: looking up the name of a host that is gone may block for 20 s."""
+        nodes, alive = self.nodes(), set()
+
+        def ask(node: str) -> None:
+            if answers(self.uri, node):
+                alive.add(node)
+
+        threads = [threading.Thread(target=ask, args=(node,), daemon=True) for node in nodes]
+        for thread in threads:
+            thread.start()
+        end = time.monotonic() + _ANSWERS
+        for thread in threads:
+            thread.join(max(end - time.monotonic(), 0.0))
+        return [node for node in nodes if node not in alive]
 
     def commands(self) -> Iterator[Line]:
         """Are there commands that nobody hears?"""
         heard = [topic for topic in self.subscribed if topic.endswith("/cmd_vel")]
         for topic, nodes in self.published.items():
             if topic.endswith("cmd_vel") and topic not in self.subscribed:
-                cure = f"start it with cmd_vel:={heard[0]}" if heard else "no drone is there to hear it"
-                yield Line(HINT, "commands", f"{', '.join(nodes)} publishes {topic}, which nobody receives: {cure}")
+                cure = f"start it with cmd_vel:={heard[0]}" if heard else "no simulator with a drone is running"
+                yield Line(HINT, "commands", f"{', '.join(nodes)} publishes {topic}, which has no subscriber: {cure}")
 
 
 def simulator(master: Master) -> Iterator[Line]:
-    """Listen to its diagnostics."""
+    """Yield what the simulators publish on /diagnostics."""
     if not master.there:
         return
     nodes = sorted({node for name, nodes in master.services.items() if name.endswith("/save_scene") for node in nodes})
     if not nodes:
-        yield Line(HINT, "simulator", "does not run: `roslaunch drone_sim drone.launch`")
+        yield Line(HINT, "simulator", "none is running: `roslaunch drone_sim drone.launch` starts one")
+        return
+    messages = _wait_for_diagnostics(nodes)
     for node in nodes:
-        message = _wait_for_diagnostics(node)
-        if message is None:
-            yield Line(
-                WRONG, "simulator", f"{node} says nothing on /diagnostics in {_DIAGNOSTICS:g} s: end and restart it"
-            )
-            continue
-        yield from _diagnosed(node, message)
+        if node in messages:
+            yield from _diagnosed(node, messages[node])
+        else:
+            said = f"{node} published nothing on /diagnostics within {_DIAGNOSTICS:g} s: stop and restart it"
+            yield Line(WRONG, "simulator", said)
 
 
-def _wait_for_diagnostics(node: str) -> Any:
-    """Return the first of its messages, or None where none comes in time."""
+def _wait_for_diagnostics(nodes: list[str]) -> dict[str, Any]:
+    """Return the first message of each node; without those that publish none within _DIAGNOSTICS."""
     import rospy
     from diagnostic_msgs.msg import DiagnosticArray
 
     if not rospy.core.is_initialized():
         rospy.init_node("drone_sim_doctor", anonymous=True, disable_signals=True, disable_rostime=True)
-    heard: list[Any] = []
-    came = threading.Event()
+    received: dict[str, Any] = {}
+    complete = threading.Event()
 
     def take(message: Any) -> None:
-        if not heard and any(one.name.startswith(f"{node[1:]}: ") for one in message.status):
-            heard.append(message)
-            came.set()
+        for node in nodes:
+            if any(status.name.startswith(f"{node[1:]}: ") for status in message.status):
+                received.setdefault(node, message)
+        if len(received) == len(nodes):
+            complete.set()
 
     subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, take)
-    came.wait(_DIAGNOSTICS)
+    complete.wait(_DIAGNOSTICS)
     subscriber.unregister()
-    return heard[0] if heard else None
+    return dict(received)
 
 
 def _diagnosed(node: str, message: Any) -> Iterator[Line]:
@@ -152,7 +167,5 @@ def _diagnosed(node: str, message: Any) -> Iterator[Line]:
         simulated |= any(pair.key == "stamps" and pair.value.startswith("simulated") for pair in one.values)
     apart = time.time() - message.header.stamp.to_sec()
     if not simulated and abs(apart) > _APART:
-        said = (
-            f"the clocks here and of {node} are {apart:.1f} s apart: transforms and pictures will not fit; run chrony"
-        )
+        said = f"the clocks of this machine and of {node} differ by {apart:.1f} s: run chrony on both"
         yield Line(HINT, "clock", said)

@@ -19,14 +19,14 @@ _NO_MODULES = {"rviz"}
 _WITH_A_DISPLAY = {"tkinter"}  # `./dev.sh setup` leaves it out elsewhere
 _WITHOUT = {  # what still works where a module is missing
     "tkinter": "`view` writes files instead of opening a window",
-    "matplotlib": "nothing draws plots",
-    "av": "nothing makes videos",
+    "matplotlib": "plots cannot be drawn",
+    "av": "videos cannot be made",
     "jinja2": "`grade --html` writes no report",
-    "distributed": "`--scheduler` finds no other machines",
+    "distributed": "`--scheduler` does not work",
     "scipy": "`sweep --optimize` does not work",
     "tqdm": "`fly` does not work",
 }
-_SLOW = "pictures will come from PyBullet's TinyRenderer, at a few frames per second"
+_SLOW = "PyBullet's TinyRenderer draws pictures instead, at a few frames per second"
 _VERSIONS = {"numpy": "numpy", "cv2": "OpenCV", "pybullet": "PyBullet", "pydantic": "pydantic", "lupa": "lupa"}
 
 
@@ -46,18 +46,18 @@ def packages() -> Iterator[Line]:
         yield _missing(name, keys[name], text)
     if not failed:
         versions = ", ".join(f"{told} {_version(name, tried[name][1])}" for name, told in _VERSIONS.items())
-        yield Line(OK, "packages", f"all {len(keys)} that package.xml names; {versions}")
+        yield Line(OK, "packages", f"all {len(keys)} of package.xml can be imported; {versions}")
     state, said = tried[RENDERER]
-    cure = f"{_SLOW}; `apt install libegl1 libgl1-mesa-dri`, or a driver that has EGL"
+    cure = f"{_SLOW}; `apt install libegl1 libgl1-mesa-dri`, or a graphics driver with EGL, helps"
     yield Line(OK, "pictures", said) if state == "ok" else Line(HINT, "pictures", f"{said}; {cure}")
     state, said = tried[FLIGHT]
-    yield Line(OK, "flight", said) if state == "ok" else Line(WRONG, "flight", f"no test flight: {said}")
+    yield Line(OK, "flight", said) if state == "ok" else Line(WRONG, "flight", f"the test flight failed: {said}")
 
 
 def _missing(module: str, key: str, why: str) -> Line:
     here = (package_path() / "dev.sh").is_file() and module not in _WITH_A_DISPLAY
     debian = key if key.startswith("python3-") else f"python3-{key.replace('_', '-')}"
-    cure = "`./dev.sh setup` installs it" if here else f"`apt install {debian}`, or install drone_sim anew"
+    cure = "`./dev.sh setup` installs it" if here else f"`apt install {debian}`, or reinstall drone_sim"
     if module in SEPARATE:
         cure = installation_of(module)
     if module in _WITHOUT:
@@ -72,7 +72,7 @@ def _version(module: str, own: str) -> str:
     try:
         return own or metadata.version(distribution)
     except metadata.PackageNotFoundError:
-        return "of some version"
+        return "(unknown version)"
 
 
 def results(names: Sequence[str]) -> dict[str, tuple[str, str]]:
@@ -101,6 +101,6 @@ def _probed(names: Sequence[str]) -> tuple[str, str]:
     try:
         done = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE)
     except subprocess.TimeoutExpired as late:
-        return (late.stdout or b"").decode(errors="replace"), f"no end within {PATIENCE:g} s"
+        return (late.stdout or b"").decode(errors="replace"), f"did not end within {PATIENCE:g} s"
     last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
     return done.stdout.decode(errors="replace"), f"ended with {done.returncode}{': ' if last else ''}{''.join(last)}"

@@ -43,7 +43,7 @@ def _flight() -> str:
     finally:
         simulation.close()
     if not abs(height - _HEIGHT) < _ERROR:
-        raise RuntimeError(f"after {seconds:g} s it was at a height of {height:.2f} m, and not {_HEIGHT} m")
+        raise RuntimeError(f"after {seconds:g} s its height was {height:.2f} m, not {_HEIGHT} m")
     return f"hovers at {height:.2f} m"
 
 

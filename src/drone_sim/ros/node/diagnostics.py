@@ -75,7 +75,7 @@ class Diagnostics(threading.Thread):
         if self._answered.wait(PATIENCE):
             return
         seconds = time.monotonic() - self._asked
-        why = "a scene or script is being read, or a script or a picture does not come to an end"
+        why = "a scene or script is being read, or a script or a picture takes very long"
         self._findings = {**self._findings, _BUSY: Finding(_BUSY, ERROR, f"busy for {seconds:.0f} s: {why}", {})}
 
     def _answer(self) -> None:

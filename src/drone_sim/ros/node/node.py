@@ -266,7 +266,7 @@ class Node:
         """Return where commands are received, in words, and whether a script hears them."""
         vehicles = self.simulation.vehicles
         if not vehicles:
-            return "no vehicle is in the scene"
+            return "the scene has no vehicle"
         is_heard = not self.player.playing or any(map(hears_commands, vehicles.values()))
         topics = ", ".join(rospy.resolve_name(f"{name}/cmd_vel") for name in vehicles)
         return f"commands on {topics}{'' if is_heard else ', but no script subscribes to them'}"

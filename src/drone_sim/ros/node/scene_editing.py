@@ -59,11 +59,11 @@ class SceneEditing:
     def _answer(self, request: AddDiagnosticsRequest) -> tuple[bool, str]:
         text = request.load_namespace
         if len(text) > _LONGEST:
-            return False, f"edit_scene: a request has at most {_LONGEST} characters"
+            return False, f"edit_scene: a request may have at most {_LONGEST} characters"
         try:
             said = json.loads(text)
         except (json.JSONDecodeError, RecursionError) as error:
-            return False, f"edit_scene: no JSON: {error}"
+            return False, f"edit_scene: the request is not JSON: {error}"
         is_reading = isinstance(said, dict) and said.keys() <= _READING
         return self._attempt(lambda: self._do(said), "" if is_reading else "~edit_scene", request)
 

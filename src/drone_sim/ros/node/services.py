@@ -117,7 +117,7 @@ class Services:
         added, removed = self._player.simulation.set_vehicles(self._vehicles.read())
         self._follow()
         told = [f"{', '.join(names)} {verb}" for names, verb in ((added, "added"), (removed, "removed")) if names]
-        return "; ".join(told) or "all are as they were"
+        return "; ".join(told) or "no vehicle was added or removed"
 
     def snapshot(self) -> str:
         """Remember the exact dynamic state."""
@@ -158,7 +158,9 @@ class VehiclesParameter:
         try:
             self._write(_sendable(parameters.vehicle_entries) or self._given)
         except (TypeError, OverflowError) as error:  # of XML-RPC: such as a seed of more than 32 bits
-            rospy.logwarn(f"the parameter {rospy.resolve_name(_VEHICLES)} cannot say who flies: {error}")
+            rospy.logwarn(
+                f"the parameter {rospy.resolve_name(_VEHICLES)} cannot be set to the vehicles of the scene: {error}"
+            )
 
     def read(self) -> Any:
         """Return what it holds."""

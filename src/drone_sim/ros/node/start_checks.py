@@ -86,8 +86,8 @@ def check_others(vehicles: Iterable[str], simulated: bool) -> None:
     for name in vehicles:
         there = others(rospy.resolve_name(f"{name}/{_OF_A_VEHICLE}"))
         if there:
-            cure = "a namespace (__ns:=a, or ns of <include>), or another drone/name"
-            raise ValueError(f"vehicle {name} flies already, in {there[0]}: give one of the two {cure}")
+            cure = "a namespace (__ns:=a, or ns of <include>) or another drone/name"
+            raise ValueError(f"a vehicle named {name} already flies in {there[0]}: give one of the two {cure}")
     if simulated and others(_CLOCK):
-        cure = "only in real time can two run under one master (use_sim_time:=false)"
-        raise ValueError(f"/use_sim_time is true, and {others(_CLOCK)[0]} publishes /clock already: {cure}")
+        cure = "two simulators can share one master only in real time (use_sim_time:=false)"
+        raise ValueError(f"/use_sim_time is true, but {others(_CLOCK)[0]} already publishes /clock: {cure}")

@@ -125,7 +125,7 @@ def markers_of(visual: Visual, matrix: frames.Matrix, files: RvizMeshes) -> Sequ
             marker.mesh_resource, marker.mesh_use_embedded_materials = files.resource(visual, _GLOW), True
             return [marker]
         except (ValueError, OSError) as error:
-            rospy.logwarn_throttle(5, f"rviz gets an object without texture: {error}")
+            rospy.logwarn_throttle(5, f"rviz shows an object without its texture: {error}")
     return [marker_of(one, matrix, visual.rgba) for one in visual.shape.for_rviz()]
 
 

@@ -60,7 +60,7 @@ class SurroundingsMarkers:
         try:
             marker.mesh_resource, marker.mesh_use_embedded_materials = self._files.resource(visual, glow=1.0), True
         except (ValueError, OSError) as error:
-            rospy.logwarn(f"rviz gets a floor without texture: {error}")
+            rospy.logwarn(f"rviz shows the floor without its texture: {error}")
             size = self._simulation.parameters.scene.floor.size
             marker.type, marker.color, marker.scale = Marker.CUBE, ColorRGBA(*_GREY), Vector3(size, size, 1e-3)
         return marker

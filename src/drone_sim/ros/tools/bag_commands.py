@@ -47,7 +47,7 @@ def _write(options: argparse.Namespace) -> None:
         entries = sorted(_entries(bag, flight), key=lambda one: one["at"])
         begins = next((one.message.data for one in bag.read(f"{flight.namespace}/state", STATE)), "")
     if not entries:
-        raise BagError(f"{options.bag}: nothing was commanded in it on {flight.namespace}/cmd_vel and the like")
+        raise BagError(f"{options.bag}: it has no commands on {flight.namespace}/cmd_vel or another command topic")
     landed = " --set start=landed" if begins == "landed" else ""
     lines = [yaml.safe_dump(one, default_flow_style=True, sort_keys=False, width=math.inf) for one in entries]
     writing.write(options.timeline, f"# fly --commands{landed}\n{''.join(f'- {line}' for line in lines)}")

@@ -46,7 +46,7 @@ def _film(options: argparse.Namespace) -> None:
         with video.writing_to(options.video, rate) as made:
             for stamp, picture, times in _timed(bag, topic, rate, damaged):
                 made.add(picture, flight.at(stamp) if flight else None, times)
-    without = "" if flight else "; no odometry of its drone was recorded, and nothing is written over it"
+    without = "" if flight else "; without a head-up display, because no odometry of its drone was recorded"
     without += f"; {len(damaged)} are left out: {damaged[0]}" if damaged else ""
     print(f"{_NAME}: wrote {options.video} of {topic}: {made}{without}", flush=True)
 

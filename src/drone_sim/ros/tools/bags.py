@@ -66,7 +66,7 @@ class Bag:
             topics = self._bag.get_type_and_topic_info().topics
             largest = max((one.uncompressed_size for one in self._bag._chunk_headers.values()), default=0)
         if largest > MAX_CHUNK:
-            raise BagError(f"{path}: a chunk of {largest} bytes; at most {MAX_CHUNK} are unpacked")
+            raise BagError(f"{path}: a chunk of {largest} bytes; at most {MAX_CHUNK} are allowed")
         self.kinds: dict[str, str] = {name: one.msg_type for name, one in topics.items()}
         self._counts = {name: one.message_count for name, one in topics.items()}
 
@@ -116,11 +116,11 @@ class Bag:
         except OSError:
             raise
         except rosbag.ROSBagUnindexedException:
-            why = "was cut off while it was recorded; `rosbag reindex` mends a copy of it"
+            why = "was cut off while it was recorded; `rosbag reindex` repairs a copy of it"
             raise BagError(f"{self.path}: {why}") from None
         except Exception as error:  # rosbag lets through what struct, bz2, genpy and the like raise
             said = " ".join(str(error).split()) or type(error).__name__
-            raise BagError(f"{self.path}: is not a bag that can be read: {said:.120}") from None
+            raise BagError(f"{self.path}: cannot be read as a bag: {said:.120}") from None
 
 
 class BagFlight:
@@ -138,7 +138,7 @@ class BagFlight:
         }  # of one stamp the last
         stamps = [stamp for stamp in sorted(rows) if len(rows[stamp]) > 1]
         if not stamps:
-            raise BagError(f"{bag.path}: no message on {topic} that can be read")
+            raise BagError(f"{bag.path}: no readable message on {topic}")
         table = np.array([rows[stamp] for stamp in stamps])
         self._stamps, self._came, self._rows = np.array(stamps), table[:, 0], table[:, 1:]
         self.start = stamps[0]
@@ -203,7 +203,7 @@ class BagFlight:
     def steps(self) -> BagSteps:
         """Return the simulation's steps. Raises BagError where it was started anew meanwhile."""
         if np.any(np.diff(self._came) < 0):
-            raise BagError(f"{self._bag.path}: time goes back in it, as at every start: one flight in one bag")
+            raise BagError(f"{self._bag.path}: time jumps back in it, as at a restart: a bag must hold one flight")
         return BagSteps(self._stamps, self._commands())
 
     def row_at(self, stamp: float) -> tuple[float, ...]:

@@ -110,9 +110,11 @@ class JoyTeleop:
             return
         silent = time.monotonic() - self._heard
         if not self._topic.get_num_connections():
-            self._lose(f"nobody publishes {self._topic.resolved_name} any more")
+            self._lose(f"{self._topic.resolved_name} has no publisher any more")
         elif timeout and silent > timeout:
-            self._lose(f"{self._topic.resolved_name} is silent for {timeout:g} s (autorepeat_rate of the joy node?)")
+            self._lose(
+                f"no message on {self._topic.resolved_name} for {timeout:g} s (autorepeat_rate of the joy node?)"
+            )
 
     def _look_for_gamepad(self) -> None:
         wanted = self._parameters.device
@@ -124,7 +126,7 @@ class JoyTeleop:
             self._gamepad = Gamepad(devices[0])
         except (OSError, IndexError) as error:
             why = f"{devices[0]}: {error}" if devices else "there is no /dev/input/js*"
-            missed = f"no gamepad ({why}); listening to {self._topic.resolved_name}"
+            missed = f"no gamepad found ({why}); listening on {self._topic.resolved_name}"
             if missed != self._missed:
                 rospy.logwarn(f"{_NAME}: {missed}")
             self._missed = missed

@@ -97,7 +97,7 @@ class Screen:
             return self._decoder.feed(b"")
         data = os.read(self._terminal, 1024)
         if not data:
-            raise OSError("the terminal is gone")
+            raise OSError("the terminal was closed")
         return self._decoder.feed(data)
 
     def _draw(self) -> None:
@@ -146,7 +146,7 @@ def _fly(over: Callable[[], bool]) -> None:
 def main() -> int:
     """Run the node until ESC, a signal, or the terminal closes; return its exit status."""
     if not sys.stdin.isatty() or not sys.stdout.isatty():
-        print(f"{_NAME}: needs a terminal to read keys from", file=sys.stderr)
+        print(f"{_NAME}: must run in a terminal, to read its keys", file=sys.stderr)
         return 1
     try:
         curses.setupterm()

@@ -34,7 +34,9 @@ def _draw(options: argparse.Namespace) -> None:
     if ending not in (*_TABLES, _BAG):
         raise ValueError(f"{shown(options.flight)}: must end in {', '.join(_TABLES)} or {_BAG}")
     if options.vehicle is not None and ending != _BAG:
-        raise ValueError(f"--vehicle {shown(options.vehicle)}: a table is of one vehicle")
+        raise ValueError(
+            f"--vehicle {shown(options.vehicle)}: only works with a bag, because a table holds one vehicle"
+        )
     from drone_sim.offline import plot  # matplotlib takes a while to import
 
     out = options.plot or f"{flight.stem}.png"

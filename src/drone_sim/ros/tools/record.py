@@ -88,4 +88,4 @@ def _kinds(simulator: str) -> dict[str, str]:
             return None
         return dict(master.getTopicTypes())
 
-    return ask_master(_NAME, ask, f"{simulator}, which does not run yet")
+    return ask_master(_NAME, ask, f"{simulator}, which is not running yet")

@@ -90,7 +90,7 @@ def _record(options: argparse.Namespace, over: Callable[[], bool]) -> None:
             _add(made, stamp, parts)
         for one in listening:
             one.unregister()
-    left = f"; {moments.missed} came too fast and are left out" if moments.missed else ""
+    left = f"; {moments.missed} are left out, because they came too fast" if moments.missed else ""
     print(f"{_NAME}: wrote {options.folder}: {made}{left}", flush=True)
 
 
@@ -103,7 +103,7 @@ def _check_topic(topic: str, over: Callable[[], bool]) -> None:
             return
         if time.monotonic() > until:
             known = near_names(topic, cameras) if cameras else "no camera has `truth: true`"
-            raise ValueError(f"{topic}: no node publishes its truth; {known}")
+            raise ValueError(f"{topic}: no node publishes the truth of this camera; {known}")
         time.sleep(_PERIOD)
 
 

@@ -98,9 +98,7 @@ def run(command: Sequence[str], environment: Mapping[str, str]) -> int:
         is_early = time.monotonic() - began < _STARTING
         if status not in _CRASHES or ends or not is_early or start + 1 == _STARTS:
             break
-        print(
-            f"{_NAME}: rviz has crashed ({signal.strsignal(-status)}): starting it again", file=sys.stderr, flush=True
-        )
+        print(f"{_NAME}: rviz crashed ({signal.strsignal(-status)}): starting it again", file=sys.stderr, flush=True)
     return SIGNALLED - status if status < 0 else status
 
 

@@ -21,7 +21,10 @@ from drone_sim.ros.tools.commands import BACKSPACE, ENTER, KEY_MAPS, Command, Co
 
 _SILENCE = 1.0  # s of real time; a simulator says something in every step, and while it stands, too
 _REQUESTS = {"t": "takeoff", "l": "land", "x": "reset"}  # topics, by key
-_STANDING = {"stopped": ", in vain: Enter starts the simulation", "paused": ": done once p resumes the simulation"}
+_STANDING = {
+    "stopped": ", without effect: Enter starts the simulation",
+    "paused": ": takes effect once p resumes the simulation",
+}
 _FAREWELL = 0.2  # s; a message leaves in rospy's own time, and a node that is gone delivers nothing
 
 
@@ -99,7 +102,7 @@ class Teleop:
         publisher = self._requests[name]
         listened = publisher.get_num_connections() > 0
         sent = f"{name} sent{_STANDING.get(self._node_state, '')}"
-        self.said = sent if listened else f"nobody listens on {publisher.resolved_name}: nothing sent"
+        self.said = sent if listened else f"no subscriber on {publisher.resolved_name}: nothing was sent"
         publisher.publish(Empty())
         return listened
 
@@ -111,7 +114,7 @@ class Teleop:
     def send(self, command: Command) -> bool:
         """Send a command; where nobody would hear it, return False, and `said` says so."""
         if not self.connected:
-            self.said = f"nobody listens on {self.topic}: nothing sent"
+            self.said = f"no subscriber on {self.topic}: nothing was sent"
             return False
         self._in_force.send(command)
         self._publisher.publish(_twist(command))
@@ -123,7 +126,7 @@ class Teleop:
             if self.farewell:
                 return
             topic = self._publisher.resolved_name
-            self.farewell = f"stop sent on {topic}" if self.connected else f"no stop sent: nobody listens on {topic}"
+            self.farewell = f"stop sent on {topic}" if self.connected else f"no stop was sent: no subscriber on {topic}"
             with contextlib.suppress(rospy.ROSException):
                 self._publisher.publish(_twist(Command()))
             time.sleep(_FAREWELL)

@@ -56,9 +56,9 @@ class Topic:
         elif self.subscriber is None and (kind or time.monotonic() - self._since > _PATIENCE):
             images = [name for name, one in published.items() if one in _KINDS]
             there = near_names(self.name, images) if images else "there are no image topics"
-            self._say(f"is a {kind}, no image; {there}" if kind else f"nobody publishes it; {there}")
+            self._say(f"is a {kind}, not an image; {there}" if kind else f"no node publishes it; {there}")
         elif self.subscriber and self.shown is None and time.monotonic() - self._since > _PATIENCE:
-            self._say(f"is published, but no picture came in {_PATIENCE:g} s; is the simulation paused?")
+            self._say(f"is published, but no picture came within {_PATIENCE:g} s; is the simulation paused?")
 
     def _say(self, why: str) -> None:
         if not self._said:
@@ -126,7 +126,7 @@ class Viewer:
         if self._over():
             return
         if all(topic.hopeless for topic in self.topics):
-            raise RuntimeError("no picture, nothing written")
+            raise RuntimeError("no picture was received: nothing was written")
         picture = pictures.tile([topic.picture for topic in self.topics])
         Path(file).write_bytes(cv2.imencode(".png", picture)[1].tobytes())
         print(f"{_NAME}: wrote {file}, {picture.shape[1]} x {picture.shape[0]}", flush=True)

@@ -89,7 +89,7 @@ class VehicleInputs:
 
     def _taking(self, topic: str, read: Callable[[Any], _Job]) -> Callable[[Any], None]:
         """Return a callback that leaves what a message asks for to the simulation's thread, or says why not."""
-        kept = ", the last good one is kept" if topic == "cmd_vel" else ""
+        kept = ", the last valid one is kept" if topic == "cmd_vel" else ""
         throttle, action = Throttle(_QUIET), _INTERVENTIONS.get(topic)
 
         def take(message: Any) -> None:

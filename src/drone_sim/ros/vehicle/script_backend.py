@@ -77,7 +77,7 @@ class RosBackend:
         try:
             answer = answers.get(timeout=_LONGEST)
         except queue.Empty:
-            raise ValueError(f"the service {name} does not answer within {_LONGEST:g} s") from None
+            raise ValueError(f"the service {name} did not answer within {_LONGEST:g} s") from None
         if isinstance(answer, Exception):
             raise ValueError(f"the service {name}: {' '.join(str(answer).split())}")
         return answer
@@ -113,7 +113,7 @@ class RosBackend:
     def advertise_image(self, topic: str, queue: int) -> Any:
         """Advertise an image topic; one that a camera publishes already stays the camera's."""
         if self._is_of_a_camera(topic):
-            rospy.loginfo(f"{topic}: the node's camera publishes it already; the script's images are not sent twice")
+            rospy.loginfo(f"{topic}: the node's camera already publishes it, so the script's images are not published")
             return _Silence()
         return _ImageSender(rospy.Publisher(topic, ImageMessage, queue_size=queue), ImageMessage, self._stamp)
 

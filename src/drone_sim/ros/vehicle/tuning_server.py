@@ -90,7 +90,7 @@ class TuningServer:
             self._inbox.ask(lambda: self._change(changes), done)
         except (ValueError, TimeoutError) as error:
             said = error.text if isinstance(error, ParameterError) else error
-            rospy.logwarn(f"{self._name} refused, nothing is changed: {said}")
+            rospy.logwarn(f"{self._name} refused, and nothing was changed: {said}")
         return ReconfigureResponse(self._config)
 
     def _change(self, changes: Mapping[str, Any]) -> str:

@@ -42,7 +42,7 @@ class VehicleTopics:
         self.sensors = {name: SensorOutput(parameters, one) for name, one in vehicle.instruments.by_name.items()}
         self._tuning: TuningServer | None = None
         if rospy.resolve_name(vehicle.name) == rospy.get_name():  # the node's own server is there
-            rospy.logwarn(f"vehicle {vehicle.name} cannot be tuned in flight: it has the name of the node")
+            rospy.logwarn(f"vehicle {vehicle.name} cannot be tuned in flight, because it has the same name as the node")
         else:
             tuning = simulation.child_scripts[vehicle.name].tuning
             self._tuning = TuningServer(vehicle.name, tuning, inbox, tuned=lambda: self.inputs.follow(self.vehicle))

@@ -25,12 +25,12 @@ _LATE = 0.1  # of the steps; a few are late on any busy computer
 def cameras(simulation: Simulation, since: Since | None) -> Finding:
     """Look at what draws, at how long a picture takes, and at the rate of each camera that somebody looks at."""
     renderer, values, problems = simulation.vision.renderer, {}, []
-    values["renderer"] = f"PyBullet's {TINY}" if renderer == TINY else renderer or "none yet: nobody has looked"
+    values["renderer"] = f"PyBullet's {TINY}" if renderer == TINY else renderer or "none yet: no camera has been used"
     drawn = since.pictures if since else 0
     mean = f"{since.drawing / drawn * 1e3:.1f} ms" if since and drawn else "not known"
     values["frame time"] = mean
     if renderer == TINY:
-        said = f"PyBullet's slow {TINY} draws, for there is no EGL: ask `rosrun drone_sim doctor`"
+        said = f"PyBullet's slow {TINY} draws, because there is no EGL: run `rosrun drone_sim doctor`"
         problems.append(Problem(WARN, said))
     for (vehicle, name), count_shown in (since.shown if since else {}).items():
         assert since is not None
@@ -38,10 +38,10 @@ def cameras(simulation: Simulation, since: Since | None) -> Finding:
         nominal = _nominal(simulation, vehicle, name, since)
         values[f"{vehicle}/{name}"] = f"{rate:.1f} of {nominal:.1f} Hz"
         if count_shown + _FEW < _ENOUGH * nominal * since.seconds:
-            problems.append(Problem(WARN, f"{vehicle}/{name} comes at {rate:.1f} of {nominal:.1f} Hz"))
+            problems.append(Problem(WARN, f"{vehicle}/{name} publishes at {rate:.1f} instead of {nominal:.1f} Hz"))
     watched = [key for vehicle in simulation.vehicles.values() for key, one in vehicle.cameras.items() if one.watched()]
     values["looked at"] = f"{len(watched)} of {sum(len(one.cameras) for one in simulation.vehicles.values())} cameras"
-    fine = f"{len(watched)} looked at; time of a picture: {mean}" if watched else "no camera is in use"
+    fine = f"{len(watched)} in use; time per picture: {mean}" if watched else "no camera is in use"
     return finding("cameras", fine, problems, values)
 
 
@@ -68,17 +68,17 @@ def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool
     if simulated_time and not player.playing:
         problems.append(Problem(WARN, f"{player.state}: /clock stands still, and nodes that use simulated time wait"))
     if held and since and not since.steps:
-        problems.append(Problem(WARN, "no step: a client of the remote API has asked to trigger each, and does not"))
+        problems.append(Problem(WARN, "no step: a client of the remote API wants to trigger each step, and does not"))
     elif factor is not None and asked and factor < _ENOUGH * asked:
-        problems.append(Problem(WARN, f"too slow: {factor:.2f} times real time, {asked:g} are asked for"))
+        problems.append(Problem(WARN, f"too slow: {factor:.2f} times real time, {asked:g} is wanted"))
     if since and since.late > _LATE * since.steps:
-        problems.append(Problem(WARN, f"{since.late} of the last {since.steps} steps came late"))
+        problems.append(Problem(WARN, f"{since.late} of the last {since.steps} steps were late"))
     late = f"{since.late} of the last {since.steps}, " if since else ""
     values = {
         "state": player.state,
         "script error": player.why_stopped,
         "simulated time": f"{simulation.time:.2f} s",
-        "run": f"number {simulation.run}; every start and every stop begins another",
+        "run": f"number {simulation.run}; every start and every stop begins a new run",
         "vehicles": ", ".join(simulation.vehicles),
         "real-time factor": f"{factor:.2f}" if factor is not None else "not known",
         "real-time factor asked for": f"{asked:g}" if asked else "as fast as it can",

@@ -24,7 +24,7 @@ _SHARE = 0.5  # of the steps with a propeller at its limit, after which it is a 
 _SLOW = 0.1  # of the speed that is commanded
 _MOVES = 0.1  # m/s, of a command that means to
 _IGNORED_FOR = 3.0  # s of simulated time
-_DEAF = "this script does not listen to commands: the tutorial's do from stage 6 on, and `pilot` does"
+_DEAF = "this script does not subscribe to commands: the tutorial's scripts do from stage 6 on, and `pilot` does"
 
 
 class VehicleDiagnosis:
@@ -76,11 +76,11 @@ class VehicleDiagnosis:
         if player.playing:
             return []
         if player.why_stopped:
-            return [Problem(ERROR, f"stands still: {player.why_stopped}; `start` runs the edited file")]
+            return [Problem(ERROR, f"stopped: {player.why_stopped}; `start` runs the edited file")]
         taken = self._log.taken.get(COMMAND)
-        cure = "`pause false` lets it go on" if player.state == "paused" else "`start` lets it fly"
+        cure = "`pause false` resumes it" if player.state == "paused" else "`start` starts it"
         if taken is not None and self._now - taken.at < _RECENT:
-            return [Problem(WARN, f"commands of {taken.sender} come in, but the simulation is {player.state}: {cure}")]
+            return [Problem(WARN, f"{taken.sender} sends commands, but the simulation is {player.state}: {cure}")]
         return []
 
     def _has_failed(self) -> list[Problem]:
@@ -92,17 +92,17 @@ class VehicleDiagnosis:
         """Tell of commands that do not move it, for it has landed or crashed."""
         taken, state = self._log.taken.get(COMMAND), str(self._vehicle.flight_state)
         if state == CRASHED:
-            return [Problem(WARN, "crashed: `reset` puts it back where it began")]
+            return [Problem(WARN, "crashed: `reset` puts it back at its start")]
         if state == LANDED and taken is not None and self._vehicle.commands.now != Twist() and self._player.playing:
-            return [Problem(WARN, f"landed: commands of {taken.sender} do not move it; `takeoff` first")]
+            return [Problem(WARN, f"landed: commands of {taken.sender} do not move it; send `takeoff` first")]
         return []
 
     def _refuses(self) -> list[Problem]:
         refused = self._log.last_refusal()
         if refused is None or not self._log.is_refusing(refused.topic):
             return []
-        kept = ", and flies by the last good one" if refused.topic == COMMAND else ""
-        return [Problem(WARN, f"refused what {refused.sender} sends on {refused.topic}{kept}: {refused.why}")]
+        kept = ", and keeps the last valid one" if refused.topic == COMMAND else ""
+        return [Problem(WARN, f"refused a message of {refused.sender} on {refused.topic}{kept}: {refused.why}")]
 
     def _leans(self) -> list[Problem]:
         if self._tilt < _LEANING or str(self._vehicle.flight_state) == CRASHED:
@@ -116,17 +116,19 @@ class VehicleDiagnosis:
         if not self._player.playing or said in (FLYING, HELD, UPSIDE_DOWN) or said != situation(self._vehicle.body):
             return []
         is_touched = said.startswith("touches")
-        return [Problem(WARN, said if is_touched else f"{said}: nothing is below it; `restart` begins again")]
+        return [Problem(WARN, said if is_touched else f"{said}: nothing is below it; `restart` puts it back")]
 
     def _cannot(self) -> list[Problem]:
         problems = []
         since, command = self._since, self._vehicle.commands.now
         if since and since.steps and since.clipped[self._vehicle.name] > _SHARE * since.steps:
-            problems.append(Problem(WARN, f"propellers at their limit in {self._clipped()}"))
+            problems.append(Problem(WARN, f"propellers are at their limit in {self._clipped()}"))
         wanted = math.hypot(*command.linear)
         if since and self._contacts and wanted > _MOVES and self._speed() < _SLOW * wanted:
             met = ", ".join(_names(self._contacts))
-            problems.append(Problem(WARN, f"held up by {met}: told {wanted:.2f} m/s, moves at {self._speed():.2f}"))
+            problems.append(
+                Problem(WARN, f"blocked by {met}: the command is {wanted:.2f} m/s, the speed {self._speed():.2f} m/s")
+            )
         return problems
 
     def _is_on_its_own(self) -> list[Problem]:
@@ -138,8 +140,8 @@ class VehicleDiagnosis:
             return [Problem(WARN, _DEAF)]
         gone = taken.sender not in self._log.senders()
         if gone and vehicle.commands.now != Twist() and not vehicle.parameters.cmd_vel_timeout:
-            said = f"flies on by the last command of {taken.sender}, which has gone"
-            return [Problem(WARN, f"{said}: send a zero one, or set cmd_vel_timeout")]
+            said = f"still obeys the last command of {taken.sender}, which has exited"
+            return [Problem(WARN, f"{said}: publish a zero Twist, or set cmd_vel_timeout")]
         return []
 
     def _has_rivals(self) -> list[Problem]:
@@ -177,7 +179,9 @@ class VehicleDiagnosis:
         if self._doing != FLYING:
             return self._doing
         if taken is None:
-            return f"{state}; no command has come yet" if hears_commands(self._vehicle) else f"{state}; {_DEAF}"
+            return (
+                f"{state}; no command has been received yet" if hears_commands(self._vehicle) else f"{state}; {_DEAF}"
+            )
         return f"{state} as {taken.sender} commands"
 
     def _values(self) -> dict[str, str]:

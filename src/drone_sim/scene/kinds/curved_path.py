@@ -42,7 +42,7 @@ class ControlPointParameters(Checked):
         """Refuse a quaternion that is no rotation."""
         super().model_post_init(context)
         if abs(math.hypot(*self.turn) - 1.0) > 1e-3:
-            raise ParameterError("the numbers x, y, z, w must have a length of 1", ("turn",))
+            raise ParameterError("must be a unit quaternion x, y, z, w", ("turn",))
 
     @property
     def control_point(self) -> ControlPoint:
@@ -76,7 +76,7 @@ class CurvedPathParameters(KindParameters):
         super().model_post_init(context)
         most = sum(one.count for one in self.control_points)
         if most > MAX_LINE:
-            raise ParameterError(f"{most} points of their curves: at most {MAX_LINE}", ("control_points",))
+            raise ParameterError(f"the curves have {most} points, at most {MAX_LINE} are allowed", ("control_points",))
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
         """Return the path."""

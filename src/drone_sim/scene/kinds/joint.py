@@ -49,7 +49,9 @@ class JointParameters(KindParameters):
         if not low <= self.value <= high:
             raise ParameterError(f"must be within the limits, {low:g} to {high:g}", ("value",), f"{self.value:g}")
         if self.type == "spherical" and (self.limits is not None or self.value):
-            raise ParameterError("limits, value: a spherical joint has none; setSphericalJointMatrix turns it")
+            raise ParameterError(
+                "limits, value: a spherical joint must not have them; turn it with setSphericalJointMatrix"
+            )
 
     @property
     def control(self) -> JointControl:

@@ -33,10 +33,10 @@ class PathParameters(KindParameters):
         super().model_post_init(context)
         if self.turns and len(self.turns) != len(self.points):
             raise ParameterError(
-                f"{len(self.turns)} of them for {len(self.points)} points: must be one for each", ("turns",)
+                f"{len(self.turns)} quaternions for {len(self.points)} points: must be one for each point", ("turns",)
             )
         if any(abs(math.hypot(*one) - 1.0) > 1e-3 for one in self.turns):
-            raise ParameterError("the numbers x, y, z, w of each must have a length of 1", ("turns",))
+            raise ParameterError("each must be a unit quaternion x, y, z, w", ("turns",))
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
         """Return the path."""

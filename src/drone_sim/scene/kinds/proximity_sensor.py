@@ -45,10 +45,10 @@ class ProximitySensorParameters(KindParameters):
         super().model_post_init(context)
         needed = _NEEDS.get(self.type)
         if needed is not None and not getattr(self, needed):
-            raise ParameterError(f"a {self.type} needs one that is greater", (needed,), "0")
+            raise ParameterError(f"must be greater than 0 for a {self.type}", (needed,), "0")
         widest = _WIDEST.get(self.type, math.inf)
         if self.angle > widest:
-            raise ParameterError(f"that of a {self.type} is at most {widest:.4g} rad", ("angle",), f"{self.angle:g}")
+            raise ParameterError(f"must be at most {widest:.4g} rad", ("angle",), f"{self.angle:g}")
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
         """Return the sensor."""

@@ -43,7 +43,7 @@ class Broadcasts:
         """Send data; raises ValueError for more than may wait."""
         if len(self.sent) >= _MOST or sum(len(one.data) for one in (broadcast, *self.sent)) > MOST_BYTES:
             raise ValueError(
-                f"at most {_MOST} data of {MOST_BYTES} bytes together wait: let them persist for a shorter time"
+                f"more than {_MOST} messages or {MOST_BYTES} bytes are waiting: let them persist for a shorter time"
             )
         self.sent.append(broadcast)
 

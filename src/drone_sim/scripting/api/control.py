@@ -160,7 +160,7 @@ class Turns:
         """Raise, lower or set the level that forbids automatic switching (0: allowed); return the level from before."""
         before = self._forbidden
         if not isinstance(allowed, (bool, int, float)) or not 0 <= allowed < 1e9:
-            raise WrongValue("true, false, or a level of 0 or more is expected")
+            raise WrongValue("expected true, false, or a level of 0 or more")
         self._forbidden = int(allowed) if not isinstance(allowed, bool) else max(0, before + (-1 if allowed else 1))
         return before
 

@@ -48,7 +48,7 @@ class CustomData:
     def set(self, handle: int, name: str, value: Any) -> None:
         """Keep a value, or forget it where it is None or ''. Raises WrongValue, ValueError."""
         if not isinstance(name, str):
-            raise WrongValue("the name of a value is a string")
+            raise WrongValue("the name of a value must be a string")
         if len(name) > _LONGEST_NAME:
             raise ValueError(f"the name of a value has at most {_LONGEST_NAME} characters, not {len(name)}")
         refuse_if_too_large(value)
@@ -56,10 +56,10 @@ class CustomData:
             self.values.pop((handle, name), None)
             return
         if (handle, name) not in self.values and len(self.values) >= _MOST:
-            raise ValueError(f"{_MOST} values are there already: forget some")
+            raise ValueError(f"at most {_MOST} values are allowed: remove some")
         size = sum(len(one) for one in self.values.values() if isinstance(one, (str, bytes)))
         if isinstance(value, (str, bytes)) and size + len(value) > MOST_BYTES:
-            raise ValueError(f"custom data may hold {MOST_BYTES} bytes together")
+            raise ValueError(f"all custom data together may have at most {MOST_BYTES} bytes")
         self.values[handle, name] = copy.deepcopy(value)
 
     def names(self, handle: int) -> list[str]:
@@ -80,7 +80,7 @@ class CustomDataFunctions:
         """Store a string, or a number as text, under a tag of an object, or sim.handle_scene; '' removes it."""
         data = written(data)
         if not isinstance(data, (str, bytes, type(None))):
-            raise WrongValue("a string is expected")
+            raise WrongValue("expected a string")
         self._data.set(self._target(handle), _CUSTOM + tag, data)
 
     @sim("345", readCustomBufferData="5", readCustomStringData="5")
@@ -140,7 +140,7 @@ class CustomDataFunctions:
             return copy.deepcopy(self._data.values[target, name])
         if options and options.get("noError"):
             return None
-        raise ValueError(f"no property '{name}'; {near_names(name, self._data.names(target))}")
+        raise ValueError(f"there is no property '{name}'; {near_names(name, self._data.names(target))}")
 
     @sim("5")
     def removeProperty(self, handle: Handle, name: Name, _options: Any = None) -> None:
@@ -156,7 +156,9 @@ class CustomDataFunctions:
 def _known(name: str) -> str:
     """Return the name of a property; raises ValueError for one that CoppeliaSim itself has."""
     if not isinstance(name, str):
-        raise WrongValue("the name of a property is a string")
+        raise WrongValue("the name of a property must be a string")
     if not name.startswith(_PROPERTIES):
-        raise ValueError(f"no property '{name:.80}' here: those here begin with customData. or signal.")
+        raise ValueError(
+            f"property '{name:.80}' is not supported: only names that begin with customData. or signal. are"
+        )
     return name

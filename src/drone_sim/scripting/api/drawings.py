@@ -42,7 +42,7 @@ _CYCLIC = CONSTANTS["drawing_cyclic"]
 _SEEN_THROUGH = {CONSTANTS["drawing_50percenttransparency"]: 0.5, CONSTANTS["drawing_25percenttransparency"]: 0.75}
 
 Item = tuple[float, ...]
-_IGNORED = "there is nothing to draw on; accepted and ignored"
+_IGNORED = "this drawing is not supported; accepted and ignored"
 _GREY = (0.5, 0.5, 0.5)
 
 
@@ -101,10 +101,10 @@ class Drawings:
         many.
         """
         if len(self.objects) >= _MOST_OBJECTS:
-            raise ValueError(f"{_MOST_OBJECTS} drawing objects are there already: remove some")
+            raise ValueError(f"at most {_MOST_OBJECTS} drawing objects are allowed: remove some")
         turned = kind & _KIND in _TURNED
         if kind & _KIND not in _KINDS and not turned:
-            raise ValueError(f"no drawing object has the type {kind}; known are sim.drawing_{', '.join(_NUMBERS)}")
+            raise ValueError(f"{kind} is not a type of drawing object; known are sim.drawing_{', '.join(_NUMBERS)}")
         name = _TURNED[kind & _KIND] if turned else _KINDS[kind & _KIND]
         rgba = (*color[:3], math.prod(part for flag, part in _SEEN_THROUGH.items() if kind & flag))
         items: deque[Item] = deque(maxlen=min(max(1, most), MOST))
@@ -125,7 +125,7 @@ class Drawings:
             return
         count = 7 if drawn.turned else _NUMBERS[drawn.kind]
         if len(item) < count:
-            raise ValueError(f"an item of {drawn.kind} has {count} numbers, not {len(item)}")
+            raise ValueError(f"an item of {drawn.kind} must have {count} numbers, not {len(item)}")
         if drawn.turned:
             item = (*item[:3], *frames.turned(item[3:7], (0.0, 0.0, 1.0)))
         item = tuple(item[: _NUMBERS[drawn.kind]])
@@ -161,7 +161,7 @@ class Drawings:
 
     def _object(self, handle: int) -> DrawingObject:
         if handle not in self.objects:
-            raise ValueError(f"no drawing object has the handle {handle}")
+            raise ValueError(f"there is no drawing object with the handle {handle}")
         return self.objects[handle]
 
     @staticmethod
@@ -211,7 +211,7 @@ class DrawingFunctions:
             self._ignored.say("addDrawingObject", _IGNORED, level=logging.DEBUG)
             return self._drawings.new_handle()
         if maxItemCount > MOST:
-            self._ignored.say("addDrawingObject", f"{maxItemCount} items are too many: {MOST} are kept")
+            self._ignored.say("addDrawingObject", f"maxItemCount = {maxItemCount}: at most {MOST} are kept")
         extent, tolerance = numbers((size, duplicateTolerance), 2)
         return self._drawings.make(
             int(objectType), extent, tolerance, int(maxItemCount), rgb, above.matrix if above else None

@@ -140,7 +140,9 @@ class Dynamics(Functions):
         """
         inertia = self._inertia(handle)
         if inertia is None:
-            raise ValueError(f"'{self._objects[handle].name}' has no mass that the dynamics move")
+            raise ValueError(
+                f"'{self._objects[handle].name}' is not moved by the dynamics, because it is static or has no mass"
+            )
         return list(inertia.tensor), list(inertia.frame)
 
     def _inertia(self, handle: int) -> Inertia | None:
@@ -214,7 +216,7 @@ class Dynamics(Functions):
         for name in names:
             if name in known:
                 return known[name]()
-        self._ignored.say(function, f"{names[0]} is not known here: 0 is returned")
+        self._ignored.say(function, f"{names[0]} is not supported: 0 is returned")
         return None
 
     def _corners(self, handle: int) -> Getters:
@@ -275,9 +277,9 @@ def _carrier(found: SceneObject | None) -> SceneObject | None:
 def _names(kinds: tuple[str, ...], parameter: int) -> list[str]:
     """Return the constants' names of a parameter; raises WrongValue, ValueError for none."""
     if not isinstance(parameter, (int, float)):
-        raise WrongValue("the number of a parameter is expected, such as sim.shapeintparam_static")
+        raise WrongValue("expected the number of a parameter, such as sim.shapeintparam_static")
     found = [name for name, value in CONSTANTS.items() if value == parameter and name.startswith(kinds)]
     if not found:
         known = [name for name in CONSTANTS if name.startswith(kinds)]
-        raise ValueError(f"no parameter of an object is {parameter:g}; {near_names(kinds[0], known)}")
+        raise ValueError(f"{parameter:g} is not a parameter of an object; {near_names(kinds[0], known)}")
     return found

@@ -27,14 +27,14 @@ class Graphs:
     def add(self, handle: int, graph: int, name: str) -> int:
         """Add a stream to a graph, unless that has one of this name; return its handle. Raises ValueError."""
         if not isinstance(name, str):
-            raise WrongValue("the name of a stream is a string")
+            raise WrongValue("the name of a stream must be a string")
         if len(name) > _LONGEST_NAME:
-            raise ValueError(f"the name of a stream has at most {_LONGEST_NAME} characters, not {len(name)}")
+            raise ValueError(f"the name of a stream must have at most {_LONGEST_NAME} characters, not {len(name)}")
         known = next((key for key, one in self._streams.items() if one[:2] == (graph, name)), None)
         if known is not None:
             return known
         if len(self._streams) >= _MOST:
-            raise ValueError(f"{_MOST} streams of graphs are there already: destroy some")
+            raise ValueError(f"at most {_MOST} streams of graphs are allowed: destroy some")
         self._streams[handle] = graph, name, None
         return handle
 

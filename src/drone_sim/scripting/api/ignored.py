@@ -37,19 +37,19 @@ _TABLE = {
             45 setGraphStreamTransformation addGraphCurve=handle
             345 handleGraph
         """,
-        "there are no user interfaces of V-REP 3.x": """
+        "user interfaces of V-REP 3.x are not supported": """
             3 setUIButtonLabel setUIButtonColor setUIButtonProperty setUIProperty setUISlider setUIPosition removeUI
                 getUIHandle=handle createUI=handle createUIButton=0 getUIEventButton=-1 getUIButtonProperty=0
                 getUIProperty=0 getUISlider=0 getUIButtonLabel='' getUIPosition=[0,0]
             - setUIButtonTexture
         """,
-        "there is no selection here, and no keys are pressed": """
+        "there is no window to select objects or press keys in": """
             345 addObjectToSelection removeObjectFromSelection getObjectSelection=[]
                 getSimulatorMessage=(-1,[0,0,0,0],[])
             5 setObjectSel getObjectSel=[]
             35 getObjectLastSelection=-1
         """,
-        "the scene file has the properties of objects": """
+        "the scene file sets the properties of objects": """
             345 setObjectProperty setObjectSpecialProperty setModelProperty setExplicitHandling getObjectProperty=0
                 getObjectSpecialProperty=0 getModelProperty=0 getExplicitHandling=0
             - setModelBase
@@ -67,7 +67,7 @@ _TABLE = {
         "propellers are rigidly attached, and nothing breaks": """
             345 breakForceSensor
         """,
-        "dummies cannot be linked to each other: a link holds nothing here": """
+        "dummies cannot be linked to each other": """
             345 setLinkDummy getLinkDummy=-1
             - setDummyLinkType getDummyLinkType=0
         """,

@@ -54,7 +54,7 @@ class ImageFilters(Functions):
         """Do nothing: a picture is what the sensor sees."""
         self._image(handle)
         self._ignored.say(
-            "workImgToSensorImg", "a picture stays what the sensor sees; accepted and ignored", "simVision"
+            "workImgToSensorImg", "a script cannot change the sensor's picture; accepted and ignored", "simVision"
         )
 
     @simVision("45")
@@ -68,7 +68,7 @@ class ImageFilters(Functions):
     def intensityScaleOnWorkImg(self, handle: Handle, start: Number, end: Number, greyScale: bool) -> None:
         """Make the image grey, and scale its brightness: 0 becomes `start`, and 1 `end`."""
         if not greyScale:
-            raise ValueError("there is no color scale here: greyScale = true is expected")
+            raise ValueError("color scales are not supported: greyScale must be true")
         low, high = numbers((start, end), 2)
         grey = low + (high - low) * self._image(handle).mean(2)
         self._keep(handle, np.repeat(grey[:, :, None], 3, axis=2))
@@ -168,7 +168,7 @@ class ImageFilters(Functions):
         eye, image = self._eye(handle), self._image(handle)
         columns, rows = (int(one) for one in numbers(xyPointCount, 2))
         if not 0 < columns * rows <= _MOST_POINTS:
-            raise WrongValue(f"1 to {_MOST_POINTS} points are expected, not {columns} x {rows}")
+            raise WrongValue(f"expected 1 to {_MOST_POINTS} points, not {columns} x {rows}")
         x, y = _directions(eye, columns, rows, bool(evenlySpacedInAngularSpace))
         row = ((y[:, None] + 1) / 2 * (image.shape[0] - 0.5)).astype(int)
         column = ((1 - x[None, :]) / 2 * (image.shape[1] - 0.5)).astype(int)
@@ -199,7 +199,7 @@ class ImageFilters(Functions):
     def _eye(self, handle: int) -> Eye:
         found = self._objects[self._handle(handle)]
         if not isinstance(found, Eye) or found.orthographic_size is not None:
-            raise ValueError(f"'{found.name}' is no perspective vision sensor of the scene")
+            raise ValueError(f"'{found.name}' is not a perspective vision sensor of the scene")
         return found
 
     def _picture_of(self, handle: int) -> np.ndarray:
@@ -215,7 +215,7 @@ class ImageFilters(Functions):
     def _keep(self, handle: int, image: np.ndarray, which: str = _WORK) -> None:
         key = self._handle(handle), which
         if key not in self._images and len(self._images) >= 3 * _MOST:
-            raise ValueError(f"a script filters the pictures of at most {_MOST} sensors")
+            raise ValueError(f"a script can filter the pictures of at most {_MOST} sensors")
         self._images[key] = image
 
 

@@ -65,11 +65,11 @@ class JointFunctions(Functions):
         """Turn a spherical joint; only the rotation of the transform counts."""
         joint, m = self._joint(handle), numbers(matrix, 12)
         if joint.motion != SPHERICAL:
-            raise WrongValue(f"'{joint.name}' is a {joint.motion} joint: a spherical one is expected")
+            raise WrongValue(f"'{joint.name}' is a {joint.motion} joint: must be a spherical joint")
         turn = (*m[:3], 0.0, *m[4:7], 0.0, *m[8:11], 0.0)
         product = frames.multiply(turn, frames.invert(turn))
         if max(abs(a - b) for a, b in zip(product, IDENTITY)) > _UNIT:
-            raise WrongValue("the matrix of a rotation is expected")
+            raise WrongValue("expected the matrix of a rotation")
         joint.turn = frames.from_quaternion((0.0, 0.0, 0.0), frames.to_quaternion(turn))
 
     # ---- what they are
@@ -93,7 +93,7 @@ class JointFunctions(Functions):
             raise WrongValue(f"'{joint.name}' is prismatic: only revolute joints are cyclic")
         low, extent = numbers(interval, 2) if not cyclic else _WITHOUT_END
         if extent <= 0:
-            raise WrongValue(f"the range of a joint is greater than 0, not {extent:g}")
+            raise WrongValue(f"the range of a joint must be greater than 0, not {extent:g}")
         joint.limit(None if cyclic else (low, low + extent))
 
     @sim("345")
@@ -106,7 +106,7 @@ class JointFunctions(Functions):
         """Let only scripts move a joint (0), or let the dynamics move it (5), in its last mode."""
         joint = self._joint(handle)
         if mode not in (_KINEMATIC_MODE, _DYNAMIC_MODE):
-            raise WrongValue("sim.jointmode_kinematic (0) or sim.jointmode_dynamic (5) is expected")
+            raise WrongValue("expected sim.jointmode_kinematic (0) or sim.jointmode_dynamic (5)")
         if (joint.control.mode == KINEMATIC) != (mode == _KINEMATIC_MODE):
             joint.change(mode=KINEMATIC if mode == _KINEMATIC_MODE else joint.dynamic_mode)
 
@@ -177,7 +177,7 @@ class JointFunctions(Functions):
         found = self._objects[handle]
         if found.kind != "joint" or isinstance(found, Joint):
             return False
-        self._ignored.say(function, "a propeller's blades are turned by its law; accepted and ignored")
+        self._ignored.say(function, "the thrust model turns a propeller's blades; accepted and ignored")
         return True
 
     def _joint(self, handle: int) -> Joint:

@@ -39,7 +39,7 @@ class Matrices:
             return list(frames.transform(m, numbers(vector, 3)))
         values = numbers(vector, len(vector))
         if not values or len(values) % 3 or len(values) > 3 * _MOST_POINTS:
-            raise WrongValue("3 numbers are expected, or 3 for each of several points")
+            raise WrongValue("expected 3 numbers, or 3 for each of several points")
         return [one for index in range(0, len(values), 3) for one in frames.transform(m, values[index : index + 3])]
 
     @sim("345")
@@ -146,7 +146,7 @@ def unit(quaternion: Sequence[float]) -> Quaternion:
     """Return a quaternion of length 1; raises WrongValue for zero."""
     length = math.sqrt(sum(value * value for value in quaternion))
     if length == 0:
-        raise WrongValue("a quaternion that is not zero is expected")
+        raise WrongValue("expected a quaternion that is not zero")
     x, y, z, w = (value / length for value in quaternion)
     return x, y, z, w
 
@@ -164,7 +164,7 @@ def about(axis: Sequence[float], angle: float) -> Quaternion:
     """Return the quaternion of a turn about an axis; raises WrongValue for an axis that is zero."""
     length = math.sqrt(sum(value * value for value in axis))
     if length == 0:
-        raise WrongValue("an axis that is not zero is expected")
+        raise WrongValue("expected an axis that is not zero")
     s = math.sin(angle / 2) / length
     return axis[0] * s, axis[1] * s, axis[2] * s, math.cos(angle / 2)
 

@@ -74,7 +74,7 @@ class MessageBus:
             if resolved in self._own_topics:
                 return _nothing
             if self.backend is None:
-                _LOG.warning("%s: no message will come: without ROS, nobody publishes it", resolved)
+                _LOG.warning("%s: no message will be received, because this flight runs without ROS", resolved)
                 return _nothing
             return self.backend.subscribe(resolved, kind, take)
 
@@ -87,9 +87,9 @@ class MessageBus:
         """Offer a service, which a callback answers; return a handle. Raises ValueError."""
         service = self.resolved("service", name)
         if self._subscriptions.has(SERVICE.format(service)):
-            raise ValueError(f"this script offers the service {service} already")
+            raise ValueError(f"this script already offers the service {service}")
         if not _TYPE.fullmatch(kind):
-            raise ValueError(f"'{kind:.80}' is no service type; one is, for example, std_srvs/Trigger")
+            raise ValueError(f"'{kind:.80}' is not a service type, such as std_srvs/Trigger")
 
         def begin(take: Callable[[Any], None]) -> Callable[[], None]:
             if self.backend is None:
@@ -199,20 +199,20 @@ class MessageBus:
 
     def _sender(self, handle: int) -> MessageSender | None:
         if handle not in self._publishers:
-            raise ValueError(f"no publisher has the handle {handle}")
+            raise ValueError(f"there is no publisher with the handle {handle}")
         return self._publishers[handle].sender
 
     def _check_type(self, topic: str, kind: str) -> None:
         """Raise ValueError for a type that the topic does not have, or that is none."""
         own = self._own_topics.get(topic)
         if own is not None and kind != own:
-            raise ValueError(f"messages on {topic} are of the type {own}, not '{kind}'")
+            raise ValueError(f"messages on {topic} have the type {own}, not '{kind}'")
         if not _TYPE.fullmatch(kind):
-            raise ValueError(f"'{kind:.80}' is no message type; one is, for example, geometry_msgs/Twist")
+            raise ValueError(f"'{kind:.80}' is not a message type, such as geometry_msgs/Twist")
 
     def _new_handle(self) -> int:
         if len(self._subscriptions) + len(self._publishers) >= _MOST:
-            raise ValueError(f"a script has at most {_MOST} subscriptions and publishers")
+            raise ValueError(f"a script may have at most {_MOST} subscriptions and publishers")
         self._last_handle += 1
         return self._last_handle
 

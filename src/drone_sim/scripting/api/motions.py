@@ -179,7 +179,7 @@ class MotionFunctions(Functions):
         moved, relative = given.get("object"), given.get("relObject", -1)
         if "pose" not in given:
             if moved is None:
-                raise ValueError("`object` or `pose` is expected")
+                raise ValueError("`object` or `pose` must be given")
             given["pose"] = to_pose(self._objects.matrix(moved, relative))
         start, goal = (_place(given, name) for name in ("pose", "targetPose"))
         way = [b - a for a, b in zip(frames.position(start), frames.position(goal))]
@@ -227,7 +227,7 @@ class MotionFunctions(Functions):
 
     def _begin(self, motion: Motion) -> dict[str, Any]:
         if len(self._motions) >= _MOST:
-            raise ValueError(f"a script has at most {_MOST} motions: clean some up")
+            raise ValueError(f"a script may have at most {_MOST} motions: clean some up")
         handle = next(self._handles)
         self._motions[handle] = motion
         return {**motion.data, "ruckigObj": handle}
@@ -235,7 +235,7 @@ class MotionFunctions(Functions):
     def _motion(self, data: Any) -> Motion:
         handle = data.get("ruckigObj") if isinstance(data, Mapping) else None
         if handle not in self._motions:
-            raise WrongValue("what moveToConfig_init or moveToPose_init returned is expected")
+            raise WrongValue("expected the value that moveToConfig_init or moveToPose_init returned")
         return self._motions[handle]
 
     def _trajectory(self, given: Parameters, start: Sequence[float], goal: Sequence[float]) -> Trajectory:
@@ -279,7 +279,7 @@ def _given(names: Sequence[str], params: Any, arguments: Sequence[Any], told: tu
     elif told and isinstance(params, (int, float)) and len(arguments) < len(names):
         found = {**dict(zip(names, (params, *arguments))), "legacy": told}
     else:
-        raise WrongValue("a table of parameters is expected")
+        raise WrongValue("expected a table of parameters")
     return {name: one for name, one in found.items() if one is not None}
 
 
@@ -294,7 +294,7 @@ def _numbers(given: Parameters, name: str, count: int | None, otherwise: list[fl
     """Return `count` numbers, or as many as there are. Before 4.6 there may be more, which are ignored."""
     values = given.get(name, otherwise)
     if not isinstance(values, Sequence) or isinstance(values, (str, bytes)) or not values:
-        raise WrongValue(f"`{name}`: a list of {f'{count} ' if count else ''}numbers is expected")
+        raise WrongValue(f"`{name}`: a list of {f'{count} ' if count else ''}numbers must be given")
     if count and "legacy" in given:
         values = values[:count]
     try:
@@ -313,7 +313,7 @@ def _least(given: Parameters, name: str, most: str, count: int, is_behind: int) 
 def _cyclic(given: Parameters, start: Sequence[float]) -> Sequence[bool]:
     found = given.get("cyclicJoints") or [False] * len(start)
     if not isinstance(found, Sequence) or len(found) < len(start):
-        raise WrongValue(f"`cyclicJoints`: {len(start)} values are expected")
+        raise WrongValue(f"`cyclicJoints`: {len(start)} values must be given")
     return found
 
 
@@ -325,5 +325,5 @@ def _near(target: float, start: float, is_cyclic: bool) -> float:
 def _place(given: Parameters, name: str) -> frames.Matrix:
     values = _numbers(given, name, None)
     if len(values) not in (7, 12):
-        raise WrongValue(f"`{name}`: a pose of 7 numbers or a matrix of 12 is expected, not {len(values)} numbers")
+        raise WrongValue(f"`{name}`: expected a pose of 7 numbers or a matrix of 12, not {len(values)} numbers")
     return from_pose(values) if len(values) == 7 else numbers(values, 12)

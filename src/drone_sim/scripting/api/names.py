@@ -72,7 +72,7 @@ class NameFunctions:
         if found is None:
             known = [*objects.names, *(objects.path(handle) for handle in objects)]
             shown = f"{name}' with the index {index}, from 0" if index > 0 else f"{name}'"
-            raise ValueError(f"no object '{shown}; {near_names(name, known)}")
+            raise ValueError(f"there is no object '{shown}; {near_names(name, known)}")
         return objects.handle_of(found)
 
     @sim("345")
@@ -133,7 +133,7 @@ def find(objects: ObjectTree, name: str, own: str, suffix: int) -> int:
     Raises ValueError with the near names.
     """
     if not isinstance(name, str):
-        raise TypeError("a name is a string")
+        raise TypeError("a name must be a string")
     return objects.handle(_full_name(objects, name, own, suffix))
 
 

@@ -41,7 +41,7 @@ class CollectionFunctions:
         """
         word = _ITEMS.get(what)
         if word is None:
-            raise WrongValue("sim.handle_single, _tree, _chain or _all is expected")
+            raise WrongValue("expected sim.handle_single, _tree, _chain or _all")
         if word != "all":
             self._objects[object]
         removes, without = bool(int(options) & _REMOVES), bool(int(options) & _WITHOUT_OBJECT)
@@ -58,7 +58,7 @@ class CollectionFunctions:
     def getCollectionHandle(self, name: Name) -> int:
         """Return the handle of a collection by its name (3.x); with name@silentError, -1 if there is none."""
         if not isinstance(name, str):
-            raise WrongValue("the name of a collection is expected")
+            raise WrongValue("expected the name of a collection")
         name, _, flag = name.partition("@")
         own = suffixed(name, self._names.suffix)
         try:

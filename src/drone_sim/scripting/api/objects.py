@@ -188,7 +188,7 @@ def _frame_and_values(first: Any, second: Any, count: int) -> tuple[int, tuple[f
     if isinstance(second, (int, float)):
         return int(second), numbers(first, count)
     if second != ():
-        raise WrongValue(f"a handle and {count} numbers are expected")
+        raise WrongValue(f"expected a handle and {count} numbers")
     return WORLD, numbers(first, count)
 
 

@@ -102,13 +102,13 @@ class OlderMotions(Functions):
         """
         start = self._objects.matrix(handle, relativeTo)
         if position is None and orientation is None:
-            raise WrongValue("a position or an orientation is expected")
+            raise WrongValue("a position or an orientation must be given")
         goal = built(position or frames.position(start), orientation or frames.to_quaternion(start))
         part = (_POSITION if position else 0) + (_ORIENTATION if orientation else 0)
         way, turn = _apart(start, goal)
         method, much = numbers(distance, 2)
         if not 0 <= method < len(_WAYS):
-            raise WrongValue("one of sim.distcalcmethod_... and a number are expected for the distance")
+            raise WrongValue("the distance needs one of sim.distcalcmethod_... and a number")
         whole = _WAYS[int(method)](way, turn * much)
         return self._along(
             whole, velocity, accel, self._mover(handle, relativeTo, part, lambda share: between(start, goal, share))
@@ -180,7 +180,7 @@ class OlderMotions(Functions):
         alone = isinstance(velocity, Sequence)
         (much,) = numbers((angleToLinearCoeff,), 1)
         if much <= 0:
-            raise WrongValue("an angleToLinearCoeff greater than 0 is expected")
+            raise WrongValue("angleToLinearCoeff must be greater than 0")
         scale = [1.0 if alone or joint.motion == PRISMATIC else 1.0 / much for joint in joints]
         most, fastest = (_each(one, scale) for one in (velocity, math.inf if accel is None else accel))
         start = [joint.value for joint in joints]
@@ -210,7 +210,7 @@ class OlderMotions(Functions):
     ) -> Callable[[float], None]:
         """Return a function of the share of the way that puts an object at `place(share)`, or only its `parts`."""
         if parts not in (_POSITION, _ORIENTATION, _POSITION + _ORIENTATION):
-            raise WrongValue("1 (position), 2 (orientation) or 3 is expected for what is moved")
+            raise WrongValue("expected 1 (move the position), 2 (the orientation) or 3 (both)")
         self._objects[handle]
 
         def move(share: float) -> None:

@@ -59,7 +59,7 @@ def _add_kind(code: str, new: str, old: str) -> None:
 
     def unpack(_self: Packing, data: Text, start: int = 0, count: int = 0, offset: int = 0) -> list[float]:
         if not offset >= 0:
-            raise WrongValue("an offset of 0 bytes or more is expected")
+            raise WrongValue("the offset must be 0 bytes or more")
         return _part(_unpacked(code, as_bytes(data)[int(offset) :]), start, count)
 
     part = f"a string of {struct.calcsize(code)} bytes each, `count` (0: all) from `start`."
@@ -73,7 +73,7 @@ for _new, (_old, _code) in _KINDS.items():
 
 def _part(values: Sequence[Any], start: int, count: int) -> list[Any]:
     if not (start >= 0 and count >= 0):
-        raise WrongValue("a start and a count of 0 or more are expected")
+        raise WrongValue("start and count must be 0 or more")
     first = int(start)
     return list(values[first : first + int(count)] if count else values[first:])
 
@@ -83,11 +83,11 @@ def _packed(kind: str, values: Sequence[Any]) -> bytes:
     try:
         numbers = [float(one) if kind in "fd" else int(one) for one in values]
     except (TypeError, ValueError, OverflowError):
-        raise WrongValue("a table of numbers is expected") from None
+        raise WrongValue("expected a table of numbers") from None
     try:
         return struct.pack(f"<{len(numbers)}{kind}", *numbers)
     except (struct.error, OverflowError) as error:
-        raise ValueError(f"a number does not fit: {error}") from None
+        raise ValueError(f"a number is too large for this type: {error}") from None
 
 
 def _unpacked(kind: str, data: bytes) -> list[Any]:
@@ -100,7 +100,7 @@ def as_bytes(data: Text | bytes) -> bytes:
     if isinstance(data, str):
         return data.encode("utf-8", "surrogateescape")
     if not isinstance(data, (bytes, bytearray)):
-        raise WrongValue("a string is expected")
+        raise WrongValue("expected a string")
     return bytes(data)
 
 
@@ -157,5 +157,5 @@ class Bits:
 
 def _whole(value: float) -> int:
     if not isinstance(value, (int, float)) or value != value // 1 or abs(value) > _MASK:
-        raise WrongValue("whole numbers of 32 bits are expected")
+        raise WrongValue("expected whole numbers of 32 bits")
     return int(value) & _MASK

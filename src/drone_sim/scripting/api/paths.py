@@ -81,7 +81,7 @@ class Paths(Functions):
             return self._empty_path(ctrlPts, options or None, subdiv if isinstance(subdiv, Sequence) else None)
         (smooth,), count = numbers((smoothness,), 1), int(subdiv)
         if not 2 <= count <= _MOST_POINTS:
-            raise WrongValue(f"a subdiv of 2 to {_MOST_POINTS} points is expected, not {count}")
+            raise WrongValue(f"subdiv = {count}: must be 2 to {_MOST_POINTS} points")
         closed = bool(int(options) & _CLOSED)
         poses = smoothed(_points(ctrlPts, 7), closed, min(max(smooth, 0.0), 1.0), count)
         said: dict[str, Any] = {"points": [pose[:3] for pose in poses], "closed": closed}
@@ -96,7 +96,7 @@ class Paths(Functions):
         if whole is not None:
             method = int(numbers(whole, 3)[1])
             if method not in range(len(COUNTS)):
-                raise WrongValue("one of sim.distcalcmethod_... is expected among intParams")
+                raise WrongValue("intParams must contain one of sim.distcalcmethod_...")
             said["counts"] = [*COUNTS][method]
         if real is not None:
             _, said["metres_per_radian"], said["metres_per_pause"] = numbers(real, 3)
@@ -104,7 +104,7 @@ class Paths(Functions):
 
     def _operations(self) -> Operations:
         if self._surroundings.operations is None:
-            raise ValueError("there is no scene here")
+            raise ValueError("there is no scene")
         return self._surroundings.operations
 
     def _add(self, operations: Operations, **said: Any) -> int:
@@ -124,7 +124,7 @@ class Paths(Functions):
         size = _WITH_DATA if int(options) & 2 else _WITHOUT_DATA
         given = _points(ptData, size) if count else []
         if len(given) != count:
-            raise WrongValue(f"{size} numbers for each of {count} points are expected, not {len(ptData)}")
+            raise WrongValue(f"expected {size} numbers for each of {count} points, not {len(ptData)}")
         there = [one.said for one in path.control_points]
         at = min(max(int(startIndex), 0), len(there))
         there[at:at] = [_control_point(one, path.is_flat) for one in given]
@@ -184,7 +184,9 @@ class Paths(Functions):
         """Return the point of a path table at a distance, as in getPathLengths, interpolated between two points."""
         ends = numbers(lengths, len(lengths))
         if len(ends) < 2 or len(path) % len(ends):
-            raise WrongValue(f"a path of {len(ends)} points has as many numbers for each, not {len(path)} in all")
+            raise WrongValue(
+                f"a path of {len(ends)} points must have equally many numbers for each, not {len(path)} in all"
+            )
         points, (along,) = _points(path, len(path) // len(ends)), numbers((t,), 1)
         index = min(max(bisect.bisect_right(ends, along) - 1, 0), len(ends) - 2)
         piece = ends[index + 1] - ends[index]
@@ -197,7 +199,7 @@ class Paths(Functions):
         """Return the distance along a path table, as in getPathLengths, to the point nearest to a place."""
         ends = numbers(lengths, len(lengths))
         if len(ends) < 2 or len(path) % len(ends) or len(path) < 3 * len(ends):
-            raise WrongValue(f"3 numbers or more for each of {len(ends)} points are expected, not {len(path)} in all")
+            raise WrongValue(f"expected 3 numbers or more for each of {len(ends)} points, not {len(path)} in all")
         x, y, z = numbers(absPt, 3)
         points = [one[:3] for one in _points(path, len(path) // len(ends))]
         return nearest(points, ends, (x, y, z))
@@ -209,7 +211,7 @@ class Paths(Functions):
         """Return a path table with a number of points, at equal distances along another path table."""
         count = int(finalConfigCnt)
         if not 2 <= count <= _MOST_POINTS:
-            raise WrongValue(f"2 to {_MOST_POINTS} points are expected, not {count}")
+            raise WrongValue(f"expected 2 to {_MOST_POINTS} points, not {count}")
         shares = (index / (count - 1) * lengths[-1] for index in range(count))
         return [one for at in shares for one in self.getPathInterpolatedConfig(path, lengths, at, method, types)]
 
@@ -217,7 +219,7 @@ class Paths(Functions):
 def _points(path: Sequence[float], dof: int) -> list[tuple[float, ...]]:
     count = int(dof)
     if count < 1 or len(path) > _MOST or not len(path) or len(path) % count:
-        raise WrongValue(f"a table with {count} numbers for each point is expected, not {len(path)} in all")
+        raise WrongValue(f"expected a table with {count} numbers for each point, not {len(path)} in all")
     flat = numbers(path, len(path))
     return [flat[first : first + count] for first in range(0, len(flat), count)]
 
@@ -248,7 +250,7 @@ def smoothed(points: Sequence[Sequence[float]], closed: bool, smoothness: float,
     """Return `count` points along a line through `points`; its corners are parabolas over a share of each piece."""
     corners = [*points, points[0]] if closed and points[0] != points[-1] else [*points]
     if len(corners) < 2:
-        raise WrongValue("two control points or more are expected")
+        raise WrongValue("expected two control points or more")
     pieces = len(corners) - 1
     return [_rounded(corners, closed, smoothness, pieces * index / (count - 1)) for index in range(count)]
 

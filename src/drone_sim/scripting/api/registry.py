@@ -124,7 +124,7 @@ class Scripts:
     def __getitem__(self, handle: int) -> Attachment:
         """Return what has a handle; raises ValueError."""
         if handle not in self._by_handle:
-            raise ValueError(f"no script has the handle {handle}")
+            raise ValueError(f"there is no script with the handle {handle}")
         return self._by_handle[handle]
 
     def attached_to(self, name: str) -> Attachment:
@@ -150,12 +150,18 @@ class Scripts:
     def call(self, caller: Attachment, callee: Attachment, call: Callable[[Callee], Any]) -> Any:
         """Let a script call another, or itself. Raises ValueError for one that waits for this call, or is too deep."""
         if callee.script is None:
-            why = "is a built-in law, and has no functions" if callee.is_law else "is loaded after this one"
+            why = (
+                "is the built-in thrust model, which has no functions"
+                if callee.is_law
+                else "is not loaded yet: it is loaded after this one"
+            )
             raise ValueError(f"the script of '{callee.name}' {why}")
         if callee is not caller and callee in self._waiting:
-            raise ValueError(f"the script of '{callee.name}' is being called already: it waits for this call to end")
+            raise ValueError(
+                f"the script of '{callee.name}' is already waiting for this call to end, so it cannot be called back"
+            )
         if len(self._waiting) >= DEEPEST:
-            raise ValueError(f"scripts call each other more than {DEEPEST} deep")
+            raise ValueError(f"scripts call each other more than {DEEPEST} levels deep")
         self._waiting.append(caller)
         try:
             return call(callee.script)

@@ -45,10 +45,10 @@ class RemotePortFunctions:
         """
         number = _port(port)
         if not self._ports.are_served:
-            self._ignored.say("start", "the legacy remote API is served with remote_api:=true", "simRemoteApi")
+            self._ignored.say("start", "the legacy remote API is off: start it with remote_api:=true", "simRemoteApi")
             return _NOT
         if number not in self._ports.wanted and len(self._ports.wanted) >= _MOST:
-            raise ValueError(f"{_MOST} ports are open already")
+            raise ValueError(f"at most {_MOST} ports can be open")
         self._ports.wanted[number] = bool(synchronous)
         return _DONE
 
@@ -104,7 +104,7 @@ class OlderRemotePortFunctions:
 def _port(number: Any) -> int:
     """Return the number of a port. Raises WrongValue, ValueError."""
     if not isinstance(number, (int, float)) or isinstance(number, bool):
-        raise WrongValue("the number of a port is expected")
+        raise WrongValue("expected the number of a port")
     if not _LOWEST <= number <= _HIGHEST:
-        raise ValueError(f"a port is {_LOWEST} to {_HIGHEST}, not {number:g}")
+        raise ValueError(f"a port must be from {_LOWEST} to {_HIGHEST}, not {number:g}")
     return int(number)

@@ -50,7 +50,7 @@ class TopicFunctions:
     def publish(self, handle: Handle, message: Any) -> None:
         """Publish a message: a table of its fields."""
         if message is None or isinstance(message, (str, bytes, int, float)):
-            raise WrongValue("a table of the message's fields is expected")
+            raise WrongValue("expected a table of the message's fields")
         refuse_if_too_large(message)
         self._bus.publish(handle, message)
 
@@ -144,7 +144,7 @@ class RosFunctions:
         """Broadcast several frames."""
         refuse_if_too_large(transforms)
         if isinstance(transforms, Mapping) or any(not isinstance(one, Mapping) for one in transforms):
-            raise WrongValue("tables with the fields of geometry_msgs/TransformStamped are expected")
+            raise WrongValue("expected tables with the fields of geometry_msgs/TransformStamped")
         if self._bus.backend is not None:
             self._bus.backend.send_transforms(list(transforms))
 
@@ -192,7 +192,7 @@ class RosFunctions:
     def _name(self, name: str) -> str:
         """Return the full name; raises WrongValue for what is none."""
         if not isinstance(name, str) or not name.strip("/"):
-            raise WrongValue("the name of a parameter is expected")
+            raise WrongValue("expected the name of a parameter")
         return self._bus.resolved("parameter", name)
 
     # ---- services of others
@@ -201,7 +201,7 @@ class RosFunctions:
     def serviceClient(self, name: Name, kind: Name) -> int:
         """Return a handle to call a service with."""
         if len(self._clients) >= _MOST:
-            raise ValueError(f"a script has at most {_MOST} service clients")
+            raise ValueError(f"a script may have at most {_MOST} service clients")
         handle = len(self._clients) + 1
         self._clients[handle] = self._bus.resolved("service", name), kind
         return handle
@@ -226,12 +226,12 @@ class RosFunctions:
 
     def _client(self, handle: int) -> tuple[str, str]:
         if handle not in self._clients:
-            raise ValueError(f"no service client has the handle {handle}")
+            raise ValueError(f"there is no service client with the handle {handle}")
         return self._clients[handle]
 
     def _ros(self) -> Backend:
         if self._bus.backend is None:
-            raise ValueError("there is no ROS here, and no service")
+            raise ValueError("this flight runs without ROS, so there are no services")
         return self._bus.backend
 
 
@@ -249,7 +249,7 @@ def _add_kind(word: str, kind: type[Any]) -> None:
         try:
             value = kind(value)
         except (TypeError, ValueError):
-            raise WrongValue(f"a value of the type {kind.__name__} is expected") from None
+            raise WrongValue(f"expected a value of the type {kind.__name__}") from None
         self._write(name, value)
 
     said = "Return whether a parameter of that type is set, and its value or the default."
@@ -264,12 +264,12 @@ for _word, _kind in {"String": str, "Int": int, "Double": float, "Bool": bool}.i
 def _top_row_first(data: Any, width: int, height: int) -> bytes:
     """Return an image turned over; raises WrongValue, ValueError for what is none of that size."""
     if isinstance(data, int):
-        raise WrongValue("an image is expected")
+        raise WrongValue("expected an image")
     refuse_if_too_large(data)
     pixels = data.encode("utf-8") if isinstance(data, str) else bytes(data)
     row, rows = 3 * int(width), int(height)
     if row < 0 or rows < 0:
-        raise ValueError(f"an image of {width} x {height} does not exist")
+        raise ValueError(f"an image cannot have {width} x {height} pixels")
     if len(pixels) != row * rows:
-        raise ValueError(f"an image of {width} x {height} has {row * rows} bytes, not {len(pixels)}")
+        raise ValueError(f"an image of {width} x {height} must have {row * rows} bytes, not {len(pixels)}")
     return b"".join(np.frombuffer(pixels, np.uint8).reshape(rows, row)[::-1])

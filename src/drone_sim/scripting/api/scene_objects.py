@@ -41,7 +41,7 @@ class SceneObjects:
     def _do(self, action: Callable[[Operations], _Value]) -> _Value:
         operations = self._operations
         if operations is None:
-            raise ValueError("there is no scene here")
+            raise ValueError("there is no scene")
         made: _Value = self._outside(lambda: action(operations))  # whole, whatever the script's time
         return made
 
@@ -85,7 +85,7 @@ class SceneObjects:
         """Make a static shape from vertices (m) and triangles, three indices from 0 each; return its handle."""
         corners = [int(one) for one in indices]
         if not vertices or len(vertices) % 3 or not corners or len(corners) % 3:
-            raise WrongValue("three numbers for each vertex, and three indices for each triangle, are expected")
+            raise WrongValue("expected three numbers for each vertex and three indices for each triangle")
         points = numbers(vertices, len(vertices))
         return self._do(lambda scene: scene.add_mesh(scene.free_name("Shape"), points, corners))
 
@@ -110,7 +110,7 @@ class SceneObjects:
         """
         if jointType not in _JOINTS:
             raise ValueError(
-                f"no joint is of the type {jointType!r}: sim.joint_revolute_subtype, _prismatic_, _spherical_"
+                f"type of joint {jointType!r}: must be sim.joint_revolute_subtype, _prismatic_, _spherical_"
             )
         dynamic = jointMode == CONSTANTS["jointmode_force"]
         return self._add("Joint", kind="joint", type=_JOINTS[jointType], mode="passive" if dynamic else "kinematic")
@@ -130,11 +130,11 @@ class SceneObjects:
         """
         if sensorType not in _VOLUMES:
             raise ValueError(
-                f"no proximity sensor is of the type {sensorType!r}: sim.proximitysensor_ray_subtype, _cone_"
+                f"type of proximity sensor {sensorType!r}: must be sim.proximitysensor_ray_subtype, _cone_"
             )
         kind, values = _VOLUMES[sensorType], numbers(floatParams, len(floatParams))
         if len(values) < 10:
-            raise WrongValue("15 numbers are expected among floatParams")
+            raise WrongValue("floatParams must have 15 numbers")
         said: dict[str, Any] = {"type": kind, "offset": values[0], "range": values[1]}
         if kind in ("cone", "disc"):
             said["angle"] = values[9]
@@ -152,7 +152,7 @@ class SceneObjects:
         """
         whole, values = numbers(intParams, len(intParams)), numbers(floatParams, len(floatParams))
         if len(whole) < 2 or len(values) < 3:
-            raise WrongValue("width and height, and near, far and angle, are expected")
+            raise WrongValue("expected width and height, and near, far and angle")
         said = {"width": int(whole[0]), "height": int(whole[1]), "near": values[0], "far": values[1]}
         key = "fov" if int(options) & _PERSPECTIVE else "size"
         return self._add("Vision_sensor", kind="vision_sensor", **said, **{key: values[2]})
@@ -311,7 +311,7 @@ class Shapes:
 
 def _handles(handles: Sequence[Handle]) -> list[int]:
     if isinstance(handles, (int, float, str)):
-        raise WrongValue("a table of handles is expected")
+        raise WrongValue("expected a table of handles")
     return [int(one) for one in handles]
 
 
@@ -324,7 +324,7 @@ def _shape(kind: str, sizes: tuple[float, ...], known: str, given: Any) -> dict[
         ball = kind in ("sphere", "spheroid")
         if x != y or (ball and x != z):
             raise ValueError(
-                f"sizes = {x:g}, {y:g}, {z:g}: a {kind} here is round{' all over' if ball else ' about z'}"
+                f"sizes = {x:g}, {y:g}, {z:g}: a {kind} must be round{' all over' if ball else ' about z'}"
             )
         if ball:
             return {"shape": "sphere", "size": [x / 2]}

@@ -30,13 +30,13 @@ def refuse_if_too_large(
         if isinstance(value, _STRINGS):
             size += len(value)
             if size > MOST_BYTES:
-                raise ValueError(f"more than {MOST_BYTES} bytes are too many")
+                raise ValueError(f"more than {MOST_BYTES} bytes cannot be passed")
             continue
         inner = _inner(value, fields)
         if inner is None:
             continue
         if depth >= DEEPEST:
-            raise ValueError(f"a table is nested too deeply, at most {DEEPEST} levels")
+            raise ValueError(f"a table is nested too deeply: at most {DEEPEST} levels are allowed")
         count += len(inner)
         if count > MOST_VALUES:
             raise ValueError(f"more than {MOST_VALUES} values are too many")

@@ -63,9 +63,9 @@ class _OnScripts(Functions):
         if handle == _SELF:
             return self._own
         if handle == _MAIN:
-            raise ValueError("the main script is the simulation itself: it has neither parameters nor functions")
+            raise ValueError("the simulation is its own main script, which has neither parameters nor functions")
         if not isinstance(handle, (int, float)):
-            raise WrongValue("the handle of a script is expected")
+            raise WrongValue("expected the handle of a script")
         number = int(handle)
         one = self._objects.get(number)
         return self._script_of(number) if one is not None and one.kind == "script" else self._scripts[number]
@@ -111,7 +111,7 @@ class ScriptFunctions(_OnScripts):
         found = next((one for one in several if name in one.parameters), None)
         found = found or (several or [self._script(script)])[0]
         if name not in found.parameters:
-            raise ValueError(f"no script parameter '{name}'; {near_names(name, found.parameters)}")
+            raise ValueError(f"there is no script parameter '{name}'; {near_names(name, found.parameters)}")
         self._scripts.ask(found, name)
         value = found.parameters[name]
         return list(value) if isinstance(value, (list, tuple)) else value
@@ -197,7 +197,7 @@ def _set(parameters: ScriptParameters, name: Any, value: Any) -> None:
     value = _stored(value, parameters.get(name))
     refuse_if_too_large([name, value])
     if name not in parameters and len(parameters) >= _MOST:
-        raise ValueError(f"a script has at most {_MOST} parameters")
+        raise ValueError(f"a script may have at most {_MOST} parameters")
     parameters[name] = value
 
 
@@ -214,9 +214,9 @@ def _stored(value: Any, before: Any) -> Any:
         value = value.item()
     if type(value) is float or type(value) is int:
         if not isfinite(value):
-            raise WrongValue("a finite number is expected")
+            raise WrongValue("expected a finite number")
     elif type(before) is float or type(before) is int:
-        raise WrongValue("a number is expected")
+        raise WrongValue("expected a number")
     return value
 
 
@@ -266,7 +266,7 @@ class ScriptCalls(_OnScripts):
         Behind 'function@object' stands the type of the script, such as sim.scripttype_childscript.
         """
         if not isinstance(function, str):
-            raise WrongValue("the name of a function is expected")
+            raise WrongValue("expected the name of a function")
         name, at, of = function.partition("@")
         callee = self._of_type(self._find(of), script) if at else self._script(script)
         values = list(arguments)
@@ -286,7 +286,7 @@ class ScriptCalls(_OnScripts):
         if not isinstance(text, str):
             text, script = script, text
         if not isinstance(text, str):
-            raise WrongValue("a text and the handle of a script are expected")
+            raise WrongValue("expected a string and the handle of a script")
         refuse_if_too_large([text])
         callee, text = self._executing(text, script)
         self._scripts.permit(self._own, callee, "")
@@ -311,7 +311,9 @@ class ScriptCalls(_OnScripts):
         if language and known and language != known:
             raise ValueError(f"the script of '{callee.name}' is in {known.capitalize()}, not {language.capitalize()}")
         if known == "python" and not self._is_python:
-            raise ValueError(f"the script of '{callee.name}' is in Python: only Python scripts run a text in it")
+            raise ValueError(
+                f"the script of '{callee.name}' is in Python: only Python scripts may execute a string in it"
+            )
         return callee, text
 
     @property

@@ -55,7 +55,7 @@ class Sensors(Functions):
         name = self._objects[handle].name
         if name not in self._host.sensors:
             known = ", ".join(self._host.sensors) or "none"
-            raise WrongValue(f"'{name}' is no sensor that measures numbers; there are: {known}")
+            raise WrongValue(f"'{name}' is not a sensor that measures numbers; known are {known}")
         return self._host.sensors[name]
 
 
@@ -105,7 +105,7 @@ class ProximitySensors(Functions):
         """Do what readProximitySensor does, but only for one object or collection, or for sim.handle_all."""
         sensor = self._objects[handle]
         if not isinstance(sensor, Detector):
-            raise WrongValue(f"'{sensor.name}' is no proximity sensor of the scene: {self._known()}")
+            raise WrongValue(f"'{sensor.name}' is not a proximity sensor of the scene: {self._known()}")
         return self._seen(self._detected(sensor, entity))
 
     @sim("345")
@@ -143,7 +143,7 @@ class ProximitySensors(Functions):
         sensor = self._host.sensors.get(name)
         detected = getattr(sensor, "detected", None)
         if sensor is None or detected is None:
-            raise WrongValue(f"'{name}' is no sensor of the kind range, and no proximity sensor: {self._known()}")
+            raise WrongValue(f"'{name}' is neither a range sensor nor a proximity sensor: {self._known()}")
         found = detected()
         if found is None:
             return _none(_NOTHING if sensor.read() else _NOT_YET)

@@ -81,7 +81,7 @@ class ServiceServer:
         request = ServiceRequest(content, made)
         with self._lock:
             if not self._is_open:
-                raise Unanswered("the script offers it no longer")
+                raise Unanswered("the script no longer offers this service")
             self._waiting.add(request)
         try:
             self._take(request)
@@ -118,6 +118,6 @@ def _checked(value: Any) -> Any:
     if value is None or value == []:
         return {}
     if isinstance(value, (str, bytes, int, float, list, tuple)):
-        raise ValueError(f"a service's callback returns a table of the response's fields, not {show(value)}")
+        raise ValueError(f"the callback of a service must return a table of the response's fields, not {show(value)}")
     refuse_if_too_large(value)
     return value

@@ -54,14 +54,14 @@ class ShapeMasses(Functions):
         """
         mass = float(getattr(self._objects[handle], "mass", 0.0))
         if not mass:
-            raise ValueError(f"'{self._objects[handle].name}' has no mass of its own: setShapeMass gives it one")
+            raise ValueError(f"'{self._objects[handle].name}' has no mass of its own: give it one with setShapeMass")
         self._set(handle, mass, inertiaMatrix, numbers(transform, 12))
         return 1
 
     def _set(self, handle: int, mass: float, tensor: Numbers, frame: Matrix) -> None:
         operations = self._surroundings.operations
         if operations is None:
-            raise ValueError("there is no scene here")
+            raise ValueError("there is no scene")
         xx, xy, xz, _, yy, yz, _, _, zz = numbers(tensor, 9)  # as V-REP reads it: what is below the diagonal is above
         inertia = Inertia((xx, xy, xz, xy, yy, yz, xz, yz, zz), IDENTITY)
         found = principal(turned(inertia, frame), np.array(frames.position(frame)))
@@ -82,7 +82,7 @@ class ShapeMasses(Functions):
         """
         found = self._objects[handle]
         if found.kind != "shape":
-            raise WrongValue(f"'{found.name}' is no shape")
+            raise WrongValue(f"'{found.name}' is not a shape")
         operations = self._surroundings.operations
         forms = operations.forms(int(handle)) if operations is not None else []
         bits = _PURE if forms and all(word in _PRIMITIVES for word, _ in forms) else 0

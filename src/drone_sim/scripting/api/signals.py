@@ -53,16 +53,16 @@ class Signals:
     def set(self, kind: type[Any], name: str, value: Any) -> None:
         """Set a signal; raises WrongValue and ValueError, also for more than signals may hold."""
         if not isinstance(name, str):
-            raise WrongValue("the name of a signal is a string")
+            raise WrongValue("the name of a signal must be a string")
         if len(name) > _LONGEST_NAME:
-            raise ValueError(f"the name of a signal has at most {_LONGEST_NAME} characters, not {len(name)}")
+            raise ValueError(f"the name of a signal must have at most {_LONGEST_NAME} characters, not {len(name)}")
         values = self._values[kind]
         if kind is str:
             size = sum(map(len, values.values())) - len(values.get(name, "")) + len(value)
             if size > MOST_BYTES:
-                raise ValueError(f"string signals may hold {MOST_BYTES} bytes together, not {size}")
+                raise ValueError(f"all string signals together may have at most {MOST_BYTES} bytes, not {size}")
         if name not in values and len(values) >= _MOST:
-            raise ValueError(f"{_MOST} signals of a kind are there already: clear some")
+            raise ValueError(f"at most {_MOST} signals of a kind are allowed: clear some")
         values[name] = value
 
     def forget(self, kind: type[Any], name: str | None) -> None:
@@ -103,7 +103,7 @@ class SignalFunctions:
     def setInt32Signal(self, name: Name, value: int) -> None:
         """Set a whole number."""
         if not abs(value) <= _LARGEST:  # so written, it refuses NaN
-            raise WrongValue(f"a whole number within +-{_LARGEST} is expected")
+            raise WrongValue(f"expected a whole number within +-{_LARGEST}")
         self._signals.set(int, name, int(value))
 
     @sim("345", setBufferSignal="5")
@@ -152,9 +152,9 @@ class Tubes:
     def open(self, kind: int, name: str, length: int) -> int:
         """Open one end, at which so many packets wait; return its handle. Raises ValueError."""
         if sum(one.tube == (kind, name) for one in self._ends.values()) >= 2:
-            raise ValueError(f"the tube '{name:.80}' has two ends already")
+            raise ValueError(f"the tube '{name:.80}' already has two ends")
         if len(self._ends) >= _MOST_ENDS:
-            raise ValueError(f"{_MOST_ENDS} ends of tubes are open already: close some")
+            raise ValueError(f"at most {_MOST_ENDS} ends of tubes can be open: close some")
         self._last_handle += 1
         self._ends[self._last_handle] = _End((kind, name), deque(maxlen=min(max(1, length), _LONGEST)))
         return self._last_handle
@@ -171,7 +171,7 @@ class Tubes:
     def waiting(self, handle: int) -> deque[Any]:
         """Return what waits at an end. Raises ValueError for a handle that there is not."""
         if handle not in self._ends:
-            raise ValueError(f"no tube has the handle {handle}")
+            raise ValueError(f"there is no tube with the handle {handle}")
         return self._ends[handle].waiting
 
     def waiting_at_other(self, handle: int) -> deque[Any] | None:
@@ -210,7 +210,7 @@ class TubeFunctions:
         """
         kind, length = (int(one) for one in numbers((header, size), 2))
         if not isinstance(name, str):
-            raise WrongValue("the name of a tube is a string")
+            raise WrongValue("the name of a tube must be a string")
         return self._tubes.open(kind, name, length)
 
     @sim("345")

@@ -157,7 +157,7 @@ class SimulationFunctions(Functions):
         values = self._values[kind]
         if parameter not in values:
             name = _name(kind, parameter)
-            self._ignored.say(name, f"has no value here: {otherwise!r} is returned")
+            self._ignored.say(name, f"is not supported: {otherwise!r} is returned")
             return otherwise
         return values[parameter]
 
@@ -187,5 +187,5 @@ def _name(kind: str, parameter: int) -> str:
     """Return the name of a parameter; raises ValueError where it is none of that kind."""
     known = {value: name for name, value in CONSTANTS.items() if name.startswith(f"{kind}_")}
     if parameter not in known:
-        raise ValueError(f"no sim.{kind}_... is {parameter!r}; {near_names(kind, known.values())}")
+        raise ValueError(f"{parameter!r} is not a sim.{kind}_...; {near_names(kind, known.values())}")
     return known[parameter]

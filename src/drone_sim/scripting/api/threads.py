@@ -46,7 +46,7 @@ class Threads(Functions):
     def waitForSignal(self, name: Name) -> Wait:
         """Return the value of a signal of any kind, as soon as it is set."""
         if not isinstance(name, str):
-            raise WrongValue("the name of a signal is a string")
+            raise WrongValue("the name of a signal must be a string")
         find = functools.partial(self._context.signals.find, name)
         return self._wait_for(lambda: find() is not None, find, by_steps=False)
 

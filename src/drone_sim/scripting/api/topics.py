@@ -88,14 +88,14 @@ class Subscriptions:
         """Raise ValueError where no subscription to a topic, or no service that is offered, has that handle."""
         if handle not in self._by_handle or self._by_handle[handle].topic.startswith("/") == is_service:
             what = "service that the script offers" if is_service else "subscription"
-            raise ValueError(f"no {what} has the handle {handle}")
+            raise ValueError(f"there is no {what} with the handle {handle}")
 
     def end(self, handle: int) -> None:
         """End a subscription; raises ValueError where there is none of that handle."""
         with self._lock:
             subscription = self._by_handle.pop(handle, None)
         if subscription is None:
-            raise ValueError(f"no subscription has the handle {handle}")
+            raise ValueError(f"there is no subscription with the handle {handle}")
         subscription.end()
 
     def close(self) -> None:

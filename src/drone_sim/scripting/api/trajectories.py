@@ -84,7 +84,7 @@ class TrajectoryFunctions:
         """
         trajectory, (seconds,) = self._trajectory(handle), numbers((timeStep,), 1)
         if seconds <= 0:
-            raise WrongValue("a time step greater than 0 is expected")
+            raise WrongValue("the time step must be greater than 0")
         state = trajectory.advance(seconds)
         return (
             int(trajectory.is_over),
@@ -111,32 +111,32 @@ class TrajectoryFunctions:
 
     def _begin(self, trajectory: Trajectory) -> int:
         if len(self._trajectories) >= _MOST:
-            raise ValueError(f"a script has at most {_MOST} trajectories: remove some")
+            raise ValueError(f"a script may have at most {_MOST} trajectories: remove some")
         handle = next(self._handles)
         self._trajectories[handle] = trajectory
         return handle
 
     def _trajectory(self, handle: int) -> Trajectory:
         if handle not in self._trajectories:
-            raise ValueError(f"no trajectory has the handle {handle}")
+            raise ValueError(f"there is no trajectory with the handle {handle}")
         return self._trajectories[handle]
 
 
 def _count(dofs: int) -> int:
     if not isinstance(dofs, (int, float)) or not 0 < dofs <= 100:
-        raise WrongValue("1 to 100 degrees of freedom are expected")
+        raise WrongValue("expected 1 to 100 degrees of freedom")
     return int(dofs)
 
 
 def _kinds(name: str, values: Any, count: int, kinds: int) -> list[list[float]]:
     """Return so many lists of `count` numbers each; what is behind them is ignored, as by V-REP."""
     if not isinstance(values, Sequence) or len(values) < count * kinds:
-        raise WrongValue(f"{count * kinds} numbers are expected in {name}")
+        raise WrongValue(f"{name} must have {count * kinds} numbers")
     found = numbers(values[: count * kinds], count * kinds)
     return [list(found[first : first + count]) for first in range(0, count * kinds, count)]
 
 
 def _selected(selection: Any, count: int) -> list[bool]:
     if not isinstance(selection, Sequence) or len(selection) < count:
-        raise WrongValue(f"{count} values are expected in selection")
+        raise WrongValue(f"selection must have {count} values")
     return [bool(one) for one in selection[:count]]

@@ -13,20 +13,20 @@ _LONGEST = 80  # characters of a name that is looked at
 PLUGINS = {
     "simROS2": "this is ROS 1: simROS has the same functions",
     "simB0": "the ZeroMQ remote API does what B0 did",
-    "simIK": "there is no inverse kinematics: a drone has no arm to bend",
-    "simOMPL": "there is no path planner: plan outside, and send the way points",
+    "simIK": "inverse kinematics is not supported",
+    "simOMPL": "there is no path planner: plan outside, and send waypoints",
     "simGeom": "there is no geometry plugin",
-    "simOctomap": "there are no octrees",
-    "simIM": "there are no image filters: publish the picture to a node that uses OpenCV",
+    "simOctomap": "octrees are not supported",
+    "simIM": "these image filters are not supported: publish the picture to a node that uses OpenCV",
     "simZMQ": "sockets are not for child scripts: use topics",
     "simWS": "sockets are not for child scripts: use topics",
     "simMTB": "there is no such plugin here",
     "simIGL": "there is no geometry plugin",
-    "simURDF": "vehicles come from the parameters' `urdf`",
+    "simURDF": "the parameter `urdf` of a vehicle names a URDF file",
     "simSDF": "there is no importer for scripts",
     "simAssimp": "meshes come from the scene file",
     "simQHull": "there is no geometry plugin",
-    "simRRS1": "there are no industrial robots",
+    "simRRS1": "industrial robots are not supported",
     "simSkeleton": "there is no such plugin here",
 }
 
@@ -36,33 +36,31 @@ ABSENT: dict[str, str] = {
     r"simExtROS_\w+": "the plugin of V-REP 3.0 to 3.2; use simROS.advertise, simROS.publish and simROS.subscribe",
     r"simros_\w+": "the plugin of V-REP 3.0 to 3.2; use simROS.advertise, simROS.publish and simROS.subscribe",
     r"simExtOMPL_\w+": PLUGINS["simOMPL"],
-    r"simExtVision_\w+|simVision\.\w+": "that filter is not here: read the picture, or let a node do it",
+    r"simExtVision_\w+|simVision\.\w+": "this filter is not supported: read the picture in the script, or use a node",
     r"simExtOctomap_\w+": PLUGINS["simOctomap"],
-    r"simExt(?!RosInterface_)\w+": "a plugin of V-REP's that is not here",
-    r"sim_ext_\w+": "a constant of a plugin that is not here",
+    r"simExt(?!RosInterface_)\w+": "this plugin of V-REP is not supported",
+    r"sim_ext_\w+": "this constant's plugin is not supported",
     r"sim\.\w*(?:Ik|IK)(?:Group|Element|Path|\b)\w*|sim\.(?:getConfigForTipPose|computeJacobian)": PLUGINS["simIK"],
-    r"sim\.(?:load|save|close)Scene": (
-        "scenes are for when the simulation is stopped, and no child script runs; clients of the remote API can do it"
-    ),
-    r"sim\.(?:load|save|close|export|import)\w*": "scenes are files: see `scene_file`; loadModel adds one's objects",
+    r"sim\.(?:load|save|close)Scene": ("only a client of the remote API can do this, while the simulation is stopped"),
+    r"sim\.(?:load|save|close|export|import)\w*": "`scene_file` names the scene; loadModel adds objects of a file",
     r"sim\.(?:create|copyPaste|remove|group|ungroup|convert|scale)(?!DrawingObject|Particle|Dialog)\w*": (
         "such objects come from the scene file"
     ),
-    r"sim\.(?:set|compute)Shape(?:Mass|Inertia|Material|BB)\w*": "setShapeMassAndInertia says what a shape weighs",
+    r"sim\.(?:set|compute)Shape(?:Mass|Inertia|Material|BB)\w*": "use setShapeMassAndInertia",
     r"sim\.(?:generateShapeFromPath|convexDecompose)": "such objects come from the scene file",
     r"sim\.(?:\w*PathSearch\w*|getPathPlanningHandle|searchPath|(?:find|get|simplify)Mp\w+)": PLUGINS["simOMPL"],
     r"sim\.setScriptVariable": "executeScriptString('name = 1', script) sets a variable of another script",
-    r"sim\.\w+JointDependency": "joints do not depend on each other: set each",
+    r"sim\.\w+JointDependency": "joints cannot depend on each other: set each joint",
     r"sim\.\w*(?:Collision|Distance)\w*": (
-        "there are no collision and distance objects; checkCollision and checkDistance measure between two objects"
+        "collision and distance objects are not supported: use checkCollision and checkDistance"
     ),
-    r"sim\.\w*(?:Mill|Mechanism)\w*": "there are no mills",
-    r"sim\.\w*(?:WorkThread|Plugin)\w*": "plugins are not loaded from scripts",
+    r"sim\.\w*(?:Mill|Mechanism)\w*": "mills are not supported",
+    r"sim\.\w*(?:WorkThread|Plugin)\w*": "scripts cannot load plugins",
     r"simROS\.imageTransport(?:Subscribe|ShutdownSubscriber)": "subscribe to sensor_msgs/Image",
     r"sim\.\w*PathTarget\w*": "a path has no target of its own: followPath moves an object along it",
     r"sim\.\w+ObjectCustomData": "use writeCustomDataBlock and readCustomDataBlock",
-    r"sim\.executeLuaCode": "executeScriptString runs a text in a script",
-    r"sim\.launchExecutable": "a child script starts no programs: use a launch file",
+    r"sim\.executeLuaCode": "use executeScriptString",
+    r"sim\.launchExecutable": "a child script cannot start programs: use a launch file",
 }
 _FLAT = re.compile(r"sim([A-Z]\w*)")
 

@@ -243,5 +243,5 @@ def _part(picture: np.ndarray, pos: Sequence[float], size: Sequence[float]) -> n
     rows, columns = picture.shape[:2]
     width, height = width or columns - x, height or rows - y
     if x < 0 or y < 0 or width <= 0 or height <= 0 or x + width > columns or y + height > rows:
-        raise WrongValue(f"a part of a picture of {columns} x {rows} is expected")
+        raise WrongValue(f"must be inside the picture of {columns} x {rows} pixels")
     return picture[rows - y - height : rows - y, x : x + width]

@@ -131,7 +131,7 @@ class Windows:
         """Press a button of a dialog that is open. Raises ValueError for one that there is not."""
         dialog = self.dialogs.get(handle)
         if dialog is None or dialog.answer:
-            raise ValueError(f"no open dialog has the handle {handle}")
+            raise ValueError(f"there is no open dialog with the handle {handle}")
         if button not in dialog.buttons:
             raise ValueError(f"the dialog '{dialog.title}' has no button '{button[:80]}', but {_said(dialog.buttons)}")
         dialog.answer = button
@@ -180,10 +180,10 @@ class Windows:
 def read_answer(given: Any) -> tuple[int, str, str]:
     """Return handle, button and text of an answer as JSON has it. Raises ValueError."""
     if not isinstance(given, Mapping) or not isinstance(given.get("handle"), int):
-        raise ValueError("an answer has a handle (a whole number), a button, and what was typed, if anything")
+        raise ValueError("an answer must have a handle (a whole number) and a button, and may have a typed text")
     button, typed = given.get("button"), given.get("typed") or ""
     if not (isinstance(button, str) and isinstance(typed, str)):
-        raise ValueError("an answer's button, and what was typed, are texts")
+        raise ValueError("the button and the typed text of an answer must be strings")
     return given["handle"], button, typed
 
 
@@ -222,7 +222,7 @@ class Dialogs:
         if dialog is not None and dialog.buttons and not dialog.answer:
             if self._windows.can_answer():
                 return _STILL_OPEN
-            self._ignored.say("getDialogResult", "nobody answers: sim.dlgret_ok is returned")
+            self._ignored.say("getDialogResult", "nobody can answer here: sim.dlgret_ok is returned")
             self._windows.assume_ok(handle)
         answer = dialog.answer if dialog is not None else ""
         return CONSTANTS[f"dlgret_{answer or OK}"]

@@ -35,7 +35,7 @@ class Wireless(Functions):
         ask within `persistence` seconds (one and a half steps).
         """
         if not isinstance(name, str) or not isinstance(data, (str, bytes)) or not name or not data:
-            raise WrongValue("a name and data, both strings that are not empty, are expected")
+            raise WrongValue("name and data must be strings that are not empty")
         if target not in (_ALL, _TREE, _CHAIN):
             self._context.scripts[target]
         clock = self._context.clock

@@ -31,7 +31,7 @@ class Channel:
         try:
             self._socket.sendall(_LENGTH.pack(len(message)) + message)
         except OSError:
-            raise Disconnected("nobody reads what is sent") from None
+            raise Disconnected("the other end has stopped reading") from None
 
     def receive(self) -> bytes | None:
         """Return the next message; None where none has come in time. Raises Disconnected."""
@@ -44,7 +44,7 @@ class Channel:
             except OSError:
                 block = b""
             if not block:
-                raise Disconnected("the other end is closed")
+                raise Disconnected("the other end was closed")
             if not came and len(block) >= 4 and len(block) == 4 + _LENGTH.unpack_from(block)[0]:
                 return block[4:]  # most often
             came += block

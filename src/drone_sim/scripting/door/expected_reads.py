@@ -74,4 +74,4 @@ class ExpectedReads:
 
 
 def _refused(*_: Any) -> NoReturn:
-    raise ValueError("the script may not read that")
+    raise ValueError("the script may not read this")

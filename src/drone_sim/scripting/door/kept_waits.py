@@ -22,7 +22,7 @@ class KeptWaits:
         if not isinstance(found, Wait):
             return found
         if len(self._waits) >= _MOST:
-            raise ValueError(f"at most {_MOST} coroutines of a script wait at once")
+            raise ValueError(f"at most {_MOST} coroutines of a script may wait at once")
         self._last += 1
         self._waits[self._last] = iter(found), found
         return self._last
@@ -33,7 +33,7 @@ class KeptWaits:
         Raises ValueError for a number of nothing, and what the wait raises.
         """
         if number not in self._waits:
-            raise ValueError("nothing is waited for under that number")
+            raise ValueError("there is no wait with this number")
         steps, wait = self._waits[number]
         try:
             asked = steps.send(answer)

@@ -61,7 +61,7 @@ class ScriptEnd:
         """Return the next message. Raises Disconnected."""
         message = self._channel.receive()
         if message is None:
-            raise Disconnected("nothing comes")
+            raise Disconnected("no message arrived")
         read: tuple[Any, ...] = marshal.loads(message)
         return read
 
@@ -107,7 +107,7 @@ class ScriptEnd:
     def _number(self, function: Any) -> int:
         if id(function) not in self._numbers:
             if len(self._functions) >= _MOST_FUNCTIONS:
-                raise ValueError(f"a script hands over {_MOST_FUNCTIONS} functions at most")
+                raise ValueError(f"a script can pass at most {_MOST_FUNCTIONS} functions")
             self._numbers[id(function)] = len(self._functions)
             self._functions.append(function)  # kept: nothing else ever has its id
         return self._numbers[id(function)]

@@ -175,7 +175,7 @@ class ScriptThere:
             self._door.is_gone = True
             self._end(said, "its process has ended")
         except NoMessage as error:
-            self._end(said, f"its process has sent what is no message: {error}")
+            self._end(said, f"its process sent an invalid message: {error}")
         finally:
             self._deadline = outer
 
@@ -202,13 +202,13 @@ class ScriptThere:
                 elif how == "failed":
                     self._failed(item)
                 else:
-                    raise NoMessage(f"'{how:.20}' is none")
+                    raise NoMessage(f"unknown reply '{how:.20}'")
         finally:
             self._failure = outer
 
     def _returned(self, phase: str, item: list[Any]) -> Any:
         if not 3 <= len(item) <= 4:
-            raise NoMessage("no end of a call")
+            raise NoMessage("malformed end of a call")
         self._has_gone_on = len(item) == 4
         self.threaded = item[1] is True
         if self._failure is not None:
@@ -217,7 +217,7 @@ class ScriptThere:
 
     def _failed(self, item: list[Any]) -> NoReturn:
         if len(item) != 6 or [type(one) for one in item[2:]] != [str, str, int, str]:
-            raise NoMessage("no failure")
+            raise NoMessage("malformed failure")
         _, threaded, phase, path, line, reason = item
         self.threaded = threaded is True
         raise ScriptError(phase[:_LONGEST], path[:_LONGEST], line, reason)
@@ -229,7 +229,7 @@ class ScriptThere:
         name, arguments = item[1], item[2:]
         function = self._changes.get(name) if type(name) is str else None
         if function is None:
-            raise NoMessage("a call that has to be waited for")
+            raise NoMessage("unexpected call that waits")
         if self._failure is not None:
             return
         if not _ALL_PLAIN(map(type, arguments)):
@@ -245,7 +245,7 @@ class ScriptThere:
     def _answer(self, item: list[Any]) -> None:
         """Carry out a call, and answer it, with what is expected to be read next."""
         if len(item) < 4 or type(item[2]) is not int or type(item[3]) is not list:
-            raise NoMessage("no call")
+            raise NoMessage("malformed call")
         began = monotonic()
         phase = self._phase
         try:
@@ -269,7 +269,7 @@ class ScriptThere:
         if name == "wait":
             return self._waits.step(*given)
         if function is None:
-            raise NoMessage("no function of the API")
+            raise NoMessage("unknown function of the API")
         done = self._door.permit(name, _in_order(function, given, by_name))
         found = function(*given, **by_name)
         if done is not None:
@@ -301,7 +301,7 @@ class ScriptThere:
 def _named(pairs: list[Any]) -> dict[str, Any]:
     """Return arguments by name. Raises NoMessage."""
     if not all(type(one) is list and len(one) == 2 and type(one[0]) is str for one in pairs):
-        raise NoMessage("no arguments by name")
+        raise NoMessage("malformed named arguments")
     return dict(pairs)
 
 

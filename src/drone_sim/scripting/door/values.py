@@ -143,7 +143,7 @@ def _marked_object(value: Any, number: Callable[[Any], int]) -> Any:
         return {"o": _pairs(named, number)}
     if isinstance(value, Iterable):
         return [marked(one, number) for one in value]
-    raise TypeError(f"a {type(value).__name__} cannot be handed over")
+    raise TypeError(f"a {type(value).__name__} cannot be passed between a script and the simulation")
 
 
 def _pairs(named: Mapping[Any, Any], number: Callable[[Any], int]) -> list[list[Any]]:
@@ -161,7 +161,7 @@ def read(message: bytes) -> list[Any]:
         text = message.decode()
         items, end = _decode(text)
     except (ValueError, RecursionError):
-        raise NoMessage("no JSON") from None
+        raise NoMessage("not JSON") from None
     if type(items) is not list or end != len(text):
         raise NoMessage("no list of items")
     for one in items:
@@ -195,20 +195,20 @@ def _mark(value: dict[str, Any]) -> tuple[str, Any]:
         ((mark, inner),) = value.items()
         if type(inner) is _MARKS.get(mark):
             return mark, inner
-    raise NoMessage("no mark")
+    raise NoMessage("unknown mark")
 
 
 def _mapping(mark: str, pairs: list[Any], function: Callable[[int], Any], depth: int) -> Any:
     if not all(type(one) is list and len(one) == 2 for one in pairs):
-        raise NoMessage("no pairs")
+        raise NoMessage("not a list of pairs")
     found = [(unmarked(key, function, depth + 1), unmarked(one, function, depth + 1)) for key, one in pairs]
     try:
         if mark == "d":
             return dict(found)
     except TypeError:
-        raise NoMessage("no key") from None
+        raise NoMessage("not a valid key") from None
     if not all(type(key) is str and key.isidentifier() and not key.startswith("_") for key, _ in found):
-        raise NoMessage("no field")
+        raise NoMessage("unknown field")
     return SimpleNamespace(**dict(found))
 
 
@@ -216,4 +216,4 @@ def _bytes(text: str) -> bytes:
     try:
         return base64.b64decode(text, validate=True)
     except (binascii.Error, ValueError):
-        raise NoMessage("no base64") from None
+        raise NoMessage("not base64") from None

@@ -68,7 +68,7 @@ end
 -- Lua 5.1's way to write a helper: what the file defines from here on belongs to a table, which is a global, too.
 function env.module(name, ...)
   if newer then error('module is of Lua 5.1: let the file return a table instead', 2) end
-  if type(name) ~= 'string' or not chunk then error('module: only in a file that is required by its name', 2) end
+  if type(name) ~= 'string' or not chunk then error('module: only works in a file that `require` loads by its name', 2) end
   local its = type(env[name]) == 'table' and env[name] or {}
   its._NAME, its._M, env[name], made[name] = name, its, its, its
   for i = 1, select('#', ...) do (select(i, ...))(its) end

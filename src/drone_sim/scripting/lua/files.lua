@@ -11,9 +11,9 @@ local tonumber, floor, unpack = tonumber, math.floor, table.unpack or unpack
 local env, modules, sources = sandbox.globals, sandbox.modules, sandbox.sources
 local log, compile, protected = bridge.log, sandbox.compile, sandbox.protected
 
-local READING = 'a Lua script reads files beside it, by io.open or io.lines with a name'
-local WRITING = 'a Lua script writes no files: print it, or simROS.publish it'
-local STARTING = 'a child script starts no programs: use a launch file'
+local READING = 'a Lua script can only read files in its own folder, by io.open or io.lines with a name'
+local WRITING = 'a Lua script cannot write files: use print or simROS.publish'
+local STARTING = 'a child script cannot start programs: use a launch file'
 local ENVIRONMENT = 'a Lua script sees no environment: use script_parameters'
 local LONGEST = 80 -- characters of a name in a message
 

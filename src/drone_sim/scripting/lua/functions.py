@@ -89,7 +89,7 @@ def _failed(
         return FAILED, explain(name, function, arguments, error).encode("utf-8", "replace")
     if name not in state.lavish:
         state.lavish.add(name)
-        LOG.info("%s: %d values given, %d taken: the others are ignored", name, len(arguments), most)
+        LOG.info("%s: got %d values and uses %d: the others are ignored", name, len(arguments), most)
     answered: tuple[Any, ...] = call(0, *arguments[:most])
     return answered
 
@@ -103,7 +103,7 @@ def _asked_in_steps(name: str, state: LuaState, wait: Wait) -> tuple[Any, ...]:
     if state.waits >= _MOST_WAITS:
         state.runtime.gccollect()  # those of coroutines that are no more
     if state.waits >= _MOST_WAITS:
-        raise ValueError(f"at most {_MOST_WAITS} coroutines of a script wait at once")
+        raise ValueError(f"at most {_MOST_WAITS} coroutines of a script may wait at once")
     steps = _steps(wait, state)
 
     def waited(answer: Any = None) -> tuple[Any, ...]:

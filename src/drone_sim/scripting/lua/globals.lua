@@ -40,7 +40,7 @@ string.dump = nil
 -- uint8[] fields of messages are strings here, and tables in V-REP, where data[1] is the first byte; it would be nil.
 setmetatable(string, {__index = function(_, key)
   if type(key) == 'number' then
-    error('a string has no [' .. key .. ']: uint8[] is a string here, of which string.byte(data, i) is the i-th', 2)
+    error('a string has no [' .. key .. ']: a uint8[] field is a string here; read its i-th byte with string.byte(data, i)', 2)
   end
 end})
 

@@ -62,7 +62,7 @@ class LuaHelpers:
         file, why = shown.removeprefix("./"), b"refused"
         try:
             if len(file) > _LONGEST or not _DATA.fullmatch(file):
-                raise ValueError("a file beside the script, or in a folder there, is expected, such as data/path.csv")
+                raise ValueError("must be a file in the script's folder or a folder in it, such as data/path.csv")
             path, why = str(self._inside(file)), b""
             return True, read_source(path), b""
         except ValueError as error:
@@ -72,7 +72,7 @@ class LuaHelpers:
         """Return the path of a file; raises ValueError for one that a link leads to elsewhere."""
         path = self._folder / file
         if not path.resolve().is_relative_to(self._folder.resolve()):
-            raise ValueError("leads out of the script's folder")
+            raise ValueError("is outside of the script's folder")
         return path
 
     def _read(self, failed: str, name: bytes, found: Callable[[str], str]) -> tuple[bool, bytes, bytes]:
@@ -81,7 +81,7 @@ class LuaHelpers:
             path, chunk = self._inside(file), self._chunk(file)
             text = LuaSource(read_source(path)).text
             if len(self._paths) > _MOST:
-                raise ValueError(f"a script has at most {_MOST} modules")
+                raise ValueError(f"a script may have at most {_MOST} modules")
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
             return False, f"{failed} '{name.decode('utf-8', 'replace')[:80]}': {why}".encode("utf-8", "replace"), b""
@@ -91,17 +91,15 @@ class LuaHelpers:
     def _file(self, name: str) -> str:
         file = name.removeprefix("./")
         if len(file) > _LONGEST or not _FILE.fullmatch(file):
-            raise ValueError(
-                "a .lua file beside the script, or in a folder there, is expected, such as helpers/pid.lua"
-            )
+            raise ValueError("must be a .lua file in the script's folder or a folder in it, such as helpers/pid.lua")
         if not (self._folder / file).exists():
             near = near_names(file, [one.name for one in self._folder.glob("*.lua")])
-            raise ValueError(f"no such file beside the script; {near}")
+            raise ValueError(f"there is no such file in the script's folder; {near}")
         return file
 
     def _module(self, name: str) -> str:
         if len(name) > _LONGEST or not _NAME.fullmatch(name):
-            raise ValueError("a module's name is made of letters, digits, _ and -; dots stand for folders")
+            raise ValueError("the name of a module may contain letters, digits, _ and -, and dots for folders")
         inner = name.replace(".", "/")
         for file in (f"{inner}.lua", f"{inner}/init.lua"):
             if (self._folder / file).exists() and not self._is_script(file):
@@ -112,9 +110,9 @@ class LuaHelpers:
         near = near_names(name, beside)
         if self._is_script(f"{inner}.lua"):
             raise ValueError(
-                f"{inner}.lua is this script itself; a helper needs another name, or lies in {inner}/init.lua"
+                f"{inner}.lua is this script itself; give the helper another name, or put it into {inner}/init.lua"
             )
-        raise ValueError(f"no file {inner}.lua beside the script{f'; {near}' if beside else ''}")
+        raise ValueError(f"there is no file {inner}.lua in the script's folder{f'; {near}' if beside else ''}")
 
     def _is_script(self, file: str) -> bool:
         """Tell whether a file in the folder is the script, which is no helper of its own."""

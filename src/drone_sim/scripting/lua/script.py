@@ -76,7 +76,10 @@ class LuaScript:
         self._breakpoints = breakpoints if breakpoints is not None else Breakpoints()
         self._check_form(text)
         if text.loops_in_c and left_behind() >= MOST_LEFT:
-            raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")
+            raise self._error(
+                "load",
+                f"{MOST_LEFT} Lua scripts hang in this process, and no more can be loaded: restart the simulator",
+            )
         self._thread: Executor = LuaThread(limit) if text.loops_in_c else SameThread(limit)
         try:
             dialect = state.dialect_for(text.text, bool(text.flat_names) or "phases" in text.form)
@@ -229,7 +232,7 @@ class LuaScript:
     def close(self) -> None:
         """Free the Lua state; the script cannot be called after that."""
         self._finalizer()
-        self._end = self._end or "the script is closed"
+        self._end = self._end or "the script was closed"
         self._phases = 0
         self._lua.clear()
 

@@ -198,4 +198,4 @@ def _texts() -> dict[str, bytes]:
 
 
 def _nothing_of_python(_object: Any, name: Any, _is_setting: bool) -> Any:
-    raise AttributeError(f"no access to {name!r}")
+    raise AttributeError(f"access is not allowed to {name!r}")

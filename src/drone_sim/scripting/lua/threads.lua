@@ -122,7 +122,7 @@ local function set_automatic(allowed)
   elseif allowed == false then
     forbidden = before + 1
   else
-    error('true, false, or a level of 0 or more is expected', 3)
+    error('expected true, false, or a level of 0 or more', 3)
   end
   return before
 end

@@ -99,7 +99,9 @@ class Helpers:
             is_known = is_there or place.is_dir() or (BUILT_IN / top).with_suffix(".py").is_file()
             return is_there or (is_known and getattr(PathFinder.find_spec(top), "origin", None) is None)
         if is_there:
-            _LOG.warning("%s: %s is not imported from here: Python's own module comes first", self._folder, top)
+            _LOG.warning(
+                "%s: %s is not used, because Python has a module with the same name; rename it", self._folder, top
+            )
         return False
 
     # ---- what Python's import asks

@@ -40,7 +40,7 @@ def end_copy(path: str) -> NoReturn:
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(_UNTIL_SAID)
     try:
-        script_log.say(f"{path}: the copy that os.fork() made has come back from the script, and ends: one flies")
+        script_log.say(f"{path}: the process that os.fork() made has returned from the script, and is ended")
     finally:
         os._exit(1)
 
@@ -67,7 +67,7 @@ def process_kept() -> Iterator[None]:
 def _guarded(limit: int) -> None:
     """Set the recursion limit; raises ValueError beyond what the stack holds."""
     if limit > _DEEPEST:
-        raise ValueError(f"a child script's recursion limit is {_DEEPEST} at most, not {limit}")
+        raise ValueError(f"the recursion limit of a child script must be at most {_DEEPEST}, not {limit}")
     _set_recursion_limit(limit)
 
 
@@ -80,7 +80,7 @@ def _kept_from_scripts(name: str, takes: Callable[..., bool]) -> Any:
     @functools.wraps(function)
     def call(*arguments: Any) -> Any:
         if time_limit.running() is not None and takes(*arguments):
-            raise ValueError(f"signal.{name}: the alarm is the time limit's (script_time_limit)")
+            raise ValueError(f"signal.{name}: the time limit of scripts (script_time_limit) uses this alarm")
         return function(*arguments)
 
     return call

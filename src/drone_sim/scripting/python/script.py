@@ -113,7 +113,7 @@ class PythonScript:
         for name in (*FUNCTIONS.values(), *THREADS):
             one = functions.get(name)
             if inspect.isgeneratorfunction(one) or inspect.iscoroutinefunction(one) or inspect.isasyncgenfunction(one):
-                raise self._error_at(one, f"{name} would not run: it has a `yield` or is `async`")
+                raise self._error_at(one, f"{name} would not run, because it has a `yield` or is `async`")
         phase_names.warn(self._path, functions)
         self.idle = phase_names.idle(functions)
 
@@ -284,7 +284,7 @@ class PythonScript:
         if name in PLUGINS:
             raise UnknownName(not_there("", name, ()))
         if name not in self._found:
-            raise UnknownName(f"no module '{name}'; {near_names(str(name), self._found)}")
+            raise UnknownName(f"there is no module '{name}'; {near_names(str(name), self._found)}")
         return self._found[name]
 
     def _error(self, phase: str, error: BaseException) -> ScriptError:

@@ -46,7 +46,7 @@ class ExposureParameters(Imperfection):
     def model_post_init(self, _context: Any) -> None:
         """Refuse to follow without an exposure time."""
         if self.automatic and not self.time:
-            raise ParameterError("needs time, the longest that it takes", ("automatic",), "true")
+            raise ParameterError("needs `time`, the longest exposure time", ("automatic",), "true")
 
     @property
     def is_on(self) -> bool:

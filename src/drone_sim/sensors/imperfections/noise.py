@@ -40,7 +40,7 @@ class PixelNoiseParameters(Imperfection):
     def model_post_init(self, _context: Any) -> None:
         """Refuse noise in electrons without `full_well`, the number of electrons in a white pixel."""
         if self.read and not self.full_well:
-            raise ParameterError("needs full_well, the electrons of a white pixel", ("read",), f"{self.read:g}")
+            raise ParameterError("needs `full_well`, the electrons of a white pixel", ("read",), f"{self.read:g}")
 
     @property
     def is_on(self) -> bool:

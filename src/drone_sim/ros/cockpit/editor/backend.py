@@ -150,7 +150,7 @@ class EditorBackend:
         """Return a text, and which of the user's scripts, or of the package's, belongs to it."""
         lesson = self._find_lesson(message)
         if lesson is None:
-            raise ScriptStoreError(f"{str(message.get('lesson'))[:80]!r}: no such text")
+            raise ScriptStoreError(f"{str(message.get('lesson'))[:80]!r}: there is no such lesson")
         own = [
             one
             for one in self._store.scripts()
@@ -172,14 +172,16 @@ class EditorBackend:
         script = self._script(message)
         path = str(script.path)
         if not path.isprintable():
-            raise ScriptStoreError(f"{script.name!r}: ROS cannot pass on such a name; save it as another one")
+            raise ScriptStoreError(
+                f"{script.name!r}: a ROS parameter cannot hold this name; save the script under another name"
+            )
         lesson = self._find_lesson(message)
         self._player.prepare(plan_of(lesson) if lesson and lesson.task else None)
         self._simulator.set_parameter("script", path)
         done, said = self._switcher.fly(lesson)
         self._player.begin() if done else self._player.end()
         if said.endswith("unavailable"):  # rospy's word for a service of nobody
-            said = f"no simulation answers: {said}"
+            said = f"the simulation does not answer: {said}"
         failure = None if done else script_failure(said)
         return {"done": done, "said": said, "failure": failure and failure._asdict()}
 

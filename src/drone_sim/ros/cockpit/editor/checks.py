@@ -14,7 +14,7 @@ from drone_sim.scripting.checking.findings import LARGEST, Finding
 
 _SECONDS = 5.0  # that a check may take
 _FIRST_SECONDS = 30.0  # of the first one, which reads the API
-_TOO_LARGE = f"has more than {LARGEST} bytes, and is not checked while you type"
+_TOO_LARGE = f"is larger than {LARGEST} bytes, so it is not checked while you type"
 _NO_ANSWER = "this text takes too long to check while you type"
 
 

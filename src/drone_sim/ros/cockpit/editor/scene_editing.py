@@ -112,7 +112,7 @@ class SceneEditing:
         try:
             answer = rospy.ServiceProxy(f"{self._node}/edit_scene", AddDiagnostics)(json.dumps(request))
         except FAILURES as error:
-            raise ValueError(f"no simulation answers: {error}") from None
+            raise ValueError(f"the simulation does not answer: {error}") from None
         if not answer.success:
             raise ValueError(answer.message)
         made: dict[str, Any] = json.loads(answer.message)
@@ -154,7 +154,7 @@ class SceneEditing:
         """Keep a model of the user's. Raises ValueError."""
         name = message.get("name")
         if not isinstance(name, str) or Path(name).name != name or Path(name).suffix.lower() not in _UPLOADED:
-            raise ValueError(f"name: must be that of a {', '.join(_UPLOADED[:-1])} or {_UPLOADED[-1]} file")
+            raise ValueError(f"name: must end in {', '.join(_UPLOADED[:-1])} or {_UPLOADED[-1]}")
         try:
             content = base64.b64decode(str(message.get("content")), validate=True)
         except binascii.Error:

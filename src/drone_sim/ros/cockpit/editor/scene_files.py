@@ -55,8 +55,8 @@ def describe_scene_of(plan: Plan) -> str:
     config = _config(plan)
     lacks = [key for key in config if key not in _KNOWN]
     said = [f"in the scene of the task {plan.name}", *_flat({key: config[key] for key in config if key in _KNOWN})]
-    said += [f"but without {', '.join(lacks)}, which only a launch can set"] if lacks else []
-    said += ["and sends what its plan says happens"] if plan.timeline else []
+    said += [f"but without {', '.join(lacks)}, which can only be set at launch"] if lacks else []
+    said += ["with the events of its plan"] if plan.timeline else []
     return ", ".join(said)
 
 

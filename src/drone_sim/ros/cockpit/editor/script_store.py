@@ -93,7 +93,7 @@ class ScriptStore:
         except ValueError as error:
             raise ScriptStoreError(f"{script.name!r}: {error}") from None
         if place.parent != self.folder.resolve():
-            raise ScriptStoreError(f"{script.name}: is a link that leads out of {self.folder}, and is left alone")
+            raise ScriptStoreError(f"{script.name}: is a link to a file outside of {self.folder}, so it is not changed")
         return place
 
     def of_file(self, path: str) -> ScriptFile | None:
@@ -210,7 +210,9 @@ class ScriptStore:
         """
         with self._writing:
             if name not in self._removed:
-                raise ScriptStoreError(f"{str(name)[:80]!r}: was not deleted here, or too long ago")
+                raise ScriptStoreError(
+                    f"{str(name)[:80]!r}: cannot be brought back: it was not deleted here, or too long ago"
+                )
             script = self._own(str(name).removeprefix(f"{OWN}/"))
             if os.path.lexists(script.path):
                 script = self._copy_of(script)
@@ -222,7 +224,7 @@ class ScriptStore:
     def _own_place(self, script: ScriptFile) -> Path:
         """Return the file of a script of the user's, or the link that it is. Raises ScriptStoreError."""
         if not script.is_own:
-            raise ScriptStoreError(f"{script.name}: belongs to the package, and stays as it is; duplicate it")
+            raise ScriptStoreError(f"{script.name}: belongs to the package and cannot be changed; duplicate it")
         self._place(script)
         return script.path
 
@@ -284,7 +286,9 @@ def _checked(name: Any) -> str:
     if Path(name).suffix not in _ENDINGS:
         raise ScriptStoreError(f"{name!r}: a script's name ends in {' or '.join(_ENDINGS)}")
     if "/" in name or name.startswith(("_", ".")) or not name.isprintable():
-        raise ScriptStoreError(f"{name!r}: a name is letters, digits, '-' and '_', and begins with neither '_' nor '.'")
+        raise ScriptStoreError(
+            f"{name!r}: a name may contain letters, digits, '-' and '_', and must not begin with '_' or '.'"
+        )
     return name
 
 
@@ -297,7 +301,7 @@ def _read_text(name: str, path: Path) -> tuple[str, str]:
         return content.decode("utf-8").replace("\r\n", "\n"), version
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise ScriptStoreError(f"{name}: line {line}: is not UTF-8, and cannot be edited here") from None
+        raise ScriptStoreError(f"{name}: line {line}: is not UTF-8, so it cannot be edited here") from None
 
 
 def _write_text(name: str, path: Path, text: str, is_new: bool = False) -> str:
@@ -310,9 +314,11 @@ def _write_text(name: str, path: Path, text: str, is_new: bool = False) -> str:
         content = text.encode("utf-8")
     except UnicodeEncodeError as error:
         line = text.count("\n", 0, error.start) + 1
-        raise ScriptStoreError(f"{name}: line {line}: has half of a character, which cannot be saved") from None
+        raise ScriptStoreError(
+            f"{name}: line {line}: contains half of a character pair (a lone surrogate), which cannot be saved"
+        ) from None
     if len(content) > LARGEST:
-        raise ScriptStoreError(f"{name}: has {len(content)} bytes; at most {LARGEST} are kept")
+        raise ScriptStoreError(f"{name}: has {len(content)} bytes; at most {LARGEST} are allowed")
     if not is_new and _has_windows_line_ends(path):
         text = text.replace("\n", "\r\n")
     with _naming_errors(name):

@@ -125,7 +125,7 @@ class Grader:
     def result(self, number: Any) -> dict[str, Any]:
         """Return the result of a number, {} while it flies. Raises ScriptStoreError where it is not known any more."""
         if number != self._asked:
-            raise ScriptStoreError("grade: another script has been graded since")
+            raise ScriptStoreError("grade: another script was graded in the meantime")
         return self._result
 
     def _wait(self, process: subprocess.Popen[str]) -> None:

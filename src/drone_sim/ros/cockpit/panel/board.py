@@ -57,7 +57,7 @@ def one_of(message: Mapping[str, Any], key: str, allowed: Sequence[str]) -> str:
     """Return what a message says under a key. Raises ValueError for what is not among those."""
     value = message.get(key)
     if not isinstance(value, str) or value not in allowed:
-        known = near_names(str(value)[:80], allowed) if allowed else "there is none now"
+        known = near_names(str(value)[:80], allowed) if allowed else "there are none now"
         raise ValueError(f"{key} = {shown(value)}: does not exist; {known}")
     return value
 

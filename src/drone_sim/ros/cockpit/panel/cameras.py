@@ -222,7 +222,7 @@ class ScriptWindows:
     def _answer(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """Hand on which button was pressed; the simulation checks it."""
         if self._answering is None:
-            raise ValueError("there is no simulation for the answer")
+            raise ValueError("no simulation is there to receive the answer")
         until = time.monotonic() + _CONNECTING
         while not self._answering.get_num_connections() and time.monotonic() < until:
             time.sleep(0.05)  # the first message of a new publisher is heard by nobody
@@ -273,7 +273,7 @@ def _depths(depths: np.ndarray) -> tuple[bytes, str]:
     """Return depths (m) in colours, black where there is none, and the range of these."""
     there = np.isfinite(depths) & (depths > 0)
     if not there.any():
-        return _encoded(np.zeros((*depths.shape, 3), np.uint8)), "nothing within its range"
+        return _encoded(np.zeros((*depths.shape, 3), np.uint8)), "nothing within range"
     near, far = float(depths[there].min()), float(depths[there].max())
     share = np.log(np.where(there, depths, near) / near) / max(math.log(far / near), 1e-6)  # as eyes see distances
     scaled = (255 * share).astype(np.uint8)

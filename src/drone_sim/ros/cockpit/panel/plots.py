@@ -192,7 +192,9 @@ class Plots:
         """Return what is new in the charts that are named, each with the run and the time (s) that a browser has."""
         asked = message.get("charts")
         if not isinstance(asked, Mapping) or len(asked) > _MOST or not all(map(_is_known, asked.values())):
-            raise ValueError(f"charts = {shown(asked)}: must be [run, time] by name, of {_MOST} charts at most")
+            raise ValueError(
+                f"charts = {shown(asked)}: must be a mapping of names to [run, time], with at most {_MOST} charts"
+            )
         return {"charts": {name: self._since(name, int(run), at) for name, (run, at) in asked.items()}}
 
     def _since(self, name: str, run: int, at: float) -> dict[str, Any]:

@@ -116,7 +116,7 @@ def _checked(field: Mapping[str, Any], value: Any) -> Any:
             raise ValueError(f"{name} = {shown(value)}: must be a whole number")
         return kind(found)
     if not isinstance(value, kind):
-        raise ValueError(f"{name} = {shown(value)}: must be {'true or false' if kind is bool else 'a text'}")
+        raise ValueError(f"{name} = {shown(value)}: must be {'true or false' if kind is bool else 'a string'}")
     return value
 
 

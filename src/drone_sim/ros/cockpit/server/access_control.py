@@ -22,7 +22,7 @@ from websockets.http11 import Request, Response
 
 SUBPROTOCOL = "drone_sim"  # of our own socket
 _LARGEST = 8 << 20  # bytes of a message from a browser: a script, with all that JSON makes longer
-_REFUSED = "The cockpit opens with the address that the simulation has printed: it ends in ?token=..."
+_REFUSED = "To open the cockpit, use the whole address that the simulation printed. It ends in ?token=..."
 _SAFE = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
@@ -183,7 +183,7 @@ class _CheckedConnection(ServerConnection):
             raise
 
     def _say(self, what: str) -> None:
-        rospy.logwarn(f"a browser at {self.remote_address[0]} is sent away: {what}")
+        rospy.logwarn(f"a browser at {self.remote_address[0]} is refused: {what}")
 
 
 class _OneLineHandler(logging.Handler):

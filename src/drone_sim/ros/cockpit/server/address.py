@@ -37,7 +37,7 @@ def free_place(address: Any, port: Any) -> tuple[str, int]:
     for one in range(port, last + 1):
         if _is_free(family, host, one):
             return host, one
-    raise AddressError(f"port = {port}: neither this one nor any other up to {last} is free at {host}")
+    raise AddressError(f"port = {port}: all ports from {port} to {last} are in use at {host}")
 
 
 def _resolved(address: Any) -> tuple[socket.AddressFamily, str]:
@@ -68,7 +68,7 @@ def _is_free(family: socket.AddressFamily, host: str, port: int) -> bool:
             one.bind((host, port))
             one.listen()
         except PermissionError:
-            raise AddressError(f"port = {port}: only root may use it; everybody may use those from 1024 on") from None
+            raise AddressError(f"port = {port}: only root may use it; choose one from 1024 on") from None
         except OSError as error:
             if error.errno != errno.EADDRINUSE:
                 raise
@@ -103,7 +103,7 @@ def address_file(address: str, port: int) -> Iterator[str]:
     try:
         _write(file, content)
     except OSError as error:
-        yield f"the token that opens it is on the terminal alone: {file}: {error.strerror}"
+        yield f"the address with the token is only in the terminal, because {file} cannot be written ({error.strerror})"
         return
     try:
         yield f"the address with the token that opens it is in {file}"

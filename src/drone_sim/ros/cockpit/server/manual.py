@@ -9,7 +9,7 @@ from drone_sim.files.resources import MEBIBYTE, package_path, read_bytes
 from drone_sim.ros.cockpit.server.access_control import MANUAL, Content
 
 _LARGEST = 16 * MEBIBYTE  # bytes of a file
-_NOT_BUILT = "The manual is not there. In a checkout, `./dev.sh docs` builds it."
+_NOT_BUILT = "The manual has not been built. In a checkout, `./dev.sh docs` builds it."
 
 
 class Manual:

@@ -136,7 +136,7 @@ def _read(text: str | bytes) -> dict[str, Any]:
 def _finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
-        raise ValueError(f"{text[:20]}: is no number that JSON has, or too large")
+        raise ValueError(f"{text[:20]}: is not a number in JSON, or too large")
     return value
 
 
