@@ -160,7 +160,7 @@ def test_no_object_hangs_too_deep(objects, upwards):
     """However a script puts a chain together."""
     made = [objects.add(f"o{number}") for number in range(999)]
     pairs = list(zip(made[1:], made))
-    with pytest.raises(ValueError, match=r"'o\d+' cannot be moved there"):
+    with pytest.raises(ValueError, match=r"'o\d+'.* 200 "):
         for below, above in reversed(pairs) if upwards else pairs:
             objects.set_parent(below, above, True)
     assert len(objects.matrix(made[-1])) == 12

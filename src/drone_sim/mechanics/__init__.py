@@ -1,1 +1,1 @@
-"""Frames, states, wrenches, rigid bodies: formulas, in SI units, without PyBullet or ROS."""
+"""Formulas for frames, states, wrenches and rigid bodies, in SI units, without PyBullet or ROS."""

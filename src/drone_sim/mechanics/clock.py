@@ -4,10 +4,10 @@ from __future__ import annotations
 
 
 class Clock:
-    """Counts steps, and sums no seconds, so that it does not drift."""
+    """Simulation clock. It counts steps instead of adding up seconds, so it does not drift."""
 
     def __init__(self, time_step: float):
-        """Begin at time 0; `time_step` in s."""
+        """Start at time 0; `time_step` in s."""
         self.time_step = time_step
         self.steps = 0
         self.is_sensing = False
@@ -19,5 +19,5 @@ class Clock:
 
     @property
     def script_time(self) -> float:
-        """What scripts are told (s): V-REP's time goes on at the end of a step, after the sensing phase."""
+        """Time (s) that scripts see. As in V-REP, it advances at the end of a step, after the sensing phase."""
         return (self.steps - self.is_sensing) * self.time_step

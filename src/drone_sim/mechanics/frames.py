@@ -1,8 +1,8 @@
-"""Frames, as V-REP counts them: 12-number matrices, X-Y-Z Euler angles, xyzw quaternions.
+"""Transforms in V-REP's conventions: 12-number matrices, X-Y-Z Euler angles, xyzw quaternions.
 
 A `Matrix` is the first three rows of a 4x4 homogeneous transform, row by row, as simGetObjectMatrix
-returns it: (r00, r01, r02, x, r10, r11, r12, y, r20, r21, r22, z). Plain tuples of floats, because a
-step handles a dozen of them and one numpy call costs more than all the arithmetic of one.
+returns it: (r00, r01, r02, x, r10, r11, r12, y, r20, r21, r22, z). It is a plain tuple of floats: a step
+handles a dozen of them, and one numpy call costs more than all the arithmetic of one.
 """
 
 from __future__ import annotations
@@ -70,10 +70,10 @@ def to_quaternion(m: Sequence[float]) -> Quaternion:
     """Return the unit quaternion (x, y, z, w), w >= 0, of a transform (Shepperd's method)."""
     xx, yy, zz = m[0], m[5], m[10]
     ww = 1 + xx + yy + zz
-    if ww > 2:  # the largest: this is a turn of less than a right angle, as most are
+    if ww > 2:  # the largest square: a rotation of less than 90°, as most are
         scale = 0.5 / sqrt(ww)
         return (m[9] - m[6]) * scale, (m[2] - m[8]) * scale, (m[4] - m[1]) * scale, ww * scale
-    # Four squares that sum to 4; dividing by the largest keeps every digit.
+    # Four squares that sum to 4; dividing by the largest loses no digits.
     squares = (1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, ww)
     largest = squares.index(max(squares))
     rows = (
@@ -88,7 +88,7 @@ def to_quaternion(m: Sequence[float]) -> Quaternion:
 
 
 def multiply_quaternions(a: Sequence[float], b: Sequence[float]) -> Quaternion:
-    """Return the product a·b of two quaternions (x, y, z, w): first b turns, then a."""
+    """Return the product a·b of two quaternions (x, y, z, w): rotate by b first, then by a."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
     return (
@@ -119,7 +119,7 @@ def multiply(a: Sequence[float], b: Sequence[float]) -> Matrix:
 
 
 def invert(m: Sequence[float]) -> Matrix:
-    """Return the inverse of a rigid transform: its rotation transposed, its translation turned back."""
+    """Return the inverse of a rigid transform: its rotation transposed, its translation rotated back."""
     r0, r1, r2, x, r4, r5, r6, y, r8, r9, r10, z = m
     return (
         r0, r4, r8, -(r0 * x + r4 * y + r8 * z),
@@ -129,7 +129,7 @@ def invert(m: Sequence[float]) -> Matrix:
 
 
 def relative(a: Sequence[float], b: Sequence[float]) -> Matrix:
-    """Return the rigid transform b, given in the frame that a is given in, in the frame a: the inverse of a times b."""
+    """Return transform b relative to transform a, where both have the same frame of reference: inverse(a)·b."""
     a0, a1, a2, x, a4, a5, a6, y, a8, a9, a10, z = a
     b0, b1, b2, b3, b4, b5, b6, b7, b8, b9, b10, b11 = b
     b3, b7, b11 = b3 - x, b7 - y, b11 - z
@@ -144,7 +144,7 @@ def relative(a: Sequence[float], b: Sequence[float]) -> Matrix:
 
 
 def relative_turn(a: Sequence[float], b: Sequence[float]) -> Matrix:
-    """Return what `relative` does without its translation, which a question for an orientation does not need."""
+    """Return `relative` with a translation of 0: cheaper if only the orientation is needed."""
     a0, a1, a2, _, a4, a5, a6, _, a8, a9, a10, _ = a
     b0, b1, b2, _, b4, b5, b6, _, b8, b9, b10, _ = b
     return (
@@ -165,7 +165,7 @@ def transform(m: Sequence[float], point: Sequence[float]) -> Vector:
 
 
 def rotate(m: Sequence[float], vector: Sequence[float]) -> Vector:
-    """Return the vector turned by the rotation of m, without its translation."""
+    """Return a vector rotated by m, without its translation."""
     x, y, z = vector
     return (
         m[0] * x + m[1] * y + m[2] * z,
@@ -175,7 +175,7 @@ def rotate(m: Sequence[float], vector: Sequence[float]) -> Vector:
 
 
 def rotate_back(m: Sequence[float], vector: Sequence[float]) -> Vector:
-    """Return the vector turned by the inverse rotation of m: a world's vector in the axes of m."""
+    """Return a vector rotated by the inverse of m: from the world to the axes of m."""
     x, y, z = vector
     return (
         m[0] * x + m[4] * y + m[8] * z,
@@ -193,7 +193,7 @@ def rotation_vector(m: Sequence[float]) -> Vector:
 
 
 def turned(quaternion: Sequence[float], vector: Sequence[float]) -> Vector:
-    """Return the vector turned by a unit quaternion: v + 2 w (q x v) + 2 q x (q x v)."""
+    """Return a vector rotated by a unit quaternion: v + 2 w (q x v) + 2 q x (q x v)."""
     x, y, z, w = quaternion
     vx, vy, vz = vector
     tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)

@@ -1,6 +1,6 @@
-"""A joint as an object of the scene: what hangs on it stands at world(joint) · motion(value) · local.
+"""A joint as an object of the scene: its children are at world(joint) · motion(value) · local.
 
-Revolute joints turn about their z axis (rad), prismatic ones slide along it (m), spherical ones turn any way.
+Revolute joints rotate about their z axis (rad), prismatic joints slide along it (m), spherical joints rotate freely.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ KINEMATIC, PASSIVE, POSITION, VELOCITY, FORCE = "kinematic", "passive", "positio
 
 @dataclass(frozen=True)
 class JointControl:
-    """What moves a joint: one of the modes above, its targets (rad or m, rad/s or m/s, N m or N), and its motor.
+    """How a joint is driven: one of the modes above, its targets (rad or m, rad/s or m/s, N m or N), its motor.
 
-    `max_force` is the most that the motor gives in the modes position and velocity.
+    `max_force` is the motor's largest force or torque in the modes position and velocity.
     """
 
     mode: str = KINEMATIC
@@ -33,23 +33,23 @@ class JointControl:
 
 
 class Drive(Protocol):
-    """A joint in the dynamics."""
+    """A joint in the dynamics; rad or m, N m or N."""
 
     def state(self) -> tuple[float, float, float]:
-        """Return position (rad or m), velocity (rad/s or m/s), what its motor gave in the last sub-step (N m or N)."""
+        """Return position, velocity (per s), and the motor's force or torque in the last sub-step."""
 
     def put(self, value: float) -> None:
-        """Put it at a position, at rest."""
+        """Place it at a position, at rest."""
 
     def limit(self, limits: tuple[float, float] | None) -> None:
-        """Let it have other limits, rad or m, or none."""
+        """Change its limits, or remove them."""
 
     def command(self, control: JointControl) -> None:
-        """Let its motor do from now on what is told; in the mode kinematic it stands still."""
+        """Control its motor like that from now on; in the mode kinematic it stands still."""
 
 
 class Joint(SceneObject):
-    """A joint: where it is, and what moves it."""
+    """A joint: its position, and its control."""
 
     def __init__(
         self,
@@ -63,23 +63,23 @@ class Joint(SceneObject):
         value: float = 0.0,
         control: JointControl = JointControl(),
     ):
-        """Stand at `local` in the parent's frame; `motion` is one of the three, without `limits` it has no end."""
+        """Create a joint at `local` in the parent's frame; `motion` is one of the three above, `limits` in rad or m."""
         super().__init__(names, alias, parent, local, kind="joint")
         self.motion = motion
         self.limits = limits
-        self.drive: Drive | None = None  # where the dynamics moves it
+        self.drive: Drive | None = None  # None if the dynamics does not move it
         self.control = control
-        self.dynamic_mode = control.mode if control.mode != KINEMATIC else PASSIVE  # the last one
-        self.turn = IDENTITY  # of a spherical one
+        self.dynamic_mode = control.mode if control.mode != KINEMATIC else PASSIVE  # the last mode but kinematic
+        self.turn = IDENTITY  # rotation of a spherical joint
         self._value = value
-        self._frame = self._moved = IDENTITY
-        self._moved_by: tuple[float, Matrix] = (0.0, IDENTITY)
+        self._joint_frame = self._child_frame = IDENTITY
+        self._motion_of_child: tuple[float, Matrix] = (0.0, IDENTITY)
 
-    # ---- where it is
+    # ---- position
 
     @property
     def value(self) -> float:
-        """How far it is turned or slid, rad or m; within half a turn where it has no end."""
+        """Position, rad or m; without limits a revolute joint's is from -pi to pi."""
         value = self._value if self.drive is None else self.drive.state()[0]
         if self.motion == REVOLUTE and self.limits is None:
             return math.remainder(value, math.tau)
@@ -87,11 +87,11 @@ class Joint(SceneObject):
 
     @property
     def velocity_along(self) -> float:
-        """How fast it moves, rad/s or m/s; 0 where the dynamics does not move it."""
+        """Velocity, rad/s or m/s; 0 if the dynamics does not move it."""
         return 0.0 if self.drive is None else self.drive.state()[1]
 
     def place(self, value: float) -> None:
-        """Put it at a position, rad or m, or at the end of its way."""
+        """Set the position (rad or m), at most to its limits."""
         if self.limits is not None:
             value = min(max(value, self.limits[0]), self.limits[1])
         self._value = value
@@ -99,7 +99,7 @@ class Joint(SceneObject):
             self.drive.put(value)
 
     def limit(self, limits: tuple[float, float] | None) -> None:
-        """Let it have other limits, rad or m, or none."""
+        """Change its limits (rad or m), or remove them."""
         self.limits = limits
         if self.drive is not None:
             self.drive.limit(limits)
@@ -107,19 +107,19 @@ class Joint(SceneObject):
             self.place(self._value)
 
     def release(self) -> None:
-        """Be moved by the dynamics no longer, and stay as it stands."""
+        """Remove it from the dynamics; it keeps its position."""
         self._value, self.drive = self.value, None
 
     def below(self) -> Matrix:
-        """Return the transform world from the frame in which stands what hangs on it."""
-        frame, moved_by = self.matrix(), (self.value, self.turn)
-        if frame is not self._frame or moved_by != self._moved_by:
-            self._frame, self._moved_by = frame, moved_by
-            self._moved = frames.multiply(frame, self.motion_matrix())
-        return self._moved
+        """Return the transform world from the frame of its children."""
+        frame, motion = self.matrix(), (self.value, self.turn)
+        if frame is not self._joint_frame or motion != self._motion_of_child:
+            self._joint_frame, self._motion_of_child = frame, motion
+            self._child_frame = frames.multiply(frame, self.motion_matrix())
+        return self._child_frame
 
     def motion_matrix(self) -> Matrix:
-        """Return the transform that its position makes, between its own frame and what hangs on it."""
+        """Return the transform of its position: its own frame from the frame of its children."""
         if self.motion == SPHERICAL:
             return self.turn
         value = self.value
@@ -127,10 +127,10 @@ class Joint(SceneObject):
             return frames.from_rpy((0.0, 0.0, value), (0.0, 0.0, 0.0))
         return frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, value))
 
-    # ---- what moves it
+    # ---- control
 
     def command(self, control: JointControl) -> None:
-        """Be controlled like that from now on; without a drive, it jumps to a target position at once."""
+        """Set its control; without a drive it jumps to a new target position at once."""
         before, self.control = self.control, control
         self.dynamic_mode = control.mode if control.mode != KINEMATIC else self.dynamic_mode
         if self.drive is not None:
@@ -139,15 +139,15 @@ class Joint(SceneObject):
             self.place(control.position)
 
     def change(self, **changes: str | float) -> None:
-        """Change some of what moves it."""
+        """Change some fields of its control."""
         self.command(replace(self.control, **changes))  # type: ignore[arg-type]
 
     def save_state(self) -> Restore:
-        """Return a function that brings back what the dynamics does not: place, position and control."""
-        own = saved(self, "_value", "turn", "control", "limits")
-        return in_turn(super().save_state(), own, self._tell_drive)
+        """Return a function that restores parent, position, limits and control; the dynamics restores the rest."""
+        joint_state = saved(self, "_value", "turn", "control", "limits")
+        return in_turn(super().save_state(), joint_state, self._update_drive)
 
-    def _tell_drive(self) -> None:
+    def _update_drive(self) -> None:
         if self.drive is not None:
             self.drive.limit(self.limits)
             self.drive.command(self.control)

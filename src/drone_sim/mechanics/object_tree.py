@@ -1,6 +1,6 @@
-"""The objects of the scene, under their V-REP names: a tree of frames that scripts reach by handle.
+"""The tree of the scene's objects, which scripts reach by handle and by V-REP name.
 
-Several models may stand in it, each under names with a suffix of its own (object_names.py).
+The scene may hold several copies of a model; each has names with another suffix (object_names.py).
 """
 
 from __future__ import annotations
@@ -15,54 +15,54 @@ from drone_sim.mechanics.saved_state import Restore
 from drone_sim.mechanics.scene_object import DynamicBody, SceneObject
 from drone_sim.message_text import near_names
 
-# V-REP's handles that are no object's: the world, and the parent of the object that is spoken of.
+# V-REP's special handles: the world, and the parent of the object that a function is called for.
 WORLD, PARENT = -1, -11
 
-DEEPEST = 200  # objects above one; what asks for places goes up from each to the next
+DEEPEST = 200  # ancestors of an object; reading its pose visits all of them
 
 
-def levels(one: SceneObject, top: SceneObject | None = None) -> int:
-    """Return how many objects an object hangs on, directly or indirectly, up to `top`."""
-    count, above = 0, one.parent
-    while above is not None and one is not top:
+def levels(child: SceneObject, top: SceneObject | None = None) -> int:
+    """Return how many ancestors an object has, up to and including `top`."""
+    count, ancestor = 0, child.parent
+    while ancestor is not None and child is not top:
         count += 1
-        above = None if above is top else above.parent
+        ancestor = None if ancestor is top else ancestor.parent
     return count
 
 
 class Handles(NamedTuple):
-    """Which handles objects have, by their names, and the first that none has had."""
+    """Handles of objects by name, and the next handle that no object has had."""
 
     by_name: Mapping[str, int] = {}
     next: int = 0
 
     def with_those_of(self, before: Handles) -> Handles:
-        """Return these, with those of objects that are not there any more: they may come again."""
+        """Return these handles and those of objects that have been removed: they may be added again."""
         taken = {*self.by_name.values()}
-        gone = {name: handle for name, handle in before.by_name.items() if handle not in taken}
-        return Handles({**gone, **self.by_name}, max(self.next, before.next))
+        removed = {name: handle for name, handle in before.by_name.items() if handle not in taken}
+        return Handles({**removed, **self.by_name}, max(self.next, before.next))
 
 
 NO_HANDLES = Handles()
 
 
 class ObjectTree:
-    """All objects, by handle (a small integer that no other object of the run has had) and by name."""
+    """All objects, by name and by handle (a small integer that no other object of the run has had)."""
 
     def __init__(self, kept: Handles = NO_HANDLES):
-        """Start empty; an object whose name is among those that are `kept` gets that handle, also after `clear`."""
-        self._begun = kept
-        self.cleared = 0  # times
+        """Start empty. An object whose name is in `kept` gets the handle from there, also after `clear`."""
+        self._initial_handles = kept
+        self.cleared = 0  # how often
         self.clear()
 
     def clear(self) -> None:
-        """Be empty, and give out handles anew."""
+        """Remove all objects; handles start again as in __init__."""
         self.cleared += 1
         self._objects: dict[int, SceneObject] = {}
         self._handles: dict[str, int] = {}
-        self._kept, self._next = self._begun  # no handle is given twice
-        self._copied: set[str] = set()  # names that some object has, or had, with a suffix
-        self._loose: list[SceneObject] = []  # bodies below others, which only a script's moves take along
+        self._reserved, self._next = self._initial_handles  # no handle is given twice
+        self._suffixed_names: set[str] = set()  # that some object has, or had, with a suffix
+        self._free_children: list[SceneObject] = []  # bodies with a parent, which only scripts move along with it
 
     def add(
         self,
@@ -77,120 +77,120 @@ class ObjectTree:
     ) -> int:
         """Add an object at `local` in the frame of the object named `parent`; return its handle.
 
-        `alias` is what it is called in 4.x paths (its name by default), `also` are further names of it, `kind` is one
-        of scene_object.KINDS. Raises ValueError for a name that is taken.
+        `alias` is its name in 4.x paths (by default `name`), `also` are further names, `kind` is one of
+        scene_object.KINDS. Raises ValueError for a name that is taken.
         """
         above = self._objects[self._handles[parent]] if parent else None
         return self.insert(SceneObject((name, *also), alias or name, above, local, body, kind=kind))
 
     def insert(self, added: SceneObject) -> int:
-        """Add an object that has been made; return its handle. Raises ValueError for a name that is taken."""
-        for one in added.names:
-            if one in self._handles:
-                raise ValueError(f"an object named '{one}' already exists")
-        handle = self._kept.get(added.name, self._next)
+        """Add a SceneObject; return its handle. Raises ValueError for a name that is taken."""
+        for name in added.names:
+            if name in self._handles:
+                raise ValueError(f"an object named '{name}' already exists")
+        handle = self._reserved.get(added.name, self._next)
         if handle == self._next or handle in self._objects:
             handle, self._next = self._next, self._next + 1
-        is_late = handle < next(reversed(self._objects), handle)
+        is_out_of_order = handle < next(reversed(self._objects), handle)
         self._objects[handle] = added
-        if is_late:  # it has come again: its place among its siblings is what it was
+        if is_out_of_order:  # it was removed and comes back: restore its position among its siblings
             self._objects = dict(sorted(self._objects.items()))
-        self._handles.update((one, handle) for one in added.names)
-        self._copied.update(plain(one) for one in added.names if plain(one) != one)
+        self._handles.update((name, handle) for name in added.names)
+        self._suffixed_names.update(plain(name) for name in added.names if plain(name) != name)
         if added.is_loose:
-            self._loose.append(added)
+            self._free_children.append(added)
         return handle
 
     def reserve(self, handles: Mapping[str, int]) -> None:
-        """Let objects that come under these names have these handles again, where nothing else has them."""
-        self._kept = {**self._kept, **handles}
+        """Reserve handles, by name, for objects that are added again, unless other objects have them."""
+        self._reserved = {**self._reserved, **handles}
 
     def remove(self, handles: Collection[int]) -> None:
-        """Take objects out of the tree; others that hang on them stay where they are, in the world."""
-        going = {id(self._objects[handle]) for handle in handles}
-        for handle, one in self._objects.items():
-            if handle not in handles and id(one.parent) in going:
-                one.local, one.parent = one.matrix(), None
+        """Remove objects. Children that remain lose their parent and keep their pose in the world."""
+        removed = {id(self._objects[handle]) for handle in handles}
+        for handle, child in self._objects.items():
+            if handle not in handles and id(child.parent) in removed:
+                child.local, child.parent = child.matrix(), None
         for handle in handles:
             for name in self._objects.pop(handle).names:
                 del self._handles[name]
         self.look_for_loose_ones()
 
     def rename(self, handle: int, name: str) -> None:
-        """Give an object another name in the place of all that it has. Raises ValueError for a name that is taken."""
+        """Replace all names of an object by one. Raises ValueError for a name that is taken."""
         renamed = self[handle]
         if name in self._handles and self._handles[name] != handle:
             raise ValueError(f"an object named '{name}' already exists")
-        for one in renamed.names:
-            del self._handles[one]
+        for old_name in renamed.names:
+            del self._handles[old_name]
         renamed.names = (name,)
         self._handles[name] = handle
         if plain(name) != name:
-            self._copied.add(plain(name))
+            self._suffixed_names.add(plain(name))
 
     def exchange(self, handle: int, other: SceneObject) -> None:
-        """Let another object take the place of one, whose names and parent it has."""
+        """Replace an object by `other`, which has its names and parent; its children get `other` as parent."""
         before, self._objects[handle] = self._objects[handle], other
-        for one in self._objects.values():
-            if one.parent is before:
-                one.parent = other
+        for child in self._objects.values():
+            if child.parent is before:
+                child.parent = other
         self.look_for_loose_ones()
 
     def handles(self) -> Handles:
-        """Return which handle every object has, for another tree of the same objects."""
+        """Return the handles of all objects, for another tree of the same objects."""
         return Handles(dict(self._handles), self._next)
 
     def look_for_loose_ones(self) -> None:
-        """Find anew the bodies that follow their parent only when a script moves that."""
-        self._loose = [one for one in self._objects.values() if one.is_loose]
+        """Update the list of bodies that follow their parent only when a script moves that."""
+        self._free_children = [body for body in self._objects.values() if body.is_loose]
 
     def is_copied(self, name: str) -> bool:
-        """Tell whether any object has, or had, that name with a suffix."""
-        return name in self._copied
+        """Return whether any object has, or had, that name with a suffix."""
+        return name in self._suffixed_names
 
     def handle(self, name: str) -> int:
-        """Return the handle of a name; raises ValueError that lists the near names."""
+        """Return the handle of the object `name`. Raises ValueError, which lists similar names."""
         if name in self._handles:
             return self._handles[name]
         raise ValueError(f"no object named '{name}'; {near_names(name, self._handles)}")
 
     @property
     def names(self) -> Iterable[str]:
-        """Every name that an object has."""
+        """All names of all objects."""
         return self._handles.keys()
 
     def children(self, parent: SceneObject | None) -> Iterator[tuple[int, SceneObject]]:
-        """Yield handle and object of what hangs on an object (on nothing, for None), in the order of handles."""
+        """Return handle and object of each child of `parent` (None: objects without a parent), by handle."""
         return ((handle, child) for handle, child in self._objects.items() if child.parent is parent)
 
     def path(self, handle: int) -> str:
-        """Return the 4.x path of an object from the root, such as /Quadcopter/propeller[0]/respondable."""
+        """Return the object's 4.x path from the root, such as /Quadcopter/propeller[0]/respondable."""
         parts = []
-        here: SceneObject | None = self[handle]
-        while here is not None:
-            twins = [child for _, child in self.children(here.parent) if child.alias == here.alias]
-            parts.append(f"{here.alias}[{twins.index(here)}]" if len(twins) > 1 else here.alias)
-            here = here.parent
+        node: SceneObject | None = self[handle]
+        while node is not None:
+            namesakes = [child for _, child in self.children(node.parent) if child.alias == node.alias]
+            parts.append(f"{node.alias}[{namesakes.index(node)}]" if len(namesakes) > 1 else node.alias)
+            node = node.parent
         return "/" + "/".join(reversed(parts))
 
     def __iter__(self) -> Iterator[int]:
-        """Yield every handle."""
+        """Iterate over the handles."""
         return iter(self._objects)
 
     def __contains__(self, name: str) -> bool:
-        """Tell whether an object has that name."""
+        """Return whether an object has that name."""
         return name in self._handles
 
     def get(self, handle: int) -> SceneObject | None:
-        """Return the object of a handle, None where there is none."""
+        """Return the object with a handle, or None."""
         return self._objects.get(handle)
 
-    def handle_of(self, sought: SceneObject | None) -> int:
+    def handle_of(self, item: SceneObject | None) -> int:
         """Return the handle of an object, WORLD for None."""
-        return WORLD if sought is None else self._handles[sought.name]
+        return WORLD if item is None else self._handles[item.name]
 
     def __getitem__(self, handle: int) -> SceneObject:
-        """Return the object of a handle; raises ValueError, or TypeError where it is no number."""
+        """Return the object with a handle. Raises ValueError, or TypeError if it is not a number."""
         try:
             return self._objects[handle]
         except (KeyError, TypeError):
@@ -199,17 +199,17 @@ class ObjectTree:
             raise TypeError("a handle must be a whole number") from None
 
     def save_state(self) -> Restore:
-        """Return a function that puts every object back where it is now, under its present parent.
+        """Return a function that puts every object back where it is now, below its present parent.
 
-        An object that was removed since, or whose parent was, is left as it is.
+        An object that was removed since, or whose parent was, is left unchanged.
         """
-        kept = [(one, one.parent, one.save_state()) for one in self._objects.values()]
+        states = [(item, item.parent, item.save_state()) for item in self._objects.values()]
 
         def restore() -> None:
-            there = {None, *self._objects.values()}
-            for one, parent, put_back in kept:
-                if one in there and parent in there:
-                    put_back()
+            existing = {None, *self._objects.values()}
+            for item, parent, restore_item in states:
+                if item in existing and parent in existing:
+                    restore_item()
             self.look_for_loose_ones()
 
         return restore
@@ -217,53 +217,53 @@ class ObjectTree:
     def matrix(self, handle: int, relative_to: int = WORLD, base: bool = False) -> Matrix:
         """Return the transform of an object relative to another, to its PARENT, or to the WORLD.
 
-        Relative to a joint is relative to what has moved with it; `base`: to the frame that stands still.
+        Relative to a joint means to its moving side, the frame of its children; with `base` to its fixed side.
         """
         try:
             moved = self._objects[handle]
         except (KeyError, TypeError):
-            moved = self[handle]  # which says what is wrong; this runs a dozen times a step
+            moved = self[handle]  # raises the error; only then, since this runs a dozen times a step
         if relative_to == WORLD:
             return moved.matrix()
         frame = self._frame(moved, relative_to, base)
         return moved.matrix() if frame is None else frames.relative(frame, moved.matrix())
 
     def _frame(self, moved: SceneObject, relative_to: int, base: bool) -> Matrix | None:
-        """Return the transform world from the frame relative to which an object is meant, None for the world's."""
+        """Return the transform world from the frame of reference, None for the world's."""
         reference = None if relative_to == WORLD else moved.parent if relative_to == PARENT else self[relative_to]
         if reference is None:
             return None
         return reference.matrix() if base else reference.below()
 
     def turn(self, handle: int, relative_to: int = WORLD, base: bool = False) -> Matrix:
-        """Return what `matrix` does, of which only the rotation counts."""
+        """Return `matrix` with a correct rotation only; the translation may be 0, which saves time."""
         if relative_to in (WORLD, PARENT):
             return self.matrix(handle, relative_to, base)
         reference = self[relative_to]
         return frames.relative_turn(reference.matrix() if base else reference.below(), self[handle].matrix())
 
     def set_matrix(self, handle: int, relative_to: int, matrix: Matrix, base: bool = False) -> None:
-        """Put an object at a transform relative to another, to its PARENT, or to the WORLD, with all that is below it.
+        """Place an object, with its descendants, relative to another, to its PARENT, or to the WORLD.
 
-        `base` is as for `matrix`. Raises ValueError for what cannot be put anywhere.
+        `base` is as for `matrix`. Raises ValueError for an object that cannot be placed.
         """
         moved = self[handle]
         frame = self._frame(moved, relative_to, base)
         matrix = matrix if frame is None else frames.multiply(frame, matrix)
-        if not self._loose:
+        if not self._free_children:
             moved.put(matrix)
             return
         before = moved.matrix()
-        below = [(one, frames.relative(before, one.matrix())) for one in self._loose if one.hangs_on(moved)]
+        below = [(body, frames.relative(before, body.matrix())) for body in self._free_children if body.hangs_on(moved)]
         moved.put(matrix)
-        for one, local in below:
-            one.put(frames.multiply(matrix, local))
+        for body, local in below:
+            body.put(frames.multiply(matrix, local))
 
     def set_position(self, handle: int, relative_to: int, position: Sequence[float], base: bool = False) -> None:
-        """Put an object at a place (m) relative to another, to its PARENT, or to the WORLD, turned as it is.
+        """Place an object at a position (m) relative to another, to its PARENT, or to the WORLD, without rotating it.
 
-        Its rotation is not taken into that frame and back: relative to itself, again and again, its errors would grow
-        threefold each time.
+        Its rotation is not converted to that frame and back: each time that an object is moved relative to itself, its
+        rounding errors would grow threefold.
         """
         moved = self[handle]
         frame = self._frame(moved, relative_to, base)
@@ -272,9 +272,9 @@ class ObjectTree:
         self.set_matrix(handle, WORLD, (m0, m1, m2, x, m4, m5, m6, y, m8, m9, m10, z))
 
     def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None:
-        """Hang an object on another (WORLD for none): it stays where it is, or keeps its local transform.
+        """Give an object a new parent (WORLD: none); it keeps its pose in the world, or its local transform.
 
-        Raises ValueError where it cannot.
+        A body always stays in place. Raises what `check_parent` raises.
         """
         self.check_parent(handle, parent)
         moved = self[handle]
@@ -287,11 +287,11 @@ class ObjectTree:
             moved.put(matrix)
 
     def check_parent(self, handle: int, parent: int) -> None:
-        """Raise ValueError where a parent would make a loop, or more than DEEPEST objects above one."""
+        """Raise ValueError if a new parent would make a loop, or give an object more than DEEPEST ancestors."""
         moved = self[handle]
         new = None if parent == WORLD else self[parent]
         if new is moved or (new is not None and new.hangs_on(moved)):
             raise ValueError(f"'{moved.name}' cannot be its own ancestor")
-        below = max(levels(one, moved) for one in self._objects.values() if one is moved or one.hangs_on(moved))
-        if new is not None and levels(new) + 1 + below > DEEPEST:
-            raise ValueError(f"'{moved.name}' cannot be moved there: it would have more than {DEEPEST} ancestors")
+        depth = max(levels(item, moved) for item in self._objects.values() if item is moved or item.hangs_on(moved))
+        if new is not None and levels(new) + 1 + depth > DEEPEST:
+            raise ValueError(f"'{moved.name}' cannot be attached there: more than {DEEPEST} ancestors of an object")

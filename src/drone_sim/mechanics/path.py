@@ -1,4 +1,4 @@
-"""A path through points, as an object of the scene. Metres, in its own frame where nothing else is said."""
+"""A path through points, as an object of the scene. Metres, in the path's frame unless stated otherwise."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drone_sim.mechanics.scene_object import SceneObject
 
 
 class Path(SceneObject):
-    """Straight pieces from point to point."""
+    """A path of straight segments between points."""
 
     def __init__(
         self,
@@ -25,9 +25,9 @@ class Path(SceneObject):
         closed: bool = False,
         turns: Sequence[Sequence[float]] = (),
     ):
-        """Take at least two points (m); `closed`: the path goes on from the last one to the first.
+        """Create a path through at least two points (m); if `closed`, it leads from the last point back to the first.
 
-        `turns` are the points' quaternions (x, y, z, w); without any they look along the path.
+        `turns` are the points' orientations (quaternions x, y, z, w); without them the points look along the path.
         """
         super().__init__(names, alias, parent, local, kind="path")
         self.points: list[Vector] = [(x, y, z) for x, y, z in points]
@@ -36,17 +36,17 @@ class Path(SceneObject):
             self.points.append(self.points[0])
         self._turns = [*turns, turns[0]][: len(self.points)] if turns else []
         self._position_along = 0.0
-        pieces = (math.dist(one, other) for one, other in itertools.pairwise(self.points))
-        self._ends = list(itertools.accumulate(pieces, initial=0.0))
+        lengths = (math.dist(start, end) for start, end in itertools.pairwise(self.points))
+        self._distances = list(itertools.accumulate(lengths, initial=0.0))  # of each point from the beginning, m
 
     @property
     def length(self) -> float:
-        """From its beginning to its end, m."""
-        return self._ends[-1]
+        """Length in m."""
+        return self._distances[-1]
 
     @property
     def position_along(self) -> float:
-        """Position (m) of a follower, kept as in V-REP 3.x: within the path's ends, or wrapped around if closed."""
+        """Position (m) of a follower, as in V-REP 3.x: limited to the path's ends, or wrapped around if closed."""
         return self._position_along
 
     @position_along.setter
@@ -60,49 +60,49 @@ class Path(SceneObject):
 
     @property
     def table(self) -> list[float]:
-        """Its points as 4.x keeps them in an object's data PATH: x, y, z and the quaternion x, y, z, w of each."""
+        """The points as CoppeliaSim 4.x keeps them in an object's data PATH: x, y, z, and quaternion x, y, z, w."""
         if self._turns or not self.points:
-            return [one for point, turn in zip(self.points, self._turns) for one in (*point, *turn)]
-        ends = [self.at(min(along, math.nextafter(self.length, 0.0))) for along in self._ends]
-        return [one for m, point in zip(ends, self.points) for one in (*point, *frames.to_quaternion(m))]
+            return [number for point, orientation in zip(self.points, self._turns) for number in (*point, *orientation)]
+        matrices = [self.at(min(along, math.nextafter(self.length, 0.0))) for along in self._distances]
+        return [number for m, point in zip(matrices, self.points) for number in (*point, *frames.to_quaternion(m))]
 
     def at(self, along: float) -> Matrix:
-        """Return the frame at a distance (m) from the beginning, in the path's own frame: x ahead, z up.
+        """Return the frame at a distance (m) from the beginning, in the path's frame: x ahead, z up.
 
-        Beyond its ends it is at them; where it is closed, it begins again.
+        Distances beyond the ends count as the ends; on a closed path they wrap around.
         """
         along = self._within(along)
-        index = min(max(bisect.bisect_right(self._ends, along) - 1, 0), len(self.points) - 2)
-        one, other = self.points[index], self.points[index + 1]
-        piece = self._ends[index + 1] - self._ends[index]
-        share = (along - self._ends[index]) / piece if piece else 0.0
-        x, y, z = (a + share * (b - a) for a, b in zip(one, other))
-        ahead = tuple(b - a for a, b in zip(one, other))
-        return looking_along((x, y, z), (ahead[0], ahead[1], ahead[2]))
+        index = min(max(bisect.bisect_right(self._distances, along) - 1, 0), len(self.points) - 2)
+        start, end = self.points[index], self.points[index + 1]
+        length = self._distances[index + 1] - self._distances[index]
+        fraction = (along - self._distances[index]) / length if length else 0.0
+        x, y, z = (a + fraction * (b - a) for a, b in zip(start, end))
+        direction = tuple(b - a for a, b in zip(start, end))
+        return looking_along((x, y, z), (direction[0], direction[1], direction[2]))
 
     def carried(self, along: float) -> tuple[int, list[float]]:
-        """Return the flags and four numbers at a distance (m) from the beginning."""
+        """Return the flags and the four channels at a distance (m) from the beginning: all 0 here."""
         return 0, [0.0] * 4
 
     def nearest(self, place: Vector) -> float:
-        """Return the distance (m) from the beginning at which the path is nearest to a place."""
-        return nearest(self.points, self._ends, place)
+        """Return the distance (m) from the beginning to the path's point that is nearest to `place`."""
+        return nearest(self.points, self._distances, place)
 
 
 def nearest(points: Sequence[Sequence[float]], ends: Sequence[float], place: Vector) -> float:
-    """Return the distance along a line at which it is nearest to a place; `ends`: those of its points."""
-    found = [(math.inf, 0.0)]
-    for (begin, end), (one, other) in zip(itertools.pairwise(ends), itertools.pairwise(points)):
-        piece = math.dist(one, other)
-        ahead = sum((b - a) * (c - a) for a, b, c in zip(one, other, place)) / piece**2 if piece else 0.0
-        share = min(max(ahead, 0.0), 1.0)
-        there = [a + share * (b - a) for a, b in zip(one, other)]
-        found.append((math.dist(there, place), begin + share * (end - begin)))
-    return min(found)[1]
+    """Return the distance along a line to its point nearest to `place`; `ends` are the distances of its `points`."""
+    candidates = [(math.inf, 0.0)]
+    for (start_distance, end_distance), (start, end) in zip(itertools.pairwise(ends), itertools.pairwise(points)):
+        length = math.dist(start, end)
+        projection = sum((b - a) * (c - a) for a, b, c in zip(start, end, place)) / length**2 if length else 0.0
+        fraction = min(max(projection, 0.0), 1.0)
+        point = [a + fraction * (b - a) for a, b in zip(start, end)]
+        candidates.append((math.dist(point, place), start_distance + fraction * (end_distance - start_distance)))
+    return min(candidates)[1]
 
 
 def looking_along(position: Vector, ahead: Vector) -> Matrix:
-    """Return the frame at a position with x in a direction, y level and z upwards; upright where there is none."""
+    """Return the frame at `position` with x along `ahead`, y level, z upwards; not rotated if `ahead` is zero."""
     x, y, z = ahead
     if not math.hypot(x, y, z):
         return frames.from_rpy(position, (0.0, 0.0, 0.0))

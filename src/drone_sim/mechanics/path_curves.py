@@ -1,7 +1,7 @@
-"""The line of V-REP 3.x through control points, and the frames along it. Metres, quaternions x, y, z, w.
+"""The line of a V-REP 3.x path through control points, and the frames along it. Metres, quaternions x, y, z, w.
 
-At a control point the line leaves the straight pieces for a quadratic Bezier curve, which begins and ends between the
-point and the middles of its pieces. Rules and tolerances are those of V-REP's published source.
+At a control point a quadratic Bezier curve replaces the corner of the two straight segments; it begins and ends between
+the point and the segments' midpoints. Rules and tolerances are those of V-REP's published source.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Quaternion, Vector
 
 Channels = tuple[float, float, float, float]
-_STRAIGHT = 0.99999  # cosine beyond which two pieces are one
-_SAME_TURN, _SAME_AXIS = math.radians(1.0), 0.99  # rad; cosine
-_SAME_PLACE, _SAME_FRAME = 1e-4, math.radians(0.5)  # m, rad: points of the line that are one
-LEAST_COUNT = 3  # points of a curve; with fewer there is none
+_STRAIGHT = 0.99999  # cosine from which on two segments count as one
+_SAME_ROTATION, _SAME_AXIS = math.radians(1.0), 0.99  # rad; cosine
+_SAME_PLACE, _SAME_FRAME = 1e-4, math.radians(0.5)  # m, rad, within which points of the line are the same
+LEAST_COUNT = 3  # points of a curve; with fewer the corner stays
 
 
 class Station(NamedTuple):
-    """A point of the line: its frame, how long (m) one stands there, and what it carries along."""
+    """A point of the line: its frame, how long (m) a follower pauses there, and V-REP's flags and channels."""
 
     position: Vector
     turn: Quaternion = (0.0, 0.0, 0.0, 1.0)
@@ -34,7 +34,7 @@ class Station(NamedTuple):
 
 @dataclass(frozen=True)
 class ControlPoint:
-    """A control point: its curve has so many points, and begins and ends at a share of the ways to the middles."""
+    """A control point with `count` points in its curve; `before`, `after`: fractions of the ways to the midpoints."""
 
     at: Station
     before: float = 0.5
@@ -43,105 +43,107 @@ class ControlPoint:
 
     @property
     def said(self) -> dict[str, Any]:
-        """The same in the words of a scene file."""
+        """The same with the keys of a scene file."""
         return {**self.at._asdict(), "factors": (self.before, self.after), "count": self.count}
 
 
 def line(points: Sequence[ControlPoint], closed: bool) -> list[Station]:
-    """Return the points of the line; `closed`: it goes on from the last one to the first, which is not repeated."""
+    """Return the points of the line; `closed`: it leads from the last point to the first, which is not repeated."""
     if len(points) < 3:
-        found = [one.at for one in points]
+        stations = [point.at for point in points]
     else:
-        around = [points[-1], *points, points[0]]
-        inner = [_corner(*three) for three in zip(around, around[1:], around[2:])]
+        cyclic = [points[-1], *points, points[0]]
+        corners = [_corner(*three) for three in zip(cyclic, cyclic[1:], cyclic[2:])]
         if not closed:
-            inner[0], inner[-1] = [points[0].at], [points[-1].at]
-        found = list(itertools.chain.from_iterable(inner))
-    return _without_doubles(found)
+            corners[0], corners[-1] = [points[0].at], [points[-1].at]
+        stations = list(itertools.chain.from_iterable(corners))
+    return _without_repeats(stations)
 
 
 def between(one: Station, other: Station, share: float) -> Station:
-    """Interpolate between two stations, at a share from 0 to 1: in a straight line, and turned about one axis."""
-    x, y, z = _mixed(one.position, other.position, share)
-    a, b, c, d = _mixed(one.channels, other.channels, share)
+    """Interpolate between two stations (share: 0 to 1): positions linearly, orientations about one axis."""
+    x, y, z = _mix(one.position, other.position, share)
+    a, b, c, d = _mix(one.channels, other.channels, share)
     flags = one.flags if share < 0.5 else other.flags
     pause = one.pause + share * (other.pause - one.pause)
-    return Station((x, y, z), _turned(one.turn, other.turn, share), pause, flags, (a, b, c, d))
+    return Station((x, y, z), _slerp(one.turn, other.turn, share), pause, flags, (a, b, c, d))
 
 
 def angle_between(one: Quaternion, other: Quaternion) -> float:
-    """Return the angle (rad, 0 to pi) of the turn from one frame to another."""
-    *axis, w = _turn(one, other)
+    """Return the angle (rad, 0 to pi) of the rotation between two frames."""
+    *axis, w = _rotation(one, other)
     return 2.0 * math.atan2(math.hypot(*axis), abs(w))
 
 
-def _corner(one: ControlPoint, here: ControlPoint, other: ControlPoint) -> list[Station]:
-    """Return the points of the line at a control point, between two others."""
-    if here.count < LEAST_COUNT or not _is_curved(one.at, here.at, other.at):
-        return [here.at]
-    first = between(here.at, between(one.at, here.at, 0.5), here.before)
-    last = between(here.at, between(here.at, other.at, 0.5), here.after)
-    found = []
-    for index in range(here.count):
-        share = index / (here.count - 1)
-        station = between(between(first, here.at, share), between(here.at, last, share), share)
-        along = share * (here.before + here.after) / 2 - here.before / 2  # in pieces; what is carried is not rounded
-        carried = between(here.at, one.at if along < 0 else other.at, abs(along)).channels
-        found.append(station._replace(flags=here.at.flags, channels=carried))
-    return found
+def _corner(previous: ControlPoint, point: ControlPoint, following: ControlPoint) -> list[Station]:
+    """Return the points of the line at a control point between two others."""
+    if point.count < LEAST_COUNT or not _is_curved(previous.at, point.at, following.at):
+        return [point.at]
+    first = between(point.at, between(previous.at, point.at, 0.5), point.before)
+    last = between(point.at, between(point.at, following.at, 0.5), point.after)
+    stations = []
+    for index in range(point.count):
+        t = index / (point.count - 1)
+        station = between(between(first, point.at, t), between(point.at, last, t), t)
+        offset = (
+            t * (point.before + point.after) / 2 - point.before / 2
+        )  # in segments; channels do not follow the curve
+        channels = between(point.at, previous.at if offset < 0 else following.at, abs(offset)).channels
+        stations.append(station._replace(flags=point.at.flags, channels=channels))
+    return stations
 
 
-def _is_curved(one: Station, here: Station, other: Station) -> bool:
-    """Tell whether way, frame or pause change differently before and after a point."""
-    ways = [[b - a for a, b in zip(*pair)] for pair in ((one.position, here.position), (here.position, other.position))]
-    lengths = [math.hypot(*way) for way in ways]
-    if min(lengths) > 0 and _dot(*ways) < _STRAIGHT * lengths[0] * lengths[1]:
+def _is_curved(before: Station, mid: Station, after: Station) -> bool:
+    """Return whether direction, orientation or pause change differently before and after a point."""
+    legs = [[b - a for a, b in zip(*two)] for two in ((before.position, mid.position), (mid.position, after.position))]
+    lengths = [math.hypot(*leg) for leg in legs]
+    if min(lengths) > 0 and _dot(*legs) < _STRAIGHT * lengths[0] * lengths[1]:
         return True
-    if min(angle_between(one.turn, here.turn), angle_between(here.turn, other.turn)) > _SAME_TURN:
-        axes = [_axis(_turn(one.turn, here.turn)), _axis(_turn(here.turn, other.turn))]
+    if min(angle_between(before.turn, mid.turn), angle_between(mid.turn, after.turn)) > _SAME_ROTATION:
+        axes = [_axis(_rotation(before.turn, mid.turn)), _axis(_rotation(mid.turn, after.turn))]
         if _dot(*axes) < _SAME_AXIS:
             return True
-    return one.pause != here.pause != other.pause
+    return before.pause != mid.pause != after.pause
 
 
-def _without_doubles(stations: Sequence[Station]) -> list[Station]:
-    found: list[Station] = []
-    for one in stations:
-        if not (found and _is_same(found[-1], one)):
-            found.append(one)
-    return found
+def _without_repeats(stations: Sequence[Station]) -> list[Station]:
+    result: list[Station] = []
+    for station in stations:
+        if not (result and _is_same(result[-1], station)):
+            result.append(station)
+    return result
 
 
-def _is_same(one: Station, other: Station) -> bool:
-    is_near = math.dist(one.position, other.position) < _SAME_PLACE
-    return is_near and angle_between(one.turn, other.turn) < _SAME_FRAME and one.pause == other.pause
+def _is_same(a: Station, b: Station) -> bool:
+    is_near = math.dist(a.position, b.position) < _SAME_PLACE
+    return is_near and angle_between(a.turn, b.turn) < _SAME_FRAME and a.pause == b.pause
 
 
-def _mixed(one: Sequence[float], other: Sequence[float], share: float) -> list[float]:
-    return [a + share * (b - a) for a, b in zip(one, other)]
+def _mix(start: Sequence[float], end: Sequence[float], t: float) -> list[float]:
+    return [a + t * (b - a) for a, b in zip(start, end)]
 
 
-def _turn(one: Quaternion, other: Quaternion) -> Quaternion:
-    x, y, z, w = one
-    return frames.multiply_quaternions((-x, -y, -z, w), other)
+def _rotation(start: Quaternion, end: Quaternion) -> Quaternion:
+    x, y, z, w = start
+    return frames.multiply_quaternions((-x, -y, -z, w), end)
 
 
-def _turned(one: Quaternion, other: Quaternion, share: float) -> Quaternion:
-    *axis, w = _turn(one, other)
+def _slerp(start: Quaternion, end: Quaternion, t: float) -> Quaternion:
+    *axis, w = _rotation(start, end)
     length = math.hypot(*axis)
     if length == 0:
-        return one
-    half = math.atan2(length, abs(w)) * share
+        return start
+    half = math.atan2(length, abs(w)) * t
     scale = math.copysign(math.sin(half), w) / length
     x, y, z = (part * scale for part in axis)
-    return frames.multiply_quaternions(one, (x, y, z, math.cos(half)))
+    return frames.multiply_quaternions(start, (x, y, z, math.cos(half)))
 
 
-def _axis(turn: Quaternion) -> list[float]:
-    *axis, w = turn
+def _axis(rotation: Quaternion) -> list[float]:
+    *axis, w = rotation
     length = math.copysign(math.hypot(*axis), w)
     return [part / length if length else 0.0 for part in axis]
 
 
-def _dot(one: Sequence[float], other: Sequence[float]) -> float:
-    return sum(a * b for a, b in zip(one, other))
+def _dot(u: Sequence[float], v: Sequence[float]) -> float:
+    return sum(a * b for a, b in zip(u, v))

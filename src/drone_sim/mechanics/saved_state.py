@@ -1,4 +1,4 @@
-"""What brings an object back to where it was: functions that may be called again and again."""
+"""Functions that restore the saved state of an object; each may be called any number of times."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ _CONTAINERS = (list, dict, set, deque)
 
 
 def saved(owner: object, *names: str) -> Restore:
-    """Return a function that gives some attributes of an object the values back that they have now.
+    """Return a function that gives the attributes `names` of `owner` the values back that they have now.
 
-    Lists, dicts, sets and deques are copied, but not what is in them: all else is replaced, and never changed.
+    Lists, dicts, sets and deques are copied, but not their items. Other values must be replaced, not changed in place.
     """
-    kept = {name: _copied(getattr(owner, name)) for name in names}
+    values = {name: _copy_of_container(getattr(owner, name)) for name in names}
 
     def restore() -> None:
-        for name, value in kept.items():
-            setattr(owner, name, _copied(value))
+        for name, value in values.items():
+            setattr(owner, name, _copy_of_container(value))
 
     return restore
 
 
 def in_turn(*parts: Restore) -> Restore:
-    """Return a function that calls several, in this order."""
+    """Return a function that calls all `parts`, in this order."""
 
     def restore() -> None:
-        for one in parts:
-            one()
+        for part in parts:
+            part()
 
     return restore
 
 
-def _copied(value: Any) -> Any:
+def _copy_of_container(value: Any) -> Any:
     return copy.copy(value) if isinstance(value, _CONTAINERS) else value

@@ -1,4 +1,4 @@
-"""One object of the scene, as scripts see it: a frame that its parent carries, or a body."""
+"""An object of the scene as scripts see it: a frame that is carried by its parent, or by a body."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ KINDS = ("shape", "joint", "dummy", "proximity_sensor", "vision_sensor", "path",
 
 
 class DynamicBody(Protocol):
-    """What the tree asks of something that the dynamics moves."""
+    """What the tree needs of a body that the dynamics moves."""
 
     @property
     def state(self) -> State:
@@ -22,14 +22,14 @@ class DynamicBody(Protocol):
 
     @property
     def matrix(self) -> Matrix:
-        """World from its frame."""
+        """Transform world from its frame."""
 
     def move(self, pose: Pose) -> None:
-        """Put it there, at rest."""
+        """Place it at a pose, at rest."""
 
 
 class SceneObject:
-    """One frame: carried by its parent, or by a body."""
+    """A frame that is carried by its parent, or by a body."""
 
     def __init__(
         self,
@@ -41,58 +41,58 @@ class SceneObject:
         *,
         kind: str = "",
     ):
-        """Stand at `local` in the parent's frame (the world's if None), or wherever `body` is.
+        """Create an object at `local` in the parent's frame (the world's if None), or at the frame of `body`.
 
-        Take the names that no other object has (V-REP 3.x), and the alias that siblings may share (4.x paths).
-        `kind` is one of KINDS: a shape where it has a body, a dummy where it has none, unless another is given.
+        `names` are unique in the scene (V-REP 3.x), siblings may share the `alias` (4.x paths). `kind` is one of KINDS;
+        by default it is shape with a body, and dummy without.
         """
         self.names = names
         self.alias = alias
         self.parent = parent
-        self._added_below = parent
+        self._first_parent = parent
         self.local = local
         self.body = body
         self.is_model = False  # whether it is the base of a model
         self.size_factor = 1.0  # how much it had been scaled when the simulation began
         self.kind = kind or ("dummy" if body is None else "shape")
-        self._above: Matrix | None = None
-        self._below: Matrix | None = None
-        self._product = IDENTITY
+        self._cached_parent: Matrix | None = None
+        self._cached_local: Matrix | None = None
+        self._cached_matrix = IDENTITY
 
     @property
     def name(self) -> str:
-        """The first of its names."""
+        """Its first name."""
         return self.names[0]
 
     def is_called(self, name: str) -> bool:
-        """Tell whether that is its alias or one of its names, with or without their suffix."""
-        return name == self.alias or any(name in (one, plain(one)) for one in self.names)
+        """Return whether `name` is the alias or one of the names, with or without their suffix."""
+        return name == self.alias or any(name in (full, plain(full)) for full in self.names)
 
     @property
     def is_loose(self) -> bool:
-        """Whether it follows its parent only when a script moves that: a free body below another object."""
+        """Whether it is a body with a parent, which it follows only when a script moves the parent."""
         return self.body is not None and self.parent is not None
 
     def is_part_of(self, whole: SceneObject) -> bool:
-        """Tell whether it is that object or was added below it, whatever it hangs on now."""
+        """Return whether it is `whole`, or was added below it, whatever its parent is now."""
         part: SceneObject | None = self
         while part is not None and part is not whole:
-            part = part._added_below
+            part = part._first_parent
         return part is whole
 
     def model(self) -> SceneObject | None:
-        """Return the base of the model that it is part of, itself perhaps; None where it is part of none."""
-        here: SceneObject | None = self
-        while here is not None and not here.is_model:
-            here = here.parent
-        return here
+        """Return the base of the model that it is part of, possibly itself, or None."""
+        ancestor: SceneObject | None = self
+        while ancestor is not None and not ancestor.is_model:
+            ancestor = ancestor.parent
+        return ancestor
 
     def hangs_on(self, other: SceneObject) -> bool:
-        """Tell whether that object is its parent, or its parent's, and so on."""
-        above = self.parent
-        while above is not None and above is not other:
-            above = above.parent
-        return above is not None
+        """Return whether `other` is its parent or another ancestor."""
+        ancestor = self.parent
+        while ancestor is not None and ancestor is not other:
+            ancestor = ancestor.parent
+        return ancestor is not None
 
     def matrix(self) -> Matrix:
         """Return the transform world from this frame."""
@@ -100,17 +100,17 @@ class SceneObject:
             return self.body.matrix
         if self.parent is None:
             return self.local
-        # Scripts ask for the same few frames several times a step: the same two tuples, the same product.
-        above, local = self.parent.below(), self.local
-        if above is not self._above or local is not self._below:
-            self._above, self._below, self._product = above, local, frames.multiply(above, local)
-        return self._product
+        # Scripts read the same few frames several times a step: the product of the same two tuples is cached.
+        parent, local = self.parent.below(), self.local
+        if parent is not self._cached_parent or local is not self._cached_local:
+            self._cached_parent, self._cached_local, self._cached_matrix = parent, local, frames.multiply(parent, local)
+        return self._cached_matrix
 
-    # World from the frame in which stands what hangs on it: its own, but for a joint's.
+    # Transform world from the frame of its children: its own frame, except in a joint.
     below = matrix
 
     def put(self, matrix: Matrix) -> None:
-        """Put it at a transform in the world; what carries it goes there, at rest."""
+        """Place it at a transform in the world; its body, if it has one, is then at rest."""
         if self.body is not None:
             self.body.move(Pose(frames.position(matrix), frames.to_quaternion(matrix)))
         elif self.parent is None:
@@ -119,19 +119,19 @@ class SceneObject:
             self.local = frames.multiply(frames.invert(self.parent.below()), matrix)
 
     def save_state(self) -> Restore:
-        """Return a function that puts it back where it is now, under its present parent."""
+        """Return a function that puts it back where it is now, below its present parent."""
         return saved(self, "parent", "local")
 
     @property
     def carrier(self) -> DynamicBody | None:
-        """The body that takes it along: its own, or that of what it hangs on; None where the dynamics moves none."""
-        one: SceneObject | None = self
-        while one is not None and one.body is None:
-            one = one.parent
-        return None if one is None else one.body
+        """The body that moves it: its own, or its nearest ancestor's; None if the dynamics moves none."""
+        item: SceneObject | None = self
+        while item is not None and item.body is None:
+            item = item.parent
+        return None if item is None else item.body
 
     def velocity(self) -> tuple[Vector, Vector]:
-        """Return linear (m/s) and angular (rad/s) velocity in the world; zero where no body carries it."""
+        """Return linear (m/s) and angular (rad/s) velocity in the world; zero if no body moves it."""
         carrier = self.carrier
         if carrier is None:
             return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)

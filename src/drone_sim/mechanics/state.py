@@ -1,4 +1,4 @@
-"""What a drone is doing, and what it is told to do: plain immutable values, SI units."""
+"""The state of a drone, and commands to it: immutable values in SI units."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ from drone_sim.mechanics.frames import (
     transform,
 )
 
-# Where a body's centre of mass is (m), how its principal axes are turned, and its velocities (m/s, rad/s).
+# Of a body: position of the centre of mass (m), orientation of the principal axes, velocities (m/s, rad/s).
 Motion = tuple[Vector, Quaternion, Vector, Vector]
 
 
 class Pose(NamedTuple):
-    """A position (m) and a unit quaternion (x, y, z, w), of a body in the world."""
+    """A body's position (m) and orientation (unit quaternion x, y, z, w) in the world."""
 
     position: Vector
     orientation: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
     @property
     def matrix(self) -> Matrix:
-        """The transform, in V-REP's 12 numbers."""
+        """The transform, as V-REP's 12 numbers."""
         return from_quaternion(self.position, self.orientation)
 
 
 def compose(a: Pose, b: Pose) -> Pose:
-    """Return the pose b, given in the frame of the pose a, in the frame that a is given in."""
+    """Return pose `b`, which is relative to pose `a`, in the frame of reference of `a`."""
     return Pose(transform(a.matrix, b.position), multiply_quaternions(a.orientation, b.orientation))
 
 
 def inverse(pose: Pose) -> Pose:
-    """Return the pose that undoes `pose`."""
+    """Return the inverse of a pose."""
     x, y, z, w = pose.orientation
     return Pose(position(invert(pose.matrix)), (-x, -y, -z, w))
 
 
 class State(NamedTuple):
-    """Pose and velocity of a body's frame; all four in the world frame (m, m/s, rad/s)."""
+    """Pose and velocity of a body's frame, in the world frame (m, m/s, rad/s)."""
 
     position: Vector
     orientation: Quaternion
@@ -52,7 +52,7 @@ class State(NamedTuple):
 
     @property
     def matrix(self) -> Matrix:
-        """The transform world from body, in V-REP's 12 numbers."""
+        """The transform world from body, as V-REP's 12 numbers."""
         return from_quaternion(self.position, self.orientation)
 
 
@@ -65,7 +65,7 @@ class Vector3(NamedTuple):
 
 
 class Twist(NamedTuple):
-    """A command, with the field names of geometry_msgs/Twist (m/s and rad/s, track frame)."""
+    """A velocity command with the field names of geometry_msgs/Twist (m/s and rad/s, track frame)."""
 
     linear: Vector3 = Vector3()
     angular: Vector3 = Vector3()

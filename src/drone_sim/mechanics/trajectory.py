@@ -1,8 +1,7 @@
-"""A motion in several degrees of freedom within limits of velocity, acceleration and jerk, as short as these let it be.
+"""The fastest motion in several degrees of freedom within limits of velocity, acceleration and jerk.
 
-ruckig finds it, as it does for CoppeliaSim: L. Berscheid and T. Kröger, Jerk-limited Real-time Trajectory Generation
-with Arbitrary Target States, Robotics: Science and Systems, 2021. Each number is one degree of freedom's, in whatever
-unit that has.
+It is computed by ruckig, as in CoppeliaSim: L. Berscheid and T. Kröger, Jerk-limited Real-time Trajectory Generation
+with Arbitrary Target States, Robotics: Science and Systems, 2021. Each degree of freedom may have its own unit.
 """
 
 from __future__ import annotations
@@ -11,13 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-PHASE, TIME, NONE = "Phase", "Time", "No"  # degrees of freedom stay in proportion, arrive together, or each for itself
-_MOST_DEGREES = 100
-_SOON = 1e-9  # s: sums of steps are not exact
+PHASE, TIME, NONE = "Phase", "Time", "No"  # move in proportion, arrive together, independently
+_MAX_DEGREES = 100
+_TOLERANCE = 1e-9  # s; sums of steps are not exact
 
 
 class State(NamedTuple):
-    """Where it is, and how it moves there."""
+    """Position, velocity and acceleration of each degree of freedom."""
 
     position: list[float]
     velocity: list[float]
@@ -26,7 +25,7 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Limits:
-    """Upper limits; the lower ones of velocity and acceleration are the negative of these, unless given."""
+    """Upper limits; lower limits of velocity and acceleration are the negative of these, unless stated."""
 
     velocity: Sequence[float]
     acceleration: Sequence[float]
@@ -36,7 +35,7 @@ class Limits:
 
 
 class Trajectory:
-    """From one state to a position and a velocity, or to a velocity alone; and how far along it somebody is."""
+    """A motion from a state to a position and a velocity, or to a velocity alone, and the time spent in it."""
 
     def __init__(
         self,
@@ -47,62 +46,62 @@ class Trajectory:
         synchronization: str = PHASE,
         selected: Sequence[bool] | None = None,
     ):
-        """Without a `position` only `velocity` is to be reached; what is not `selected` keeps its velocity.
+        """Compute the motion. Without `position` only `velocity` is a target.
 
-        Raises ValueError for limits within which there is none.
+        Degrees of freedom that are not `selected` keep their velocity. Raises ValueError if the limits allow no motion.
         """
-        self._goal, self._start, self._velocity = position, start, velocity
+        self._position, self._start_state, self._velocity = position, start, velocity
         self._selected = selected or [True] * len(velocity)
-        if not 0 < len(velocity) <= _MOST_DEGREES:
-            raise ValueError(f"1 to {_MOST_DEGREES} degrees of freedom are expected, not {len(velocity)}")
-        for most in (limits.velocity, limits.acceleration, limits.jerk):
-            if not all(one > 0 for one, taken in zip(most, self._selected) if taken):
+        if not 0 < len(velocity) <= _MAX_DEGREES:
+            raise ValueError(f"1 to {_MAX_DEGREES} degrees of freedom are allowed, not {len(velocity)}")
+        for limit in (limits.velocity, limits.acceleration, limits.jerk):
+            if not all(value > 0 for value, is_selected in zip(limit, self._selected) if is_selected):
                 raise ValueError("the limits of velocity, acceleration and jerk must be greater than 0")
-        self._found = self._compute(limits, synchronization)
+        self._motion = self._compute(limits, synchronization)
         self.elapsed = 0.0  # s
 
     @property
     def duration(self) -> float:
-        """How long it takes, s."""
-        return float(self._found.duration)
+        """Duration in s."""
+        return float(self._motion.duration)
 
     @property
     def is_over(self) -> bool:
-        """Whether its end is reached."""
-        return self.elapsed >= self.duration - _SOON
+        """Whether the end is reached."""
+        return self.elapsed >= self.duration - _TOLERANCE
 
     def advance(self, seconds: float) -> State:
-        """Go on for so long, at most to the end; return the state there."""
+        """Advance by `seconds`, at most to the end; return the state there."""
         self.elapsed += seconds
-        state = State(*map(list, self._found.at_time(min(self.elapsed, self.duration))))
-        if self.is_over:  # exactly there, whatever was lost in sums
-            for index, taken in enumerate(self._selected):
-                if taken and self._goal is not None:
-                    state.position[index] = self._goal[index]
-                if taken:
+        state = State(*map(list, self._motion.at_time(min(self.elapsed, self.duration))))
+        if self.is_over:  # exactly the target, without rounding errors
+            for index, is_selected in enumerate(self._selected):
+                if is_selected and self._position is not None:
+                    state.position[index] = self._position[index]
+                if is_selected:
                     state.velocity[index], state.acceleration[index] = self._velocity[index], 0.0
         return state
 
     def _compute(self, limits: Limits, synchronization: str) -> Any:
         try:
-            import ruckig  # 1 MB that few scripts need
+            import ruckig  # late: 1 MB that few scripts need
         except ImportError as error:
             raise ValueError(f"trajectories need ruckig (pip install ruckig): {error}") from None
         count = len(self._velocity)
-        given = ruckig.InputParameter(count)
-        given.control_interface = getattr(ruckig.ControlInterface, "Velocity" if self._goal is None else "Position")
-        given.synchronization = getattr(ruckig.Synchronization, synchronization)
-        given.current_position, given.current_velocity, given.current_acceleration = map(list, self._start)
-        given.enabled = list(self._selected)
-        given.target_velocity = list(self._velocity)
-        if self._goal is not None:
-            given.target_position = list(self._goal)
-        given.max_velocity, given.max_acceleration, given.max_jerk = limits.velocity, limits.acceleration, limits.jerk
-        given.min_velocity, given.min_acceleration = limits.least_velocity, limits.least_acceleration
-        found = ruckig.Trajectory(count)
+        task = ruckig.InputParameter(count)
+        task.control_interface = getattr(ruckig.ControlInterface, "Velocity" if self._position is None else "Position")
+        task.synchronization = getattr(ruckig.Synchronization, synchronization)
+        task.current_position, task.current_velocity, task.current_acceleration = map(list, self._start_state)
+        task.enabled = list(self._selected)
+        task.target_velocity = list(self._velocity)
+        if self._position is not None:
+            task.target_position = list(self._position)
+        task.max_velocity, task.max_acceleration, task.max_jerk = limits.velocity, limits.acceleration, limits.jerk
+        task.min_velocity, task.min_acceleration = limits.least_velocity, limits.least_acceleration
+        motion = ruckig.Trajectory(count)
         try:
-            ruckig.Ruckig(count).calculate(given, found)
+            ruckig.Ruckig(count).calculate(task, motion)
         except ruckig.RuckigError as error:
-            said = " ".join(str(error).split()).removeprefix("[ruckig] ").partition(" input:")[0]
-            raise ValueError(f"ruckig finds no trajectory within these limits: {said}") from None
-        return found
+            reason = " ".join(str(error).split()).removeprefix("[ruckig] ").partition(" input:")[0]
+            raise ValueError(f"there is no trajectory within these limits: {reason}") from None
+        return motion

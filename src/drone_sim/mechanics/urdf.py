@@ -1,8 +1,8 @@
-"""Read a drone's URDF as one rigid body, which is what V-REP's force sensors make of it.
+"""Reads a drone's URDF as one rigid body, since V-REP's force sensors hold its links together rigidly.
 
-PyBullet's own URDF_MERGE_FIXED_LINKS adds the links' inertias without the products that turning and
-moving them brings, and an unmerged drone of five links costs twice the time per step. So the links are
-merged here, by the parallel axis theorem:
+PyBullet's own URDF_MERGE_FIXED_LINKS adds up the links' inertias without the terms that their rotations and offsets
+bring, and an unmerged drone of five links costs twice the time per step. So the links are merged here, by the
+parallel axis theorem:
 
     m = sum m_i      c = sum m_i c_i / m      I = sum R_i I_i R_i^T + m_i (|d|² 1 - d d^T),  d = c_i - c
 """
@@ -24,15 +24,15 @@ from drone_sim.files.resources import is_file, read_bytes
 from drone_sim.mechanics.frames import IDENTITY, Matrix, from_rpy, multiply, position, to_rpy, transform
 from drone_sim.mechanics.inertia import Inertial, combined
 
-_MOST = 8  # URDFs that are kept in memory
+_MAX_CACHED = 8  # URDFs
 
 
 class UrdfError(ValueError):
-    """A URDF cannot be used; the message is one line that names the file, the element and the reason."""
+    """A URDF cannot be used; the message is one line with the file, the element and the reason."""
 
 
 class BladesLink(NamedTuple):
-    """A visual that turns about the z axis of a joint's frame: its index, the joint, the visual in it."""
+    """A visual that rotates about a joint's z axis: its index, joint, root from joint, joint from visual."""
 
     visual: int
     joint_name: str
@@ -42,26 +42,26 @@ class BladesLink(NamedTuple):
 
 @dataclass(frozen=True)
 class RigidBody:
-    """The URDF's links as one body, in the frame of the root link (metres, kilograms)."""
+    """All links of a URDF as one body, in the frame of the root link (metres, kilograms)."""
 
     mass: float
-    inertials: dict[str, Inertial]  # of each link
+    inertials: dict[str, Inertial]  # by link
     centre_of_mass: np.ndarray  # (3,)
     inertia: np.ndarray  # (3, 3), about the centre of mass, root link's axes
     links: dict[str, Matrix]  # root from link, joints at zero
-    parents: dict[str, tuple[str, Matrix]]  # of each link but the root: the link above, and above from link
-    blade_joints: dict[str, str]  # of each link that turns about its z axis: the joint
+    parents: dict[str, tuple[str, Matrix]]  # by link, except the root: its parent, and parent from link
+    blade_joints: dict[str, str]  # by link that rotates about its z axis: its joint
     visuals: tuple[tuple[str, Matrix], ...]  # of each visual: its link, and link from visual
     blades: tuple[BladesLink, ...]
     xml: str  # the same body as a URDF of one link
 
 
 def read(path: str) -> RigidBody:
-    """Return the URDF at `path` as one rigid body, which is never changed; raises UrdfError."""
+    """Return the URDF at `path` as one rigid body, which must not be changed. Raises UrdfError."""
     try:
         content, folder = read_bytes(path, urdf_files.MAX_SIZE), Path(path).absolute().parent
         if not all(map(is_file, _merged(content, folder)[1])):
-            _merged.cache_clear()  # read anew, it says what is missing
+            _merged.cache_clear()  # reading again raises an error with the missing mesh
         return _merged(content, folder)[0]
     except OSError as error:
         raise UrdfError(f"{path}: {error.strerror or error}") from None
@@ -69,16 +69,16 @@ def read(path: str) -> RigidBody:
         raise UrdfError(f"{path}: {' '.join(str(error).split())}") from None
 
 
-@lru_cache(maxsize=_MOST)  # flights of one plan have one vehicle
+@lru_cache(maxsize=_MAX_CACHED)  # all flights of a plan have the same vehicle
 def _merged(content: bytes, folder: Path) -> tuple[RigidBody, list[Path]]:
-    """Return the body of a URDF, and its meshes, which have to be there."""
+    """Return the body of a URDF, and the meshes that must exist for it."""
     robot = urdf_files.parsed(content, folder, ("fixed", "continuous"))
     return _merge(robot), [Path(mesh.attrib["filename"]) for mesh in robot.iter("mesh")]
 
 
 def _merge(robot: Xml.Element) -> RigidBody:
     links = {link.attrib["name"]: link for link in robot.findall("link")}
-    joints = {_end(joint, "child"): joint for joint in robot.findall("joint")}
+    joints = {_link_name(joint, "child"): joint for joint in robot.findall("joint")}
     poses = {name: _pose(name, joints) for name in links}
     roots = [name for name in links if name not in joints]
     inertials = {name: _inertial(link, poses[name]) for name, link in links.items()}
@@ -90,7 +90,7 @@ def _merge(robot: Xml.Element) -> RigidBody:
         centre_of_mass=centre,
         inertia=inertia,
         links=poses,
-        parents={name: (_end(joint, "parent"), origin_of(joint)) for name, joint in joints.items()},
+        parents={name: (_link_name(joint, "parent"), origin_of(joint)) for name, joint in joints.items()},
         blade_joints={
             name: joint.attrib["name"] for name, joint in joints.items() if joint.attrib["type"] == "continuous"
         },
@@ -105,11 +105,11 @@ def _pose(link: str, joints: dict[str, Xml.Element]) -> Matrix:
     while link in joints:
         joint = joints[link]
         pose = multiply(origin_of(joint), pose)
-        link = _end(joint, "parent")
+        link = _link_name(joint, "parent")
     return pose
 
 
-def _end(joint: Xml.Element, end: str) -> str:
+def _link_name(joint: Xml.Element, end: str) -> str:
     element = joint.find(end)
     return "" if element is None else element.attrib["link"]
 
@@ -119,7 +119,7 @@ def _numbers(text: str) -> tuple[float, ...]:
 
 
 def origin_of(element: Xml.Element | None) -> Matrix:
-    """Return the parent's frame from that of an element with an <origin>."""
+    """Return the transform of an element's <origin>, parent from element; IDENTITY if there is none."""
     origin = None if element is None else element.find("origin")
     if origin is None:
         return IDENTITY
@@ -132,19 +132,19 @@ def _inertial(link: Xml.Element, pose: Matrix) -> Inertial:
 
 
 def mass_of(link: Xml.Element) -> float:
-    """Return the mass (kg) that a link says, else 0."""
+    """Return a link's mass (kg), 0 if it has none."""
     element = link.find("inertial/mass")
     return 0.0 if element is None else float(element.attrib["value"])
 
 
 def inertia_tensor(link: Xml.Element, pose: Matrix = IDENTITY) -> np.ndarray:
-    """Return the inertia (3, 3), kg m², that a link says, else 0, along the axes in which it is at `pose`."""
+    """Return a link's inertia (3, 3), kg m², or 0, along the axes of the frame in which it is at `pose`."""
     element = link.find("inertial/inertia")
     if element is None:
         return np.zeros((3, 3))
     xx, xy, xz, yy, yz, zz = (float(element.attrib[key]) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
-    turn = np.array(multiply(pose, origin_of(link.find("inertial")))).reshape(3, 4)[:, :3]
-    return turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+    rotation = np.array(multiply(pose, origin_of(link.find("inertial")))).reshape(3, 4)[:, :3]
+    return rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
 
 
 def _blades(
@@ -183,8 +183,8 @@ def _write_inertial(link: Xml.Element, mass: float, centre: np.ndarray, inertia:
 
 def _moved(element: Xml.Element, pose: Matrix) -> Xml.Element:
     moved = copy.deepcopy(element)
-    place = multiply(pose, origin_of(element))
+    matrix = multiply(pose, origin_of(element))
     for origin in moved.findall("origin"):
         moved.remove(origin)
-    Xml.SubElement(moved, "origin", xyz=" ".join(map(repr, position(place))), rpy=" ".join(map(repr, to_rpy(place))))
+    Xml.SubElement(moved, "origin", xyz=" ".join(map(repr, position(matrix))), rpy=" ".join(map(repr, to_rpy(matrix))))
     return moved

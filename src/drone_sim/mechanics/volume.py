@@ -1,7 +1,7 @@
-"""The volumes of V-REP's proximity sensors: which rays fill them, and what lies inside. Metres, the sensor's frame.
+"""The rays of V-REP's proximity sensors, and whether a point is in their volume. Metres, in the sensor's frame.
 
-A sensor looks along z from its origin. A volume begins `offset` away, and ends `range` further. `ray` is a line,
-`disc` a fan in the xz plane, `cone` and `pyramid` widen from the origin, by their full angle, `cylinder` has a radius.
+A sensor looks along z from its origin; its volume begins at the distance `offset` and is `range` long. `ray` is a line,
+`disc` a fan in the xz plane; `cone` and `pyramid` widen from the origin by their full angle; `cylinder` has a radius.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ from dataclasses import dataclass
 from drone_sim.mechanics.frames import Vector
 
 _RINGS = 12
-_ACROSS = 21  # rays along each side of a pyramid
-_FAN = 181
-_AROUND = 3  # rays to either side of the best one, when it is looked at more closely
+_SIDE_RAYS = 21  # along each side of a pyramid's cross section
+_FAN_RAYS = 181
+_FINE_RAYS = 3  # to either side of the best ray, when it is refined
 _EPSILON = 1e-9
 
-Spot = tuple[float, float]  # of a ray in the cross section: from -1 to 1 each
+Spot = tuple[float, float]  # u and v of a ray in the cross section, from -1 to 1
 Ray = tuple[Vector, Vector]
 
 
 @dataclass(frozen=True)
 class Volume:
-    """A sensor's volume; `angle` in rad, `radius` in m, where its type has one."""
+    """A sensor's volume: `angle` in rad and `radius` in m, if its type has them."""
 
     type: str
     range: float
@@ -35,27 +35,27 @@ class Volume:
 
     @property
     def step(self) -> float:
-        """How far apart the rays are in the cross section, which is 2 wide."""
-        return {"ray": 0.0, "disc": 2 / (_FAN - 1), "pyramid": 2 / (_ACROSS - 1)}.get(self.type, 1 / _RINGS)
+        """Distance between rays in the cross section, which is 2 wide."""
+        return {"ray": 0.0, "disc": 2 / (_FAN_RAYS - 1), "pyramid": 2 / (_SIDE_RAYS - 1)}.get(self.type, 1 / _RINGS)
 
     def spots(self) -> list[Spot]:
-        """Return where in the cross section there are rays."""
+        """Return the places of the rays in the cross section."""
         if self.type == "ray":
             return [(0.0, 0.0)]
         if self.type == "disc":
-            return [(-1 + 2 * one / (_FAN - 1), 0.0) for one in range(_FAN)]
+            return [(-1 + 2 * n / (_FAN_RAYS - 1), 0.0) for n in range(_FAN_RAYS)]
         if self.type == "pyramid":
-            side = [-1 + 2 * one / (_ACROSS - 1) for one in range(_ACROSS)]
+            side = [-1 + 2 * n / (_SIDE_RAYS - 1) for n in range(_SIDE_RAYS)]
             return list(itertools.product(side, side))
         return [(0.0, 0.0), *_rings()]
 
     def spots_around(self, spot: Spot, step: float) -> list[Spot]:
-        """Return where there are rays around another one, within `step`."""
-        side = [step * one / _AROUND for one in range(-_AROUND, _AROUND + 1)]
-        found = {self._inside(spot[0] + u, spot[1] + v) for u, v in itertools.product(side, side)}
-        return sorted(found)
+        """Return the places of refined rays within `step` of a place in the cross section."""
+        side = [step * n / _FINE_RAYS for n in range(-_FINE_RAYS, _FINE_RAYS + 1)]
+        spots = {self._clamped(spot[0] + u, spot[1] + v) for u, v in itertools.product(side, side)}
+        return sorted(spots)
 
-    def _inside(self, u: float, v: float) -> Spot:
+    def _clamped(self, u: float, v: float) -> Spot:
         if self.type == "disc":
             return max(-1.0, min(1.0, u)), 0.0
         if self.type == "pyramid":
@@ -72,44 +72,44 @@ class Volume:
         if self.type == "pyramid":
             wide = math.tan(self.angle / 2)
             return (u * wide * near, v * wide * near, near), (u * wide * far, v * wide * far, far)
-        lean = math.hypot(u, v) * self.angle / 2
-        around = math.atan2(v, u)
-        x, y, z = math.sin(lean) * math.cos(around), math.sin(lean) * math.sin(around), math.cos(lean)
+        polar = math.hypot(u, v) * self.angle / 2
+        azimuth = math.atan2(v, u)
+        x, y, z = math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)
         return (near * x, near * y, near * z), (far * x, far * y, far * z)
 
     def spot(self, point: Vector) -> Spot:
-        """Return where in the cross section the ray through a point inside is."""
+        """Return the place in the cross section of the ray through a point in the volume."""
         x, y, z = point
         if self.type == "cylinder":
             return x / self.radius, y / self.radius
         if self.type == "pyramid":
             wide = z * math.tan(self.angle / 2)
             return x / wide, y / wide
-        aside = math.hypot(x, y)
-        share = math.atan2(aside, z) / (self.angle / 2) / (aside or 1.0) if self.angle else 0.0
-        return x * share, y * share
+        distance = math.hypot(x, y)
+        scale = math.atan2(distance, z) / (self.angle / 2) / (distance or 1.0) if self.angle else 0.0
+        return x * scale, y * scale
 
     def holds(self, point: Vector) -> bool:
-        """Tell whether a point is inside."""
+        """Return whether a point is inside; a ray or a disc has no inside."""
         x, y, z = point
-        aside, near, far = math.hypot(x, y), self.offset - _EPSILON, self.offset + self.range + _EPSILON
+        distance, near, far = math.hypot(x, y), self.offset - _EPSILON, self.offset + self.range + _EPSILON
         if self.type == "cylinder":
-            return near <= z <= far and aside <= self.radius
+            return near <= z <= far and distance <= self.radius
         if self.type == "pyramid":
             wide = z * math.tan(self.angle / 2)
             return near <= z <= far and abs(x) <= wide and abs(y) <= wide
         if self.type == "cone":
-            return near <= math.hypot(aside, z) <= far and math.atan2(aside, z) <= self.angle / 2
-        return False  # of no thickness
+            return near <= math.hypot(distance, z) <= far and math.atan2(distance, z) <= self.angle / 2
+        return False
 
     @property
     def reach(self) -> float:
-        """How far from the origin its farthest point is."""
+        """Distance of its farthest point from the origin."""
         return math.hypot(*self.ray((1.0, 1.0) if self.type == "pyramid" else (1.0, 0.0))[1])
 
 
 def _rings() -> Iterator[Spot]:
     for ring in range(1, _RINGS + 1):
-        for one in range(6 * ring):
-            angle = math.tau * one / (6 * ring)
+        for n in range(6 * ring):
+            angle = math.tau * n / (6 * ring)
             yield ring / _RINGS * math.cos(angle), ring / _RINGS * math.sin(angle)

@@ -1,4 +1,4 @@
-"""What pushes a body for a step, summed: forces and torques that keep their direction in the world."""
+"""The sum of the forces and torques on a body in one step. They keep their directions in the world."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from drone_sim.mechanics.frames import Quaternion, Vector
 
 
 class Wrench:
-    """World-fixed forces at body-fixed points, summed: what the sub-steps of one step re-apply.
+    """Sum of world-fixed forces at body-fixed points, which every sub-step of one step re-applies.
 
     V-REP turns each force into the world once per step and re-applies that world vector in every
     sub-step, at a point that moves with the body. For points p_i (inertial frame of the body) and
     forces F_i (world), the torque about the centre of mass under the rotation R is sum (R p_i) x F_i.
-    Parallel forces F_i = f_i a have one lever in common, l = sum p_i f_i, and one torque (R l) x a. With the
+    Parallel forces F_i = f_i a share one lever, l = sum p_i f_i, and one torque (R l) x a. With the
     unit quaternion (q, w) of R it is l x a + (w t + q x t) x a, where t = 2 q x l.
     """
 
     def __init__(self) -> None:
-        """Start with no force at all."""
+        """Start with zero force and torque."""
         self.force: Vector = (0.0, 0.0, 0.0)
-        self._torque: Vector = (0.0, 0.0, 0.0)  # what does not depend on R: the torques, and every l x a
-        self._levers: list[tuple[float, ...]] = []  # 2 l and a, in one
+        self._torque: Vector = (0.0, 0.0, 0.0)  # the part that does not depend on R: the torques, and every l x a
+        self._levers: list[tuple[float, ...]] = []  # 2 l and a of each axis, in one tuple
 
     def add(self, force: Vector, torque: Vector, point: Vector) -> None:
         """Add a force (N, world) at a point (m, inertial frame of the body), and a torque (N m, world)."""
         self.add_parallel(force, torque, point, force)
 
     def add_parallel(self, force: Vector, torque: Vector, lever: Vector, axis: Vector) -> None:
-        """Add forces along one axis (world) by their sum (N), and torques by theirs (N m).
+        """Add forces along one axis (world) by their sum (N), and torques by their sum (N m).
 
         `lever` is sum p_i f_i (inertial frame of the body) over the points p_i where forces f_i times the axis act.
         """
@@ -43,12 +43,12 @@ class Wrench:
 
     @property
     def terms(self) -> tuple[Vector, Sequence[tuple[float, ...]]]:
-        """What `torque_under` sums: the torque that does not depend on R, and of each axis 2 l and a, in one."""
+        """The summands of `torque_under`: the torque that does not depend on R, and 2 l and a of each axis."""
         return self._torque, self._levers
 
     def torque_under(self, orientation: Quaternion) -> Vector:
-        """Return the torque about the centre of mass (N m, world) while the body has this orientation."""
-        # Written out, without a loop but the one over directions: Dynamics.advance does the same in every sub-step.
+        """Return the torque about the centre of mass (N m, world) for an orientation of the body."""
+        # Vector operations are written out for speed; Dynamics has a copy of this code in its loop over sub-steps.
         x, y, z, w = orientation
         sum_x, sum_y, sum_z = self._torque
         for lx, ly, lz, ax, ay, az in self._levers:
