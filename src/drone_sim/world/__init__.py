@@ -1,18 +1,18 @@
-"""The world: bodies, dynamics, and what can be seen of them. The only package that imports pybullet."""
+"""The physics: bodies, dynamics, and their visual shapes. The only package that imports pybullet."""
 
 import os
 
 
 def _load_pybullet_quietly() -> None:
-    """Import pybullet for the first time, without the line on stderr that says when it was compiled."""
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
+    """Import pybullet for the first time without the line about its build time on stderr."""
+    stderr, devnull = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(devnull, 2)
     try:
         import pybullet  # noqa: F401
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        os.close(devnull)
 
 
 _load_pybullet_quietly()

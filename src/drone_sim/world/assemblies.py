@@ -1,6 +1,6 @@
-"""Bodies of several shapes, and of several links with joints between them, told to PyBullet as a URDF of our own.
+"""Bodies of several shapes, or of several links with joints; PyBullet gets them as a URDF that is written here.
 
-Of all that PyBullet takes, a URDF alone has neither a limit of parts nor of links, and says every inertia.
+Among PyBullet's ways to create a body, only a URDF has no limit of parts or links and states every inertia.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from drone_sim.shapes.shape import Geometry
 from drone_sim.world.bullet_files import BulletFiles
 
 _NO_LIMIT = 1e9
-_FASTEST = 1e4  # rad/s or m/s of a joint; PyBullet's own limit is 100
+_MAX_VELOCITY = 1e4  # rad/s or m/s of a joint; PyBullet's own limit is 100
 _NO_INERTIA = PrincipalInertia((0.0, 0.0, 0.0))
 
 
 class Hinge(NamedTuple):
-    """How a link hangs on another: by a joint about or along z.
+    """How a link is attached to its parent: by a joint about or along z.
 
-    parent: index of the other link; local: that link's frame from the joint's; motion: "revolute", "prismatic", or
-    "fixed" for none; limits: rad or m, None for none; value: rad or m, at the beginning.
+    parent: index of the parent link; local: the parent's frame from the joint's; motion: "revolute", "prismatic", or
+    "fixed"; limits: rad or m, None: unlimited; value: initial position, rad or m.
     """
 
     parent: int
@@ -40,9 +40,9 @@ class Hinge(NamedTuple):
 
 
 class Link(NamedTuple):
-    """A rigid body of an assembly. Its frame is that of its hinge, as it has moved; the first has none.
+    """A rigid body of an assembly. Its frame is its joint's frame after the motion; the first link has no joint.
 
-    local: the link's frame from that of the parts; mass: kg; inertia: in the frame of the parts.
+    local: link from parts; mass: kg; inertia: in the frame of the parts.
     """
 
     parts: Sequence[Part]
@@ -53,9 +53,9 @@ class Link(NamedTuple):
 
 
 def create(client: int, files: BulletFiles, links: Sequence[Link], pose: Pose) -> tuple[int, list[int]]:
-    """Add an assembly with its first link's frame at a pose; return its body id, and PyBullet's number of each link.
+    """Create an assembly with the first link's frame at a pose; return its body id, and PyBullet's number of each link.
 
-    It stands still where its first link has no mass. Raises ValueError, in one line, for a file that cannot be read.
+    It is fixed to the world if its first link has no mass. Raises ValueError, in one line, for an unreadable file.
     """
     path = files.write(_urdf(files, links), ".urdf")
     try:
@@ -68,24 +68,24 @@ def create(client: int, files: BulletFiles, links: Sequence[Link], pose: Pose) -
             physicsClientId=client,
         )
     except pybullet.error as error:
-        raise ValueError(f"a body of {len(links)} links: PyBullet cannot make it ({error})") from None
+        raise ValueError(f"a body of {len(links)} links: PyBullet cannot create it ({error})") from None
     finally:
-        os.unlink(path)  # or there would be one more file for every body that has come
+        os.unlink(path)  # otherwise every new body would leave a file
     names = [pybullet.getJointInfo(body, number, client)[12] for number in range(len(links) - 1)]
     numbers = [-1, *(names.index(f"l{index}".encode()) for index in range(1, len(links)))]
     for link, number in zip(links, numbers):
         if link.hinge is not None:
-            _settle(client, body, number, link.hinge)
+            _set_joint(client, body, number, link.hinge)
         if link.mass:
             moments = list(link.inertia.moments)
             pybullet.changeDynamics(body, number, localInertiaDiagonal=moments, physicsClientId=client)
     return body, numbers
 
 
-def _settle(client: int, body: int, number: int, hinge: Hinge) -> None:
-    """Let a link be of V-REP's material, and its joint turn freely."""
+def _set_joint(client: int, body: int, number: int, hinge: Hinge) -> None:
+    """Give a link V-REP's material, and let its joint move freely."""
     pybullet.changeDynamics(body, number, lateralFriction=1, restitution=0, physicsClientId=client)
-    pybullet.changeDynamics(body, number, jointDamping=0, maxJointVelocity=_FASTEST, physicsClientId=client)
+    pybullet.changeDynamics(body, number, jointDamping=0, maxJointVelocity=_MAX_VELOCITY, physicsClientId=client)
     if hinge.motion != "fixed":
         pybullet.setJointMotorControl2(body, number, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
         pybullet.resetJointState(body, number, hinge.value, 0, client)
@@ -101,7 +101,7 @@ def _urdf(files: BulletFiles, links: Sequence[Link]) -> bytes:
     for index, link in enumerate(links):
         if link.hinge is not None:
             _add_joint(robot, index, link.hinge)
-    Xml.indent(robot)  # PyBullet cuts long lines
+    Xml.indent(robot)  # PyBullet truncates long lines
     return Xml.tostring(robot)
 
 
@@ -110,19 +110,19 @@ def _add_link(files: BulletFiles, robot: Xml.Element, index: int, link: Link) ->
     inertial = Xml.SubElement(element, "inertial")
     _add_origin(inertial, frames.multiply(link.local, link.inertia.frame))
     Xml.SubElement(inertial, "mass", value=repr(link.mass))
-    # PyBullet refuses moments that no solid has, such as V-REP lets one have: they are set afterwards, as they are.
+    # PyBullet refuses moments that no solid can have, but V-REP allows them: the true ones are set afterwards.
     a = b = c = repr(max(link.inertia.moments))
     Xml.SubElement(inertial, "inertia", ixx=a, iyy=b, izz=c, ixy="0", ixz="0", iyz="0")
     for number, part in enumerate(link.parts):
-        told = part.shape.for_bullet(files, moves=link.mass != 0)
-        assert isinstance(told, Geometry), "a URDF cannot be a part of another body"
-        place = frames.multiply(link.local, part.local)
-        seen = _add_shape(element, "visual", place, told)
-        material = Xml.SubElement(seen, "material", name=f"m{index}_{number}")
+        geometry = part.shape.for_bullet(files, moves=link.mass != 0)
+        assert isinstance(geometry, Geometry), "a URDF cannot be a part"
+        pose = frames.multiply(link.local, part.local)
+        visual = _add_shape(element, "visual", pose, geometry)
+        material = Xml.SubElement(visual, "material", name=f"m{index}_{number}")
         Xml.SubElement(material, "color", rgba=" ".join(map(repr, part.color)))
-        solid = _add_shape(element, "collision", place, told)
-        if told.flags:
-            solid.set("concave", "yes")
+        collision = _add_shape(element, "collision", pose, geometry)
+        if geometry.flags:
+            collision.set("concave", "yes")
 
 
 def _add_joint(robot: Xml.Element, index: int, hinge: Hinge) -> None:
@@ -137,27 +137,27 @@ def _add_joint(robot: Xml.Element, index: int, hinge: Hinge) -> None:
         Xml.SubElement(joint, "limit", lower=low, upper=high, effort=repr(_NO_LIMIT), velocity=repr(_NO_LIMIT))
 
 
-def _add_shape(element: Xml.Element, kind: str, place: Matrix, told: Geometry) -> Xml.Element:
+def _add_shape(element: Xml.Element, kind: str, pose: Matrix, geometry: Geometry) -> Xml.Element:
     shape = Xml.SubElement(element, kind)
-    _add_origin(shape, place)
-    word, attributes = _geometry(told, kind)
-    Xml.SubElement(Xml.SubElement(shape, "geometry"), word, attributes)
+    _add_origin(shape, pose)
+    tag, attributes = _geometry(geometry, kind)
+    Xml.SubElement(Xml.SubElement(shape, "geometry"), tag, attributes)
     return shape
 
 
-def _geometry(told: Geometry, kind: str) -> tuple[str, dict[str, str]]:
-    """Return a URDF's word for a shape, and its attributes."""
-    given = told.visual if kind == "visual" else told.collision
-    if told.type == "GEOM_BOX":
-        return "box", {"size": " ".join(repr(2 * half) for half in given["halfExtents"])}
-    if told.type == "GEOM_MESH":
-        scale = " ".join(repr(float(one)) for one in given.get("meshScale", (1.0, 1.0, 1.0)))
-        return "mesh", {"filename": given["fileName"], "scale": scale}
-    radius = {"radius": repr(given["radius"])}
-    if told.type == "GEOM_SPHERE":
+def _geometry(geometry: Geometry, kind: str) -> tuple[str, dict[str, str]]:
+    """Return the URDF tag of a shape, and its attributes."""
+    arguments = geometry.visual if kind == "visual" else geometry.collision
+    if geometry.type == "GEOM_BOX":
+        return "box", {"size": " ".join(repr(2 * half) for half in arguments["halfExtents"])}
+    if geometry.type == "GEOM_MESH":
+        scale = " ".join(repr(float(factor)) for factor in arguments.get("meshScale", (1.0, 1.0, 1.0)))
+        return "mesh", {"filename": arguments["fileName"], "scale": scale}
+    radius = {"radius": repr(arguments["radius"])}
+    if geometry.type == "GEOM_SPHERE":
         return "sphere", radius
-    word = "capsule" if told.type == "GEOM_CAPSULE" else "cylinder"
-    return word, {**radius, "length": repr(given["height" if "height" in given else "length"])}
+    tag = "capsule" if geometry.type == "GEOM_CAPSULE" else "cylinder"
+    return tag, {**radius, "length": repr(arguments["height" if "height" in arguments else "length"])}
 
 
 def _add_origin(element: Xml.Element, matrix: Matrix) -> None:

@@ -1,4 +1,4 @@
-"""Make PyBullet bodies of the floor, of the objects of a scene that stand still, and of URDFs."""
+"""Creates PyBullet bodies for the floor, for static objects of a scene, and for URDFs."""
 
 from __future__ import annotations
 
@@ -19,59 +19,58 @@ _THICKNESS = 0.1  # m, below z = 0
 GROUND_REACH = 2000.0  # m from the origin, along either axis
 
 
-# Number of the collision and of the visual shape of what was made, by what it was made of: PyBullet frees neither when
-# a body goes.
+# PyBullet's numbers of created collision and visual shapes, by what they were created from. They are reused, since
+# PyBullet frees neither when a body is removed.
 Made = dict[tuple[str, str], tuple[int, int]]
 
 
 def create(
     client: int, files: BulletFiles, shape: SceneShape, pose: Pose, *, moves: bool, color: Sequence[float], made: Made
 ) -> int:
-    """Add an object without its texture; return its body id. Only a URDF `moves`, by its own masses.
+    """Create an object without its texture; return its body id. Only a URDF `moves`, with its own masses.
 
-    Other equal shapes share the PyBullet shapes in `made`. Raises ValueError, in one line, for a file that cannot be
-    read.
+    Equal shapes share the PyBullet shapes in `made`. Raises ValueError, in one line, for a file that cannot be read.
     """
     position, orientation = pose
     try:
-        told = shape.for_bullet(files, moves)
-        if isinstance(told, UrdfFile):
-            return _load(client, told, pose, moves)
-        key = repr(told), repr(color)
+        geometry = shape.for_bullet(files, moves)
+        if isinstance(geometry, UrdfFile):
+            return _load(client, geometry, pose, moves)
+        key = repr(geometry), repr(color)
         if key not in made:
-            solid = pybullet.createCollisionShape(physicsClientId=client, **_collision(told))
-            seen = pybullet.createVisualShape(
-                getattr(pybullet, told.type), rgbaColor=color, physicsClientId=client, **told.visual
+            collision = pybullet.createCollisionShape(physicsClientId=client, **_collision(geometry))
+            visual = pybullet.createVisualShape(
+                getattr(pybullet, geometry.type), rgbaColor=color, physicsClientId=client, **geometry.visual
             )
-            made[key] = solid, seen
+            made[key] = collision, visual
         return pybullet.createMultiBody(0, *made[key], position, orientation, physicsClientId=client)
     except pybullet.error as error:
-        raise ValueError(f"{shape}: PyBullet cannot make it ({error})") from None
+        raise ValueError(f"{shape}: PyBullet cannot create it ({error})") from None
 
 
-def _load(client: int, told: UrdfFile, pose: Pose, moves: bool) -> int:
-    flags = pybullet.URDF_USE_INERTIA_FROM_FILE  # what PyBullet would derive from the bounds is not right
-    body = pybullet.loadURDF(told.path, *pose, useFixedBase=not moves, flags=flags, physicsClientId=client)
+def _load(client: int, urdf: UrdfFile, pose: Pose, moves: bool) -> int:
+    flags = pybullet.URDF_USE_INERTIA_FROM_FILE  # PyBullet would derive a wrong one from the bounds
+    body = pybullet.loadURDF(urdf.path, *pose, useFixedBase=not moves, flags=flags, physicsClientId=client)
     links = [pybullet.getBodyInfo(body, client)[0]]
     links += [pybullet.getJointInfo(body, number, client)[12] for number in range(pybullet.getNumJoints(body, client))]
     for number, link in enumerate(links, start=-1):
-        moments = told.moments[link.decode()]
+        moments = urdf.moments[link.decode()]
         pybullet.changeDynamics(body, number, localInertiaDiagonal=moments, physicsClientId=client)
     return body
 
 
 def load_rigid_body(client: int, files: BulletFiles, xml: str, pose: Pose) -> int:
-    """Add a merged URDF with its root link at a pose; return its body id."""
+    """Create the body of a merged URDF with its root link at a pose; return its body id."""
     path = files.urdf_of(xml)
-    # The merged inertia is right; what PyBullet would derive from the collision shapes' bounds is not.
+    # The merged inertia is correct; PyBullet would derive a wrong one from the bounds of the collision shapes.
     flags = pybullet.URDF_USE_INERTIA_FROM_FILE
     number = pybullet.loadURDF(path, pose.position, pose.orientation, flags=flags, physicsClientId=client)
-    os.unlink(path)  # or there would be one more file for every vehicle that has come
+    os.unlink(path)  # otherwise every new vehicle would leave a file
     return int(number)
 
 
 def set_material(client: int, body: int) -> None:
-    """Let a body be of V-REP's Bullet material: friction 1, no restitution, no damping (PyBullet's default damps)."""
+    """Give a body V-REP's Bullet material: friction 1, no restitution, no damping (PyBullet damps by default)."""
     pybullet.changeDynamics(
         body,
         -1,
@@ -84,9 +83,9 @@ def set_material(client: int, body: int) -> None:
     )
 
 
-def _collision(told: Geometry) -> dict[str, Any]:
-    flags = {"flags": getattr(pybullet, told.flags)} if told.flags else {}
-    return {"shapeType": getattr(pybullet, told.type), **told.collision, **flags}
+def _collision(geometry: Geometry) -> dict[str, Any]:
+    flags = {"flags": getattr(pybullet, geometry.flags)} if geometry.flags else {}
+    return {"shapeType": getattr(pybullet, geometry.type), **geometry.collision, **flags}
 
 
 # ---- the floor, and the ground around it
@@ -95,25 +94,25 @@ def _collision(told: Geometry) -> dict[str, Any]:
 def floor_planes(size: float, ground: bool) -> list[Plane]:
     """Return what is drawn of a floor of `size` metres a side, at z = 0: the floor, and the ground around it.
 
-    The two meet at the floor's edge and do not overlap. Without `ground`, or if the floor is as large, there is none.
+    They share the floor's edge and do not overlap. Without `ground`, or if the floor is as large, there is no ground.
     """
     floor, reach = Plane(size, TILE), 2 * GROUND_REACH
     return [floor, Plane(reach, TILE, hole=size)] if ground and size < reach else [floor]
 
 
 def create_floor(client: int, files: BulletFiles, planes: Sequence[Plane]) -> int:
-    """Add the floor of `floor_planes`, and the ground if there is one; return their body id.
+    """Create the body of `floor_planes`; return its body id.
 
-    The ground is the second visual shape of the same body: every body costs a step some 4 % of its time, whether
-    anything comes near it or not.
+    The ground is the second visual shape of the floor's body: each body costs a step some 4 % of its time, even if
+    nothing is near it.
     """
     half, depth = planes[0].size / 2, _THICKNESS / 2
     boxes = [(half, half, 0.0, 0.0)]  # half lengths in x and y, and centre
     for ground in planes[1:]:
-        reach, wide = ground.size / 2, (ground.size / 2 - half) / 2
-        boxes += [(reach, wide, 0.0, half + wide), (reach, wide, 0.0, -half - wide)]
-        boxes += [(wide, half, half + wide, 0.0), (wide, half, -half - wide, 0.0)]
-    solid = pybullet.createCollisionShapeArray(
+        outer, width = ground.size / 2, (ground.size / 2 - half) / 2
+        boxes += [(outer, width, 0.0, half + width), (outer, width, 0.0, -half - width)]
+        boxes += [(width, half, half + width, 0.0), (width, half, -half - width, 0.0)]
+    collision = pybullet.createCollisionShapeArray(
         shapeTypes=[pybullet.GEOM_BOX] * len(boxes),
         halfExtents=[[x, y, depth] for x, y, _, _ in boxes],
         collisionFramePositions=[[x, y, -depth] for _, _, x, y in boxes],
@@ -125,13 +124,13 @@ def create_floor(client: int, files: BulletFiles, planes: Sequence[Plane]) -> in
         rgbaColors=[(1.0, 1.0, 1.0, 1.0), (*GROUND, 1.0)][: len(planes)],
         physicsClientId=client,
     )
-    return int(pybullet.createMultiBody(0, solid, visual, physicsClientId=client))
+    return int(pybullet.createMultiBody(0, collision, visual, physicsClientId=client))
 
 
 def _mesh(plane: Plane) -> bytes:
-    """Return a plane with its texture's coordinates as an OBJ file."""
+    """Return a plane with its texture coordinates as an OBJ file."""
     (part,) = plane.triangles()
-    assert part.uv is not None, "a plane has them"
+    assert part.uv is not None, "a plane has texture coordinates"
     lines = [f"v {x} {y} {z}" for x, y, z in part.corners.reshape(-1, 3)]
     lines += [f"vt {u} {v}" for u, v in part.uv.reshape(-1, 2)]
     lines += ["vn 0 0 1"]

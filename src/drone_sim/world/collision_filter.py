@@ -1,4 +1,4 @@
-"""Which bodies meet which, and which have lost their mass for a while."""
+"""Which bodies collide with each other, and which have lost their mass for a while."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ from drone_sim.mechanics.frames import Vector
 
 
 class CollisionFilter:
-    """What collides in one client's world; by body and link, -1 is the root."""
+    """The collisions of one client; by body and link (-1: the root)."""
 
     def __init__(self, client: int, moved: Callable[[int], None]):
-        """Take the client, and what is told of a body that stands still, or moves, from now on."""
+        """Use a PyBullet client; `moved` is called for a body that becomes static or dynamic."""
         self._client = client
         self._moved = moved
-        self._permeable: set[tuple[int, int]] = set()  # what nothing meets
-        self._frozen: dict[int, tuple[float, Vector]] = {}  # mass and moments of what has lost them
+        self._permeable: set[tuple[int, int]] = set()  # links that collide with nothing
+        self._frozen: dict[int, tuple[float, Vector]] = {}  # mass and moments of inertia of frozen bodies
 
     def forget(self, body: int) -> None:
-        """Forget a body that is gone."""
-        self._permeable = {one for one in self._permeable if one[0] != body}
+        """Forget a removed body."""
+        self._permeable = {key for key in self._permeable if key[0] != body}
         self._frozen.pop(body, None)
 
     def let_everything_pass(self, body: int, link: int) -> None:
-        """Make a link permeable: it collides with nothing, and no ray meets it."""
+        """Make a link permeable: it collides with nothing, and no ray hits it."""
         pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
         self._permeable.add((body, link))
 
     def is_permeable(self, body: int, link: int) -> bool:
-        """Tell whether nothing meets a link."""
+        """Return whether a link collides with nothing."""
         return (body, link) in self._permeable
 
     def let_pass(self, body: int, other: int, passes: bool = True) -> None:
-        """Let two bodies go through each other, or, after that, collide again."""
-        links = [range(-1, pybullet.getNumJoints(one, self._client)) for one in (body, other)]
+        """Disable collisions between two bodies, or enable them again."""
+        links = [range(-1, pybullet.getNumJoints(either, self._client)) for either in (body, other)]
         for link, another in itertools.product(*links):
             pybullet.setCollisionFilterPair(body, other, link, another, int(not passes), self._client)
 
     def freeze(self, body: int, still: bool) -> None:
-        """Take a body's mass away and stop it, or give the mass back."""
+        """Take away a body's mass and stop it (`still`), or restore its mass."""
         if still and body in self._frozen:
             return
         if still:

@@ -1,7 +1,7 @@
-"""The term ω × Iω of Euler's equations, of every link of every body: left out as in CoppeliaSim, or the textbook's.
+"""The term ω × Iω in Euler's equations of all links: omitted as in CoppeliaSim, or integrated accurately.
 
-PyBullet gives it to every multibody, and has no switch for it. It takes I⁻¹ (ω × Iω) h from the angular velocity in a
-sub-step of length h, without a look at what comes after: a tumble gains energy. A torque ω × Iω takes that out again.
+PyBullet applies it to every multibody, without a switch. It subtracts I⁻¹ (ω × Iω) h from the angular velocity in a
+sub-step of length h, an explicit step: a tumbling body gains energy. A torque ω × Iω cancels the term.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import pybullet
 
 from drone_sim.mechanics.frames import Quaternion, Vector, cross, turned
 
-SLOW = 1e-8  # (rad/s)²; slower, the term is below the noise of what moves
-_ROUND = 1e-9  # of its largest moment of inertia by which others may differ: a cube or a sphere has no such term
-_turn, _ALONG_AXES = pybullet.applyExternalTorque, pybullet.LINK_FRAME
-_ITERATIONS = 6  # each leaves h |ω| / 2 of the error: 1e-10 of it at 9 rad/s and 5 ms
+SLOW = 1e-8  # (rad/s)²; below this the term is smaller than the noise of moving bodies
+_ROUND = 1e-9  # allowed difference of moments of inertia, as part of the largest: cubes and spheres have no such term
+_apply_torque, _ALONG_AXES = pybullet.applyExternalTorque, pybullet.LINK_FRAME
+_ITERATIONS = 6  # each reduces the error to h |ω| / 2 of it: in all to 1e-10 at 9 rad/s and 5 ms
 
 
 class NoGyroscopicTerm:
-    """Cancels the term that PyBullet applies. Dynamics does so itself for the bodies that it pushes."""
+    """Cancels the term that PyBullet applies. For the bodies that Dynamics pushes, Dynamics itself cancels it."""
 
     acts_after_steps = False  # whether `end_sub_step` has an effect
 
@@ -28,7 +28,7 @@ class NoGyroscopicTerm:
         """Start with no bodies in PyBullet's `client`."""
         self._client = client
         self._roots: dict[int, Vector] = {}  # moments of inertia (kg m², along the principal axes), by body
-        self._links: dict[int, dict[int, Vector]] = {}  # the same of all other links, by PyBullet's number
+        self._links: dict[int, dict[int, Vector]] = {}  # of all other links, by PyBullet's number
         self._unpushed: dict[int, Vector] = {}  # of _roots, those that Dynamics does not push in this step
 
     @property
@@ -59,11 +59,11 @@ class NoGyroscopicTerm:
         return bool(self._unpushed or self._links)
 
     def begin_sub_step(self, duration: float) -> None:
-        """Apply torques for the next PyBullet step of `duration` (s) to all that Dynamics does not push."""
+        """Apply torques for the next PyBullet step of `duration` (s) to all bodies that Dynamics does not push."""
         for body, moments in self._unpushed.items():
             torque = self.torque_of_velocity(moments, body, None, duration)
             if torque is not None:
-                _turn(body, -1, torque, _ALONG_AXES, self._client)
+                _apply_torque(body, -1, torque, _ALONG_AXES, self._client)
         if self._links:
             self._begin_sub_step_of_links(duration)
 
@@ -72,44 +72,44 @@ class NoGyroscopicTerm:
 
     def _begin_sub_step_of_links(self, duration: float) -> None:
         for body, links in self._links.items():
-            states = pybullet.getLinkStates(body, list(links), 1, 1, self._client)  # with velocities, attitudes of now
+            states = pybullet.getLinkStates(body, list(links), 1, 1, self._client)  # with velocities, current attitudes
             for (number, moments), state in zip(links.items(), states):
-                if _turns(state[7]):
-                    torque = self._torque(moments, _seen_from(state[1], state[7]), duration)
-                    _turn(body, number, torque, _ALONG_AXES, self._client)
+                if _rotates(state[7]):
+                    torque = self._torque(moments, _in_frame(state[1], state[7]), duration)
+                    _apply_torque(body, number, torque, _ALONG_AXES, self._client)
 
     def torque_of_velocity(
         self, moments: Vector, body: int, attitude: Quaternion | None, duration: float
     ) -> Vector | None:
-        """Return the torque of a root (N m, principal axes) from its velocity, None if it hardly turns.
+        """Return the torque on a root (N m, principal axes) from its velocity, None if it hardly rotates.
 
-        `attitude` saves a call of PyBullet where it is known.
+        A known `attitude` saves a call of PyBullet.
         """
         velocity = pybullet.getBaseVelocity(body, self._client)[1]
-        if not _turns(velocity):
+        if not _rotates(velocity):
             return None
         attitude = attitude or pybullet.getBasePositionAndOrientation(body, self._client)[1]
-        return self._torque(moments, _seen_from(attitude, velocity), duration)
+        return self._torque(moments, _in_frame(attitude, velocity), duration)
 
     def _torque(self, moments: Vector, velocity: Vector, _duration: float) -> Vector:
-        """Return ω × Iω (N m), everything along the principal axes."""
+        """Return ω × Iω (N m), all along the principal axes."""
         (a, b, c), (p, q, r) = moments, velocity
         return (c - b) * q * r, (a - c) * r * p, (b - a) * p * q
 
 
 class GyroscopicTerm(NoGyroscopicTerm):
-    """Half of the term before PyBullet turns a body, half of it after: the angular momentum L stays as it is.
+    """Applies half of the term before PyBullet rotates a body, half of it after: this conserves the angular momentum L.
 
     With the velocities u before and v between, I v = exp(-v h/2) I u, and after that I w = exp(-v h/2) I v, all along
-    the principal axes, while Bullet turns the body by v h. Being symmetric in time it neither gains nor loses energy.
-    Links below a joint have PyBullet's own term: nobody can set their velocities after a step.
+    the principal axes, while Bullet rotates the body by v h. Being symmetric in time it neither gains nor loses energy.
+    Links below a joint have PyBullet's own term, since their velocities cannot be set after a step.
     """
 
     acts_after_steps = True
 
     @property
     def moments_to_cancel(self) -> Mapping[int, Vector]:
-        """None: half of the term remains, and an attitude does not show the half that acts after a step."""
+        """Empty: half of the term remains, and an attitude does not show the half that acts after a step."""
         return {}
 
     def add(self, body: int) -> None:
@@ -118,46 +118,46 @@ class GyroscopicTerm(NoGyroscopicTerm):
         self._links.pop(body, None)
 
     def begin_step(self, pushed: Container[int]) -> bool:
-        """Do as the base class, but for all roots: Dynamics leaves the ones that it pushes to `begin_sub_step`, too."""
+        """As in the base class, but for all roots: Dynamics leaves those that it pushes to `begin_sub_step`, too."""
         return super().begin_step(())
 
     def end_sub_step(self, duration: float) -> None:
-        """Turn every root's velocity by the second half of the term."""
+        """Change every root's velocity by the second half of the term."""
         client = self._client
         for body, moments in self._roots.items():
             linear, velocity = pybullet.getBaseVelocity(body, client)
-            if _turns(velocity):
-                turn = pybullet.getBasePositionAndOrientation(body, client)[1]
-                between = _seen_from(turn, velocity)
-                after = _velocity(moments, _turned_back(between, duration / 2, _momentum(moments, between)))
-                pybullet.resetBaseVelocity(body, linear, turned(turn, after), client)
+            if _rotates(velocity):
+                attitude = pybullet.getBasePositionAndOrientation(body, client)[1]
+                between = _in_frame(attitude, velocity)
+                after = _velocity(moments, _rotated_back(between, duration / 2, _momentum(moments, between)))
+                pybullet.resetBaseVelocity(body, linear, turned(attitude, after), client)
 
     def _torque(self, moments: Vector, velocity: Vector, duration: float) -> Vector:
         momentum, between = _momentum(moments, velocity), velocity
         for _ in range(_ITERATIONS):
-            half = _turned_back(between, duration / 2, momentum)
+            half = _rotated_back(between, duration / 2, momentum)
             between = _velocity(moments, half)
         changes = zip(super()._torque(moments, velocity, duration), half, momentum)
         x, y, z = (torque + (new - old) / duration for torque, new, old in changes)
         return x, y, z
 
 
-def _turns(velocity: Vector) -> bool:
+def _rotates(velocity: Vector) -> bool:
     x, y, z = velocity
     return x * x + y * y + z * z > SLOW
 
 
-def _seen_from(turn: Quaternion, vector: Vector) -> Vector:
-    """Return a vector of the world in a frame that is turned so."""
-    x, y, z, w = turn
+def _in_frame(orientation: Quaternion, vector: Vector) -> Vector:
+    """Return a vector of the world in a frame with this orientation."""
+    x, y, z, w = orientation
     return turned((-x, -y, -z, w), vector)
 
 
 def torque_of_turn(moments: Vector, before: Quaternion, now: Quaternion, duration: float) -> Vector | None:
-    """Return ω × Iω of a body by how it has turned, None where it hardly has: quicker than to ask for its velocity.
+    """Return ω × Iω of a body from its rotation over a step, which is faster than reading its velocity.
 
-    Bullet turns it by the whole of that in one go; the axis is the same before and after. All in one function, which
-    runs in every sub-step.
+    None if it hardly rotates. Bullet applies the rotation at once, about an axis that is the same before and after. It
+    is all in one function, because this runs in every sub-step.
     """
     (x0, y0, z0, w0), (x1, y1, z1, w1) = before, now
     x = w0 * x1 - w1 * x0 - y0 * z1 + z0 * y1
@@ -180,12 +180,12 @@ def _velocity(moments: Vector, momentum: Vector) -> Vector:
     return momentum[0] / moments[0], momentum[1] / moments[1], momentum[2] / moments[2]
 
 
-def _turned_back(velocity: Vector, duration: float, vector: Vector) -> Vector:
+def _rotated_back(velocity: Vector, duration: float, vector: Vector) -> Vector:
     """Return exp(-v t) of a vector (Rodrigues' formula)."""
     speed = math.hypot(*velocity)
     axis = _velocity((speed, speed, speed), velocity)
     sine, versine = math.sin(-speed * duration), 1 - math.cos(speed * duration)
     once = cross(axis, vector)
     twice = cross(axis, once)
-    x, y, z = (one + sine * first + versine * second for one, first, second in zip(vector, once, twice))
+    x, y, z = (old + sine * first + versine * second for old, first, second in zip(vector, once, twice))
     return x, y, z

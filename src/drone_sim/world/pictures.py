@@ -1,4 +1,4 @@
-"""What can be seen of the world: PyBullet's visual shapes as neutral descriptions, and where they are."""
+"""The visual shapes of PyBullet's bodies as neutral descriptions, and their poses."""
 
 from __future__ import annotations
 
@@ -18,131 +18,131 @@ from drone_sim.shapes.visual import Visual
 from drone_sim.world.bullet_files import BulletFiles
 
 _TYPES = {getattr(pybullet, name): shape for name, shape in REPORTED_SHAPES.items()}
-_changes = itertools.count()  # of any world: what was seen in one is not mistaken for what is in another
+_changes = itertools.count()  # shared by all worlds, so that no two worlds have the same number
 
 
 class Place(NamedTuple):
-    """Where a visual is in its link's frame; it turns about the z axis of a frame there, at a speed in rad/s."""
+    """Pose of a visual in its link's frame; it rotates about the z axis of the frame `axis`, at `speed` (rad/s)."""
 
-    local: Matrix  # the link's frame from the visual
-    axis: Matrix = IDENTITY  # the link's frame from that which it turns in
+    local: Matrix  # link from visual
+    axis: Matrix = IDENTITY  # link from the frame of rotation
     speed: float = 0.0
 
     def velocity(self, pose: np.ndarray) -> np.ndarray:
-        """Return what is added to the link's velocities (6,), in the world, where the visual is at `pose` (4, 4)."""
-        local, axis = (np.reshape((*one, 0, 0, 0, 1), (4, 4)) for one in (self.local, self.axis))
-        around = pose @ np.linalg.inv(local) @ axis  # the frame that it turns in, in the world
-        turn = self.speed * around[:3, 2]
-        return np.array([*np.cross(turn, pose[:3, 3] - around[:3, 3]), *turn])
+        """Return the velocity (6,) that the rotation adds to the link's, in the world; `pose` (4, 4): of the visual."""
+        local, axis = (np.reshape((*m, 0, 0, 0, 1), (4, 4)) for m in (self.local, self.axis))
+        frame = pose @ np.linalg.inv(local) @ axis  # world from the frame of rotation
+        angular = self.speed * frame[:3, 2]
+        return np.array([*np.cross(angular, pose[:3, 3] - frame[:3, 3]), *angular])
 
 
-class _Placed(NamedTuple):
+class _Part(NamedTuple):
     visual: Visual
     link: int  # -1: the root link
     place: Place
 
 
 class Pictures:
-    """The visual shapes of one client's bodies, read once for each body: a subject for cameras (sensors.camera)."""
+    """The visual shapes of one client's bodies, read once per body; cameras (sensors.camera) draw them."""
 
-    changes: int  # another number than before whenever a picture may look different
+    changes: int  # a new number whenever a picture may have changed
 
     def __init__(self, client: int, files: BulletFiles, *, window: bool):
-        """Start with an empty world. `files` are those that PyBullet reads; `window`: PyBullet shows it in one."""
+        """Start with an empty world. `files` are those that PyBullet reads; `window`: PyBullet has a window."""
         self._client = client
         self._files, self._window = files, window
         self._floor = -1
         self._inertial_from_root: dict[int, Pose] = {}
         self._textures: dict[int, str] = {}
         self._bullet_textures = Textures(client, files)
-        self._looks: dict[int, Mapping[int, Sequence[tuple[DrawnShape, str]]]] = {}
+        self._shapes: dict[int, Mapping[int, Sequence[tuple[DrawnShape, str]]]] = {}
         self._hidden: set[tuple[int, int]] = set()
-        self._parts: dict[int, list[_Placed]] = {}
-        self._standing: dict[int, np.ndarray] = {}  # poses of what the dynamics does not move
-        self._poses: tuple[int, np.ndarray] | None = None  # of all visuals, and the changes that they are of
+        self._parts: dict[int, list[_Part]] = {}
+        self._static_poses: dict[int, np.ndarray] = {}  # of bodies that the dynamics does not move
+        self._poses: tuple[int, np.ndarray] | None = None  # of all visuals, cached for that value of `changes`
         self.look_anew()
 
     def add(self, body: int, inertial_from_root: Pose) -> None:
-        """Know a body, where PyBullet says where its inertial frame is."""
+        """Add a body with the pose of its root link in its inertial frame, whose pose PyBullet returns."""
         self._inertial_from_root[body] = inertial_from_root
         self.look_anew()
 
     def look_anew(self) -> None:
-        """Take new pictures from now on: something may be elsewhere, or look different."""
+        """Mark all pictures as outdated."""
         self.changes = next(_changes)
 
     def set_floor(self, body: int, looks: Sequence[tuple[DrawnShape, str]]) -> None:
-        """Say which body is the floor, which receives the shadows, and its looks, of which the second is the ground."""
+        """Set the body that is the floor, on which shadows fall, and its shapes: the floor, and the ground if any."""
         self._floor = body
         self.set_looks(body, {-1: looks})
 
     def set_looks(self, body: int, looks: Mapping[int, Sequence[tuple[DrawnShape, str]]]) -> None:
-        """Say of which shapes a body's links (-1: the root) are, in their order, and what image covers each, or ''.
+        """Set shapes and textures ('': none) of the visuals of a body's links (-1: the root), in their order.
 
-        PyBullet tells only of shapes that it has a word for.
+        PyBullet can only report shapes that it has a type for.
         """
-        self._looks[body] = looks
+        self._shapes[body] = looks
 
     def cover(self, body: int, texture: str, visual: int = -1) -> None:
-        """Cover a visual shape of a body (-1: all of its root link's) with an image, '' for none, as PyBullet draws."""
+        """Set the texture ('': none) of a visual of a body's root link (-1: of all) in PyBullet's own pictures."""
         self._bullet_textures.cover(body, texture, visual)
         if self._window:
             self._bullet_textures.show()
 
     def hide(self, body: int, link: int) -> None:
-        """Leave a link (-1: the root) out of all pictures."""
+        """Omit a link (-1: the root) from all pictures."""
         self._hidden.add((body, link))
         self.forget(body)
 
     def set_texture(self, body: int, texture: str) -> None:
-        """Say which image covers a body: PyBullet does not tell."""
+        """Set the texture of a body, which PyBullet does not report."""
         self._textures[body] = texture
 
     def forget(self, body: int) -> None:
-        """Read a body anew: it has changed."""
+        """Forget the visuals of a body, which have changed, so that they are read again."""
         self._parts.pop(body, None)
         self.moved(body)
 
     def moved(self, body: int) -> None:
-        """Look anew where a body stands: it has been put somewhere."""
-        self._standing.pop(body, None)
+        """Forget the pose of a body that was placed elsewhere."""
+        self._static_poses.pop(body, None)
         self.look_anew()
 
     def all_moved(self) -> None:
-        """Look anew where everything stands."""
-        self._standing.clear()
+        """Forget all poses."""
+        self._static_poses.clear()
         self.look_anew()
 
     def remove(self, body: int) -> None:
-        """Forget all about a body: it is gone, and PyBullet may give its number to another."""
+        """Forget everything about a removed body, whose number PyBullet may reuse."""
         self.forget(body)
         del self._inertial_from_root[body]
         self._bullet_textures.forget(body)
-        self._looks.pop(body, None)
-        self._hidden = {one for one in self._hidden if one[0] != body}
+        self._shapes.pop(body, None)
+        self._hidden = {key for key in self._hidden if key[0] != body}
         self._textures.pop(body, None)
         if body == self._floor:
             self._floor = -1
 
     def place(self, body: int, places: Mapping[int, Place]) -> None:
-        """Move some of a body's visuals, by index, to other places."""
-        parts = self._of(body)
-        others = {index: place for index, place in places.items() if parts[index].place != place}
-        if others:
+        """Move visuals of a body, by index, to other places in their links."""
+        parts = self._parts_of(body)
+        changed = {index: place for index, place in places.items() if parts[index].place != place}
+        if changed:
             self.moved(body)
-        for index, place in others.items():
+        for index, place in changed.items():
             parts[index] = parts[index]._replace(place=place)
 
     def visuals(self, bodies: Iterable[int] | None = None) -> list[Visual]:
-        """Return what can be drawn of these bodies, or of all, in the order of `visual_poses`."""
-        return [part.visual for body in self._chosen(bodies) for part in self._of(body)]
+        """Return the visuals of some bodies, or of all, in the order of `visual_poses`."""
+        return [part.visual for body in self._bodies_or_all(bodies) for part in self._parts_of(body)]
 
     def places(self, bodies: Iterable[int] | None = None) -> list[tuple[int, int]]:
-        """Return body and link (-1: the root) of each of their visuals, or of all, in the order of `visuals`."""
-        return [(body, part.link) for body in self._chosen(bodies) for part in self._of(body)]
+        """Return body and link (-1: the root) of each visual of some bodies, or of all, in the order of `visuals`."""
+        return [(body, part.link) for body in self._bodies_or_all(bodies) for part in self._parts_of(body)]
 
     def visual_poses(self, bodies: Iterable[int] | None = None) -> np.ndarray:
-        """Return the poses world from visual, (N, 4, 4), of these bodies, or of all."""
+        """Return the poses world from visual, (N, 4, 4), of the visuals of some bodies, or of all."""
         if bodies is not None:
             return self._poses_of(bodies)
         if self._poses is None or self._poses[0] != self.changes:  # once for all cameras of a step
@@ -150,12 +150,12 @@ class Pictures:
         return self._poses[1]
 
     def visual_velocities(self) -> np.ndarray:
-        """Return the velocities of the visuals' origins and of their turns, (N, 6), m/s and rad/s in the world."""
+        """Return linear velocity of the origin, and angular velocity, of all visuals, (N, 6), m/s, rad/s, world."""
         poses = self.visual_poses()
         velocities = np.zeros((len(poses), 6))
-        parts = ((body, part) for body in self._inertial_from_root for part in self._of(body))
+        parts = ((body, part) for body in self._inertial_from_root for part in self._parts_of(body))
         for number, ((body, part), pose) in enumerate(zip(parts, poses)):
-            if body not in self._standing:
+            if body not in self._static_poses:
                 centre, linear, angular = self._motion(body, part.link)
                 velocities[number] = *(linear + np.cross(angular, pose[:3, 3] - centre)), *angular
             if part.place.speed:
@@ -163,57 +163,58 @@ class Pictures:
         return velocities
 
     def _motion(self, body: int, link: int) -> np.ndarray:
-        """Return where a link's centre of mass is, and its velocities, in the world, (3, 3)."""
+        """Return a link's centre of mass and its velocities in the world, (3, 3)."""
         if link < 0:
             centre, _ = pybullet.getBasePositionAndOrientation(body, self._client)
             return np.array([centre, *pybullet.getBaseVelocity(body, self._client)])
         state = pybullet.getLinkState(body, link, 1, 1, self._client)
         return np.array([state[0], *state[6:8]])
 
-    def _chosen(self, bodies: Iterable[int] | None) -> Iterable[int]:
+    def _bodies_or_all(self, bodies: Iterable[int] | None) -> Iterable[int]:
         return self._inertial_from_root if bodies is None else bodies
 
     def _poses_of(self, bodies: Iterable[int]) -> np.ndarray:
         poses: list[np.ndarray] = [np.empty((0, 4, 4))]
         for body in bodies:
-            if body in self._standing:
-                poses.append(self._standing[body])
+            if body in self._static_poses:
+                poses.append(self._static_poses[body])
                 continue
             centre = Pose(*pybullet.getBasePositionAndOrientation(body, self._client))
             root = compose(centre, self._inertial_from_root[body]).matrix
             links = {-1: root}
-            for part in self._of(body):
+            for part in self._parts_of(body):
                 if part.link not in links:
                     links[part.link] = from_quaternion(*pybullet.getLinkState(body, part.link, 0, 1, self._client)[4:6])
-            local = np.tile(np.eye(4), (len(self._of(body)), 1, 1))
+            local = np.tile(np.eye(4), (len(self._parts_of(body)), 1, 1))
             local[:, :3] = np.reshape(
-                [multiply(links[part.link], part.place.local) for part in self._of(body)] or np.empty(0), (-1, 3, 4)
+                [multiply(links[part.link], part.place.local) for part in self._parts_of(body)] or np.empty(0),
+                (-1, 3, 4),
             )
             poses.append(local)
             mass = pybullet.getDynamicsInfo(body, -1, self._client)[0]
             if mass == 0 and pybullet.getNumJoints(body, self._client) == 0:
-                self._standing[body] = local
+                self._static_poses[body] = local
         return np.concatenate(poses)
 
-    def _of(self, body: int) -> list[_Placed]:
+    def _parts_of(self, body: int) -> list[_Part]:
         if body not in self._parts:
             rows = pybullet.getVisualShapeData(body, physicsClientId=self._client)
             if self._hidden:
                 rows = [row for row in rows if (body, row[1]) not in self._hidden]
-            looks = self._looks_of(body, rows)
+            looks = self._shapes_of(body, rows)
             self._parts[body] = [self._part((body, n), row, *look) for n, (row, look) in enumerate(zip(rows, looks))]
         return self._parts[body]
 
-    def _looks_of(self, body: int, rows: Sequence[Sequence[Any]]) -> list[tuple[DrawnShape, str]]:
+    def _shapes_of(self, body: int, rows: Sequence[Sequence[Any]]) -> list[tuple[DrawnShape, str]]:
         """Return shape and texture of each visual."""
-        if body in self._looks:  # a link without any has none but what PyBullet makes up
-            left = {link: list(looks) for link, looks in self._looks[body].items()}
-            return [left[row[1]].pop(0) for row in rows]
+        if body in self._shapes:  # a link without any has only visuals that PyBullet makes up
+            remaining = {link: list(looks) for link, looks in self._shapes[body].items()}
+            return [remaining[row[1]].pop(0) for row in rows]
         texture = self._textures.get(body, "")
         origin = self._files.origin
         return [(_TYPES[row[2]].from_bullet(row[3], origin(row[4].decode())), texture) for row in rows]
 
-    def _part(self, key: tuple[int, int], row: Sequence[Any], shape: DrawnShape, texture: str) -> _Placed:
+    def _part(self, key: tuple[int, int], row: Sequence[Any], shape: DrawnShape, texture: str) -> _Part:
         link, position, orientation, rgba = row[1], *row[5:8]
         floor, ground = key == (self._floor, 0), key == (self._floor, 1)
         visual = Visual(
@@ -221,18 +222,18 @@ class Pictures:
             shape=shape,
             rgba=tuple(rgba),
             texture=texture,
-            edition=tuple(identity_of(one) for one in (*shape.files, texture) if one),
+            edition=tuple(identity_of(file) for file in (*shape.files, texture) if file),
             floor=floor,
             ground=ground,
         )
-        return _Placed(visual, link, Place(from_quaternion(position, orientation)))
+        return _Part(visual, link, Place(from_quaternion(position, orientation)))
 
     def tiny_picture(
         self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return RGB (height, width, 3) and depth (height, width) of PyBullet's software renderer.
+        """Return RGB (height, width, 3) and depth (height, width) from PyBullet's software renderer.
 
-        Slow, but always there. `camera` is the (4, 4) pose world from optical frame, the field of view in radians,
+        Slow, but always available. `camera` is the pose (4, 4) world from optical frame, the field of view in radians,
         `near` and `far` in metres; depth is in metres along the optical z, NaN where nothing is nearer than `far`.
         """
         self._bullet_textures.show()
@@ -257,31 +258,31 @@ class Pictures:
         return color, depth.astype(np.float32)
 
     def look_from_behind(self, position: Sequence[float], yaw: float) -> None:
-        """Put the camera of PyBullet's window behind and above a place (m), looking along a yaw (rad)."""
+        """Place the camera of PyBullet's window behind and above a position (m), looking along a yaw (rad)."""
         pybullet.resetDebugVisualizerCamera(1.2, np.degrees(yaw) - 90, -20, position, self._client)
 
 
 class Textures:
-    """Which image covers which body; PyBullet, whose window alone shows them, gets them when somebody looks."""
+    """Textures of PyBullet's visuals. They are loaded late, because only PyBullet's own pictures show them."""
 
     def __init__(self, client: int, files: BulletFiles):
-        """Begin with none."""
+        """Start without textures."""
         self._client = client
         self._files = files
         self._waiting: dict[int, tuple[str, int]] = {}
 
     def cover(self, body: int, texture: str, visual: int = -1) -> None:
-        """Cover a visual shape of a body (-1: all of its root link's) with an image, '' for none."""
+        """Set the texture ('': none) of a visual of a body's root link (-1: of all)."""
         if texture:
             self._waiting[body] = (texture, visual)
 
     def show(self) -> None:
-        """Give PyBullet those that it has not got yet."""
+        """Load all textures that PyBullet does not have yet."""
         while self._waiting:
             body, (texture, visual) = self._waiting.popitem()
             image = pybullet.loadTexture(self._files.texture(texture), physicsClientId=self._client)
             pybullet.changeVisualShape(body, -1, visual, textureUniqueId=image, physicsClientId=self._client)
 
     def forget(self, body: int) -> None:
-        """Forget a body that is gone."""
+        """Forget a removed body."""
         self._waiting.pop(body, None)

@@ -1,4 +1,4 @@
-"""What bodies can be put back to: where they began, and snapshots of the whole dynamic state."""
+"""Saved states of bodies: their initial poses, and snapshots of the entire dynamic state."""
 
 from __future__ import annotations
 
@@ -10,40 +10,40 @@ from drone_sim.mechanics.frames import Quaternion, Vector
 
 
 class SavedStates:
-    """The initial places of one client's bodies, at rest, and its snapshots.
+    """The initial poses of one client's bodies, at rest, and its snapshots.
 
-    A snapshot of PyBullet's would copy every mesh, so there is none for where they began.
+    A snapshot of PyBullet's copies every mesh, so the initial state is not saved as one.
     """
 
     def __init__(self, client: int, all_moved: Callable[[], None]):
-        """Begin with none; `all_moved` is called when everything has been put somewhere."""
+        """Start without saved states; `all_moved` is called when all bodies have been placed."""
         self._client, self._all_moved = client, all_moved
         self._places: dict[int, tuple[Vector, Quaternion, list[float]]] = {}
         self._snapshots: set[int] = set()
 
-    # ---- where they began
+    # ---- initial poses
 
     def keep_all(self, bodies: Iterable[int]) -> None:
-        """Remember where bodies stand, at rest, and let the first run begin like every other, to the last bit."""
+        """Save the poses of bodies, at rest, and restore them, so that all runs begin equal to the last bit."""
         for body in bodies:
             self.keep(body)
         self.begin_anew()
 
     def keep(self, body: int) -> None:
-        """Remember where a body stands, at rest, for `begin_anew`."""
+        """Save the pose of a body, at rest, for `begin_anew`."""
         joints = range(pybullet.getNumJoints(body, self._client))
         angles = [pybullet.getJointState(body, joint, self._client)[0] for joint in joints]
         self._places[body] = (*pybullet.getBasePositionAndOrientation(body, self._client), angles)
 
     def forget(self, body: int) -> None:
-        """Forget a body that is gone."""
+        """Forget a removed body."""
         self._places.pop(body, None)
 
     def begin_anew(self) -> None:
-        """Put all that are kept where they stood, at rest."""
+        """Place all saved bodies at their saved poses, at rest."""
         self._all_moved()
-        for body, (centre, turn, angles) in self._places.items():
-            pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
+        for body, (centre, orientation, angles) in self._places.items():
+            pybullet.resetBasePositionAndOrientation(body, centre, orientation, self._client)
             pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
             for joint, angle in enumerate(angles):
                 pybullet.resetJointState(body, joint, angle, 0, self._client)
@@ -51,18 +51,18 @@ class SavedStates:
     # ---- snapshots
 
     def snapshot(self) -> int:
-        """Remember the exact dynamic state, contacts included; return a number for `restore` and `forget_snapshot`."""
+        """Save the exact dynamic state, with contacts; return a number for `restore` and `forget_snapshot`."""
         number = pybullet.saveState(self._client)
         self._snapshots.add(number)
         return int(number)
 
     def restore(self, number: int) -> None:
-        """Bring back what `snapshot` remembered, to the last bit."""
+        """Restore a snapshot, to the last bit."""
         self._all_moved()
         pybullet.restoreState(number, physicsClientId=self._client)
 
     def has_snapshot(self, number: int) -> bool:
-        """Tell whether a snapshot is there: no body has come or gone since."""
+        """Return whether a snapshot exists, that is, no body was added or removed since."""
         return number in self._snapshots
 
     def forget_snapshot(self, number: int) -> None:
@@ -72,7 +72,7 @@ class SavedStates:
             pybullet.removeState(number, physicsClientId=self._client)
 
     def forget_snapshots(self) -> None:
-        """Free them all, which PyBullet would keep: other bodies are there than were."""
+        """Free all snapshots, which PyBullet would keep; after a change of bodies they are invalid."""
         for number in self._snapshots:
             pybullet.removeState(number, physicsClientId=self._client)
         self._snapshots.clear()

@@ -1,4 +1,4 @@
-"""What scripts push shapes of the scene with: forces and torques that keep their direction through a step."""
+"""Forces and torques that scripts apply to shapes; they keep their directions in the world through a step."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ _NONE: Vector = (0.0, 0.0, 0.0)
 
 
 class ShapeForces:
-    """The sums of what pushes each link (-1: the root) of a body in the next step."""
+    """The sums of forces and torques on each link (-1: the root) of a body in the next step."""
 
     def __init__(self, client: int):
-        """Begin with none."""
+        """Start without forces."""
         self._client = client
         self.sums: dict[tuple[int, int], tuple[Vector, Vector]] = {}
 
     def add(self, body: int, link: int, force: Vector, torque: Vector) -> None:
-        """Let a force (N) at the centre of mass and a torque (N m) act in the next step, both in the world frame."""
+        """Add a force (N) at the centre of mass and a torque (N m) for the next step, both in the world frame."""
         (fx, fy, fz), (tx, ty, tz) = self.sums.get((body, link), (_NONE, _NONE))
         force = fx + force[0], fy + force[1], fz + force[2]
         self.sums[body, link] = force, (tx + torque[0], ty + torque[1], tz + torque[2])
 
     def drop(self, body: int, link: int, forces: bool, torques: bool) -> None:
-        """Forget the forces, or the torques, or both, that were added since the last step."""
+        """Remove the forces, or the torques, or both, that were added since the last step."""
         force, torque = self.sums.get((body, link), (_NONE, _NONE))
         self.sums[body, link] = _NONE if forces else force, _NONE if torques else torque
 
     def forget(self, body: int) -> None:
-        """Forget a body that is gone."""
-        self.sums = {key: one for key, one in self.sums.items() if key[0] != body}
+        """Forget a removed body."""
+        self.sums = {key: total for key, total in self.sums.items() if key[0] != body}
 
     def apply(self) -> None:
-        """Push, in the sub-step that comes."""
+        """Apply all sums in the next sub-step."""
         client, in_world = self._client, pybullet.WORLD_FRAME
         for (body, link), (force, torque) in self.sums.items():
             if link == -1:

@@ -29,76 +29,75 @@ from drone_sim.world.pictures import Pictures
 from drone_sim.world.queries import Queries
 from drone_sim.world.saved_states import SavedStates
 
-_NO_TURN = (0.0, 0.0, 0.0, 1.0)
-# (N s)², the square of the last change of an impulse after which Bullet holds the contacts for solved. With PyBullet's
-# 1e-7 what lies still rattles at some 1e-3 m/s², which only an accelerometer feels; this is less than 1e-6 m/s².
-_SOLVED = 1e-18
+_IDENTITY = (0.0, 0.0, 0.0, 1.0)  # quaternion
+# (N s)²: the contact solver stops when the squared change of an impulse is below this. With PyBullet's default, 1e-7,
+# bodies at rest rattle by some 1e-3 m/s², which only accelerometers measure; with this, by less than 1e-6 m/s².
+_RESIDUAL_THRESHOLD = 1e-18
 _FAR_UP = 1e6  # m
-_ahead: list[int] = []  # clients that nobody has used yet
+_unused: list[int] = []  # clients
 
 
 def connect_ahead() -> None:
-    """Let the next world of this process, and the first of each of its forks, find its 30 MB allocated already."""
-    if not _ahead:
-        _ahead.append(pybullet.connect(pybullet.DIRECT))
+    """Connect a client in advance: its 30 MB serve the next world of this process, and of each of its forks."""
+    if not _unused:
+        _unused.append(pybullet.connect(pybullet.DIRECT))
 
 
 class World:
     """A floor, objects and rigid bodies under gravity."""
 
     def __init__(self, sub_step: float, gravity: float, gui: bool = False, *, gyroscopic: bool = False):
-        """Make an empty world that steps by `sub_step` (s); `gui` opens PyBullet's window.
+        """Create an empty world that steps by `sub_step` (s); `gui` opens PyBullet's window.
 
-        `gyroscopic`: bodies turn as Euler's equations say, and not as in V-REP, which leaves out their term ω × Iω.
-        Raises RuntimeError where `gui` finds no display.
+        `gyroscopic`: bodies rotate by Euler's equations, not as in V-REP, which omits their term ω × Iω.
+        Raises RuntimeError if `gui` finds no display.
         """
         self._files = BulletFiles()
         self._client = (
-            _ahead.pop() if _ahead and not gui else pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
+            _unused.pop() if _unused and not gui else pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         )
         if self._client < 0:
-            raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or do not use gui:=true")
-        # Of each file it reads PyBullet would keep the content for good, and none of ours is read twice.
+            raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or leave out gui:=true")
+        # By default PyBullet keeps the content of every file for good, but none of ours is read twice.
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self._client)
         self._sub_step, self._gravity, self._gyroscopic = sub_step, gravity, gyroscopic
         self._gui = gui
         if gui:
             pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self._client)
-        self._begin()
+        self._set_up()
 
     def clear(self) -> None:
         """Remove everything."""
         self.saved_states.forget_snapshots()
-        pybullet.resetSimulation(physicsClientId=self._client)  # its first argument is another
+        pybullet.resetSimulation(physicsClientId=self._client)  # its first argument is not the client
         self._files.clear()
-        self._begin()
+        self._set_up()
 
-    def _begin(self) -> None:
-        """Be empty."""
+    def _set_up(self) -> None:
         client = self._client
         pybullet.setGravity(0, 0, self._gravity, client)
         pybullet.setTimeStep(self._sub_step, client)
         self._inertial_frames: dict[int, tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._made: bodies.Made = {}
-        self._states: dict[int, tuple[Motion, State]] = {}  # the last ones that were asked for, by body
+        self._states: dict[int, tuple[Motion, State]] = {}  # cached by body, with the motion that they are from
         self.pictures = Pictures(client, self._files, window=self._gui)
         self.joints = Joints(client, self.pictures.look_anew)
-        self.collision_filter = CollisionFilter(client, self._moved)
+        self.collision_filter = CollisionFilter(client, self._forget_motion_of)
         self.queries = Queries(client, self.collision_filter)
         self._dynamics = Dynamics(client, self._sub_step, self.queries, gyroscopic=self._gyroscopic)
         self.shape_forces = self._dynamics.shape_forces
-        self.saved_states = SavedStates(client, self._all_moved)
+        self.saved_states = SavedStates(client, self._forget_all_motion)
 
-    def _moved(self, body: int) -> None:
+    def _forget_motion_of(self, body: int) -> None:
         self._dynamics.moved(body)
         self.pictures.moved(body)
 
-    def _all_moved(self) -> None:
+    def _forget_all_motion(self) -> None:
         self._dynamics.all_moved()
         self.pictures.all_moved()
 
     def close(self) -> None:
-        """Free the world; may be called twice."""
+        """Free the world; may be called repeatedly."""
         if self._client >= 0:
             pybullet.disconnect(self._client)
             self._client = -1
@@ -107,15 +106,15 @@ class World:
     # ---- building
 
     def add_floor(self, size: float, texture: str, ground: bool = False) -> int:
-        """Add a square floor with its top at z = 0, `size` metres a side, and bare ground around it if asked for.
+        """Add a square floor with its top at z = 0, `size` metres a side; with `ground`, bare ground lies around it.
 
         Returns its body id.
         """
         planes = bodies.floor_planes(size, ground)
         body = bodies.create_floor(self._client, self._files, planes)
         self.pictures.cover(body, texture, visual=0)
-        self._know(body)
-        self.set_material(body, -1, friction=1.0, restitution=1.0)  # of two that touch, what falls on it has the say
+        self._register(body)
+        self.set_material(body, -1, friction=1.0, restitution=1.0)  # 1: only the other body's values count
         self.pictures.set_floor(body, list(zip(planes, (texture, ""))))
         return body
 
@@ -130,8 +129,8 @@ class World:
     ) -> int:
         """Add an object of a scene; return its body id.
 
-        mass: kg, 0 stands still; it fills the shape evenly, but for a URDF, which says its own; color: rgba, 0..1;
-        texture: path of an image.
+        mass: kg, spread evenly over the shape (a URDF states its own masses), 0 if static; color: rgba, 0..1; texture:
+        path of an image.
         Raises ValueError, in one line, for a file that cannot be read.
         """
         if mass and not isinstance(shape, Urdf):
@@ -139,8 +138,8 @@ class World:
             return self.add_assembly([Link(parts, mass=mass, inertia=inertia_of(parts, mass))], pose, [texture])[0]
         body = bodies.create(self._client, self._files, shape, pose, moves=mass != 0, color=color, made=self._made)
         self.pictures.cover(body, texture)
-        self._know(body)
-        self.set_pose(body, pose)  # again, for PyBullet reads a URDF's pose in single precision
+        self._register(body)
+        self.set_pose(body, pose)  # again: PyBullet reads a URDF's pose in single precision
         if isinstance(shape, DrawnShape):
             self.pictures.set_looks(body, {-1: [(shape, texture)]})
         elif texture:
@@ -148,15 +147,14 @@ class World:
         return body
 
     def add_assembly(self, links: Sequence[Link], pose: Pose, textures: Sequence[str]) -> tuple[int, list[int]]:
-        """Add a body of several links, its first one's frame at `pose`; return its id and the number of each link.
+        """Add a body of several links with the first link's frame at `pose`; return its id and the number of each link.
 
-        `textures` has for each link the path of an image, or ''. Raises ValueError, in one line, for a file that
-        cannot be read.
+        `textures` has a path or '' for each link. Raises ValueError, in one line, for a file that cannot be read.
         """
         body, numbers = assemblies.create(self._client, self._files, links, pose)
         self.pictures.cover(body, textures[0])
-        self._know(body)
-        self.set_pose(body, pose)  # again, for PyBullet reads a URDF's pose in single precision
+        self._register(body)
+        self.set_pose(body, pose)  # again: PyBullet reads a URDF's pose in single precision
         looks = {
             number: [(part.shape, texture) for part in link.parts if isinstance(part.shape, DrawnShape)]
             for number, link, texture in zip(numbers, links, textures)
@@ -167,12 +165,12 @@ class World:
     def add_rigid_body(self, body: RigidBody, pose: Pose) -> int:
         """Add a merged URDF with its root link at `pose`, at rest; return its body id."""
         number = bodies.load_rigid_body(self._client, self._files, body.xml, pose)
-        self._know(number)
-        self.set_pose(number, pose)  # again, for PyBullet reads a URDF's pose in single precision
+        self._register(number)
+        self.set_pose(number, pose)  # again: PyBullet reads a URDF's pose in single precision
         return number
 
     def remove(self, body: int) -> None:
-        """Take a body out of the world."""
+        """Remove a body."""
         self.saved_states.forget_snapshots()
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
@@ -185,58 +183,58 @@ class World:
         self._files.drop_old()
 
     def set_material(self, body: int, link: int, friction: float, restitution: float) -> None:
-        """Set friction and restitution of a link (-1: the root); of two that touch, the values are multiplied."""
+        """Set friction and restitution of a link (-1: the root). Bullet multiplies those of two links in contact."""
         pybullet.changeDynamics(
             body, link, lateralFriction=friction, restitution=restitution, physicsClientId=self._client
         )
 
     def set_color(self, body: int, rgba: Sequence[float], link: int | None = None) -> None:
-        """Paint a link of a body, or all of it (0..1 each)."""
-        everything = range(-1, pybullet.getNumJoints(body, self._client))
-        for one in everything if link is None else (link,):
-            pybullet.changeVisualShape(body, one, rgbaColor=rgba, physicsClientId=self._client)
+        """Set the color (rgba, 0..1) of a link of a body, or of all links."""
+        all_links = range(-1, pybullet.getNumJoints(body, self._client))
+        for number in all_links if link is None else (link,):
+            pybullet.changeVisualShape(body, number, rgbaColor=rgba, physicsClientId=self._client)
         self.pictures.forget(body)
 
-    def _know(self, number: int) -> None:
-        """Take in a body that PyBullet has just made."""
+    def _register(self, number: int) -> None:
+        """Prepare a body that was just created in PyBullet."""
         self.saved_states.forget_snapshots()
         bodies.set_material(self._client, number)
         info = pybullet.getDynamicsInfo(number, -1, self._client)
         inertial = Pose(info[3], info[4])
-        backwards = inverse(inertial)
-        if backwards.orientation == _NO_TURN:
-            backwards = Pose(backwards.position, _NO_TURN)  # the very same one: `state` looks in every step
-        self._inertial_frames[number] = (inertial, backwards)
-        self.pictures.add(number, backwards)
+        from_root = inverse(inertial)
+        if from_root.orientation == _IDENTITY:
+            from_root = Pose(from_root.position, _IDENTITY)  # the same object: `state` compares it in every step
+        self._inertial_frames[number] = (inertial, from_root)
+        self.pictures.add(number, from_root)
         self._dynamics.add(number)
 
     # ---- dynamics
 
     def solve_contacts_for_instruments(self) -> None:
-        """Solve contacts so accurately that a body at rest is at rest for an accelerometer, too.
+        """Solve contacts so accurately that an accelerometer measures a body at rest as at rest.
 
-        It costs nothing in flight; the motion of bodies in contact differs in the last bits.
+        This costs nothing in flight; the motion of bodies in contact differs in the last bits.
         """
-        pybullet.setPhysicsEngineParameter(solverResidualThreshold=_SOLVED, physicsClientId=self._client)
+        pybullet.setPhysicsEngineParameter(solverResidualThreshold=_RESIDUAL_THRESHOLD, physicsClientId=self._client)
 
     def inertial_frame(self, body: int) -> Matrix:
         """Return the transform root link from inertial frame (centre of mass, principal axes)."""
         return self._inertial_frames[body][0].matrix
 
     def inertia(self, body: int, link: int = -1) -> Inertia:
-        """Return how the mass of a link (-1: the root) lies in its frame: along its principal axes."""
-        _, _, (a, b, c), place, turn, *_ = pybullet.getDynamicsInfo(body, link, self._client)
-        return Inertia((a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c), Pose(place, turn).matrix)
+        """Return the inertia of a link (-1: the root) along its principal axes, which are given in its frame."""
+        _, _, (a, b, c), centre, orientation, *_ = pybullet.getDynamicsInfo(body, link, self._client)
+        return Inertia((a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c), Pose(centre, orientation).matrix)
 
     def state(self, body: int) -> State:
-        """Return pose and velocity of a body's root link: the same object until it moves."""
+        """Return pose and velocity of a body's root link; the same object as long as it does not move."""
         motion = self._dynamics.motion(body)
-        known, state = self._states.get(body, (None, None))
-        if known is motion and state is not None:
+        cached_motion, state = self._states.get(body, (None, None))
+        if cached_motion is motion and state is not None:
             return state
-        centre, turn, (vx, vy, vz), angular = motion
-        inertial, backwards = self._inertial_frames[body]
-        orientation = turn if backwards.orientation is _NO_TURN else multiply_quaternions(turn, backwards.orientation)
+        centre, axes, (vx, vy, vz), angular = motion
+        inertial, from_root = self._inertial_frames[body]
+        orientation = axes if from_root.orientation is _IDENTITY else multiply_quaternions(axes, from_root.orientation)
         arm = turned(orientation, inertial.position)  # from the root link to the centre of mass
         sx, sy, sz = cross(angular, arm)
         position = (centre[0] - arm[0], centre[1] - arm[1], centre[2] - arm[2])
@@ -245,44 +243,44 @@ class World:
         return state
 
     def is_finite(self) -> bool:
-        """Whether the poses and velocities of all bodies are finite."""
+        """Return whether the poses and velocities of all bodies are finite."""
         states = [self.state(body) for body in self._inertial_frames]
         return bool(np.isfinite([number for state in states for part in state for number in part]).all())
 
     def set_pose(self, body: int, pose: Pose) -> None:
-        """Move a body's root link to `pose` and stop it."""
+        """Place a body's root link at `pose`, at rest."""
         inertial = self._inertial_frames[body][0]
-        centre, turn = compose(pose, inertial)
-        self._moved(body)
-        pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
+        centre, orientation = compose(pose, inertial)
+        self._forget_motion_of(body)
+        pybullet.resetBasePositionAndOrientation(body, centre, orientation, self._client)
         pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
 
     def set_velocity(self, body: int, linear: Vector, angular: Vector) -> None:
-        """Let the frame of a body's root link move so fast (m/s, rad/s)."""
+        """Set the velocity of the frame of a body's root link (m/s, rad/s)."""
         arm = turned(self.state(body).orientation, self._inertial_frames[body][0].position)
-        velocity = [one + more for one, more in zip(linear, cross(angular, arm))]
+        velocity = [a + b for a, b in zip(linear, cross(angular, arm))]
         pybullet.resetBaseVelocity(body, velocity, angular, self._client)
         self._dynamics.moved(body)
 
     def part(self, body: int) -> None:
-        """End all contacts of a body by moving it far up: Bullet would remember them wherever else it goes."""
+        """End all contacts of a body by moving it far up: Bullet would keep them wherever else it is placed."""
         self.set_pose(body, Pose((0.0, 0.0, _FAR_UP)))
         pybullet.performCollisionDetection(self._client)
 
     def advance(
         self, wrenches: Mapping[int, Wrench], sub_steps: int, between: Callable[[int], None] | None = None
     ) -> None:
-        """Step `sub_steps` times, re-applying each body's wrench every time (PyBullet forgets it).
+        """Take `sub_steps` sub-steps and re-apply each body's wrench in every one, since PyBullet clears it.
 
-        `between` is called with 0 before the first of these sub-steps, and after each with how many there have been.
+        `between` is called with 0 before the first sub-step, and after each with the number of sub-steps so far.
         """
         self._dynamics.advance(wrenches, sub_steps, between)
         self.pictures.look_anew()
 
     def apply(self, body: int, wrench: Wrench) -> None:
-        """Let a wrench act on a body through the next sub-step, beside what `advance` applies."""
+        """Apply a wrench to a body in the next sub-step, in addition to those of `advance`."""
         self._dynamics.apply(body, wrench)
 
     def keep_initial_poses(self) -> None:
-        """Remember where everything stands, at rest, for `saved_states.begin_anew`."""
+        """Save the poses of all bodies, at rest, for `saved_states.begin_anew`."""
         self.saved_states.keep_all(self._inertial_frames)
