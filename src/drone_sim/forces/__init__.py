@@ -1,4 +1,4 @@
-"""What pushes: propellers, pushes, drag, weather. A kind that `forces:` may name has its line here."""
+"""Forces on bodies: propellers, pushes, drag, weather. Each kind that `forces:` in YAML allows has its line here."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Air drag, which lets one feel the weather, and a steady wind of its own.
+"""Air drag, by which a body feels the weather, and a steady wind for one vehicle.
 
     F = -c (v - w)    N: c the coefficients along the body's axes (kg/s), v and w velocities of body and air (m/s)
 
-Linear in the velocity, as the drag of propellers that turn is: R. Mahony, V. Kumar, P. Corke, "Multirotor Aerial
+It is linear in the velocity, like the drag of turning propellers: R. Mahony, V. Kumar, P. Corke, "Multirotor Aerial
 Vehicles", IEEE Robotics & Automation Magazine 19(3), 2012, section on blade flapping and induced drag.
 """
 
@@ -21,33 +21,33 @@ _Coefficient = Annotated[Finite, Within(0, 100)]
 _Coefficients = tuple[_Coefficient, _Coefficient, _Coefficient]
 _Speed = Annotated[Finite, Within(-100, 100)]
 _Velocity = tuple[_Speed, _Speed, _Speed]
-_LIGHT = (0.1, 0.1, 0.1)  # kg/s
+_DRAG = (0.1, 0.1, 0.1)  # kg/s
 
 
 class DragParameters(Checked):
-    """`coefficients` along the body's x, y and z; `wind` is the air's velocity in the world, beside the weather's."""
+    """`coefficients` along the body's x, y and z; `wind`: velocity of the air in the world, added to the weather's."""
 
     kind: Literal["drag"]
-    coefficients: Annotated[_Coefficients, Field(description="3 numbers, along the body's [x, y, z] in kg/s")] = _LIGHT
+    coefficients: Annotated[_Coefficients, Field(description="3 numbers, along the body's [x, y, z] in kg/s")] = _DRAG
     wind: Annotated[_Velocity, Field(description="3 numbers, [x, y, z] in m/s, in the world")] = (0.0, 0.0, 0.0)
 
     def make(self) -> Drag:
-        """Return the force."""
+        """Create the force."""
         return Drag(self)
 
 
 class Drag(Force):
-    """What the air does to a body that moves in it; at the centre of mass, in every sub-step."""
+    """Drag of a body that moves through the air; it acts at the centre of mass, in every sub-step."""
 
     every_sub_step: ClassVar[bool] = True
     feels_wind: ClassVar[bool] = True
 
     def __init__(self, parameters: DragParameters):
-        """Take coefficients and wind."""
+        """Create the force from its parameters."""
         self._coefficients, self._wind = parameters.coefficients, parameters.wind
 
     def add_to(self, wrench: Wrench, body: PushedBody) -> None:
-        """Add the drag of this moment."""
+        """Add the present drag."""
         (vx, vy, vz), (wx, wy, wz), (ax, ay, az) = body.state.linear_velocity, self._wind, body.wind
         x, y, z = rotate(invert(body.matrix), (vx - wx - ax, vy - wy - ay, vz - wz - az))
         cx, cy, cz = self._coefficients

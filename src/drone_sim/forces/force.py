@@ -1,4 +1,4 @@
-"""What a force is."""
+"""The interface of forces."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drone_sim.mechanics.wrench import Wrench
 
 
 class PushedBody(Protocol):
-    """The body that forces act on."""
+    """The body that a force acts on."""
 
     @property
     def mass(self) -> float:
@@ -23,27 +23,27 @@ class PushedBody(Protocol):
 
     @property
     def matrix(self) -> Matrix:
-        """World from its root link."""
+        """Transform world from its root link."""
 
     @property
     def wind(self) -> Vector:
-        """Velocity of the air where it is (m/s, world)."""
+        """Velocity of the air at its position (m/s, world)."""
 
 
 class Force:
-    """Acts on a body: asked once a step, as V-REP's scripts push, or before every sub-step.
+    """A force on a body, called once a step, as V-REP's scripts apply forces, or before every sub-step.
 
-    What it adds to the wrench of a step keeps its direction in the world through the sub-steps, and its point on the
-    body. In a sub-step the body's state is that of this moment.
+    Wrenches that are added once a step keep their direction in the world and their point on the body through all
+    sub-steps. In a sub-step the body's state is the present one.
     """
 
     every_sub_step: ClassVar[bool] = False
-    feels_wind: ClassVar[bool] = False  # of a vehicle that has such a force, weather needs no other
+    feels_wind: ClassVar[bool] = False  # if any force of a vehicle does, weather adds no default drag
 
     def add_to(self, wrench: Wrench, body: PushedBody) -> None:
-        """Add what acts now. Forces in N, torques in N m, both in the world; points in the body's inertial frame."""
+        """Add the present wrench: N and N m, both in the world; points in the body's inertial frame."""
         raise NotImplementedError
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings back what it is now, for a snapshot."""
+        """Return a function that restores the present state, for a snapshot."""
         return lambda: None

@@ -1,8 +1,8 @@
-"""V-REP's propeller script: a fan of particles whose momentum lifts the drone.
+"""The propeller model of V-REP's script: a fan of particles whose momentum lifts the drone.
 
 With v the particle velocity (m/s) and n the particles emitted in a step of dt seconds:
 
-    n      = floor(430 dt + carry)          carry: the fraction left over by the step before
+    n      = floor(430 dt + carry)          carry: the fraction left over from the step before
     thrust = n * 8500 * v * pi * 0.005^3 / (6 dt)     along the propeller's +z   (N)
     torque = rotation * 0.002 * v                     about the same axis        (N m)
 
@@ -23,7 +23,7 @@ from drone_sim.mechanics.wrench import Wrench
 
 
 class PropellerParameters(Checked):
-    """V-REP's particle law."""
+    """Parameters of V-REP's particle model."""
 
     law: Literal["3.x", "4.x"]
     particles_per_second: Annotated[Finite, Within(1e-3, 1e6)]
@@ -34,15 +34,15 @@ class PropellerParameters(Checked):
 
 
 class ParticleLaw:
-    """Counts the particles of a step, which are as many for every propeller."""
+    """Counts the particles of a step; each propeller emits this number."""
 
     def __init__(self, parameters: PropellerParameters, time_step: float):
-        """Take the law's constants, and the step in seconds."""
+        """Create the model for a time step in seconds."""
         self._rate = parameters.particles_per_second * time_step
         self._keeps_carry = parameters.law == "3.x"
         volume = math.pi * parameters.particle_size**3 / 6
         self._newtons = parameters.particle_density * volume / time_step
-        self.carry = 0.0  # the fraction of a particle left over by the last step
+        self.carry = 0.0  # the fraction of a particle left over from the last step
 
     def emit(self) -> float:
         """Emit one step's particles; return the thrust in newtons per m/s of their velocity."""
@@ -53,7 +53,7 @@ class ParticleLaw:
 
 
 class Propellers(Force):
-    """A drone's propellers: their thrust, and how much air has gone through them."""
+    """A drone's propellers: their thrust, and the amount of air that they have moved."""
 
     def __init__(
         self,
@@ -64,16 +64,16 @@ class Propellers(Force):
         time_step: float,
         commanded: Callable[[], Sequence[float]],
     ):
-        """Take where each pushes along (unit, root link's frame) and acts (m, inertial frame), and its sense (+-1).
+        """Create the propellers: axis (unit, root link's frame), point (m, inertial frame) and sense (+-1) of each.
 
-        `commanded` returns the particle velocities (m/s) that are asked for.
+        `commanded` returns the commanded particle velocities (m/s).
         """
-        self._commanded = self._given = commanded
+        self._commanded = self._intact_commands = commanded
         self.effectiveness: tuple[float, ...] = (1.0,) * len(axes)
-        self.air = [0.0] * len(axes)  # m of it that went through each
-        self.clipped = 0  # steps in which a limit was in force
-        self._newtons = 0.0  # per m/s, of the step
-        self._emitted: Sequence[float] = [0.0] * len(axes)  # m/s, of the step
+        self.air = [0.0] * len(axes)  # m of air that has gone through each
+        self.clipped = 0  # steps in which a limit was applied
+        self._newtons = 0.0  # per m/s, in the last step
+        self._emitted: Sequence[float] = [0.0] * len(axes)  # m/s, in the last step
         self._law = ParticleLaw(parameters, time_step)
         self._time_step = time_step
         self._limits = self._slowest, self._fastest = parameters.velocity_limits or (-math.inf, math.inf)
@@ -83,7 +83,7 @@ class Propellers(Force):
         self._by_axis = list(by_axis.items())
 
     def add_to(self, wrench: Wrench, body: PushedBody) -> None:
-        """Emit a step's particles at the velocities that are commanded, within limits."""
+        """Emit a step's particles at the commanded velocities, within limits."""
         velocities, matrix = self._commanded(), body.matrix
         if min(velocities) < self._slowest or max(velocities) > self._fastest:
             self.clipped += 1
@@ -111,33 +111,33 @@ class Propellers(Force):
             )
 
     def weaken(self, effectiveness: Sequence[float]) -> None:
-        """Let each blow at this share of the velocity, and so of thrust and torque: 1 is sound, 0 is stopped.
+        """Scale each propeller's velocity, and so its thrust and torque, by a share: 1 is intact, 0 is stopped.
 
-        Those for which there is no number are sound.
+        Propellers without a number are intact.
         """
         count = len(self.air)
         self.effectiveness = (*effectiveness, *[1.0] * count)[:count]
         if all(share == 1 for share in effectiveness):
-            self._commanded, (self._slowest, self._fastest) = self._given, self._limits
+            self._commanded, (self._slowest, self._fastest) = self._intact_commands, self._limits
         else:
-            self._commanded, self._slowest, self._fastest = self._weakened, -math.inf, math.inf
+            self._commanded, self._slowest, self._fastest = self._weakened_velocities, -math.inf, math.inf
 
-    def _weakened(self) -> list[float]:
+    def _weakened_velocities(self) -> list[float]:
         slowest, fastest = self._limits
-        return [share * min(max(one, slowest), fastest) for share, one in zip(self.effectiveness, self._given())]
+        return [share * min(max(v, slowest), fastest) for share, v in zip(self.effectiveness, self._intact_commands())]
 
     @property
     def velocities(self) -> Sequence[float]:
-        """Velocity of the particles of each propeller in m/s, as in the last step."""
+        """Particle velocity of each propeller in m/s, in the last step."""
         return self._emitted
 
     @property
     def thrusts(self) -> list[float]:
-        """Thrust of each propeller in N, as in the last step."""
+        """Thrust of each propeller in N, in the last step."""
         return [self._newtons * velocity for velocity in self._emitted]
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings back the fraction of a particle, what was emitted, and what is broken."""
+        """Return a function that restores the carry, the last emission, the air moved, and the effectiveness."""
         carry, air, effectiveness = self._law.carry, list(self.air), self.effectiveness
         emitted, newtons = list(self._emitted), self._newtons
 

@@ -1,4 +1,4 @@
-"""Pushes: forces and torques, fixed in the world, that last for a while."""
+"""Pushes: world-fixed forces and torques that last for a while."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ class Push(NamedTuple):
 
 
 class Pushes(Force):
-    """The pushes that still last; they add up."""
+    """The pushes that act at present; they add up."""
 
     def __init__(self, time_step: float):
-        """Begin with none; `time_step` in seconds."""
+        """Start without pushes; `time_step` in seconds."""
         self._time_step = time_step
-        self.lasting: list[tuple[Push, int]] = []  # and the steps that are left
+        self.lasting: list[tuple[Push, int]] = []  # with the number of remaining steps
 
     def add(self, push: Push) -> None:
-        """Begin a push; its duration is rounded to whole steps, one at least."""
+        """Start a push; its duration is rounded to whole steps, at least one."""
         self.lasting.append((push, max(1, round(push.duration / self._time_step))))
 
     def add_to(self, wrench: Wrench, body: PushedBody) -> None:
-        """Add what pushes, and use up a step of it."""
+        """Add all pushes for one step."""
         for push, _ in self.lasting:
             wrench.add(push.force, push.torque, (0.0, 0.0, 0.0))
         self.lasting = [(push, steps - 1) for push, steps in self.lasting if steps > 1]
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings back what still lasts."""
-        kept = list(self.lasting)
+        """Return a function that restores the present pushes."""
+        pushes = list(self.lasting)
 
         def restore() -> None:
-            self.lasting = list(kept)
+            self.lasting = list(pushes)
 
         return restore

@@ -1,8 +1,8 @@
-"""The weather of a scene: a steady wind, and gusts that drift with it. All vehicles are in one air.
+"""The weather of a scene: a steady wind, and gusts that drift with it. All vehicles share the same air.
 
-A vehicle at the position p feels, at the time t, the steady wind U and the gust at the way V t - e p: e is the wind's
-direction over ground, V its speed there. So who is further downwind meets the same gusts later, by its distance over V;
-across the wind and upwards a gust is as wide as the world.
+At the time t a vehicle at the position p meets the steady wind U and the gust at the way V t - e p: e is the wind's
+direction over ground, V its speed there. So a vehicle further downwind meets the same gusts later, by its distance
+divided by V; across the wind and upwards a gust has no limits.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from drone_sim.forces.dryden import Gusts
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.frames import Vector
 
-_BEFORE = 100.0  # m of gusts that have passed when a run begins: who is a bit downwind has some, too
+_PASSED_AT_START = 100.0  # m of gusts, so that vehicles somewhat downwind meet gusts from the start
 _STILL: Vector = (0.0, 0.0, 0.0)
 
 _Speed = Annotated[Finite, Within(-100, 100)]
@@ -30,7 +30,7 @@ _PARTS = Parts(("along", "across", "up"))
 
 
 class GustParameters(Checked):
-    """Dryden's gusts (see forces.dryden); of deviation 0 there are none."""
+    """Dryden's gusts (see forces.dryden); a deviation of 0 means none."""
 
     deviation: Annotated[tuple[_Deviation, _Deviation, _Deviation], _PARTS, Field(description=f"{_COMPONENTS} in m/s")]
     length: Annotated[tuple[_Length, _Length, _Length], _PARTS, Field(description=f"{_COMPONENTS} in m, 1 to 10000")]
@@ -39,7 +39,7 @@ class GustParameters(Checked):
 
 
 class WeatherParameters(Checked):
-    """What the air does."""
+    """Wind and gusts."""
 
     wind: Annotated[
         tuple[_Speed, _Speed, _Speed],
@@ -50,35 +50,35 @@ class WeatherParameters(Checked):
 
 
 class Weather:
-    """The air of one simulation. Without wind and gusts there is none to feel, until a change brings some.
+    """The air of one simulation. It has no effect without wind and gusts, until a change brings some.
 
-    `changes` counts them.
+    `changes` counts the changes.
     """
 
     def __init__(self, parameters: WeatherParameters, clock: Clock):
-        """Begin as the parameters say, at the time of the simulation's clock."""
+        """Start with these parameters, at the time of the simulation's clock."""
         self._parameters = parameters
         self._clock = clock
         self.changes = 0
-        self._field: tuple[int, Gusts] | None = None  # the last one, and its seed
+        self._cached_gusts: tuple[int, Gusts] | None = None  # the last gusts, and their seed
         self.reset()
 
     def reset(self) -> None:
-        """Be as at the start of a run."""
+        """Return to the state at the start of a run."""
         self.is_felt = any(self._parameters.wind) or any(self._parameters.gusts.deviation)
-        self._passed, self._since = _BEFORE, 0.0
-        self._be(self._parameters)
+        self._passed, self._since = _PASSED_AT_START, 0.0
+        self._apply(self._parameters)
 
     def change(self, changes: Mapping[str, Any]) -> None:
-        """Lay other values over some of the present ones, as in YAML. Raises ParameterError."""
+        """Change some of the present values, as in YAML. Raises ParameterError."""
         new = changed(self.now, changes)
         time = self._clock.time
         self._passed, self._since = self._way(time), time
         self.is_felt = True
-        self._be(new)
+        self._apply(new)
         self.changes += 1
 
-    def _be(self, now: WeatherParameters) -> None:
+    def _apply(self, now: WeatherParameters) -> None:
         self.now = now
         x, y, _ = now.wind
         speed = math.hypot(x, y)
@@ -87,32 +87,32 @@ class Weather:
         self._gusts = self._gusts_of(now.gusts.seed) if any(now.gusts.deviation) else None
 
     def _gusts_of(self, seed: int) -> Gusts:
-        if self._field is None or self._field[0] != seed:
-            self._field = seed, Gusts(seed)
-        return self._field[1]
+        if self._cached_gusts is None or self._cached_gusts[0] != seed:
+            self._cached_gusts = seed, Gusts(seed)
+        return self._cached_gusts[1]
 
     def _way(self, time: float) -> float:
-        """Return how much of the gusts (m) has passed the world's origin."""
+        """Return the way (m) of the gusts past the world's origin so far."""
         return self._passed + self._speed * (time - self._since)
 
     def at(self, place: Vector) -> Vector:
-        """Return the velocity of the air (m/s, world) at a place (m, world), now."""
+        """Return the present velocity of the air (m/s, world) at a place (m, world)."""
         if not self.is_felt:
             return _STILL
         if self._gusts is None:
             return self.now.wind
-        (ex, ey), (wx, wy, wz), own = self._along, self.now.wind, self.now.gusts
+        (ex, ey), (wx, wy, wz), gusts = self._along, self.now.wind, self.now.gusts
         way = self._way(self._clock.time) - ex * place[0] - ey * place[1]
-        along, across, up = self._gusts.at(way, own.deviation, own.length)
+        along, across, up = self._gusts.at(way, gusts.deviation, gusts.length)
         return wx + ex * along - ey * across, wy + ey * along + ex * across, wz + up
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings back the present weather: gusts are a matter of seed, time and place."""
+        """Return a function that restores the weather; gusts depend on seed, time and place alone."""
         now, felt, passed, since = self.now, self.is_felt, self._passed, self._since
 
         def restore() -> None:
             self.is_felt, self._passed, self._since = felt, passed, since
-            self._be(now)
+            self._apply(now)
             self.changes += 1
 
         return restore
