@@ -1,4 +1,4 @@
-"""The shapes: one class each, from the scene file to Bullet, to what the cameras draw, and to rviz."""
+"""The shapes: each class describes one for scene files, Bullet, the cameras, and rviz."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pkgutil import resolve_name
 
 from drone_sim.shapes.shape import ReportedShape, SceneShape, Shape
 
-# Module and class of each, in the order in which messages name them. A shape that is added is added here.
+# Module and class of each shape, in the order in which messages name them. Add new shapes here.
 _CLASSES = (
     "box:Box",
     "cylinder:Cylinder",
@@ -16,6 +16,6 @@ _CLASSES = (
     "capsule:Capsule",
     "plane:Plane",
 )
-_SHAPES: tuple[type[Shape], ...] = tuple(resolve_name(f"{__name__}.{one}") for one in _CLASSES)
-SCENE_SHAPES = {one.word: one for one in _SHAPES if issubclass(one, SceneShape)}  # by a scene file's word
-REPORTED_SHAPES = {one.bullet_type: one for one in _SHAPES if issubclass(one, ReportedShape)}
+_SHAPES: tuple[type[Shape], ...] = tuple(resolve_name(f"{__name__}.{name}") for name in _CLASSES)
+SCENE_SHAPES = {shape.word: shape for shape in _SHAPES if issubclass(shape, SceneShape)}  # by name in scene files
+REPORTED_SHAPES = {shape.bullet_type: shape for shape in _SHAPES if issubclass(shape, ReportedShape)}

@@ -15,7 +15,7 @@ from drone_sim.shapes.shape import Files, Geometry, Primitive, ReportedShape, Sc
 
 
 def _unit_box() -> tuple[np.ndarray, np.ndarray]:
-    """Return corners (12, 3, 3) and uv (12, 3, 2); each side shows the picture upright (z up) from outside."""
+    """Return corners (12, 3, 3) and uv (12, 3, 2); each side shows the texture upright (z up) from outside."""
     square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # counter-clockwise
     sides = [
         np.roll(np.insert(square[::sign], 0, sign / 2, axis=1), axis, axis=1)
@@ -33,13 +33,13 @@ def _unit_box() -> tuple[np.ndarray, np.ndarray]:
 
 
 _CORNERS, _UV = _unit_box()
-# rviz's only lamp is carried by who looks, and leaves sides black: the colours of triangles are ours to choose.
+# Triangles, because rviz draws them in the given colours. Its only light is at the viewpoint and leaves sides black.
 _FOR_RVIZ = tuple((float(x), float(y), float(z)) for x, y, z in _CORNERS.reshape(-1, 3))
 
 
 @dataclass(frozen=True)
 class Box(SceneShape, ReportedShape):
-    """A box; `size` is its full length, width and height."""
+    """A box; `size` is its length, width and height."""
 
     word = "box"
     bullet_type = "GEOM_BOX"
@@ -48,13 +48,13 @@ class Box(SceneShape, ReportedShape):
     size: Annotated[tuple[Length, Length, Length], Field(description="3 numbers, [length, width, height] in m")]
 
     def for_bullet(self, files: Files, moves: bool) -> Geometry:
-        """Return a box by its half lengths."""
+        """Return the geometry, by half lengths."""
         half = {"halfExtents": [length / 2 for length in self.size]}
         return Geometry(self.bullet_type, half, half)
 
     @classmethod
     def from_bullet(cls, dimensions: Sequence[float], file: str) -> Box:
-        """Return the box of these full lengths."""
+        """Return a box from its full lengths."""
         length, width, height = dimensions
         return cls((length, width, height))
 
@@ -63,9 +63,9 @@ class Box(SceneShape, ReportedShape):
         return (Triangles(_CORNERS * np.asarray(self.size), _UV),)
 
     def shared(self) -> tuple[Box, tuple[float, float, float]]:
-        """Return the unit box, and its own size."""
+        """Return the unit box, and the scale."""
         return Box((1.0, 1.0, 1.0)), self.size
 
     def for_rviz(self) -> tuple[Primitive]:
-        """Return its triangles."""
+        """Return the triangles."""
         return (Primitive("triangles", self.size, corners=_FOR_RVIZ),)

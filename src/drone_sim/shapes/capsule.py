@@ -17,7 +17,7 @@ from drone_sim.shapes.solid import Solid, round_solid
 
 @dataclass(frozen=True)
 class Capsule(Cylinder):
-    """A cylinder along its z axis with half a sphere on each end; `size` is radius and length without them, m."""
+    """A cylinder along its z axis with a hemisphere on each end; `size` is radius and length without these, m."""
 
     word = "capsule"
     bullet_type = "GEOM_CAPSULE"
@@ -30,7 +30,7 @@ class Capsule(Cylinder):
         return (Triangles(turned(half_circle(outer(radius), length))),)
 
     def solid(self) -> Solid:
-        """Return a cylinder and two half balls, whose centroids are 3/8 of the radius away from their flat sides."""
+        """Return a cylinder and two hemispheres, with centroids 3/8 of the radius away from their flat sides."""
         r, length = self.size
         cylinder, ball = np.pi * r**2 * length, 4 / 3 * np.pi * r**3
         arm = (length / 2 + 3 / 8 * r) ** 2 - (3 / 8 * r) ** 2
@@ -40,12 +40,12 @@ class Capsule(Cylinder):
         return round_solid(volume, xx / volume, zz / volume)
 
     def shared(self) -> tuple[DrawnShape, tuple[float, float, float]]:
-        """Return itself: scaled along z, its caps would not be round."""
+        """Return the capsule itself: scaled along z its caps would not be round."""
         return self, (1.0, 1.0, 1.0)
 
     def for_rviz(self) -> tuple[Primitive, ...]:
         """Return a cylinder and two spheres."""
         radius, length = self.size
-        wide = 2 * radius
+        diameter = 2 * radius
         ends = [from_rpy((0, 0, sign * length / 2), (0, 0, 0)) for sign in (-1, 1)]
-        return (*super().for_rviz(), *(Primitive("sphere", (wide, wide, wide), end) for end in ends))
+        return (*super().for_rviz(), *(Primitive("sphere", (diameter, diameter, diameter), end) for end in ends))

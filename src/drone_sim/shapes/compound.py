@@ -1,4 +1,4 @@
-"""A shape of several: rigid, in one body."""
+"""A rigid shape of several shapes, in one body."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class Compound(Shape):
-    """Several shapes, each with a place and a color of its own."""
+    """Several shapes, each with its place and color."""
 
     word = "compound"
 
@@ -35,5 +35,5 @@ class Compound(Shape):
 
 
 def parts_of(shape: SceneShape | Compound, color: Rgba) -> tuple[Part, ...]:
-    """Return what a shape is made of: itself, unless it is a compound."""
+    """Return the parts of a compound, or the shape itself as the only part."""
     return shape.of if isinstance(shape, Compound) else (Part(shape, IDENTITY, color),)

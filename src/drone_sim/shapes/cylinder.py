@@ -34,33 +34,33 @@ class Cylinder(SceneShape, ReportedShape):
     size: Annotated[tuple[Length, Length], Field(description="2 numbers, [radius, length] in m")]
 
     def for_bullet(self, files: Files, moves: bool) -> Geometry:
-        """Return a cylinder, whose length PyBullet names in two ways."""
+        """Return the geometry; PyBullet has two names for the length."""
         radius, length = self.size
         return Geometry(self.bullet_type, {"radius": radius, "height": length}, {"radius": radius, "length": length})
 
     @classmethod
     def from_bullet(cls, dimensions: Sequence[float], file: str) -> Cylinder:
-        """Return the cylinder of this length and radius, which is PyBullet's order."""
+        """Return a cylinder from length and radius, in PyBullet's order."""
         length, radius = dimensions[:2]
         return cls((radius, length))
 
     def triangles(self) -> tuple[Triangles]:
         """Return a prism."""
         radius, length = self.size
-        wide, high = outer(radius), length / 2
-        return (Triangles(turned([(0, -high), (wide, -high), (wide, high), (0, high)])),)
+        outer_radius, half = outer(radius), length / 2
+        return (Triangles(turned([(0, -half), (outer_radius, -half), (outer_radius, half), (0, half)])),)
 
     def solid(self) -> Solid:
-        """Return the round cylinder."""
+        """Return the solid of the exact cylinder."""
         radius, length = self.size
         return round_solid(np.pi * radius**2 * length, radius**2 / 4 + length**2 / 12, radius**2 / 2)
 
     def shared(self) -> tuple[DrawnShape, tuple[float, float, float]]:
-        """Return the cylinder of 1 m radius and 1 m length, and its own."""
+        """Return the cylinder of 1 m radius and 1 m length, and the scale."""
         radius, length = self.size
         return Cylinder((1.0, 1.0)), (radius, radius, length)
 
     def for_rviz(self) -> tuple[Primitive, ...]:
-        """Return a cylinder by its diameters."""
+        """Return a cylinder, by its diameters."""
         radius, length = self.size
         return (Primitive("cylinder", (2 * radius, 2 * radius, length)),)

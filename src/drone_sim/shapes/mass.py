@@ -1,4 +1,4 @@
-"""How a mass lies in a shape that is evenly filled."""
+"""Mass properties of evenly filled shapes."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from drone_sim.shapes.shape import DrawnShape
 
 
 class PrincipalInertia(NamedTuple):
-    """Principal moments (kg m²), and the shape's frame from that of the centre of mass and the principal axes."""
+    """Principal moments (kg m²), and the shape's frame from the frame of centre of mass and principal axes."""
 
     moments: tuple[float, float, float]
     frame: Matrix = IDENTITY
 
 
 def inertia_of(parts: Sequence[Part], mass: float) -> PrincipalInertia:
-    """Return the inertia of a mass (kg) that fills some parts evenly; a mesh counts as its convex hull.
+    """Return the inertia of a mass (kg) that fills `parts` evenly; a mesh counts as its convex hull.
 
     Raises ValueError, in one line, for a mesh that cannot be read.
     """
-    filled = [_of_unit_density(part) for part in parts]
-    density = mass / sum(one.mass for one in filled)
-    whole = combined([Inertial(density * one.mass, one.centre, density * one.inertia) for one in filled])
+    solids = [_of_unit_density(part) for part in parts]
+    density = mass / sum(solid.mass for solid in solids)
+    whole = combined([Inertial(density * solid.mass, solid.centre, density * solid.inertia) for solid in solids])
     return principal(whole.inertia, whole.centre)
 
 
@@ -43,10 +43,10 @@ def principal(tensor: np.ndarray, centre: np.ndarray) -> PrincipalInertia:
 
 
 def _of_unit_density(part: Part) -> Inertial:
-    """Return a part, filled with 1 kg/m³, in the frame of the whole."""
+    """Return a part, filled with 1 kg/m³, in the frame of the whole shape."""
     if not isinstance(part.shape, DrawnShape):
-        raise ValueError(f"{part.shape}: its mass cannot be computed from its shape")
+        raise ValueError(f"{part.shape}: its mass cannot be computed from its form")
     solid = part.shape.solid()
     local = np.reshape(part.local, (3, 4))
-    turn, place = local[:, :3], local[:, 3]
-    return Inertial(solid.volume, turn @ solid.centroid + place, turn @ solid.inertia @ turn.T)
+    rotation, position = local[:, :3], local[:, 3]
+    return Inertial(solid.volume, rotation @ solid.centroid + position, rotation @ solid.inertia @ rotation.T)

@@ -23,8 +23,8 @@ class Mesh(SceneShape, ReportedShape):
 
     word = "mesh"
     bullet_type = "GEOM_MESH"
-    default_color = WHITE  # which leaves its own materials as they are
-    has_uv = True  # where the file says some
+    default_color = WHITE  # keeps the file's own materials
+    has_uv = True  # if the file has them
 
     file: File
     size: Annotated[tuple[_Scale, _Scale, _Scale], Field(description="3 numbers, its scale along [x, y, z]")] = (
@@ -34,12 +34,12 @@ class Mesh(SceneShape, ReportedShape):
     )
 
     def __str__(self) -> str:
-        """Return its name for a message."""
+        """Return its name for messages."""
         return f"{self.word} {self.file}"
 
     @property
     def files(self) -> tuple[str]:
-        """The mesh file; what that names is read with it."""
+        """The mesh file; files that it refers to are read with it."""
         return (self.file,)
 
     def meshes(self) -> tuple[tuple[str, Sequence[float]]]:
@@ -47,28 +47,28 @@ class Mesh(SceneShape, ReportedShape):
         return ((self.file, self.size),)
 
     def for_bullet(self, files: Files, moves: bool) -> Geometry:
-        """Return a mesh: what stands still may be hollow; what moves is its convex hull."""
+        """Return the mesh itself if it is static, so it may be concave; else its convex hull."""
         scale = {"meshScale": list(self.size)}
-        seen = {**scale, "fileName": files.mesh(self.file)}
+        visual = {**scale, "fileName": files.mesh(self.file)}
         if moves:
-            return Geometry(self.bullet_type, {**scale, "fileName": files.mesh(self.file, hull=True)}, seen)
-        return Geometry(self.bullet_type, seen, seen, flags="GEOM_FORCE_CONCAVE_TRIMESH")
+            return Geometry(self.bullet_type, {**scale, "fileName": files.mesh(self.file, hull=True)}, visual)
+        return Geometry(self.bullet_type, visual, visual, flags="GEOM_FORCE_CONCAVE_TRIMESH")
 
     @classmethod
     def from_bullet(cls, dimensions: Sequence[float], file: str) -> Mesh:
-        """Return the mesh file at this scale."""
+        """Return the mesh of a file, at this scale."""
         x, y, z = dimensions
         return cls(file, (x, y, z))
 
     def triangles(self) -> Iterator[Triangles]:
-        """Yield the file's parts."""
+        """Yield the parts of the file."""
         for part in mesh_files.read(self.file):
             faces = part.faces
             if np.prod(self.size) < 0:
-                faces = faces[:, ::-1]  # a mirror image turns the faces inside out
+                faces = faces[:, ::-1]  # mirroring turns the faces inside out
             corners = (part.vertices * np.asarray(self.size))[faces]
             yield Triangles(corners, None if part.uv is None else part.uv[faces], part.rgba, part.texture)
 
     def for_rviz(self) -> tuple[Primitive]:
-        """Return the file, which rviz reads itself."""
+        """Return the file, which rviz itself reads."""
         return (Primitive("mesh", self.size, file=self.file),)

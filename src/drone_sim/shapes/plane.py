@@ -1,4 +1,4 @@
-"""A plane without end, as URDFs may hold one."""
+"""An infinite plane, which a URDF may contain."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 
 from drone_sim.shapes.shape import Primitive, ReportedShape, Triangles
 
-_SIZE = 400.0  # m; a camera sees 100 m
+_SIZE = 400.0  # m, side of the drawn square; cameras see 100 m
 _SQUARE = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])
-_HALVES = np.array([[0, 1, 2], [0, 2, 3]])  # of a quadrilateral, by its corners
-_IN_RVIZ = 200.0  # m, its side
-_FLAT = 1e-3  # m, its thickness there
+_TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])  # triangles of a quadrilateral, as indices of its corners
+_RVIZ_SIZE = 200.0  # m, side
+_RVIZ_THICKNESS = 1e-3  # m, thickness in rviz
 
 
 @dataclass(frozen=True)
 class Plane(ReportedShape):
-    """The xy plane, seen from above, as a square.
+    """The xy plane, visible from above, drawn as a square.
 
-    size, tile: the sides of the square and of a texture, m. hole: the side of a square hole in its middle, m.
+    size, tile: sides of the square and of a texture, m. hole: side of a square hole in its middle, m.
     """
 
     word = "plane"
@@ -33,18 +33,18 @@ class Plane(ReportedShape):
 
     @classmethod
     def from_bullet(cls, dimensions: Sequence[float], file: str) -> Plane:
-        """Return the plane: PyBullet's has no size."""
+        """Return a default plane: PyBullet's has no size."""
         return cls()
 
     def triangles(self) -> tuple[Triangles]:
         """Return two triangles, or eight around a hole."""
-        corners = self.size * _SQUARE[_HALVES]
+        corners = self.size * _SQUARE[_TRIANGLES]
         if self.hole:
             outer, inner = self.size * _SQUARE, self.hole * _SQUARE
             sides = [np.array([outer[n], outer[n - 3], inner[n - 3], inner[n]]) for n in range(4)]
-            corners = np.concatenate([side[_HALVES] for side in sides])
+            corners = np.concatenate([side[_TRIANGLES] for side in sides])
         return (Triangles(corners, corners[:, :, :2] / self.tile),)
 
     def for_rviz(self) -> tuple[Primitive]:
         """Return a thin slab."""
-        return (Primitive("cube", (_IN_RVIZ, _IN_RVIZ, _FLAT)),)
+        return (Primitive("cube", (_RVIZ_SIZE, _RVIZ_SIZE, _RVIZ_THICKNESS)),)

@@ -1,9 +1,9 @@
-"""What a shape is: all that a scene file, the world, the cameras and rviz have to know of one.
+"""The interface of a shape for scene files, the world, the cameras and rviz.
 
-Each shape is one frozen dataclass in a file of its own, which says what it is by its base classes; its fields are
-its keys in a scene file, where it stands in one.
+Each shape is a frozen dataclass in its own file. Its base classes state where it can be used; its fields are its keys
+in a scene file, if it can be used there.
 
-PyBullet, which only world/ knows, and rviz, which only ros/ knows, are told of it in words of theirs.
+PyBullet, which only world/ knows, and rviz, which only ros/ knows, get the neutral descriptions below.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from drone_sim.shapes.solid import Solid, hull_of
 
 
 class Files(Protocol):
-    """Writes what PyBullet is to read: it is given no other files. Raises RuntimeError where the disk is full."""
+    """Writer of the files that PyBullet reads; it reads no others. Raises RuntimeError if the disk is full."""
 
     def write(self, content: bytes, suffix: str) -> str:
         """Write a file; return its path."""
 
     def mesh(self, path: str, hull: bool = False) -> str:
-        """Write a mesh file once more, or what has the same convex `hull`; return its path.
+        """Write a mesh file again, or one with the same convex hull if `hull`; return its path.
 
-        Raises ValueError, in one line that names the file, for one that cannot be read.
+        Raises ValueError, in one line that names the file, if it cannot be read.
         """
 
     def urdf(self, robot: Xml.Element) -> str:
-        """Write a URDF that urdf_files.read has checked, and its meshes; return its path. Raises what `mesh` does."""
+        """Write a URDF that urdf_files.read has checked, and its meshes; return its path. Raises as `mesh` does."""
 
 
 class Geometry(NamedTuple):
     """A body of one link: its collision and its visual shape.
 
     type: name of the constant for `shapeType`; collision, visual: the other arguments of createCollisionShape and
-    createVisualShape, which differ in their words; flags: name of the constant for the collision shape's, or none.
+    createVisualShape, whose names differ; flags: name of the constant for the collision shape's flags, or ''.
     """
 
     type: str
@@ -51,9 +51,9 @@ class Geometry(NamedTuple):
 
 
 class UrdfFile(NamedTuple):
-    """A body as a URDF says, which loadURDF reads, and the principal moments (kg m²) of each link, by its name.
+    """A body as a URDF for loadURDF, and the principal moments (kg m²) of each link, by its name.
 
-    In the file is a sphere's inertia, along the same axes: PyBullet takes moments that no solid has for 0.
+    The file has a sphere's inertia, along the same axes: PyBullet sets moments that no solid can have to 0.
     """
 
     path: str
@@ -64,10 +64,10 @@ Corner = tuple[float, float, float]
 
 
 class Primitive(NamedTuple):
-    """One marker.
+    """A marker in rviz.
 
-    scale: along x, y, z; a cube, sphere or cylinder is of 1 m without it. local: the shape's frame from its own.
-    file: path of a "mesh". corners: of "triangles", three each, counter-clockwise seen from outside, m.
+    scale: along x, y, z; without it a cube, sphere or cylinder measures 1 m. local: shape from marker. file: path of a
+    "mesh". corners: of "triangles", three each, counter-clockwise seen from outside, m.
     """
 
     kind: Literal["cube", "sphere", "cylinder", "mesh", "triangles"]
@@ -79,14 +79,14 @@ class Primitive(NamedTuple):
 
 Rgba = tuple[float, float, float, float]  # 0..1
 
-SECTIONS = 24  # of what is round, around its axis
+SECTIONS = 24  # around the axis of round shapes
 
 
 class Triangles(NamedTuple):
-    """One material's triangles, in the shape's frame.
+    """Triangles of one material, in the shape's frame.
 
-    corners: (m, 3, 3), m, counter-clockwise seen from outside; uv: (m, 3, 2), v upwards, or None; rgba: 0..1;
-    texture: (h, w, 3 or 4) uint8, top row first, or None.
+    corners: (m, 3, 3), m, counter-clockwise seen from outside; uv: (m, 3, 2), v upwards, or None; rgba: 0..1; texture:
+    (h, w, 3 or 4) uint8, top row first, or None.
     """
 
     corners: np.ndarray
@@ -96,98 +96,98 @@ class Triangles(NamedTuple):
 
 
 def turned(profile: Sequence[tuple[float, float]], sections: int = SECTIONS) -> np.ndarray:
-    """Return the corners (m, 3, 3) of what a line of points (radius, z), upwards, makes as it turns about z."""
+    """Return the corners (m, 3, 3) of the surface of revolution about z of a profile (radius, z), upwards."""
     angles = 2 * np.pi / sections * np.arange(sections)
     circle = np.column_stack([np.cos(angles), np.sin(angles), np.ones(sections)])
     rings = np.array([circle * (radius, radius, z) for radius, z in profile])
     low, high = rings[:-1], rings[1:]
     next_low, next_high = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
-    both = np.stack([np.stack([low, next_low, next_high], axis=2), np.stack([low, next_high, high], axis=2)], axis=2)
-    corners = both.reshape(-1, 3, 3)
-    meet = (corners == np.roll(corners, 1, axis=1)).all(axis=2).any(axis=1)  # on the axis
-    return corners[~meet]
+    pairs = np.stack([np.stack([low, next_low, next_high], axis=2), np.stack([low, next_high, high], axis=2)], axis=2)
+    corners = pairs.reshape(-1, 3, 3)
+    is_degenerate = (corners == np.roll(corners, 1, axis=1)).all(axis=2).any(axis=1)  # on the axis
+    return corners[~is_degenerate]
 
 
 def half_circle(radius: float, length: float = 0.0, sections: int = SECTIONS) -> list[tuple[float, float]]:
-    """Return points (radius, z) of half a circle, upwards, whose upper half is shifted away by a length."""
+    """Return points (radius, z) of half a circle, upwards, with its two quarters `length` apart."""
     angles = np.linspace(0, np.pi / 2, sections // 4 + 1)[:-1]
     upper = [*zip(radius * np.cos(angles), radius * np.sin(angles) + length / 2), (0.0, radius + length / 2)]
-    return [*((wide, -z) for wide, z in reversed(upper)), *upper]
+    return [*((r, -z) for r, z in reversed(upper)), *upper]
 
 
 def outer(radius: float) -> float:
-    """Return the circumradius of the polygon that has the area of the circle: silhouettes agree on average."""
+    """Return the circumradius of the polygon with the area of the circle, so that silhouettes agree on average."""
     angle = 2.0 * np.pi / SECTIONS
     return float(radius * np.sqrt(angle / np.sin(angle)))
 
 
 class Shape(ABC):
-    """A form, in its own frame: centred on its origin, metres."""
+    """A form in its own frame, which is at its centre; metres."""
 
-    word: ClassVar[str]  # by which scene files and messages name it
+    word: ClassVar[str]  # its name in scene files and messages
 
     def __str__(self) -> str:
-        """Return its name for a message, with the file that it is read from."""
+        """Return its name for messages, with the file that it is read from."""
         return self.word
 
 
 @dataclass(frozen=True)
 class SceneShape(Shape):
-    """What can stand in a scene: a dataclass whose fields, with their types, are its keys there."""
+    """A shape that a scene may contain: a dataclass whose typed fields are its keys in the scene file."""
 
-    default_color: ClassVar[Rgba] = (0.7, 0.7, 0.7, 1.0)  # where a scene file says none
+    default_color: ClassVar[Rgba] = (0.7, 0.7, 0.7, 1.0)  # without one in the scene file
 
     @abstractmethod
     def for_bullet(self, files: Files, moves: bool) -> Geometry | UrdfFile:
-        """Return what PyBullet makes a body of; `moves` is whether that will have a mass.
+        """Return a description of the body for PyBullet; `moves`: the body will have a mass.
 
-        Raises ValueError, in one line that names the file, for one that cannot be read.
+        Raises ValueError, in one line that names the file, if it cannot be read.
         """
 
     def meshes(self) -> Iterable[tuple[str, Sequence[float]]]:
-        """Return path and scale (x, y, z) of the mesh files that it is made of. Raises what `for_bullet` does."""
+        """Return path and scale (x, y, z) of its mesh files. Raises as `for_bullet` does."""
         return ()
 
 
 class DrawnShape(Shape):
-    """What the cameras and rviz draw."""
+    """A shape that the cameras and rviz draw."""
 
-    has_uv: ClassVar[bool] = False  # whether there is something to lay a texture by
+    has_uv: ClassVar[bool] = False  # whether it has texture coordinates
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The files that it is read from: another look when they are written anew."""
+        """The files that it is read from; it looks different when they are written again."""
         return ()
 
     @abstractmethod
     def triangles(self) -> Iterable[Triangles]:
         """Return its surface, by material.
 
-        Raises ValueError, in one line that names the file, for one that cannot be read.
+        Raises ValueError, in one line that names the file, if it cannot be read.
         """
 
     def solid(self) -> Solid:
-        """Return what it fills: its convex hull, which is what of it collides when it moves.
+        """Return its convex hull, with which it collides if it moves.
 
-        Raises what `triangles` does.
+        Raises as `triangles` does.
         """
         return hull_of([part.corners for part in self.triangles()])
 
     def shared(self) -> tuple[DrawnShape, tuple[float, float, float]]:
-        """Return the shape whose triangles serve all sizes of this one, and the scale (x, y, z) that makes it this."""
+        """Return a shape whose triangles serve all sizes of this one, and the scale (x, y, z) to this size."""
         return self, (1.0, 1.0, 1.0)
 
     @abstractmethod
     def for_rviz(self) -> Sequence[Primitive]:
-        """Return what rviz draws of it, its color and texture aside."""
+        """Return the markers that rviz draws, without color and texture."""
 
 
 class ReportedShape(DrawnShape):
-    """What PyBullet tells of by a constant of its own: what a URDF may hold."""
+    """A shape for which PyBullet reports a type: a shape that a URDF may contain."""
 
-    bullet_type: ClassVar[str]  # the constant's name
+    bullet_type: ClassVar[str]  # name of PyBullet's constant
 
     @classmethod
     @abstractmethod
     def from_bullet(cls, dimensions: Sequence[float], file: str) -> ReportedShape:
-        """Return the shape with these `dimensions` of getVisualShapeData, and the mesh file that PyBullet's is of."""
+        """Return the shape from `dimensions` in getVisualShapeData, and the mesh file behind PyBullet's."""

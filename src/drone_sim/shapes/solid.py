@@ -1,4 +1,4 @@
-"""What a shape fills: its volume, where the middle of it is, and how it resists being turned."""
+"""The volume of a shape, its centroid and inertia."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-_THIN = 1e-9  # of the bounds' volume: what has less is taken for a box of its bounds
-_THICKNESS = 1e-4  # m, of that box where the bounds are flat
+_THIN = 1e-9  # fraction of the bounds' volume; a thinner hull counts as a box of its bounds
+_THICKNESS = 1e-4  # m, of that box if the bounds are flat
 
 
 class Solid(NamedTuple):
@@ -20,13 +20,13 @@ class Solid(NamedTuple):
 
 
 def round_solid(volume: float, xx: float, zz: float) -> Solid:
-    """Return the solid of what is round about its z axis, and centred, by its radii of gyration squared (m²)."""
+    """Return a centred solid of revolution about z, from its radii of gyration squared (m²)."""
     return Solid(volume, np.zeros(3), volume * np.diag([xx, xx, zz]))
 
 
 def hull_of(corners: Sequence[np.ndarray]) -> Solid:
-    """Return the convex hull of triangles (m, 3, 3) each, as a solid; of what is flat, a thin box of its bounds."""
-    import trimesh  # takes longer to import than all else
+    """Return the convex hull of triangles (m, 3, 3), as a solid; for a flat hull, a thin box of its bounds."""
+    import trimesh  # late: takes longer to import than everything else
     from manifold3d import Manifold
 
     points = np.concatenate(corners).reshape(-1, 3)
@@ -34,8 +34,8 @@ def hull_of(corners: Sequence[np.ndarray]) -> Solid:
     extents = np.maximum(high - low, _THICKNESS)
     hull = Manifold.hull_points(points)
     if hull.volume() > _THIN * np.prod(extents):
-        told = hull.to_mesh64()
-        solid = trimesh.Trimesh(told.vert_properties, told.tri_verts, process=False)
+        hull_mesh = hull.to_mesh64()
+        solid = trimesh.Trimesh(hull_mesh.vert_properties, hull_mesh.tri_verts, process=False)
     else:
         solid = trimesh.creation.box(extents, trimesh.transformations.translation_matrix((low + high) / 2))
     return Solid(float(solid.volume), np.asarray(solid.center_mass), np.asarray(solid.moment_inertia))

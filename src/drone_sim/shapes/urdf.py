@@ -1,4 +1,4 @@
-"""A URDF as an object of a scene: links and joints, each with shapes of its own."""
+"""A URDF as an object of a scene: links and joints with their shapes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drone_sim.shapes.urdf_inertials import complete_inertials
 
 @dataclass(frozen=True)
 class Urdf(SceneShape):
-    """A URDF, which says itself how it looks and what it weighs; a mass of 0 nails its root link to the world."""
+    """A URDF, which states its own looks and masses; with a mass of 0 its root link is fixed to the world."""
 
     word = "urdf"
 
@@ -22,11 +22,11 @@ class Urdf(SceneShape):
     size: tuple[()] = ()
 
     def __str__(self) -> str:
-        """Return its name for a message."""
+        """Return its name for messages."""
         return f"{self.word} {self.file}"
 
     def for_bullet(self, files: Files, moves: bool) -> UrdfFile:
-        """Return the file, checked and cleaned, with the inertia of each link."""
+        """Return the checked and cleaned file, with the inertia of each link."""
         robot = self._robot()
         try:
             moments = complete_inertials(robot)
@@ -35,7 +35,7 @@ class Urdf(SceneShape):
         return UrdfFile(files.urdf(robot), moments)
 
     def meshes(self) -> Iterator[tuple[str, Sequence[float]]]:
-        """Yield what its visuals and collisions name."""
+        """Yield path and scale of the meshes of its visuals and collisions."""
         for mesh in self._robot().iter("mesh"):
             yield mesh.attrib["filename"], [float(word) for word in mesh.attrib["scale"].split()]
 

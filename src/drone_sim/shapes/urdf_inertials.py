@@ -1,4 +1,4 @@
-"""What each link of a scene's URDF weighs, and how that lies in it, where the file leaves it open."""
+"""Mass and inertia of the links of a scene's URDF, also where the file does not state them."""
 
 from __future__ import annotations
 
@@ -17,26 +17,25 @@ from drone_sim.shapes.mesh import Mesh
 from drone_sim.shapes.shape import WHITE, SceneShape
 from drone_sim.shapes.sphere import Sphere
 
-_UNTOLD = 1.0  # kg, of a link that moves and says no mass; PyBullet takes it for that
-_ROUNDING = 1e-9  # of the largest moment
+_DEFAULT_MASS = 1.0  # kg, of a moving link without a stated mass, as in PyBullet
+_ROUNDING = 1e-9  # fraction of the largest moment
 
 
 def complete_inertials(robot: Xml.Element) -> dict[str, tuple[float, float, float]]:
     """Write an <inertial> into each link of a checked URDF; return the links' principal moments (kg m²), by name.
 
-    A link with a mass and no inertia is evenly filled. One without <inertial> weighs nothing where a fixed joint holds
-    it, else 1 kg. Raises ValueError, in one line, for a tensor with a negative moment, and for a mesh that cannot be
-    read.
+    A link with a mass and no inertia is evenly filled. One without <inertial> has no mass if a fixed joint holds it,
+    else 1 kg. Raises ValueError, in one line, for a tensor with a negative moment, and for a mesh that cannot be read.
     """
     fixed = (joint for joint in robot.findall("joint") if joint.get("type") == "fixed")
     held = {joint.findall("child")[0].attrib["link"] for joint in fixed}
     return {name: _complete(link, name in held) for link in robot.findall("link") for name in [link.attrib["name"]]}
 
 
-def _complete(link: Xml.Element, held: bool) -> tuple[float, float, float]:
-    told = link.find("inertial") is not None
-    mass = urdf.mass_of(link) if told else 0.0 if held else _UNTOLD
-    inertia = _told(link) or _evenly_filled(link, mass)
+def _complete(link: Xml.Element, is_held: bool) -> tuple[float, float, float]:
+    has_inertial = link.find("inertial") is not None
+    mass = urdf.mass_of(link) if has_inertial else 0.0 if is_held else _DEFAULT_MASS
+    inertia = _stated_inertia(link) or _evenly_filled(link, mass)
     least = min(inertia.moments)
     if least < -_ROUNDING * max(map(abs, inertia.moments)):
         raise ValueError(f"link {link.attrib['name']}: inertia: principal moment {least:g} kg m²: must be 0 or more")
@@ -44,15 +43,15 @@ def _complete(link: Xml.Element, held: bool) -> tuple[float, float, float]:
     return inertia.moments
 
 
-def _told(link: Xml.Element) -> PrincipalInertia | None:
-    """Return the inertia that a link says, None where it says none."""
+def _stated_inertia(link: Xml.Element) -> PrincipalInertia | None:
+    """Return the inertia that a link states, or None."""
     tensor = urdf.inertia_tensor(link)
     centre = frames.position(urdf.origin_of(link.find("inertial")))
     return principal(tensor, np.array(centre)) if tensor.any() else None
 
 
 def _evenly_filled(link: Xml.Element, mass: float) -> PrincipalInertia:
-    """Return the inertia of a mass that fills what of a link collides, else what of it is seen."""
+    """Return the inertia of a mass that fills the link's collision shapes, or else its visuals."""
     parts = [*_parts(link, "collision")] or [*_parts(link, "visual")]
     if mass and parts:
         return inertia_of(parts, mass)
@@ -67,7 +66,7 @@ def _parts(link: Xml.Element, kind: str) -> Iterator[Part]:
 
 
 def _shape(geometry: Xml.Element) -> SceneShape | None:
-    """Return a shape; None for a plane, which fills nothing."""
+    """Return a shape; None for a plane, which has no volume."""
     if geometry.tag == "mesh":
         x, y, z = _numbers(geometry, "scale")
         return Mesh(geometry.attrib["filename"], (x, y, z))
@@ -88,12 +87,12 @@ def _numbers(geometry: Xml.Element, attribute: str) -> list[float]:
 
 
 def _write(link: Xml.Element, mass: float, inertia: PrincipalInertia) -> None:
-    for told in link.findall("inertial"):
-        link.remove(told)
+    for old in link.findall("inertial"):
+        link.remove(old)
     inertial = Xml.SubElement(link, "inertial")
     frame = inertia.frame
-    place, turn = (" ".join(map(repr, three)) for three in (frames.position(frame), frames.to_rpy(frame)))
-    Xml.SubElement(inertial, "origin", xyz=place, rpy=turn)
+    xyz, rpy = (" ".join(map(repr, three)) for three in (frames.position(frame), frames.to_rpy(frame)))
+    Xml.SubElement(inertial, "origin", xyz=xyz, rpy=rpy)
     Xml.SubElement(inertial, "mass", value=repr(mass))
     a = b = c = repr(max(inertia.moments))
     Xml.SubElement(inertial, "inertia", ixx=a, iyy=b, izz=c, ixy="0", ixz="0", iyz="0")

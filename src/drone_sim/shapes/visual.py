@@ -1,4 +1,4 @@
-"""A neutral description of one thing to draw, shared by the world (which fills it) and the renderer."""
+"""A neutral description of a visual, which the world creates and the renderer draws."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ GROUND = (0.47, 0.50, 0.44)  # colour of the bare ground around the floor
 
 @dataclass(frozen=True)
 class Visual:
-    """One shape with its look, in its own frame; where it stands is given per frame, as a pose.
+    """A shape and its appearance, in its own frame; its pose is given separately for each picture.
 
-    key: identity, for example ``(body, index)``; a different Visual under a known key replaces it.
-    rgba: 0..1, multiplied with what a mesh's own material says; white leaves the material as it is.
+    key: identity, for example ``(body, index)``; a different Visual with a known key replaces it.
+    rgba: 0..1, multiplied with a mesh's own material; white leaves the material unchanged.
     texture: path of an image that replaces a mesh's own texture.
-    edition: changes when the files of this visual have been written anew.
-    floor: receives the shadows; a horizontal surface whose top is the top of its geometry.
-    ground: what is around the floor, as far as one sees; receives the shadows, too.
+    edition: changes when the files of this visual have been written again.
+    floor: receives the shadows; a horizontal surface at the top of its geometry.
+    ground: the surroundings of the floor, as far as cameras see; receives the shadows, too.
     """
 
     key: Hashable
