@@ -15,19 +15,19 @@ class PushedBody(Protocol):
 
     @property
     def mass(self) -> float:
-        """Its mass (kg)."""
+        """The body's mass (kg)."""
 
     @property
     def state(self) -> State:
-        """Pose and velocity of its root link."""
+        """Pose and velocity of the body's root link."""
 
     @property
     def matrix(self) -> Matrix:
-        """Transform world from its root link."""
+        """Transform world from the root link."""
 
     @property
     def wind(self) -> Vector:
-        """Velocity of the air at its position (m/s, world)."""
+        """Velocity of the air at the body (m/s, world)."""
 
 
 class Force:

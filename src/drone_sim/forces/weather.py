@@ -52,7 +52,7 @@ class WeatherParameters(Checked):
 class Weather:
     """The air of one simulation. It has no effect without wind and gusts, until a change brings some.
 
-    `changes` counts the changes.
+    `changes` is the number of changes so far.
     """
 
     def __init__(self, parameters: WeatherParameters, clock: Clock):

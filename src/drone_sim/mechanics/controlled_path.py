@@ -73,12 +73,12 @@ class ControlledPath(Path):
         self._distances = list(itertools.accumulate(lengths, initial=0.0))
 
     def at(self, along: float) -> Matrix:
-        """Return the frame at a measured distance (m) from the beginning, in the path's frame. Raises ValueError."""
+        """Return the frame, in the path's, at a measured distance (m). Raises ValueError for a path without points."""
         station = self._station(along)
         return frames.from_quaternion(station.position, station.turn)
 
     def carried(self, along: float) -> tuple[int, list[float]]:
-        """Return the flags and the four channels at a distance (m) from the beginning. Raises ValueError."""
+        """Return flags and four channels at a measured distance (m). Raises ValueError for a path without points."""
         station = self._station(along)
         return station.flags, list(station.channels)
 

@@ -33,19 +33,19 @@ class JointControl:
 
 
 class Drive(Protocol):
-    """A joint in the dynamics; rad or m, N m or N."""
+    """Interface of a joint in the dynamics; rad or m, N m or N."""
 
     def state(self) -> tuple[float, float, float]:
         """Return position, velocity (per s), and the motor's force or torque in the last sub-step."""
 
     def put(self, value: float) -> None:
-        """Place it at a position, at rest."""
+        """Place the joint at a position, at rest."""
 
     def limit(self, limits: tuple[float, float] | None) -> None:
-        """Change its limits, or remove them."""
+        """Change the joint's limits, or remove them."""
 
     def command(self, control: JointControl) -> None:
-        """Control its motor like that from now on; in the mode kinematic it stands still."""
+        """Control the motor by `control` from now on; in the mode kinematic it holds the joint still."""
 
 
 class Joint(SceneObject):
@@ -87,11 +87,11 @@ class Joint(SceneObject):
 
     @property
     def velocity_along(self) -> float:
-        """Velocity, rad/s or m/s; 0 if the dynamics does not move it."""
+        """Velocity, rad/s or m/s; 0 if the dynamics does not move the joint."""
         return 0.0 if self.drive is None else self.drive.state()[1]
 
     def place(self, value: float) -> None:
-        """Set the position (rad or m), at most to its limits."""
+        """Set the position (rad or m), within the limits."""
         if self.limits is not None:
             value = min(max(value, self.limits[0]), self.limits[1])
         self._value = value
@@ -99,7 +99,7 @@ class Joint(SceneObject):
             self.drive.put(value)
 
     def limit(self, limits: tuple[float, float] | None) -> None:
-        """Change its limits (rad or m), or remove them."""
+        """Change the limits (rad or m), or remove them."""
         self.limits = limits
         if self.drive is not None:
             self.drive.limit(limits)
@@ -107,11 +107,11 @@ class Joint(SceneObject):
             self.place(self._value)
 
     def release(self) -> None:
-        """Remove it from the dynamics; it keeps its position."""
+        """Remove the joint from the dynamics; it keeps its position."""
         self._value, self.drive = self.value, None
 
     def below(self) -> Matrix:
-        """Return the transform world from the frame of its children."""
+        """Return the transform world from the frame that children are relative to."""
         frame, motion = self.matrix(), (self.value, self.turn)
         if frame is not self._joint_frame or motion != self._motion_of_child:
             self._joint_frame, self._motion_of_child = frame, motion
@@ -119,7 +119,7 @@ class Joint(SceneObject):
         return self._child_frame
 
     def motion_matrix(self) -> Matrix:
-        """Return the transform of its position: its own frame from the frame of its children."""
+        """Return the transform of the position: the joint's frame from the frame of its children."""
         if self.motion == SPHERICAL:
             return self.turn
         value = self.value
@@ -130,7 +130,7 @@ class Joint(SceneObject):
     # ---- control
 
     def command(self, control: JointControl) -> None:
-        """Set its control; without a drive it jumps to a new target position at once."""
+        """Set the control; without a drive the joint jumps to a new target position at once."""
         before, self.control = self.control, control
         self.dynamic_mode = control.mode if control.mode != KINEMATIC else self.dynamic_mode
         if self.drive is not None:
@@ -139,7 +139,7 @@ class Joint(SceneObject):
             self.place(control.position)
 
     def change(self, **changes: str | float) -> None:
-        """Change some fields of its control."""
+        """Change some fields of the control."""
         self.command(replace(self.control, **changes))  # type: ignore[arg-type]
 
     def save_state(self) -> Restore:

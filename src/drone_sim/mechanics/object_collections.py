@@ -129,7 +129,7 @@ def _selected_objects(item: Item, tree: ObjectTree) -> dict[int, None]:
 
 
 def members(entity: int, objects: ObjectTree, collections: Collections) -> list[int]:
-    """Return the handles of the objects of `entity`, an object or a collection. Raises ValueError, TypeError."""
+    """Return the handles of an object, or of a collection's objects. Raises ValueError, TypeError for neither."""
     if entity in collections:
         return collections.objects(entity, objects)
     objects[entity]

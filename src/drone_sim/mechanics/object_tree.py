@@ -80,8 +80,8 @@ class ObjectTree:
         `alias` is its name in 4.x paths (by default `name`), `also` are further names, `kind` is one of
         scene_object.KINDS. Raises ValueError for a name that is taken.
         """
-        above = self._objects[self._handles[parent]] if parent else None
-        return self.insert(SceneObject((name, *also), alias or name, above, local, body, kind=kind))
+        parent_object = self._objects[self._handles[parent]] if parent else None
+        return self.insert(SceneObject((name, *also), alias or name, parent_object, local, body, kind=kind))
 
     def insert(self, added: SceneObject) -> int:
         """Add a SceneObject; return its handle. Raises ValueError for a name that is taken."""

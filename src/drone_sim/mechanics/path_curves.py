@@ -60,18 +60,18 @@ def line(points: Sequence[ControlPoint], closed: bool) -> list[Station]:
     return _without_repeats(stations)
 
 
-def between(one: Station, other: Station, share: float) -> Station:
-    """Interpolate between two stations (share: 0 to 1): positions linearly, orientations about one axis."""
-    x, y, z = _mix(one.position, other.position, share)
-    a, b, c, d = _mix(one.channels, other.channels, share)
-    flags = one.flags if share < 0.5 else other.flags
-    pause = one.pause + share * (other.pause - one.pause)
-    return Station((x, y, z), _slerp(one.turn, other.turn, share), pause, flags, (a, b, c, d))
+def between(start: Station, end: Station, t: float) -> Station:
+    """Interpolate between two stations, t from 0 to 1: positions linearly, orientations about one axis."""
+    x, y, z = _mix(start.position, end.position, t)
+    a, b, c, d = _mix(start.channels, end.channels, t)
+    flags = start.flags if t < 0.5 else end.flags
+    pause = start.pause + t * (end.pause - start.pause)
+    return Station((x, y, z), _slerp(start.turn, end.turn, t), pause, flags, (a, b, c, d))
 
 
-def angle_between(one: Quaternion, other: Quaternion) -> float:
+def angle_between(start: Quaternion, end: Quaternion) -> float:
     """Return the angle (rad, 0 to pi) of the rotation between two frames."""
-    *axis, w = _rotation(one, other)
+    *axis, w = _rotation(start, end)
     return 2.0 * math.atan2(math.hypot(*axis), abs(w))
 
 
@@ -85,9 +85,7 @@ def _corner(previous: ControlPoint, point: ControlPoint, following: ControlPoint
     for index in range(point.count):
         t = index / (point.count - 1)
         station = between(between(first, point.at, t), between(point.at, last, t), t)
-        offset = (
-            t * (point.before + point.after) / 2 - point.before / 2
-        )  # in segments; channels do not follow the curve
+        offset = t * (point.before + point.after) / 2 - point.before / 2  # in segments; channels ignore the curve
         channels = between(point.at, previous.at if offset < 0 else following.at, abs(offset)).channels
         stations.append(station._replace(flags=point.at.flags, channels=channels))
     return stations

@@ -18,14 +18,14 @@ class DynamicBody(Protocol):
 
     @property
     def state(self) -> State:
-        """Pose and velocity of its frame."""
+        """Pose and velocity of the body's frame."""
 
     @property
     def matrix(self) -> Matrix:
-        """Transform world from its frame."""
+        """Transform world from the body's frame."""
 
     def move(self, pose: Pose) -> None:
-        """Place it at a pose, at rest."""
+        """Place the body at a pose, at rest."""
 
 
 class SceneObject:
@@ -44,7 +44,7 @@ class SceneObject:
         """Create an object at `local` in the parent's frame (the world's if None), or at the frame of `body`.
 
         `names` are unique in the scene (V-REP 3.x), siblings may share the `alias` (4.x paths). `kind` is one of KINDS;
-        by default it is shape with a body, and dummy without.
+        by default `shape` with a body and `dummy` without.
         """
         self.names = names
         self.alias = alias
@@ -61,41 +61,41 @@ class SceneObject:
 
     @property
     def name(self) -> str:
-        """Its first name."""
+        """The object's first name."""
         return self.names[0]
 
     def is_called(self, name: str) -> bool:
-        """Return whether `name` is the alias or one of the names, with or without their suffix."""
+        """Return whether `name` is the object's alias or one of its names, with or without their suffix."""
         return name == self.alias or any(name in (full, plain(full)) for full in self.names)
 
     @property
     def is_loose(self) -> bool:
-        """Whether it is a body with a parent, which it follows only when a script moves the parent."""
+        """Whether the object is a body with a parent, which it follows only when a script moves the parent."""
         return self.body is not None and self.parent is not None
 
     def is_part_of(self, whole: SceneObject) -> bool:
-        """Return whether it is `whole`, or was added below it, whatever its parent is now."""
+        """Return whether the object is `whole`, or was added below it, whatever its parent is now."""
         part: SceneObject | None = self
         while part is not None and part is not whole:
             part = part._first_parent
         return part is whole
 
     def model(self) -> SceneObject | None:
-        """Return the base of the model that it is part of, possibly itself, or None."""
+        """Return the base of the model that the object is part of, possibly the object itself, or None."""
         ancestor: SceneObject | None = self
         while ancestor is not None and not ancestor.is_model:
             ancestor = ancestor.parent
         return ancestor
 
     def hangs_on(self, other: SceneObject) -> bool:
-        """Return whether `other` is its parent or another ancestor."""
+        """Return whether `other` is the object's parent or another ancestor."""
         ancestor = self.parent
         while ancestor is not None and ancestor is not other:
             ancestor = ancestor.parent
         return ancestor is not None
 
     def matrix(self) -> Matrix:
-        """Return the transform world from this frame."""
+        """Return the transform world from the object's frame."""
         if self.body is not None:
             return self.body.matrix
         if self.parent is None:
@@ -106,11 +106,11 @@ class SceneObject:
             self._cached_parent, self._cached_local, self._cached_matrix = parent, local, frames.multiply(parent, local)
         return self._cached_matrix
 
-    # Transform world from the frame of its children: its own frame, except in a joint.
+    # Transform world from the frame that children are relative to: the object's frame, except in a joint.
     below = matrix
 
     def put(self, matrix: Matrix) -> None:
-        """Place it at a transform in the world; its body, if it has one, is then at rest."""
+        """Place the object at a transform in the world; the body, if it has one, is then at rest."""
         if self.body is not None:
             self.body.move(Pose(frames.position(matrix), frames.to_quaternion(matrix)))
         elif self.parent is None:
@@ -119,19 +119,19 @@ class SceneObject:
             self.local = frames.multiply(frames.invert(self.parent.below()), matrix)
 
     def save_state(self) -> Restore:
-        """Return a function that puts it back where it is now, below its present parent."""
+        """Return a function that puts the object back where it is now, below its present parent."""
         return saved(self, "parent", "local")
 
     @property
     def carrier(self) -> DynamicBody | None:
-        """The body that moves it: its own, or its nearest ancestor's; None if the dynamics moves none."""
+        """The body that moves the object: its own, or its nearest ancestor's; None if no body does."""
         item: SceneObject | None = self
         while item is not None and item.body is None:
             item = item.parent
         return None if item is None else item.body
 
     def velocity(self) -> tuple[Vector, Vector]:
-        """Return linear (m/s) and angular (rad/s) velocity in the world; zero if no body moves it."""
+        """Return the object's linear (m/s) and angular (rad/s) velocity, world frame; zero if no body moves it."""
         carrier = self.carrier
         if carrier is None:
             return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Reads a drone's URDF as one rigid body, since V-REP's force sensors hold its links together rigidly.
+"""Reader of a drone's URDF as one rigid body, since V-REP's force sensors hold its links together rigidly.
 
 PyBullet's own URDF_MERGE_FIXED_LINKS adds up the links' inertias without the terms that their rotations and offsets
 bring, and an unmerged drone of five links costs twice the time per step. So the links are merged here, by the

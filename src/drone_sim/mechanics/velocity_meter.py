@@ -10,7 +10,7 @@ from drone_sim.mechanics.saved_state import Restore, saved
 
 
 class VelocityMeter:
-    """Measures mean velocities over the last step, of vehicles and of every object that was asked for.
+    """Measures mean velocities over the last step, of vehicles and of every object whose velocity was requested.
 
     For objects that the dynamics moves or carries, only motion between `begin_step` and `end_step` counts; placing them
     elsewhere, by a script or a person, does not. For all other objects that counts as motion, too.
@@ -49,7 +49,7 @@ class VelocityMeter:
         """Return linear (m/s, world) and angular velocity (rad/s): Euler angles of the step's rotation, per second.
 
         The angles refer to the object's frame before the step. For an object that was placed elsewhere since, or is new
-        to the meter, both are the present velocities in the dynamics. Raises ValueError.
+        to the meter, both are the present velocities in the dynamics. Raises ValueError for an unknown handle.
         """
         rotation = self._rotation_over_step(handle)
         if rotation is None:
@@ -61,7 +61,7 @@ class VelocityMeter:
         return linear, (alpha / duration, beta / duration, gamma / duration)
 
     def rotation(self, handle: int) -> Vector:
-        """Return the rotation vector of the step, per second (rad/s, world). Raises ValueError."""
+        """Return the step's rotation vector per second (rad/s, world). Raises ValueError for an unknown handle."""
         rotation = self._rotation_over_step(handle)
         if rotation is None:
             return self._objects[handle].velocity()[1]

@@ -34,7 +34,7 @@ class Mesh(SceneShape, ReportedShape):
     )
 
     def __str__(self) -> str:
-        """Return its name for messages."""
+        """Return the mesh's name for messages."""
         return f"{self.word} {self.file}"
 
     @property
@@ -47,7 +47,7 @@ class Mesh(SceneShape, ReportedShape):
         return ((self.file, self.size),)
 
     def for_bullet(self, files: Files, moves: bool) -> Geometry:
-        """Return the mesh itself if it is static, so it may be concave; else its convex hull."""
+        """Return the mesh itself, which may be concave, for a static body; for a moving one its convex hull."""
         scale = {"meshScale": list(self.size)}
         visual = {**scale, "fileName": files.mesh(self.file)}
         if moves:

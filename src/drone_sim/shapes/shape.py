@@ -53,7 +53,7 @@ class Geometry(NamedTuple):
 class UrdfFile(NamedTuple):
     """A body as a URDF for loadURDF, and the principal moments (kg m²) of each link, by its name.
 
-    The file has a sphere's inertia, along the same axes: PyBullet sets moments that no solid can have to 0.
+    The file states the inertia of a sphere, along the same axes: PyBullet takes moments that no solid can have for 0.
     """
 
     path: str
@@ -122,12 +122,12 @@ def outer(radius: float) -> float:
 
 
 class Shape(ABC):
-    """A form in its own frame, which is at its centre; metres."""
+    """A geometric form, centred on the origin of its frame; metres."""
 
-    word: ClassVar[str]  # its name in scene files and messages
+    word: ClassVar[str]  # name in scene files and messages
 
     def __str__(self) -> str:
-        """Return its name for messages, with the file that it is read from."""
+        """Return the shape's name for messages, with the file that it is read from."""
         return self.word
 
 
@@ -145,7 +145,7 @@ class SceneShape(Shape):
         """
 
     def meshes(self) -> Iterable[tuple[str, Sequence[float]]]:
-        """Return path and scale (x, y, z) of its mesh files. Raises as `for_bullet` does."""
+        """Return path and scale (x, y, z) of the shape's mesh files. Raises as `for_bullet` does."""
         return ()
 
 
@@ -156,18 +156,18 @@ class DrawnShape(Shape):
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The files that it is read from; it looks different when they are written again."""
+        """The files that the shape is read from; it looks different when they are written again."""
         return ()
 
     @abstractmethod
     def triangles(self) -> Iterable[Triangles]:
-        """Return its surface, by material.
+        """Return the surface, by material.
 
         Raises ValueError, in one line that names the file, if it cannot be read.
         """
 
     def solid(self) -> Solid:
-        """Return its convex hull, with which it collides if it moves.
+        """Return the convex hull, with which the shape collides if it moves.
 
         Raises as `triangles` does.
         """

@@ -44,7 +44,6 @@ def _complete(link: Xml.Element, is_held: bool) -> tuple[float, float, float]:
 
 
 def _stated_inertia(link: Xml.Element) -> PrincipalInertia | None:
-    """Return the inertia that a link states, or None."""
     tensor = urdf.inertia_tensor(link)
     centre = frames.position(urdf.origin_of(link.find("inertial")))
     return principal(tensor, np.array(centre)) if tensor.any() else None

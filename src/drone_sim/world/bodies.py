@@ -1,4 +1,4 @@
-"""Creates PyBullet bodies for the floor, for static objects of a scene, and for URDFs."""
+"""Creation of PyBullet bodies: the floor, static objects of a scene, URDFs."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ class Dynamics:
     def __init__(self, client: int, sub_step: float, queries: Queries, *, gyroscopic: bool):
         """Step the bodies of PyBullet's `client` by `sub_step` (s).
 
-        `gyroscopic`: bodies turn as Euler's equations say; otherwise as in V-REP, without the term ω × Iω.
+        `gyroscopic`: bodies rotate by Euler's equations; otherwise as in V-REP, without the term ω × Iω.
         """
         self._client, self._sub_step, self._queries = client, sub_step, queries
         self.shape_forces = ShapeForces(client)

@@ -1,7 +1,7 @@
 """The term ω × Iω in Euler's equations of all links: omitted as in CoppeliaSim, or integrated accurately.
 
-PyBullet applies it to every multibody, without a switch. It subtracts I⁻¹ (ω × Iω) h from the angular velocity in a
-sub-step of length h, an explicit step: a tumbling body gains energy. A torque ω × Iω cancels the term.
+PyBullet applies it to every multibody and has no option for it. It subtracts I⁻¹ (ω × Iω) h from the angular velocity
+in a sub-step of length h, an explicit step: a tumbling body gains energy. A torque ω × Iω cancels the term.
 """
 
 from __future__ import annotations

@@ -90,21 +90,21 @@ class JointDrive:
         self._is_held = False
 
     def state(self) -> tuple[float, float, float]:
-        """Return its position, velocity, and its motor's force in the last sub-step."""
+        """Return the joint's position, velocity, and its motor's force in the last sub-step."""
         return self._joints.state(*self._at)
 
     def put(self, value: float) -> None:
-        """Place it at a position, at rest."""
+        """Place the joint at a position, at rest."""
         self._joints.put(*self._at, value)
         if self._is_held:
             self._hold(value)
 
     def limit(self, limits: tuple[float, float] | None) -> None:
-        """Change its limits, or remove them."""
+        """Change the joint's limits, or remove them."""
         self._joints.limit(*self._at, limits)
 
     def command(self, control: JointControl) -> None:
-        """Control its motor like that from now on."""
+        """Control the motor by `control` from now on."""
         self._is_held = control.mode == KINEMATIC
         if self._is_held:
             self._hold(self.state()[0])

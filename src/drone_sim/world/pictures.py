@@ -63,7 +63,7 @@ class Pictures:
         self.look_anew()
 
     def add(self, body: int, inertial_from_root: Pose) -> None:
-        """Add a body with the pose of its root link in its inertial frame, whose pose PyBullet returns."""
+        """Add a body; PyBullet returns only the pose of its inertial frame."""
         self._inertial_from_root[body] = inertial_from_root
         self.look_anew()
 
@@ -72,7 +72,7 @@ class Pictures:
         self.changes = next(_changes)
 
     def set_floor(self, body: int, looks: Sequence[tuple[DrawnShape, str]]) -> None:
-        """Set the body that is the floor, on which shadows fall, and its shapes: the floor, and the ground if any."""
+        """Set the body of the floor, on which shadows fall, and its `looks`; the second, if any, is the ground."""
         self._floor = body
         self.set_looks(body, {-1: looks})
 
@@ -206,7 +206,6 @@ class Pictures:
         return self._parts[body]
 
     def _shapes_of(self, body: int, rows: Sequence[Sequence[Any]]) -> list[tuple[DrawnShape, str]]:
-        """Return shape and texture of each visual."""
         if body in self._shapes:  # a link without any has only visuals that PyBullet makes up
             remaining = {link: list(looks) for link, looks in self._shapes[body].items()}
             return [remaining[row[1]].pop(0) for row in rows]

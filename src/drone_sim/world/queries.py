@@ -172,7 +172,7 @@ class Queries:
         return [_touch(row, -1.0 if row[2] in swapped else 1.0) for row in rows if row[9] > 0.0]
 
     def lowest(self, body: int) -> float:
-        """Return the height (m) of the lowest point of a body without joints that can collide."""
+        """Return the height (m) of the lowest point that can collide, of a body without joints."""
         return float(pybullet.getAABB(body, -1, self._client)[0][2])
 
     def overlaps(self) -> int:

@@ -196,7 +196,6 @@ class World:
         self.pictures.forget(body)
 
     def _register(self, number: int) -> None:
-        """Prepare a body that was just created in PyBullet."""
         self.saved_states.forget_snapshots()
         bodies.set_material(self._client, number)
         info = pybullet.getDynamicsInfo(number, -1, self._client)
