@@ -74,9 +74,9 @@ def test_the_widest_fisheye_is_as_wide_as_the_docs_say(width):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (("plumb_bob", (-0.8,)), r"\[-0.8, 0.0, 0.0, 0.0, 0.0\]: this plumb_bob lens is impossible"),
-        (("equidistant", (0.1,) * 5), "5 coefficients: equidistant has 4"),
-        (("barrel", ()), "model 'barrel': must be one of plumb_bob, rational_polynomial, equidistant"),
+        (("plumb_bob", (-0.8,)), r"\[-0.8, 0.0, 0.0, 0.0, 0.0\]: .*plumb_bob.* folds"),
+        (("equidistant", (0.1,) * 5), "5 coefficients"),
+        (("barrel", ()), "model 'barrel'"),
     ],
 )
 def test_what_is_no_lens_is_refused(given, said):

@@ -1,1 +1,1 @@
-"""Camera pictures from meshes and poses: knows numpy and OpenGL, neither PyBullet nor ROS."""
+"""OpenGL renderer: camera images from meshes and poses. It imports neither PyBullet nor ROS."""

@@ -1,4 +1,4 @@
-"""What is on the graphics card: shared meshes, one record per instance, and the draws they make."""
+"""GPU buffers of the visuals: shared meshes, one record per instance, and batches for instanced draw calls."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from drone_sim.render.programs import Role
 from drone_sim.render.surfaces import Surface
 from drone_sim.shapes.visual import Visual
 
-SHADE = 0.55  # what a shadow leaves of the floor's brightness
+SHADE = 0.55  # brightness of the floor in a shadow, relative to its brightness in the light
 VERTEX_LAYOUT = (("position", "3f", 12), ("normal", "3f", 12), ("uv", "2f", 8))
 MOVING_LAYOUT = (("row0", "4f", 16), ("row1", "4f", 16), ("row2", "4f", 16))
 FIXED_LAYOUT = (("paint", "4f", 16),)
@@ -26,7 +26,7 @@ ANISOTROPY = 8.0
 
 @dataclass
 class CardSurface:
-    """A surface on the card."""
+    """A surface in GPU memory."""
 
     vertices: moderngl.Buffer
     indices: moderngl.Buffer
@@ -38,7 +38,7 @@ class CardSurface:
     centre: np.ndarray
 
     def release(self) -> None:
-        """Free its memory on the card."""
+        """Free the GPU memory of the surface."""
         for resource in (self.vertices, self.indices, self.texture):
             if resource is not None:
                 resource.release()
@@ -46,33 +46,33 @@ class CardSurface:
 
 @dataclass
 class Batch:
-    """Instances of one surface that are drawn by one call."""
+    """Instances of one surface that one draw call renders."""
 
     surface: CardSurface
-    members: list[int]  # indices into the visuals
+    members: list[int]  # indices of visuals
     floor: bool = False
     transparent: bool = False
     ground: bool = False
-    first: int = 0  # record
+    first: int = 0  # index of its first record in the instance buffers
     arrays: dict[Role, moderngl.VertexArray] = field(default_factory=dict)
 
     @property
     def look(self) -> str:
-        """Which of the programs of a role draws it."""
+        """Return the key of `programs.LOOKS`: which of a role's shader programs renders this batch."""
         return "plain" if self.surface.texture is None else "floor" if self.floor else "textured"
 
     def draw(self, role: Role) -> None:
-        """Draw in a role that `DrawBatches.link` has linked."""
+        """Render the batch in a role that `DrawBatches.link` prepared."""
         if role.kind == "surface" and self.surface.texture is not None:
             self.surface.texture.use(0)
         self.arrays[role].render(instances=len(self.members) * role.tiles)
 
 
 class DrawBatches:
-    """The visuals as batches; must be used with its context current."""
+    """All visuals, sorted into batches. Its methods need the OpenGL context to be current."""
 
     def __init__(self, context: moderngl.Context, software: bool) -> None:
-        """Empty. software: whether the CPU draws."""
+        """Create it without visuals. software: whether OpenGL renders on the CPU."""
         self._context = context
         self._software = software
         self._linked: set[Role] = set()
@@ -84,24 +84,24 @@ class DrawBatches:
         self.all: list[Batch] = []
         self.solids: list[Batch] = []
         self.floors: list[Batch] = []
-        self.ground: list[Batch] = []  # which the picture is cleared to; it has a depth, too
+        self.ground: list[Batch] = []  # not drawn: the image is cleared to its colour; but it has depth
         self.glass: list[Batch] = []
 
     def update(self, visuals: Sequence[Visual]) -> None:
-        """Follow the list; on ValueError (an unreadable mesh) all stays as it was."""
+        """Replace the visuals. Raises ValueError for an unreadable mesh, and then changes nothing."""
         visuals = tuple(visuals)
         if visuals == self.visuals:
             return
         shared = [_shared(visual) for visual in visuals]
-        loaded = {form: surfaces.load(form) for form, _ in shared if form not in self._surfaces}
+        loaded = {geometry: surfaces.load(geometry) for geometry, _ in shared if geometry not in self._surfaces}
         self._release_batches()
-        for form in set(self._surfaces) - {form for form, _ in shared}:
-            for surface in self._surfaces.pop(form):
+        for geometry in set(self._surfaces) - {geometry for geometry, _ in shared}:
+            for surface in self._surfaces.pop(geometry):
                 surface.release()
-        for form, made in loaded.items():
-            self._surfaces[form] = tuple(self._upload(one) for one in made)
+        for geometry, surfaces_of_geometry in loaded.items():
+            self._surfaces[geometry] = tuple(self._upload(surface) for surface in surfaces_of_geometry)
         self.visuals = visuals
-        self.all = self._sort(visuals, [form for form, _ in shared])
+        self.all = self._sort(visuals, [geometry for geometry, _ in shared])
         self.solids = [batch for batch in self.all if not (batch.floor or batch.transparent or batch.ground)]
         self.floors = [batch for batch in self.all if batch.floor]
         self.ground = [batch for batch in self.all if batch.ground]
@@ -111,9 +111,9 @@ class DrawBatches:
         self._reserve()
 
     def move(self, origin: np.ndarray, poses: np.ndarray) -> None:
-        """Write the instances' matrices, world-from-visual (N, 4, 4), relative to `origin` (3,), metres.
+        """Upload the poses, world-from-visual (N, 4, 4), relative to `origin` (3,), metres.
 
-        The difference is taken in double precision, so that far from the world's origin nothing trembles.
+        The subtraction is in double precision, so that objects far from the world's origin do not jitter.
         """
         if poses.shape != (len(self.visuals), 4, 4):
             raise ValueError(f"poses of shape {poses.shape} for {len(self.visuals)} visuals")
@@ -127,31 +127,31 @@ class DrawBatches:
         return np.asarray(rows, dtype=np.float32)
 
     def link(self, role: Role, programs: Mapping[str, Any]) -> None:
-        """Let the batches be drawn in a role, with its programs by their look."""
+        """Prepare the batches for a role, once. `programs` maps each `Batch.look` to the role's shader program."""
         if role not in self._linked:
             self._linked.add(role)
             for batch in self.all:
                 batch.arrays[role] = self._array(batch, programs[batch.look], role.tiles)
 
     def identify(self, instances: np.ndarray) -> None:
-        """Write whose each visual is, (N,), for outputs that show it."""
+        """Upload the instance number of each visual, (N,), for the output "instance"."""
         if self._buffers:
             self._buffers[2].write(np.asarray(instances)[self._members].astype(np.float32))
 
     def move_before(self, origin: np.ndarray, poses: np.ndarray) -> None:
-        """Write where the visuals were in the picture before, as `move` does for this one."""
+        """Upload the poses of the previous image, for the output "before"; arguments as for `move`."""
         if self._buffers:
             self._buffers[3].write(self._rows(origin, poses))
 
     def floor_height(self, poses: np.ndarray) -> float | None:
-        """World z of the top of the first floor, metres, or None without a floor."""
+        """Return the world z of the top of the first floor, metres; None without a floor."""
         if not self.floors:
             return None
         floor = self.floors[0]
         return float(poses[floor.members[0], 2, 3] + floor.surface.top * self._scales[floor.first, 0, 2])
 
     def glass_from_far(self, away: Callable[[np.ndarray], float], poses: np.ndarray) -> list[Batch]:
-        """The transparent batches, the farthest first; `away` says how far a point (3,) in the world is."""
+        """Return the transparent batches, farthest first; `away` returns the distance of a point (3,) in the world."""
 
         def depth(batch: Batch) -> float:
             pose = poses[batch.members[0]]
@@ -160,7 +160,7 @@ class DrawBatches:
         return sorted(self.glass, key=depth, reverse=True) if len(self.glass) > 1 else self.glass
 
     def release(self) -> None:
-        """Free everything on the card."""
+        """Free all GPU memory."""
         self._release_batches()
         for shared in self._surfaces.values():
             for surface in shared:
@@ -177,16 +177,16 @@ class DrawBatches:
         self._linked.clear()
         self.solids, self.floors, self.ground, self.glass = [], [], [], []
 
-    def _upload(self, one: Surface) -> CardSurface:
-        uv = np.zeros((len(one.vertices), 2), dtype=np.float32) if one.uv is None else one.uv
-        low, high = one.vertices.min(axis=0), one.vertices.max(axis=0)
+    def _upload(self, surface: Surface) -> CardSurface:
+        uv = np.zeros((len(surface.vertices), 2), dtype=np.float32) if surface.uv is None else surface.uv
+        low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
         return CardSurface(
-            vertices=self._context.buffer(np.hstack([one.vertices, one.normals, uv]).astype(np.float32)),
-            indices=self._context.buffer(np.ascontiguousarray(one.faces, dtype=np.uint32)),
-            texture=None if one.texture is None else self._upload_texture(one.texture),
-            rgba=one.rgba,
-            transparent=one.transparent,
-            closed=one.closed,
+            vertices=self._context.buffer(np.hstack([surface.vertices, surface.normals, uv]).astype(np.float32)),
+            indices=self._context.buffer(np.ascontiguousarray(surface.faces, dtype=np.uint32)),
+            texture=None if surface.texture is None else self._upload_texture(surface.texture),
+            rgba=surface.rgba,
+            transparent=surface.transparent,
+            closed=surface.closed,
             top=float(high[2]),
             centre=(low + high) / 2.0,
         )
@@ -202,12 +202,12 @@ class DrawBatches:
             texture.anisotropy = min(ANISOTROPY, self._context.max_anisotropy)
         return texture
 
-    def _sort(self, visuals: Sequence[Visual], forms: Sequence[Visual]) -> list[Batch]:
-        """Solid instances of a surface share a batch; transparent ones are drawn singly, in the order of depth."""
+    def _sort(self, visuals: Sequence[Visual], geometries: Sequence[Visual]) -> list[Batch]:
+        """Group the solid instances by surface; a transparent one has its own batch, since it is sorted by depth."""
         solids: dict[int, Batch] = {}
         singles: list[Batch] = []
-        for index, (visual, form) in enumerate(zip(visuals, forms)):
-            for surface in self._surfaces[form]:
+        for index, (visual, geometry) in enumerate(zip(visuals, geometries)):
+            for surface in self._surfaces[geometry]:
                 if visual.ground:
                     singles.append(Batch(surface, [index], ground=True))
                 elif visual.floor:
@@ -218,8 +218,8 @@ class DrawBatches:
                     solids[id(surface)].members.append(index)
                 else:
                     solids[id(surface)] = Batch(surface, [index])
-        alike = sorted(solids.values(), key=lambda batch: (batch.surface.texture is not None, batch.surface.closed))
-        batches = alike + singles
+        shared = sorted(solids.values(), key=lambda batch: (batch.surface.texture is not None, batch.surface.closed))
+        batches = shared + singles
         first = 0
         for batch in batches:
             batch.first = first
@@ -227,7 +227,6 @@ class DrawBatches:
         return batches
 
     def _reserve(self) -> None:
-        """Make the record buffers."""
         if not self.all:
             return
         records = [self._paint(batch, index) for batch in self.all for index in batch.members]
@@ -242,7 +241,7 @@ class DrawBatches:
         return (red, green, blue, SHADE if batch.floor else alpha if batch.transparent else 1.0)
 
     def _array(self, batch: Batch, program: Any, times: int) -> moderngl.VertexArray:
-        """Let a program draw a batch, every instance so many times."""
+        """Return the vertex array with which `program` draws every instance of a batch `times` times."""
         array = self._context.vertex_array(program, [], index_buffer=batch.surface.indices, index_element_size=4)
         layouts = (MOVING_LAYOUT, FIXED_LAYOUT, IDENTITY_LAYOUT, BEFORE_LAYOUT)
         for layout, buffer, first, divisor in (
@@ -260,6 +259,6 @@ class DrawBatches:
 
 
 def _shared(visual: Visual) -> tuple[Visual, tuple[float, float, float]]:
-    """The geometry to upload, one for all that share it, and the scale that makes it this visual's."""
+    """Return the geometry to upload, equal for all visuals that share it, and the scale of this visual."""
     shape, scale = visual.shape.shared()
     return Visual(None, shape, WHITE, texture=visual.texture, edition=visual.edition), scale

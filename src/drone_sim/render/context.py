@@ -1,4 +1,4 @@
-"""An OpenGL context without a display."""
+"""Creates an OpenGL context without a display."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from typing import Any
 
 import moderngl
 
-# glvnd's libEGL hands out every GL function too, so neither libGL nor libOpenGL has to be installed.
+# glvnd's libEGL also resolves every GL function, so neither libGL nor libOpenGL has to be installed.
 LIBEGL = "libEGL.so.1"
 REQUIRED = 330
-# Mesa's own approximations of trilinear filtering: a tenth off a frame's time where the CPU draws, no visible
-# difference, no effect elsewhere. Read by Mesa when it makes its first context in the process.
+# Mesa's approximations of trilinear filtering save a tenth of the frame time of its CPU renderer without a visible
+# difference; a GPU ignores them. Mesa reads the variable when the process creates its first context.
 MESA_TUNING = ("GALLIVM_PERF", "brilinear,rho_approx")
-DEVICES = 4  # how many devices to try: the first may be a graphics card that this user may not open
+DEVICES = 4  # to try: the user may lack permission to open the first, a graphics card
 
 
 class RendererUnavailable(RuntimeError):
-    """No OpenGL context can be had through EGL; the message is one line."""
+    """EGL provides no OpenGL context. The message is one line."""
 
 
 def create(device_index: int) -> moderngl.Context:
-    """A context of the EGL device with this index or, where that fails, of the next that works."""
+    """Return a context of the EGL device with this index or, if that fails, of the next device that works."""
     os.environ.setdefault(*MESA_TUNING)
     reasons = []
     for index in range(device_index, device_index + DEVICES):
@@ -34,5 +34,5 @@ def create(device_index: int) -> moderngl.Context:
 
 
 def is_software(context: moderngl.Context) -> bool:
-    """Whether the CPU draws, so that costly texture filters should be left alone."""
+    """Return whether OpenGL renders on the CPU, where expensive texture filters should be off."""
     return any(name in context.info["GL_RENDERER"].lower() for name in ("llvmpipe", "softpipe", "swrast"))

@@ -1,4 +1,4 @@
-"""How many pixels the objects of a scene would have, each of them alone."""
+"""Pixel counts of the objects of a scene, each rendered alone, without occlusion by others."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 
 def covered(gl: moderngl.Context, numbers: np.ndarray, draw: Callable[[int], None]) -> np.ndarray:
-    """Return how many pixels each of `numbers` covers alone, indexed by number, (largest + 1,).
+    """Return how many pixels each of the objects `numbers` covers when alone, indexed by number, (largest + 1,).
 
-    `draw` draws that object and nothing else, without clearing, and with the same depth for all of its fragments.
-    The depth test `<` then passes one fragment of each pixel, however many parts of the object lie there.
+    `draw` draws only the object with that number, without clearing, and gives all its fragments the same depth.
+    The depth test `<` then passes one fragment per pixel, even where parts of the object overlap.
     """
     counts = np.zeros(int(numbers.max(initial=0)) + 1, dtype=np.int64)
     query = gl.query(samples=True)
@@ -29,16 +29,16 @@ def covered(gl: moderngl.Context, numbers: np.ndarray, draw: Callable[[int], Non
 def pixels(
     instances: np.ndarray, poses: np.ndarray, mask: Callable[[np.ndarray, np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """Return the same through a lens, from a picture of each object alone; slower.
+    """Return the same as `covered` for a distorted lens, by rendering one image per object; slower.
 
-    instances, poses: the object's number of each visual, (N,), and its pose, (N, 4, 4). `mask` draws the picture of
-    instances, given other numbers and poses.
+    instances, poses: each visual's object number, (N,), and pose, (N, 4, 4). `mask` renders the output "instance" for
+    other numbers and poses.
     """
     counts = np.zeros(int(instances.max(initial=0)) + 1, dtype=np.int64)
     nowhere = np.eye(4)
-    nowhere[2, 3] = -1e9  # m, where nobody sees it
+    nowhere[2, 3] = -1e9  # m, far below everything that a camera sees
     for number in np.unique(instances):
-        own = instances == number
-        there = mask(own.astype(np.uint16), np.where(own[:, None, None], poses, nowhere))
-        counts[number] = there.sum(dtype=np.int64)
+        is_part = instances == number
+        covered_pixels = mask(is_part.astype(np.uint16), np.where(is_part[:, None, None], poses, nowhere))
+        counts[number] = covered_pixels.sum(dtype=np.int64)
     return counts

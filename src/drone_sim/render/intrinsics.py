@@ -1,8 +1,8 @@
-"""The pinhole model of a camera, in the conventions of ROS and of OpenGL.
+"""Camera models, pinhole and orthographic, in the conventions of ROS and OpenGL.
 
-Optical frame (REP 103): z forward, x right, y down. Pixel coordinates (u, v) have whole numbers at pixel
-centres, as in OpenCV and image_geometry: the top left pixel's centre is (0, 0), the picture covers
--0.5..width-0.5, and the optical axis meets its centre at ((width - 1) / 2, (height - 1) / 2).
+Optical frame (REP 103): z forward, x right, y down. Pixel coordinates (u, v) are integers at pixel centres, as in
+OpenCV and image_geometry: the centre of the top left pixel is (0, 0), the image covers -0.5..width-0.5, and the
+optical axis meets its centre ((width - 1) / 2, (height - 1) / 2).
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Intrinsics:
-    """A camera without distortion and with square pixels.
+    """A pinhole camera with square pixels.
 
-    width, height: pixels; horizontal_fov: rad; near, far: metres along the optical z. baseline: m, how far to the right
-    of the left camera of a pair it sits; 0 for any other.
-    Raises ValueError for a size, angle or range with which no picture can be made.
+    width, height: pixels; horizontal_fov: rad; near, far: metres along the optical z. baseline: m, distance of the
+    right camera of a stereo pair from the left one; 0 for any other camera.
+    Raises ValueError for an impossible size, angle or range.
     """
 
     width: int
@@ -31,13 +31,13 @@ class Intrinsics:
     baseline: float = field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
-        """Refuse what no camera can be."""
+        """Validate the fields; raise ValueError."""
         if self.width < 1 or self.height < 1:
             raise ValueError(f"image size {self.width} x {self.height}: both must be at least 1")
         if not 0.0 < self.horizontal_fov < math.pi:
             raise ValueError(f"horizontal_fov {self.horizontal_fov}: must lie between 0 and pi rad")
         if not 0.0 < self.near < self.far < math.inf:
-            raise ValueError(f"near {self.near}, far {self.far}: 0 < near < far is needed")
+            raise ValueError(f"near {self.near}, far {self.far}: must be 0 < near < far")
 
     @property
     def fx(self) -> float:
@@ -51,12 +51,12 @@ class Intrinsics:
 
     @property
     def cx(self) -> float:
-        """Column of the optical axis, the middle of the picture."""
+        """Column of the optical axis, the middle of the image."""
         return (self.width - 1) / 2.0
 
     @property
     def cy(self) -> float:
-        """Row of the optical axis, the middle of the picture."""
+        """Row of the optical axis, the middle of the image."""
         return (self.height - 1) / 2.0
 
     @property
@@ -66,41 +66,41 @@ class Intrinsics:
 
     @property
     def P(self) -> tuple[float, ...]:
-        """Projection matrix, 3 x 4 row-major, as in sensor_msgs/CameraInfo: of points in the left camera's frame."""
+        """Projection matrix, 3 x 4 row-major, as in sensor_msgs/CameraInfo; points are in the left camera's frame."""
         return (self.fx, 0.0, self.cx, 0.0 - self.fx * self.baseline, 0.0, self.fy, self.cy, 0.0, 0.0, 0.0, 1.0, 0.0)
 
     @property
     def distortion(self) -> tuple[str, tuple[float, ...]]:
-        """The model of the lens and its coefficients, as in sensor_msgs/CameraInfo."""
+        """The distortion model and its coefficients, as in sensor_msgs/CameraInfo."""
         return "plumb_bob", (0.0,) * 5
 
     @property
     def is_fisheye(self) -> bool:
-        """Whether it may see what is beside the camera, or behind it: depths are then along the ray."""
+        """Whether the camera may see points beside or behind it; its depths are then along the ray."""
         return False
 
     @property
     def pixels(self) -> np.ndarray:
-        """The pixels' coordinates u, v, (height, width, 2)."""
+        """Coordinates u, v of each pixel, (height, width, 2)."""
         return np.stack(np.meshgrid(np.arange(self.width), np.arange(self.height)), axis=-1)
 
     @cached_property
     def rays(self) -> np.ndarray:
-        """Directions of the pixels in the optical frame, of unit length, (height, width, 3)."""
+        """Unit ray of each pixel in the optical frame, (height, width, 3)."""
         across = (self.pixels - (self.cx, self.cy)) / (self.fx, self.fy)
         rays = np.concatenate([across, np.ones((*across.shape[:2], 1))], axis=-1)
         return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Return the pixels (..., 2) of points (..., 3) in the optical frame, m; NaN of what is behind the camera."""
+        """Return the pixels (..., 2) of points (..., 3) in the optical frame, m; NaN for points behind the camera."""
         ahead = np.where(points[..., 2:] > 0, points[..., 2:], np.nan)
         return np.asarray(points[..., :2] / ahead * (self.fx, self.fy) + (self.cx, self.cy))
 
     def projection(self) -> np.ndarray:
-        """OpenGL clip matrix (4, 4) float64 of the optical frame, acting on column vectors.
+        """Return the OpenGL matrix clip-from-optical (4, 4) float64, for column vectors.
 
-        Depth near..far maps to -1..1 as in glFrustum. OpenGL counts rows from the bottom; here y down in
-        the optical frame is y up in the clip space, so that a plain glReadPixels yields the top row first.
+        Depth near..far maps to -1..1 as in glFrustum. OpenGL counts rows from the bottom; here the optical frame's
+        y down becomes y up in clip space, so that glReadPixels returns the top row first.
         """
         clip = _perspective(self.near, self.far)
         clip[0, 0] = 2.0 * self.fx / self.width
@@ -110,10 +110,10 @@ class Intrinsics:
 
 @dataclass(frozen=True)
 class Orthographic:
-    """A camera without perspective and with square pixels.
+    """An orthographic camera with square pixels.
 
-    width, height: pixels; wide: metres across the picture; near, far: metres along the optical z.
-    Raises ValueError for a size or range with which no picture can be made.
+    width, height: pixels; wide: width of the view in metres; near, far: metres along the optical z.
+    Raises ValueError for an impossible size or range.
     """
 
     width: int
@@ -123,21 +123,21 @@ class Orthographic:
     far: float
 
     def __post_init__(self) -> None:
-        """Refuse what no camera can be."""
+        """Validate the fields; raise ValueError."""
         if self.width < 1 or self.height < 1:
             raise ValueError(f"image size {self.width} x {self.height}: both must be at least 1")
         if not 0.0 < self.wide < math.inf:
             raise ValueError(f"wide {self.wide}: must be greater than 0 m")
         if not 0.0 < self.near < self.far < math.inf:
-            raise ValueError(f"near {self.near}, far {self.far}: 0 < near < far is needed")
+            raise ValueError(f"near {self.near}, far {self.far}: must be 0 < near < far")
 
     @property
     def high(self) -> float:
-        """Metres from the picture's top to its bottom."""
+        """Height of the view in metres."""
         return self.wide * self.height / self.width
 
     def projection(self) -> np.ndarray:
-        """OpenGL clip matrix (4, 4) float64 of the optical frame, as Intrinsics.projection.
+        """Return the OpenGL matrix clip-from-optical, as `Intrinsics.projection` does.
 
         Depth near..far maps to -1..1 as in glOrtho.
         """
@@ -152,11 +152,11 @@ Lens = Intrinsics | Orthographic
 
 @dataclass(frozen=True, eq=False)
 class Tiles:
-    """Pinholes that look from one place, each into its rectangle of one picture.
+    """Several pinhole cameras at one position, each of which renders into its rectangle of a common image.
 
-    width, height: of the picture, px; near, far: metres along each pinhole's own axis. projections: OpenGL clip
-    matrices of the picture, from the optical frame of the camera, (n, 4, 4). bounds: the rectangles in that picture, of
-    which x and y go from -1 to 1: the lowest x and y, the highest x and y, (n, 4).
+    width, height: of the image, px; near, far: metres along each pinhole's axis. projections: OpenGL matrices
+    clip-from-optical of the whole image and the camera's optical frame, (n, 4, 4). bounds: the rectangles in clip
+    space (-1..1): lowest x, lowest y, highest x, highest y, (n, 4).
     """
 
     width: int
@@ -168,9 +168,9 @@ class Tiles:
 
     @staticmethod
     def of_one(focal: float, centre: np.ndarray, size: tuple[int, int], within: tuple[float, float]) -> np.ndarray:
-        """Return the clip matrix (4, 4) of a pinhole in its own optical frame.
+        """Return the matrix clip-from-optical (4, 4) of one pinhole, in its optical frame.
 
-        focal: px; centre: the pixel that its axis meets; size: of the picture, px; within: near and far.
+        focal: px; centre: the pixel on its axis; size: of the image, px; within: near and far.
         """
         clip = _perspective(*within)
         clip[:2, :2] = np.diag(2.0 * focal / np.array(size))
@@ -178,12 +178,12 @@ class Tiles:
         return clip
 
     def projection(self) -> np.ndarray:
-        """OpenGL clip matrices (n, 4, 4) of the optical frame."""
+        """Return the OpenGL matrices clip-from-optical (n, 4, 4)."""
         return self.projections
 
 
 def _perspective(near: float, far: float) -> np.ndarray:
-    """What a clip matrix does with the optical z, as in glFrustum; nothing yet with x and y."""
+    """Return the z and w part of a clip matrix, as in glFrustum; x and y are still 0."""
     clip = np.zeros((4, 4))
     clip[2, 2] = (far + near) / (far - near)
     clip[2, 3] = -2.0 * far * near / (far - near)

@@ -1,7 +1,7 @@
-"""What a picture is made of besides its colours: for each pixel a depth, an instance, a normal, a place before.
+"""Per-pixel outputs of the renderer besides colour: depth, instance, normal, and position in the previous image.
 
-An output is a line of `OUTPUTS`. Any of them are drawn in one pass, with the colours or without, into an attachment
-each: how many are asked for at once hardly matters.
+Each output is an entry of `OUTPUTS`. Any selection of them is rendered in one pass, with or without colour, each into
+its framebuffer attachment: the number of outputs hardly changes the time.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-COLOR = "color"  # the picture itself, which may be asked for like an output
+COLOR = "color"  # the image itself, which can be requested like an output
 
 
 @dataclass(frozen=True)
 class Output:
     """A quantity for each pixel.
 
-    components, dtype: of a pixel; all are `nothing` where nothing is. vertex, fragment: GLSL that computes the `value`
-    that the pixel gets, from the vertices' and instances' attributes in `inputs`, by what `declared` hands on; `point`
-    stands for the vertex's place in the world relative to the camera.
+    components, dtype: of a pixel; each component is `nothing` where no surface is. vertex, fragment: GLSL that computes
+    the pixel's `value` from the vertex and instance attributes in `inputs`, through the varyings in `declared`; `point`
+    is the vertex position in world axes relative to the camera.
     """
 
     components: int
     dtype: type
     fragment: str
-    declared: str = ""  # what the vertex shader hands on, without in or out
+    declared: str = ""  # varyings, without `in` or `out`
     vertex: str = ""
     uniforms: str = ""
     inputs: str = ""
@@ -34,23 +34,23 @@ class Output:
 
     @property
     def is_whole(self) -> bool:
-        """Whether it counts something."""
+        """Whether its values are integers."""
         return bool(np.issubdtype(self.dtype, np.integer))
 
     def held(self, most: int) -> type:
-        """The dtype that an attachment has, if numbers are at most `most`: the CPU draws bytes fastest."""
+        """Return the attachment's dtype for values up to `most`: the CPU renderer is fastest with bytes."""
         return np.uint8 if self.is_whole and most <= np.iinfo(np.uint8).max else self.dtype
 
     @property
     def kind(self) -> str:
         """The GLSL type of `value`."""
-        one, several = ("uint", "uvec") if self.is_whole else ("float", "vec")
-        return one if self.components == 1 else f"{several}{self.components}"
+        scalar, vector = ("uint", "uvec") if self.is_whole else ("float", "vec")
+        return scalar if self.components == 1 else f"{vector}{self.components}"
 
 
 OUTPUTS: Mapping[str, Output] = {
-    # The clip w is the optical z in perspective. Where rays are parallel, depth is `parallel.x`, the near plane's, and
-    # the buffer's part of `parallel.y`, the way to the far one. A choice for each pixel would take twice the time.
+    # In perspective, the clip w is the optical z. With parallel rays, depth is `parallel.x` (the near plane) plus the
+    # buffer's share of `parallel.y` (far - near). A run-time branch per pixel would double the time.
     "depth": Output(
         1,
         np.float32,
@@ -69,7 +69,7 @@ OUTPUTS: Mapping[str, Output] = {
         vertex="identity_ = identity;",
         inputs="in float identity;",
     ),
-    # In the optical frame, of unit length, towards who looks.
+    # A unit vector in the optical frame, towards the camera.
     "normal": Output(
         4,
         np.float32,
@@ -77,13 +77,13 @@ OUTPUTS: Mapping[str, Output] = {
         declared="vec3 normal_; vec3 ray_;",
         vertex=(
             "mat3 m = transpose(mat3(row0.xyz, row1.xyz, row2.xyz));"
-            " vec3 n = normal / vec3(dot(m[0], m[0]), dot(m[1], m[1]), dot(m[2], m[2]));"  # by the inverse scale twice
+            " vec3 n = normal / vec3(dot(m[0], m[0]), dot(m[1], m[1]), dot(m[2], m[2]));"  # divided by the scale twice
             " normal_ = mat3(optical_from_world) * (m * n); ray_ = mat3(optical_from_world) * point;"
         ),
         uniforms="uniform mat4 optical_from_world;",
         inputs="in vec3 normal;",
     ),
-    # Where what is seen was in the picture before, in that one's optical frame, m.
+    # Position of the surface point at the previous image, in the optical frame of that image, m.
     "before": Output(
         4,
         np.float32,
@@ -101,27 +101,31 @@ OUTPUTS: Mapping[str, Output] = {
 
 
 def with_outputs(vertex: str, fragment: str, names: Sequence[str], first: int) -> tuple[str, str]:
-    """Return shaders that draw these outputs, too, into the attachments from `first` on."""
+    """Return the vertex and fragment shader extended by these outputs, which use the attachments from `first` on."""
     chosen = [OUTPUTS[name] for name in names]
-    handed = [part.strip() for one in chosen for part in one.declared.split(";") if part.strip()]
+    varyings = [part.strip() for output in chosen for part in output.declared.split(";") if part.strip()]
 
-    def passed(way: str) -> list[str]:
+    def declare(direction: str) -> list[str]:
         return [
-            f"flat {way} {one.removeprefix('flat ')};" if one.startswith("flat ") else f"{way} {one};" for one in handed
+            f"flat {direction} {part.removeprefix('flat ')};" if part.startswith("flat ") else f"{direction} {part};"
+            for part in varyings
         ]
 
-    uniforms = [one.uniforms for one in chosen]
-    inputs = [one.inputs for one in chosen if one.inputs not in vertex]
-    moved = ["vec3 point = world_point();", *(f"{{ {one.vertex} }}" for one in chosen)]
-    outs = [f"layout(location = {place}) out {one.kind} out{place};" for place, one in enumerate(chosen, first)]
-    drawn = [f"{{ {one.kind} value; {one.fragment} out{place} = value; }}" for place, one in enumerate(chosen, first)]
+    uniforms = [output.uniforms for output in chosen]
+    inputs = [output.inputs for output in chosen if output.inputs not in vertex]
+    statements = ["vec3 point = world_point();", *(f"{{ {output.vertex} }}" for output in chosen)]
+    outs = [f"layout(location = {place}) out {output.kind} out{place};" for place, output in enumerate(chosen, first)]
+    drawn = [
+        f"{{ {output.kind} value; {output.fragment} out{place} = value; }}"
+        for place, output in enumerate(chosen, first)
+    ]
     return (
-        _extended(vertex, [*inputs, *uniforms, *passed("out")], moved),
-        _extended(fragment, [*uniforms, *passed("in"), *outs], drawn),
+        _extended(vertex, [*inputs, *uniforms, *declare("out")], statements),
+        _extended(fragment, [*uniforms, *declare("in"), *outs], drawn),
     )
 
 
 def _extended(source: str, declared: Sequence[str], statements: Sequence[str]) -> str:
-    """Return a shader that declares more before its main, and does more at its end."""
+    """Return a shader with more declarations before its `main` and more statements at the end of `main`."""
     before, main, body = source.partition("void main() {")
     return "\n".join([before, *declared, main + body.rstrip().removesuffix("}"), *statements, "}"])

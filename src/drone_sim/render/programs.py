@@ -1,4 +1,4 @@
-"""The shader programs, each compiled when it is first needed."""
+"""The shader programs, each compiled at its first use."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from drone_sim.render import shaders
 from drone_sim.render.outputs import with_outputs
 
 TO_SUN = (-0.34, 0.30, 0.89)  # world frame, about 27 degrees from the vertical
-LOOKS = {"plain": (), "textured": ("TEXTURED",), "floor": ("TEXTURED", "FLAT")}  # of batches, and what these define
+# Look of a batch: GLSL macros that its shaders define.
+LOOKS = {"plain": (), "textured": ("TEXTURED",), "floor": ("TEXTURED", "FLAT")}
 _SOURCES = {
     "surface": (shaders.SURFACE_VERTEX, shaders.SURFACE_FRAGMENT),
     "bare": (shaders.BARE_VERTEX, shaders.BARE_FRAGMENT),
@@ -23,9 +24,10 @@ _SOURCES = {
 
 
 class Role(NamedTuple):
-    """What something is drawn as: a surface with its colours, bare, alone, a shadow, the sky; with what outputs.
+    """A purpose of a draw call, a key of `_SOURCES`, and its `outputs`.
 
-    tiles: how often, each time into another part of the picture. parallel: whether the rays are, for the outputs.
+    tiles: how often everything is drawn, each time into another part of the image. parallel: whether the camera is
+    orthographic, which changes the outputs' shaders.
     """
 
     kind: str
@@ -38,29 +40,29 @@ ALONE = Role("alone")
 
 
 class Programs:
-    """The programs of a context, by role; those of surfaces also by a batch's look."""
+    """The shader programs of a context, by role and look; only surfaces differ by look."""
 
     def __init__(self, gl: moderngl.Context):
-        """None has been compiled yet."""
+        """Compile nothing yet."""
         self._gl = gl
-        self._made: dict[Role, Mapping[str, Any]] = {}
+        self._programs: dict[Role, Mapping[str, Any]] = {}
         self._to_sun = tuple(np.array(TO_SUN) / np.linalg.norm(TO_SUN))
 
     def of(self, role: Role) -> Mapping[str, Any]:
-        """Return a role's programs, by look."""
-        if role not in self._made:
+        """Return the programs of a role, by look."""
+        if role not in self._programs:
             if role.kind == "surface":
-                made = {look: self._compiled(role, defined) for look, defined in LOOKS.items()}
+                programs = {look: self._compile(role, defined) for look, defined in LOOKS.items()}
             else:
-                made = dict.fromkeys(LOOKS, self._compiled(role))
-            self._made[role] = made
-        return self._made[role]
+                programs = dict.fromkeys(LOOKS, self._compile(role))
+            self._programs[role] = programs
+        return self._programs[role]
 
     def one(self, role: Role) -> Any:
-        """Return the program of a role in which all looks are alike."""
+        """Return the program of a role that does not depend on the look."""
         return self.of(role)["plain"]
 
-    def _compiled(self, role: Role, defined: tuple[str, ...] = ()) -> Any:
+    def _compile(self, role: Role, defined: tuple[str, ...] = ()) -> Any:
         vertex, fragment = _SOURCES[role.kind]
         if role.outputs:
             vertex, fragment = with_outputs(vertex, fragment, role.outputs, first=int(role.kind == "surface"))
@@ -69,7 +71,7 @@ class Programs:
         if role.parallel:
             defined = *defined, "PARALLEL"
         start = "\n".join(["#version 330 core", *(f"#define {name}" for name in defined)])
-        vertex, fragment = (one.replace("#version 330 core", start).lstrip() for one in (vertex, fragment))
+        vertex, fragment = (source.replace("#version 330 core", start).lstrip() for source in (vertex, fragment))
         program = self._gl.program(vertex_shader=vertex, fragment_shader=fragment)
         if "to_sun" in program:
             program["to_sun"] = self._to_sun

@@ -1,6 +1,6 @@
-"""The shaders, GLSL 3.30. World coordinates are relative to the camera's position, axes those of the world."""
+"""The shaders, GLSL 3.30. World coordinates have the world's axes and the camera as origin."""
 
-# Where a point, or a direction, is in the picture. Of several tiles each draws everything, clipped to its rectangle.
+# Projection of a point or direction. With several tiles everything is drawn for each tile, clipped to its rectangle.
 VIEW = """
 #version 330 core
 #ifdef TILES
@@ -23,7 +23,7 @@ vec4 seen(vec4 point) { return clip_from_world * point; }
 #endif
 """
 
-# Per instance: a world-from-mesh matrix by rows, which may scale; `paint.a` is what alpha the picture gets.
+# Per instance: the rows of the matrix world-from-mesh, which may scale. `paint.a` is the alpha written to the image.
 INPUTS = (
     VIEW
     + """
@@ -38,8 +38,8 @@ vec3 world_point() {
 """
 )
 
-# Light is computed per vertex: floors and boxes have one normal per face, and round things enough vertices.
-# FLAT spares what is level the interpolation of a colour that is the same everywhere.
+# Light is computed per vertex: floors and boxes have one normal per face, and round objects have enough vertices.
+# FLAT saves the interpolation of the colour on floors, where it is constant.
 SURFACE_VERTEX = (
     INPUTS
     + """
@@ -87,7 +87,7 @@ void main() {
 }
 """
 
-# What has no colour: only its depth, and the outputs that are added to these.
+# Without colour: depth only, and the outputs that `with_outputs` adds.
 BARE_VERTEX = (
     INPUTS
     + """
@@ -103,7 +103,7 @@ void main() {
 }
 """
 
-# One object alone, for counting its pixels: its fragments have one depth, and are clipped by that of the vertices.
+# A single object, for counting its pixels: all its fragments get the same depth; vertices are clipped as usual.
 ALONE_VERTEX = (
     INPUTS
     + """
@@ -120,7 +120,7 @@ ALONE_FRAGMENT = """
 void main() { gl_FragDepth = 0.5; }
 """
 
-# Every vertex slides along the light onto the floor; what lies below the floor casts nothing beyond itself.
+# Every vertex is projected along the light onto the floor; vertices below the floor only move vertically.
 SHADOW_VERTEX = (
     INPUTS
     + """
@@ -140,7 +140,7 @@ out vec4 pixel;
 void main() { pixel = vec4(0.0, 0.0, 0.0, 1.0); }
 """
 
-# A coarse dome around the camera, at the far plane; its vertices lie where the gradient bends.
+# A coarse dome around the camera, at the far plane, with vertices where the gradient changes.
 SKY_VERTEX = (
     VIEW
     + """

@@ -1,6 +1,6 @@
-"""The sky: a dome of a few bands, each vertex with its colour, so that no pixel costs more than a blend.
+"""The sky: a dome of a few bands with a colour per vertex, so that a pixel costs only an interpolation.
 
-It ends a little below the horizon, where the ground is of one colour and costs nothing at all.
+It ends a little below the horizon: below it the ground has one colour, to which the image is cleared.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 from drone_sim.shapes.visual import GROUND
 
 SECTORS = 8
-HAZE = GROUND  # far away; the picture is cleared to it
+HAZE = GROUND  # colour of the distant ground, to which the image is cleared
 # Elevation in degrees, and the colour there: the ground's haze brightens to the horizon, blue above it.
 BANDS = (
     (-6.0, HAZE),
@@ -24,7 +24,7 @@ BANDS = (
 
 
 def dome() -> np.ndarray:
-    """Triangles (m, 3, 6) float32: unit direction in the world and colour of each corner."""
+    """Return triangles (m, 3, 6) float32: unit direction in the world and colour of each corner."""
     rings = []
     for elevation, colour in BANDS:
         up, around = np.radians(elevation), np.linspace(0.0, 2.0 * np.pi, SECTORS + 1)
