@@ -64,10 +64,7 @@ BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
         ({"cameras": {"track": {"topic": "rear/camera_info"}}}, "which is the image of cameras/track"),
         ({"cameras": {"track": {"topic": "front/compressed"}}}, "which is the compressed of cameras/front"),
         ({"cameras": {"track": {"topic": "track"}}}, "'track': its camera_info would be camera_info, which is the"),
-        (
-            {"cameras": {"track": {"object": "FrontVision"}}},
-            "object = 'FrontVision': is also the name of cameras/front",
-        ),
+        ({"cameras": {"track": {"object": "FrontVision"}}}, "object = 'FrontVision': is the object of cameras/front"),
         ({"cameras": {"track": {"width": 4096, "height": 4096}}}, "at most 16777216 are allowed"),
         ({"cameras": {f"c{n}": {} for n in range(20)}}, "parameter cameras"),
         ({"scene": {"objects": [BALL, BALL]}}, "scene/objects/1/name = 'Ball': is used twice"),

@@ -1,6 +1,6 @@
-"""What measures: each sensor with its period, its pose, its noise and its last sample.
+"""The sensors of vehicles. Each has a period, a pose, noise and a latest sample.
 
-A kind that `sensors:` may name has its line here. Cameras are sensors too, with parameters of their own.
+`SENSORS` lists the kinds allowed under the key `sensors`. Cameras are sensors too, under the key `cameras`.
 """
 
 from __future__ import annotations

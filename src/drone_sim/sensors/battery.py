@@ -1,7 +1,7 @@
-"""A battery that the propellers drain: sensor_msgs/BatteryState. It does not act on the flight, not even empty.
+"""A battery that the propellers drain: sensor_msgs/BatteryState. Even an empty one does not affect the flight.
 
 Momentum theory (Leishman, Principles of Helicopter Aerodynamics, 2006, chapter 2): a hovering propeller of thrust T
-and disk area A needs the power T^1.5 / sqrt(2 ρ A). So, from the power that hovering takes,
+and disk area A needs the power T^1.5 / sqrt(2 ρ A). With the power that hovering needs,
 
     P = idle_power + (hover_power - idle_power) · mean_i (T_i / T_hover)^1.5,   T_hover = weight / propellers
 
@@ -9,7 +9,7 @@ The cells are a source U0 behind a resistance R (the Rint model): with U = U0 - 
 
     I = (U0 - sqrt(U0² - 4 R P)) / 2R
 
-U0 falls in a straight line with the charge, from `full` to `empty` volts a cell.
+U0 falls linearly with the charge, from `full` to `empty` volts per cell.
 """
 
 from __future__ import annotations
@@ -37,106 +37,106 @@ class BatteryParameters(SensorParameters):
     frame: Name = "base_link"
     cells: Annotated[int, Within(1, 1000)]
     capacity: Annotated[Finite, Within(1e-3, 1e4), Unit("Ah")]
-    full: _Volts  # a cell, without load
-    empty: _Volts  # a cell, without load
-    resistance: Annotated[Finite, Within(0, 1e3), Unit("Ω")]  # of all of it
+    full: _Volts  # per cell, without load
+    empty: _Volts  # per cell, without load
+    resistance: Annotated[Finite, Within(0, 1e3), Unit("Ω")]  # of the whole battery
     hover_power: _Watts
     idle_power: _Watts
-    charge: Fraction = 1.0  # at the start, of the capacity
+    charge: Fraction = 1.0  # at the start, as a fraction of the capacity
     noise: NoiseParameters = NoiseParameters()  # V
 
     def make(self, fitting: Fitting) -> Battery:
-        """Return the instrument; `reset` comes before its first look."""
+        """Return the instrument; call its `reset` before `look`."""
         return Battery(self, fitting)
 
     def check(self, sub_step: float) -> None:
-        """Raise ParameterError for periods that sub_step does not divide, or values that contradict each other."""
+        """Raise ParameterError as the base class does, and for contradictory values."""
         super().check(sub_step)
         if self.empty > self.full:
-            raise ParameterError(f"must not be more than full = {self.full:g}", ("empty",), f"{self.empty:g}")
+            raise ParameterError(f"must be at most full = {self.full:g}", ("empty",), f"{self.empty:g}")
         if self.idle_power > self.hover_power:
-            limit = f"must not be more than hover_power = {self.hover_power:g}"
+            limit = f"must be at most hover_power = {self.hover_power:g}"
             raise ParameterError(limit, ("idle_power",), f"{self.idle_power:g}")
 
 
 class BatterySample(NamedTuple):
-    """What a battery monitor shows."""
+    """The values that a battery monitor shows."""
 
     voltage: float  # V
-    current: float  # A, out of the battery
-    charge: float  # Ah that are left
+    current: float  # A, positive when discharging
+    charge: float  # Ah left
 
 
 class Battery(Instrument):
-    """Drains in every sub-step."""
+    """Integrates the drawn current in every sub-step."""
 
     parameters: BatteryParameters
 
     def __init__(self, parameters: BatteryParameters, fitting: Fitting):
-        """Take what it is like."""
+        """Create it; call `reset` before `look`."""
         super().__init__(parameters, fitting)
         self._noise = self.make_noise(parameters.noise, 1)
         self._charge = 0.0  # Ah
         self.outputs = (Output("", "sensor_msgs/BatteryState", self._message),)
 
     def reset(self) -> None:
-        """Begin anew, as charged as at the start."""
+        """Return to the state at the start of a run, with the initial charge."""
         super().reset()
         self._charge = self.parameters.charge * self.parameters.capacity
 
     def look(self, count: int) -> None:
-        """Drain, then sample if it is time."""
+        """Drain the battery over a sub-step, then sample if due."""
         used = self._load()[1] * self.fitting.sub_step / _HOUR
         self._charge = max(0.0, self._charge - used)
         super().look(count)
 
     def sample(self) -> BatterySample:
-        """Return voltage, current and charge."""
+        """Return voltage, current and charge; only the voltage is noisy."""
         voltage, current = self._load()
         (measured,) = self._noise.add((voltage,))
         return BatterySample(measured, current, self._charge)
 
     def save_state(self) -> Restore:
-        """Return a function that brings back the charge, too."""
+        """Return a function that restores the sensor and the charge."""
         return in_turn(super().save_state(), saved(self, "_charge"))
 
     def power(self) -> float:
-        """Return what is drawn now, in W."""
-        own, thrusts = self.parameters, self.carrier.thrusts
+        """Return the power drawn now, in W."""
+        p, thrusts = self.parameters, self.carrier.thrusts
         hover = self.carrier.mass * abs(self.carrier.gravity) / len(thrusts)
         if not hover:
-            return own.idle_power
+            return p.idle_power
         lift = sum(abs(thrust / hover) ** 1.5 for thrust in thrusts) / len(thrusts)
-        return own.idle_power + (own.hover_power - own.idle_power) * lift
+        return p.idle_power + (p.hover_power - p.idle_power) * lift
 
     def _load(self) -> tuple[float, float]:
         """Return voltage (V) and current (A) under the present load."""
-        own = self.parameters
-        source = own.cells * (own.empty + (own.full - own.empty) * self._charge / own.capacity)
+        p = self.parameters
+        source = p.cells * (p.empty + (p.full - p.empty) * self._charge / p.capacity)
         if not self._charge:
             return source, 0.0
         power = self.power()
-        if not own.resistance:
+        if not p.resistance:
             return source, power / source
-        # Beyond U0²/4R it cannot give what is asked for; then it gives the most that it can.
-        root = math.sqrt(max(0.0, source**2 - 4 * own.resistance * power))
-        current = (source - root) / (2 * own.resistance)
-        return source - own.resistance * current, current
+        # It cannot deliver more than U0²/4R; if more is needed, it delivers that.
+        root = math.sqrt(max(0.0, source**2 - 4 * p.resistance * power))
+        current = (source - root) / (2 * p.resistance)
+        return source - p.resistance * current, current
 
     def _message(self, value: BatterySample, header: Mapping[str, Any]) -> Fields:
-        own = self.parameters
+        p = self.parameters
         return {
             "header": header,
             "voltage": value.voltage,
             "temperature": math.nan,
             "current": -value.current,  # negative when discharging
             "charge": value.charge,
-            "capacity": own.capacity,
-            "design_capacity": own.capacity,
-            "percentage": value.charge / own.capacity,
+            "capacity": p.capacity,
+            "design_capacity": p.capacity,
+            "percentage": value.charge / p.capacity,
             "power_supply_status": _DISCHARGING,
             "power_supply_health": _GOOD if value.charge else _DEAD,
             "power_supply_technology": _LIPO,
             "present": True,
-            "cell_voltage": [value.voltage / own.cells] * own.cells,
+            "cell_voltage": [value.voltage / p.cells] * p.cells,
         }

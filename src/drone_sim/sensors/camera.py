@@ -1,4 +1,4 @@
-"""Vision sensors on a drone."""
+"""Cameras on a vehicle, colour or depth."""
 
 from __future__ import annotations
 
@@ -22,68 +22,64 @@ from drone_sim.sensors.vision import Vision
 
 
 class CameraFitting(NamedTuple):
-    """How one camera is fitted to a vehicle."""
+    """The connection of a camera to its vehicle."""
 
-    name: str  # of vehicle and camera, such as drone/front: no other has it, and its noise depends on it
-    pose: Callable[[], Matrix]  # world from the optical frame
-    velocity: Callable[[], tuple[Vector, Vector]]  # of that frame's origin and of its turn, m/s and rad/s in the world
+    name: str  # unique, such as drone/front; seeds the noise
+    pose: Callable[[], Matrix]  # transform world-from-optical
+    velocity: Callable[[], tuple[Vector, Vector]]  # of the optical frame, linear (m/s) and angular (rad/s), world
     clock: Clock
 
 
 class Camera(Sensor):
-    """One vision sensor: where it is, what it sees, and who looks.
-
-    Its period counts simulation steps, for only after those is there anything to see; and it looks only where
-    somebody wants to know.
-    """
+    """A vision sensor. Its period counts simulation steps; it renders only if a viewer wants the image."""
 
     def __init__(self, parameters: CameraParameters, fitting: CameraFitting, vision: Vision):
-        """Take what it is, from where it looks, and what draws."""
+        """`vision` renders its images."""
         super().__init__(parameters.every)
         self.kind = parameters.kind
         self._photography = Photography(fitting.name, fitting.clock)
         self.change(parameters)
-        self.viewers: set[Callable[[], bool]] = set()  # each says whether it looks now
-        self.shown = 0  # pictures, to those who look
-        self.image: np.ndarray | None = None  # what those who look are shown; None while nobody does
+        self.viewers: set[Callable[[], bool]] = set()  # each returns whether it wants images now
+        self.shown = 0  # number of images delivered to the viewers
+        self.image: np.ndarray | None = None  # the last delivered image; None without viewers
         self.pose, self._velocity = fitting.pose, fitting.velocity
         self.failure: Failure = "ok"
-        self.is_linked = False  # whether pictures come over a link, late or not at all
-        self.age = 0.0  # s, of `image`
+        self.is_linked = False  # whether images are delayed or lost by a simulated link
+        self.age = 0.0  # s, of `image` at its delivery
         self._vision = vision
 
     def watched(self) -> bool:
-        """Tell whether anybody looks."""
-        return bool(self.viewers) and any(looks() for looks in self.viewers)
+        """Return whether any viewer wants images now."""
+        return bool(self.viewers) and any(wants_images() for wants_images in self.viewers)
 
     def change(self, parameters: CameraParameters) -> None:
-        """Take the rate, the optics and the imperfections of these parameters."""
+        """Apply the rate, optics and imperfections of `parameters`."""
         self.period = parameters.every
         self.intrinsics = parameters.intrinsics()
         self._photography.change(parameters)
-        self._moment: Moment | None = None  # of the last truth
-        self._truth: PictureTruth | None = None  # that somebody has asked for since the last picture
-        self._drawn: tuple[int, Matrix, PictureTruth] | None = None  # with the last picture
-        self._last: dict[str, tuple[int, Matrix, np.ndarray]] = {}  # by kind: the scene's changes, pose, picture
+        self._moment: Moment | None = None  # of the last ground truth
+        self._truth: PictureTruth | None = None  # requested since the last image
+        self._drawn: tuple[int, Matrix, PictureTruth] | None = None  # scene changes, pose, truth of the last image
+        self._last: dict[str, tuple[int, Matrix, np.ndarray]] = {}  # by kind: scene changes, pose, image
 
     def take(self, kind: str = "") -> np.ndarray:
-        """Return a picture of the scene as it stands, of its own kind or another; as Vision.picture says.
+        """Render an image of the camera's or another kind, as `Vision.picture` does.
 
-        Colours have the camera's imperfections. Outputs that were asked for in the truth of the last picture are drawn
-        together with this one.
+        Colour images have the camera's imperfections. Outputs that were used of the previous image's ground truth are
+        rendered in the same pass.
         """
         kind = kind or self.kind
         if kind != COLOR:
             return self._vision.picture(kind, self.intrinsics, self._matrix())
         if not self._photography.is_perfect:
             return self._photography.take(self.intrinsics, self._light)
-        asked, self._truth = self._truth, None
-        if asked is None:
+        requested, self._truth = self._truth, None
+        if requested is None:
             return self._vision.picture(kind, self.intrinsics, self._matrix())
-        return self._taken_with(asked.drawn)
+        return self._take_with_outputs(requested.drawn)
 
-    def _taken_with(self, names: Sequence[str]) -> np.ndarray:
-        """Return a picture that is drawn together with outputs, which `truth` then has."""
+    def _take_with_outputs(self, names: Sequence[str]) -> np.ndarray:
+        """Render a colour image together with outputs, which `truth` then finds ready."""
         truth = self._vision.truth(self.intrinsics, self._matrix(), self._moment)
         if truth is None:
             return self._vision.picture(COLOR, self.intrinsics, self._matrix())
@@ -93,7 +89,7 @@ class Camera(Sensor):
         return truth.output(COLOR)
 
     def meter(self, steps: int) -> None:
-        """Look how bright it is, for automatic exposure, if a picture is due after so many steps."""
+        """Measure the brightness for automatic exposure if an image is due at step `steps`."""
         if self._photography.is_metering and self.is_due(steps):
             self._photography.meter(self.intrinsics, self._light)
 
@@ -104,9 +100,9 @@ class Camera(Sensor):
         return np.reshape((*self.pose(), 0, 0, 0, 1), (4, 4))
 
     def look(self, kind: str = "") -> np.ndarray:
-        """Return what it sees now: the last picture of a kind where nothing has changed since, else a new one.
+        """Return the present image: the last one if neither scene nor pose has changed since, else a new one.
 
-        A frozen camera returns its last picture, a silent one a black picture.
+        A frozen camera returns its last image, a silent one a black image.
         """
         kind = kind or self.kind
         changes, pose = self._vision.changes, self.pose()
@@ -119,35 +115,35 @@ class Camera(Sensor):
         return last[2]
 
     def truth(self) -> PictureTruth | None:
-        """Return the ground truth of what it sees now, with the motion since the last call; None without OpenGL.
+        """Return the ground truth of the present image, with the motion since the last call.
 
-        A silent camera has none.
+        None without OpenGL, and for a silent camera.
         """
         if self.failure == "silent":
             return None
         if self._drawn is not None and self._drawn[:2] == (self._vision.changes, self.pose()):
-            found: PictureTruth | None = self._drawn[2]
+            truth: PictureTruth | None = self._drawn[2]
         else:
-            found = self._vision.truth(self.intrinsics, self._matrix(), self._moment)
-        self._truth, self._drawn = found, None
-        self._moment = found.moment if found is not None else None
-        return found
+            truth = self._vision.truth(self.intrinsics, self._matrix(), self._moment)
+        self._truth, self._drawn = truth, None
+        self._moment = truth.moment if truth is not None else None
+        return truth
 
     def show(self, steps: int, image: np.ndarray | None, age: float = 0.0) -> None:
-        """Hand over a picture that has arrived after so many steps, at an age in s; None for no picture."""
+        """Deliver an image at step `steps`, `age` seconds after it was taken; None removes the present one."""
         self.image, self.age = image, age
         if image is not None:
             self.shown += 1
             self.latest = Reading(steps, image)
 
     def reset(self) -> None:
-        """Forget the pictures that were taken."""
+        """Forget all images, and reset the exposure."""
         self.image = self.latest = self._moment = self._truth = self._drawn = None
         self._last.clear()
         self._photography.reset()
         self.age = 0.0
 
     def save_state(self) -> Restore:
-        """Return a function that brings back the last picture that was shown, and how it was taken."""
-        own = saved(self, "image", "age", "latest", "_last", "period", "intrinsics")
-        return in_turn(own, self._photography.save_state())
+        """Return a function that restores the last delivered image, the optics and the exposure."""
+        image = saved(self, "image", "age", "latest", "_last", "period", "intrinsics")
+        return in_turn(image, self._photography.save_state())

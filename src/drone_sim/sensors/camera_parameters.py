@@ -1,4 +1,4 @@
-"""What a vision sensor may be."""
+"""Parameters of cameras."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from drone_sim.sensors.imperfections import Imperfections
 from drone_sim.sensors.sensor import MountParameters
 
 MAX_CAMERAS = 16
-MAX_PIXELS = 4096 * 4096  # of all cameras together
+MAX_PIXELS = 4096 * 4096  # of all cameras of a vehicle together
 
 
 TRUTH = (
     *("labels", "instances", "categories", "depth", "normals", "points", "flow", "flow_known", "boxes", "box_markers"),
     "overlay",
-    *("detections", "detections_3d"),  # where vision_msgs is installed
+    *("detections", "detections_3d"),  # if vision_msgs is installed
 )
-_lens = lru_cache(maxsize=MAX_CAMERAS)(Distorted)  # whose rays are found once
-WIDEST = 3.1  # rad, without an equidistant lens
+_lens = lru_cache(maxsize=MAX_CAMERAS)(Distorted)  # the rays are computed once per lens
+WIDEST = 3.1  # rad, for other lenses than equidistant
 
 
 class LensParameters(Checked):
-    """A lens that is no pinhole, as sensor_msgs/CameraInfo has it: docs/sensors.md says what the coefficients are."""
+    """A distorted lens with a model of sensor_msgs/CameraInfo; docs/sensors.md explains the coefficients."""
 
     model: Literal["plumb_bob", "rational_polynomial", "equidistant"]
     coefficients: Annotated[tuple[Finite, ...], Field(max_length=8)] = ()
 
 
 class CameraParameters(Imperfections):
-    """A vision sensor: where it sits, what it sees, and how well."""
+    """Mount, optics and imperfections of a camera."""
 
     object: Name
     topic: Annotated[str, Field(pattern=TOPIC, max_length=128)]
@@ -50,13 +50,13 @@ class CameraParameters(Imperfections):
     lens: LensParameters | None = None
     near: Annotated[Finite, Within(1e-4, 1e4), Unit("m")]
     far: Annotated[Finite, Within(1e-3, 1e5), Unit("m")]
-    baseline: Annotated[Finite, Within(0, 100), Unit("m")] = 0.0  # of the right camera of a pair, from the left one
-    truth: Switch = False  # whether it publishes what is behind its pictures, too
+    baseline: Annotated[Finite, Within(0, 100), Unit("m")] = 0.0  # of a stereo pair's right camera, from the left
+    truth: Switch = False  # whether it also publishes ground truth
 
     @model_validator(mode="after")
-    def _can_be(self) -> CameraParameters:
+    def _check_optics(self) -> CameraParameters:
         if self.horizontal_fov > WIDEST and not (self.lens and self.lens.model == "equidistant"):
-            raise ValueError(f"horizontal_fov: must be from 0.01 to {WIDEST}, without an equidistant lens")
+            raise ValueError(f"horizontal_fov: must be from 0.01 to {WIDEST} unless the lens is equidistant")
         if self.lens is not None:
             self.intrinsics()
         if self.kind == "depth":
@@ -66,17 +66,17 @@ class CameraParameters(Imperfections):
     def _refuse_imperfections(self) -> None:
         for name in Imperfections.model_fields:
             if getattr(self, name).is_on:
-                raise ParameterError("only works with cameras of kind color", (name,))
+                raise ParameterError("is allowed only for cameras of kind color", (name,))
 
     def intrinsics(self) -> Intrinsics:
-        """Return how it makes pixels of the world."""
-        own = self.width, self.height, self.horizontal_fov, self.near, self.far
+        """Return the camera model."""
+        fields = self.width, self.height, self.horizontal_fov, self.near, self.far
         if self.lens is None:
-            return Intrinsics(*own, baseline=self.baseline)
-        return _lens(*own, self.lens.model, self.lens.coefficients, baseline=self.baseline)
+            return Intrinsics(*fields, baseline=self.baseline)
+        return _lens(*fields, self.lens.model, self.lens.coefficients, baseline=self.baseline)
 
     def topics(self) -> Iterator[tuple[str, str]]:
-        """Yield what it publishes, and what each topic is."""
+        """Yield each topic, and a word for its content."""
         yield self.topic, "image"
         folder, slash, _ = self.topic.rpartition("/")
         yield f"{folder}{slash}camera_info", "camera_info"

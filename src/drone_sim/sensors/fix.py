@@ -1,8 +1,8 @@
-"""A satellite receiver: sensor_msgs/NavSatFix, from where the scene's origin lies on the Earth.
+"""A satellite receiver: sensor_msgs/NavSatFix, for a scene whose origin is at the datum on the Earth.
 
-Places on it are latitude and longitude (degrees) and height (m) on the ellipsoid of WGS 84. Constants: NGA.STND.0036,
-World Geodetic System 1984, version 1.0.0 (2014). The local frame is the plane that touches the ellipsoid at the datum:
-x east, y north, z up.
+Geodetic positions are latitude and longitude (degrees) and height above the ellipsoid of WGS 84 (m). Constants:
+NGA.STND.0036, World Geodetic System 1984, version 1.0.0 (2014). The local frame is the plane tangent to the ellipsoid
+at the datum: x east, y north, z up.
 """
 
 from __future__ import annotations
@@ -19,39 +19,39 @@ from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, Sensor
 SEMI_MAJOR = 6378137.0  # m
 FLATTENING = 1 / 298.257223563
 _ECCENTRICITY_2 = FLATTENING * (2 - FLATTENING)
-_ROUNDS = 5  # of an iteration whose error shrinks by 1/150 every time, from some metres: far below 1e-6 m
+_ITERATIONS = 5  # each reduces the error, some metres at first, by a factor of 150: far below 1e-6 m
 
 
 def to_earth(latitude: float, longitude: float, height: float) -> Vector:
-    """Return a place in the Earth-centred, Earth-fixed frame, in m (closed form)."""
+    """Return the position in the Earth-centred, Earth-fixed frame (ECEF), m (closed form)."""
     phi, lam = radians(latitude), radians(longitude)
-    across = SEMI_MAJOR / sqrt(1 - _ECCENTRICITY_2 * sin(phi) ** 2)
+    radius = SEMI_MAJOR / sqrt(1 - _ECCENTRICITY_2 * sin(phi) ** 2)
     return (
-        (across + height) * cos(phi) * cos(lam),
-        (across + height) * cos(phi) * sin(lam),
-        (across * (1 - _ECCENTRICITY_2) + height) * sin(phi),
+        (radius + height) * cos(phi) * cos(lam),
+        (radius + height) * cos(phi) * sin(lam),
+        (radius * (1 - _ECCENTRICITY_2) + height) * sin(phi),
     )
 
 
 def from_earth(place: Sequence[float]) -> Vector:
-    """Return latitude and longitude (degrees) and height (m) of a place in the Earth's frame (m).
+    """Return latitude and longitude (degrees) and height (m) of a position in the ECEF frame (m).
 
-    The fixed point of tan φ = (z + e² N sin φ) / p: Torge and Müller, Geodesy (2012), chapter 4.
+    Fixed-point iteration of tan φ = (z + e² N sin φ) / p: Torge and Müller, Geodesy (2012), chapter 4.
     """
     x, y, z = place
     p = hypot(x, y)
     phi = atan2(z, p * (1 - _ECCENTRICITY_2))
-    for _ in range(_ROUNDS):
-        across = SEMI_MAJOR / sqrt(1 - _ECCENTRICITY_2 * sin(phi) ** 2)
-        phi = atan2(z + _ECCENTRICITY_2 * across * sin(phi), p)
-    across = SEMI_MAJOR / sqrt(1 - _ECCENTRICITY_2 * sin(phi) ** 2)
-    # Of the two forms that are exact, at the poles and at the equator, this is exact at both.
-    height = p * cos(phi) + (z + _ECCENTRICITY_2 * across * sin(phi)) * sin(phi) - across
+    for _ in range(_ITERATIONS):
+        radius = SEMI_MAJOR / sqrt(1 - _ECCENTRICITY_2 * sin(phi) ** 2)
+        phi = atan2(z + _ECCENTRICITY_2 * radius * sin(phi), p)
+    radius = SEMI_MAJOR / sqrt(1 - _ECCENTRICITY_2 * sin(phi) ** 2)
+    # p / cos φ - N fails at the poles, z / sin φ - (1 - e²) N at the equator; this form is exact everywhere.
+    height = p * cos(phi) + (z + _ECCENTRICITY_2 * radius * sin(phi)) * sin(phi) - radius
     return degrees(phi), degrees(atan2(y, x)), height
 
 
 def earth_from_local(latitude: float, longitude: float, height: float) -> Matrix:
-    """Return the transform from the local frame (east, north, up) at a datum to the Earth's frame."""
+    """Return the transform ECEF-from-local for the local frame (east, north, up) at a datum."""
     phi, lam = radians(latitude), radians(longitude)
     sp, cp, sl, cl = sin(phi), cos(phi), sin(lam), cos(lam)
     x, y, z = to_earth(latitude, longitude, height)
@@ -59,7 +59,7 @@ def earth_from_local(latitude: float, longitude: float, height: float) -> Matrix
 
 
 def geodetic(local: Sequence[float], datum: Sequence[float]) -> Vector:
-    """Return latitude, longitude (degrees) and height (m) of a local place (m); of the datum those are given, too."""
+    """Return latitude, longitude (degrees) and height (m) of a local position (m); `datum` holds the same values."""
     return from_earth(transform(earth_from_local(*datum), local))
 
 
@@ -68,7 +68,7 @@ _UNKNOWN, _DIAGONAL = 0, 2  # sensor_msgs/NavSatFix: COVARIANCE_TYPE_
 
 
 class FixNoise(Checked):
-    """What is wrong with where it says that it is."""
+    """Noise of the position, in the local frame."""
 
     horizontal: NoiseParameters = NoiseParameters()  # m, east and north
     vertical: NoiseParameters = NoiseParameters()  # m
@@ -83,7 +83,7 @@ class FixParameters(SensorParameters):
     noise: FixNoise = FixNoise()
 
     def make(self, fitting: Fitting) -> Fix:
-        """Return the instrument; `reset` comes before its first look."""
+        """Return the instrument; call its `reset` before `look`."""
         return Fix(self, fitting)
 
 
@@ -93,7 +93,7 @@ class Fix(Instrument):
     parameters: FixParameters
 
     def __init__(self, parameters: FixParameters, fitting: Fitting):
-        """Take what it is like and where it sits."""
+        """Create it; call `reset` before `look`."""
         super().__init__(parameters, fitting)
         self._horizontal = self.make_noise(parameters.noise.horizontal, 2)
         self._vertical = self.make_noise(parameters.noise.vertical, 1)

@@ -1,14 +1,14 @@
-"""An inertial measurement unit, as REP-145 wants it: angular velocity, specific force, orientation.
+"""An inertial measurement unit after REP 145: angular velocity, specific force, orientation.
 
-Specific force is what an accelerometer feels, f = Rᵀ (a - g): 9.81 m/s² upwards at rest, nothing in free fall. A sample
-is the mean since the last one, as a strapdown IMU's integrators give it (Savage, Strapdown Inertial Navigation
+Specific force is what an accelerometer measures, f = Rᵀ (a - g): 9.81 m/s² upwards at rest, 0 in free fall. A sample
+is the mean since the last sample, like the integrals of a strapdown IMU (Savage, Strapdown Inertial Navigation
 Integration Algorithm Design, J. Guidance 21(1) and 21(2), 1998):
 
     f = 1/T sum R_k^T (dv_k - g dt)        w = 1/T sum R_k^T w_k dt
 
-with dv_k the change of the mounted point's velocity in sub-step k, and R_k the sensor's axes at the end of it: Bullet's
-forces keep their direction in the world until then. What the samples add up to is thus how the velocity has changed,
-with every contact, however seldom they are taken; with a sample in every sub-step, (R f + g) dt is exactly that.
+where dv_k is the change of the mount point's velocity in sub-step k, and R_k the sensor's axes at its end: Bullet keeps
+the direction of a force constant in the world until then. So the samples sum up to the change of velocity, contacts
+included, at any rate; with a sample in every sub-step, (R f + g) dt is exactly that change.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from drone_sim.sensors.noise import NoiseParameters
 from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic, diagonal, xyz
 
 _ZERO: Vector = (0.0, 0.0, 0.0)
-_NOT_REPORTED = [-1.0, *([0.0] * 8)]  # a covariance whose first number is -1
+_NOT_REPORTED = [-1.0, *([0.0] * 8)]  # covariance of a missing measurement (REP 145)
 
 
 class ImuNoise(Checked):
-    """What is wrong with each of its measurements."""
+    """Noise of each measurement."""
 
     angular_velocity: NoiseParameters = NoiseParameters()  # rad/s
     linear_acceleration: NoiseParameters = NoiseParameters()  # m/s²
@@ -48,7 +48,7 @@ class ImuNoise(Checked):
 
 
 class ImuParameters(SensorParameters):
-    """An IMU; its topics are below `topic`."""
+    """An IMU. Its topics are below the namespace `topic`."""
 
     kind: Literal["imu"]
     topic: Topic = "imu"
@@ -58,12 +58,12 @@ class ImuParameters(SensorParameters):
     suffixes = ("/data", "/data_raw")
 
     def make(self, fitting: Fitting) -> Imu:
-        """Return the instrument; `reset` comes before its first look."""
+        """Return the instrument; call its `reset` before `look`."""
         return Imu(self, fitting)
 
 
 class ImuSample(NamedTuple):
-    """What an IMU measures, in its own frame."""
+    """The measurements of an IMU, in its frame."""
 
     orientation: Quaternion  # of the sensor in the world
     angular_velocity: Vector  # rad/s
@@ -71,71 +71,71 @@ class ImuSample(NamedTuple):
 
 
 class Imu(Instrument):
-    """Integrates in every sub-step; a sample is the mean since the last one."""
+    """Integrates in every sub-step; a sample is the mean since the last sample."""
 
     parameters: ImuParameters
 
     def __init__(self, parameters: ImuParameters, fitting: Fitting):
-        """Take what it is like and where it sits."""
+        """Create it; call `reset` before `look`."""
         super().__init__(parameters, fitting)
         noise = parameters.noise
-        self._turning = self.make_noise(noise.angular_velocity, 3)
-        self._feeling = self.make_noise(noise.linear_acceleration, 3)
-        self._leaning = self.make_noise(noise.orientation, 3)
+        self._rate_noise = self.make_noise(noise.angular_velocity, 3)
+        self._force_noise = self.make_noise(noise.linear_acceleration, 3)
+        self._tilt_noise = self.make_noise(noise.orientation, 3)
         self.outputs = (
             Output("/data", "sensor_msgs/Imu", self._data),
             Output("/data_raw", "sensor_msgs/Imu", self._raw),
         )
         self._velocity, self._axes, self._jumps = _ZERO, IDENTITY, 0
-        self._gained, self._turned, self._passed = _ZERO, _ZERO, 0.0
+        self._delta_velocity, self._delta_angle, self._duration = _ZERO, _ZERO, 0.0
 
     # ---- measuring
 
     def reset(self) -> None:
-        """Begin anew, at rest."""
+        """Return to the state at the start of a run."""
         super().reset()
         self._axes = self.fitting.pose()
         self._velocity = self._point_velocity(self._axes)
         self._jumps = self.carrier.jumps
-        self._gained, self._turned, self._passed = _ZERO, _ZERO, 0.0  # m/s, rad and s since the last sample
+        self._delta_velocity, self._delta_angle, self._duration = _ZERO, _ZERO, 0.0  # m/s, rad, s since the last sample
 
     def look(self, count: int) -> None:
-        """Integrate over the sub-step that has just been, then sample if it is time."""
+        """Integrate over the last sub-step, then sample if due."""
         axes, step = self.fitting.pose(), self.fitting.sub_step
-        velocity, last, fallen = self._point_velocity(axes), self._velocity, self.carrier.gravity * step
-        before = self._axes
-        if self._jumps != self.carrier.jumps:  # put there at rest: that was neither acceleration nor turn
-            self._jumps, last, before = self.carrier.jumps, _ZERO, axes
-        change = velocity[0] - last[0], velocity[1] - last[1], velocity[2] - last[2] - fallen
-        (gx, gy, gz), (cx, cy, cz) = self._gained, rotate_back(axes, change)
-        self._gained = gx + cx, gy + cy, gz + cz
-        # The axis of a turn has the same components before and after.
-        (tx, ty, tz), (rx, ry, rz) = self._turned, rotation_vector(relative_turn(before, axes))
-        self._turned = tx + rx, ty + ry, tz + rz
+        velocity, last, dv_gravity = self._point_velocity(axes), self._velocity, self.carrier.gravity * step
+        last_axes = self._axes
+        if self._jumps != self.carrier.jumps:  # a teleport, at rest, is neither acceleration nor rotation
+            self._jumps, last, last_axes = self.carrier.jumps, _ZERO, axes
+        change = velocity[0] - last[0], velocity[1] - last[1], velocity[2] - last[2] - dv_gravity
+        (gx, gy, gz), (cx, cy, cz) = self._delta_velocity, rotate_back(axes, change)
+        self._delta_velocity = gx + cx, gy + cy, gz + cz
+        # A rotation vector has the same components in the old and the new frame.
+        (tx, ty, tz), (rx, ry, rz) = self._delta_angle, rotation_vector(relative_turn(last_axes, axes))
+        self._delta_angle = tx + rx, ty + ry, tz + rz
         self._axes, self._velocity = axes, velocity
-        self._passed += step
+        self._duration += step
         super().look(count)
 
     def sample(self) -> ImuSample:
-        """Return the means since the last sample, and the present orientation."""
-        force, rate = (_sum(_ZERO, one, 1 / self._passed) for one in (self._gained, self._turned))
-        self._gained, self._turned, self._passed = _ZERO, _ZERO, 0.0
-        turn = multiply_quaternions(to_quaternion(self._axes), _rotation(self._leaning.add(_ZERO)))
-        return ImuSample(turn, _vector(self._turning.add(rate)), _vector(self._feeling.add(force)))
+        """Return the mean rates and forces since the last sample, and the present orientation."""
+        force, rate = (_sum(_ZERO, one, 1 / self._duration) for one in (self._delta_velocity, self._delta_angle))
+        self._delta_velocity, self._delta_angle, self._duration = _ZERO, _ZERO, 0.0
+        orientation = multiply_quaternions(to_quaternion(self._axes), _quaternion(self._tilt_noise.add(_ZERO)))
+        return ImuSample(orientation, _vector(self._rate_noise.add(rate)), _vector(self._force_noise.add(force)))
 
     def _point_velocity(self, axes: Matrix) -> Vector:
-        """Return the velocity (m/s, world) of the vehicle's point where the sensor sits."""
-        place, _, linear, angular = self.carrier.state
+        """Return the velocity (m/s, world) of the vehicle at the sensor's position."""
+        root, _, linear, angular = self.carrier.state
         (x, y, z), (vx, vy, vz) = position(axes), linear
-        sx, sy, sz = cross(angular, (x - place[0], y - place[1], z - place[2]))
+        sx, sy, sz = cross(angular, (x - root[0], y - root[1], z - root[2]))
         return vx + sx, vy + sy, vz + sz
 
     def save_state(self) -> Restore:
-        """Return a function that brings it back, in the middle of a sample."""
-        own = saved(self, "_velocity", "_axes", "_gained", "_turned", "_passed")
-        return in_turn(super().save_state(), own, self._know_jumps)
+        """Return a function that restores the sensor and its integrals."""
+        integrals = saved(self, "_velocity", "_axes", "_delta_velocity", "_delta_angle", "_duration")
+        return in_turn(super().save_state(), integrals, self._update_jumps)
 
-    def _know_jumps(self) -> None:
+    def _update_jumps(self) -> None:
         self._jumps = self.carrier.jumps
 
     # ---- messages
@@ -145,9 +145,9 @@ class Imu(Instrument):
             "header": header,
             "orientation_covariance": _NOT_REPORTED,
             "angular_velocity": xyz(value.angular_velocity),
-            "angular_velocity_covariance": diagonal(*[self._turning.variance] * 3),
+            "angular_velocity_covariance": diagonal(*[self._rate_noise.variance] * 3),
             "linear_acceleration": xyz(value.specific_force),
-            "linear_acceleration_covariance": diagonal(*[self._feeling.variance] * 3),
+            "linear_acceleration_covariance": diagonal(*[self._force_noise.variance] * 3),
         }
 
     def _data(self, value: ImuSample, header: Mapping[str, Any]) -> Fields:
@@ -155,7 +155,7 @@ class Imu(Instrument):
         return {
             **self._raw(value, header),
             "orientation": {"x": x, "y": y, "z": z, "w": w},
-            "orientation_covariance": diagonal(*[self._leaning.variance] * 3),
+            "orientation_covariance": diagonal(*[self._tilt_noise.variance] * 3),
         }
 
 
@@ -168,7 +168,7 @@ def _vector(values: Sequence[float]) -> Vector:
     return x, y, z
 
 
-def _rotation(vector: Sequence[float]) -> Quaternion:
+def _quaternion(vector: Sequence[float]) -> Quaternion:
     """Return the unit quaternion of a rotation vector (rad)."""
     angle = math.hypot(*vector)
     scale = math.sin(angle / 2) / angle if angle else 0.5

@@ -1,4 +1,4 @@
-"""A magnetometer: the Earth's field, as the scene has it, in the sensor's axes."""
+"""A magnetometer: the scene's magnetic field in the sensor's axes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, Sensor
 
 
 class MagneticFieldParameters(SensorParameters):
-    """A magnetometer of three axes; the bias of its noise is hard iron."""
+    """A magnetometer of three axes. The bias of its noise models hard iron."""
 
     kind: Literal["magnetic_field"]
     topic: Topic = "magnetic_field"
@@ -20,7 +20,7 @@ class MagneticFieldParameters(SensorParameters):
     noise: NoiseParameters = NoiseParameters()  # T
 
     def make(self, fitting: Fitting) -> MagneticField:
-        """Return the instrument; `reset` comes before its first look."""
+        """Return the instrument; call its `reset` before `look`."""
         return MagneticField(self, fitting)
 
 
@@ -30,7 +30,7 @@ class MagneticField(Instrument):
     parameters: MagneticFieldParameters
 
     def __init__(self, parameters: MagneticFieldParameters, fitting: Fitting):
-        """Take what it is like and where it sits."""
+        """Create it; call `reset` before `look`."""
         super().__init__(parameters, fitting)
         self._noise = self.make_noise(parameters.noise, 3)
         self.outputs = (Output("", "sensor_msgs/MagneticField", self._message),)

@@ -1,6 +1,6 @@
-"""A distance sensor: one ray along its x axis, as sensor_msgs/Range has it, downwards where nothing else is said.
+"""A distance sensor: sensor_msgs/Range from one ray along its x axis, which points down by default.
 
-What is beyond its range is +Inf, what is too near -Inf (REP-117).
+A distance beyond the range is +Inf, one below it -Inf (REP 117).
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from drone_sim.sensors.noise import NoiseParameters
 from drone_sim.sensors.sensor import Fields, Fitting, Hit, Instrument, Output, SensorParameters, Topic
 
 _RADIATION = {"ultrasound": 0, "infrared": 1}  # sensor_msgs/Range
-# V-REP's proximity sensors look along their z; as the vision sensors, with y up and x to the left.
+# Sensor frame from object frame. V-REP's proximity and vision sensors have z forward, y up and x left.
 _OBJECT = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 
 
 class RangeParameters(SensorParameters):
-    """A distance sensor of one ray."""
+    """A distance sensor with one ray."""
 
     kind: Literal["range"]
     topic: Topic = "range"
     frame: Name = "range_link"
     radiation: Literal["ultrasound", "infrared"] = "infrared"
-    field_of_view: Annotated[Finite, Within(0, math.pi), Unit("rad")] = 0.0  # for the message; it is one ray
+    field_of_view: Annotated[Finite, Within(0, math.pi), Unit("rad")] = 0.0  # for the message only
     min_range: Annotated[Finite, Within(0, 1e4), Unit("m")]
     max_range: Annotated[Length, Unit("m")]
     noise: NoiseParameters = NoiseParameters()  # m
@@ -35,11 +35,11 @@ class RangeParameters(SensorParameters):
     from_object = _OBJECT
 
     def make(self, fitting: Fitting) -> Range:
-        """Return the instrument; `reset` comes before its first look."""
+        """Return the instrument; call its `reset` before `look`."""
         return Range(self, fitting)
 
     def check(self, sub_step: float) -> None:
-        """Raise ParameterError for periods that sub_step does not divide, or a range without extent."""
+        """Raise ParameterError as the base class does, and for an empty range."""
         super().check(sub_step)
         if not self.min_range < self.max_range:
             raise ParameterError(
@@ -48,42 +48,42 @@ class RangeParameters(SensorParameters):
 
 
 class RangeSample(NamedTuple):
-    """A distance (m) as it was measured, and what the ray truly met."""
+    """The measured distance (m), and the true hit of the ray."""
 
     distance: float
     hit: Hit | None
-    normal: Vector  # of what it met, in the frame of the object that scripts find
+    normal: Vector  # of the hit surface, in the frame of the object that scripts find
 
 
 class Range(Instrument):
-    """Sends a ray with every sample."""
+    """Casts one ray per sample."""
 
     parameters: RangeParameters
 
     def __init__(self, parameters: RangeParameters, fitting: Fitting):
-        """Take what it is like and where it sits."""
+        """Create it; call `reset` before `look`."""
         super().__init__(parameters, fitting)
         self._noise = self.make_noise(parameters.noise, 1)
         self.outputs = (Output("", "sensor_msgs/Range", self._message),)
 
     def sample(self) -> RangeSample:
-        """Return the distance of what is ahead."""
-        own, pose = self.parameters, self.fitting.pose()
-        hit = self.carrier.ray(position(pose), transform(pose, (own.max_range, 0.0, 0.0)))
+        """Return the distance along the ray."""
+        parameters, pose = self.parameters, self.fitting.pose()
+        hit = self.carrier.ray(position(pose), transform(pose, (parameters.max_range, 0.0, 0.0)))
         if hit is None:
             return RangeSample(math.inf, None, (0.0, 0.0, 0.0))
         normal = rotate_back(_OBJECT, rotate_back(pose, hit.normal))
         (measured,) = self._noise.add((hit.distance,))
-        if measured > own.max_range:
+        if measured > parameters.max_range:
             measured = math.inf
-        elif measured < own.min_range:
+        elif measured < parameters.min_range:
             measured = -math.inf
         return RangeSample(measured, hit, normal)
 
     def detected(self) -> tuple[float, str, Vector] | None:
-        """Return the distance (m) last measured, the name of what was met, and its unit normal in the object's frame.
+        """Return the last measured distance (m), the name of the hit object, and its unit normal in the object's frame.
 
-        None where nothing is within its range.
+        None if nothing is within the range.
         """
         sample: RangeSample | None = self.latest and self.latest.value
         if sample is None or sample.hit is None or not math.isfinite(sample.distance):
@@ -91,12 +91,12 @@ class Range(Instrument):
         return sample.distance, sample.hit.what, sample.normal
 
     def _message(self, value: RangeSample, header: Mapping[str, Any]) -> Fields:
-        own = self.parameters
+        parameters = self.parameters
         return {
             "header": header,
-            "radiation_type": _RADIATION[own.radiation],
-            "field_of_view": own.field_of_view,
-            "min_range": own.min_range,
-            "max_range": own.max_range,
+            "radiation_type": _RADIATION[parameters.radiation],
+            "field_of_view": parameters.field_of_view,
+            "min_range": parameters.min_range,
+            "max_range": parameters.max_range,
             "range": value.distance,
         }

@@ -1,10 +1,10 @@
-"""What a sensor is: how often it looks, what it last measured, a snapshot of its own; what carries it.
+"""Base classes of sensors, and the interface of the vehicle that carries them.
 
-A `Sensor` has a period, a latest sample, and can be brought back. An `Instrument` is one that measures numbers: after
-every sub-step it is told how many there have been (`look`); when its period is over it takes a sample, which becomes a
-`Reading` after the latency. A camera is the other sort: it looks when somebody asks, after whole steps.
-An instrument says itself which messages its readings make (`outputs`), as neutral data: who publishes them knows none
-of the kinds.
+A `Sensor` has a period, a latest sample and a snapshot. An `Instrument` measures numbers: `look` is called after every
+sub-step; at the end of each period it takes a sample, which becomes a `Reading` after the latency. A camera is the
+other kind: it renders on request, after whole steps.
+An instrument describes the messages of its readings in `outputs`, as plain data, so that their publisher needs no code
+for each kind.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.state import State
 from drone_sim.sensors.noise import Noise, NoiseParameters
 
-# An optical frame (z forward, x right, y down) in a frame with x forward, y left, z up: REP-103.
+# Body frame (x forward, y left, z up) from optical frame (z forward, x right, y down): REP 103.
 _OPTICAL = from_rpy((0.0, 0.0, 0.0), (-math.pi / 2, 0.0, -math.pi / 2))
 
 
 class MountParameters(Checked):
-    """A place in the frame of an object ('' is the vehicle's root): metres; rad, roll, pitch, yaw.
+    """A pose in the frame of an object ('' is the vehicle's root): position in m; roll, pitch, yaw in rad.
 
-    Cameras look, and rays go, along its +x.
+    Cameras look, and rays point, along its +x.
     """
 
     parent: Label = ""
@@ -53,12 +53,12 @@ class MountParameters(Checked):
 
     @property
     def frame(self) -> Matrix:
-        """Parent from the mounted frame: x forward, y left, z up."""
+        """Transform parent-from-mount; the mount has x forward, y left, z up."""
         return from_rpy(self.position, self.rpy)
 
     @property
     def optical(self) -> Matrix:
-        """Parent from the optical frame of a camera that is mounted so: z forward, x right, y down."""
+        """Transform parent-from-optical for a camera with this mount: z forward, x right, y down."""
         return multiply(self.frame, _OPTICAL)
 
 
@@ -66,31 +66,31 @@ Topic = Annotated[str, Field(pattern=TOPIC, max_length=128)]
 
 
 class SensorParameters(Checked):
-    """When a sensor samples, where it sits, and what it is called; cameras have parameters of their own."""
+    """Rate, mount and names of a sensor. Cameras have `CameraParameters` instead."""
 
-    kind: str  # each kind names its own
-    rate: Annotated[Finite, Within(1e-3, 1e5), Unit("Hz")]  # of simulated time; sub_step divides its period
+    kind: str  # a Literal in each subclass
+    rate: Annotated[Finite, Within(1e-3, 1e5), Unit("Hz")]  # of simulated time; the period is a multiple of sub_step
     topic: Topic  # in the vehicle's namespace
-    frame: Name  # of its messages
-    object: Name | None = None  # its name among the objects that a script finds; the sensor's own if left out
+    frame: Name  # frame_id of its messages
+    object: Name | None = None  # name of the object that scripts find; default: the sensor's name
     mount: MountParameters | None = None
-    latency: Annotated[Finite, Within(0, 60), Unit("s")] = 0.0  # whole sub-steps, from measuring to reading
+    latency: Annotated[Finite, Within(0, 60), Unit("s")] = 0.0  # whole sub-steps, from the measurement to the reading
     seed: Annotated[int, Within(0, 2**63 - 1)] = 0
 
-    suffixes: ClassVar[tuple[str, ...]] = ("",)  # of the topics that it publishes, after `topic`
-    default_mount: ClassVar[Matrix] = IDENTITY  # the root from the sensor's frame, where nothing says anything else
-    from_object: ClassVar[Matrix] = IDENTITY  # the sensor's frame from that of the object that scripts find
+    suffixes: ClassVar[tuple[str, ...]] = ("",)  # of its topics, appended to `topic`
+    default_mount: ClassVar[Matrix] = IDENTITY  # root-from-sensor, without `mount` and without a URDF link `frame`
+    from_object: ClassVar[Matrix] = IDENTITY  # sensor frame from the frame of the object that scripts find
 
     def make(self, fitting: Fitting) -> Instrument:
-        """Return the instrument; `reset` comes before its first look."""
+        """Return the instrument; call its `reset` before `look`."""
         raise NotImplementedError
 
     def period(self, sub_step: float) -> int:
-        """Return the sub-steps (of `sub_step` seconds) between two samples."""
+        """Return the number of sub-steps (of `sub_step` seconds) between two samples."""
         return max(1, round(1 / (self.rate * sub_step)))
 
     def check(self, sub_step: float) -> None:
-        """Raise ParameterError for a period or a latency that is no whole multiple of `sub_step` (s)."""
+        """Raise ParameterError if the period or the latency is not a whole multiple of `sub_step` (s)."""
         steps = self.period(sub_step)
         if abs(steps * sub_step * self.rate - 1) > 1e-4:
             raise ParameterError(
@@ -105,55 +105,55 @@ class SensorParameters(Checked):
             )
 
     def topics(self) -> Iterator[tuple[str, str]]:
-        """Yield what it publishes, and what each topic is."""
+        """Yield each topic, and a word for its content."""
         for suffix in self.suffixes:
             yield f"{self.topic}{suffix}", suffix[1:] or self.kind
 
     def placed(self, links: Mapping[str, Matrix]) -> tuple[str, Matrix]:
-        """Return the object that it hangs on ('' is the vehicle's root), and that from the sensor's frame.
+        """Return the parent object ('' is the vehicle's root), and the transform parent-from-sensor.
 
-        It sits where `mount` says, or at the link of the URDF (given as root from link) that is named like its frame.
+        Without `mount`, the sensor is at the URDF link named `frame`; `links` holds the transforms root-from-link.
         """
         if self.mount is not None:
             return self.mount.parent, self.mount.frame
         return "", links.get(self.frame, self.default_mount)
 
     def sensor_at(self, world_from_object: Matrix) -> Matrix:
-        """Return the world from the sensor's frame, given the object's pose."""
-        if self.from_object is IDENTITY:  # most often, and a fast sensor asks in every sub-step
+        """Return the transform world-from-sensor for the pose of the object that scripts find."""
+        if self.from_object is IDENTITY:  # the usual case; called in every sub-step
             return world_from_object
         return multiply(world_from_object, invert(self.from_object))
 
 
-Fields = dict[str, Any]  # of a ROS message, by name; nested mappings and lists for its own messages
+Fields = dict[str, Any]  # of a ROS message, by name; nested messages are mappings and lists
 
 
 class Hit(NamedTuple):
-    """What a ray meets first: how far away (m), which object, and its surface's unit normal in the world."""
+    """The first hit of a ray: distance (m), object, and the surface's unit normal in the world."""
 
     distance: float
-    what: str  # name of the object; '' for one that has none
+    what: str  # name of the object; '' if it has none
     normal: Vector
 
 
 class Contact(NamedTuple):
-    """One point at which the vehicle touched something in the last sub-step; all vectors in the world."""
+    """A contact point of the vehicle in the last sub-step; all vectors in the world frame."""
 
-    what: str  # name of what it touched: an object of the scene, the floor, another vehicle
+    what: str  # name of the other object, the floor or another vehicle
     point: Vector  # m
-    normal: Vector  # unit, of the other's surface, towards the vehicle
+    normal: Vector  # unit normal of the other's surface, towards the vehicle
     force: Vector  # N, on the vehicle, friction included
 
 
 class Carrier(Protocol):
-    """The vehicle, as its sensors see it: all of it as of the last sub-step."""
+    """The vehicle as its sensors see it, after the last sub-step."""
 
     state: State  # of the root link
-    jumps: int  # how often it has been put somewhere else, at rest; never counts down
+    jumps: int  # number of teleports, each of which leaves it at rest; never decreases
     mass: float  # kg
     gravity: float  # acceleration of free fall along z in m/s², negative downwards
-    datum: DatumParameters  # where on the Earth the world's origin is
-    magnetic_field: Vector  # the Earth's in the world, in T
+    datum: DatumParameters  # position of the world's origin on the Earth
+    magnetic_field: Vector  # of the Earth, T, world
 
     @property
     def thrusts(self) -> Sequence[float]:
@@ -161,71 +161,71 @@ class Carrier(Protocol):
 
     @property
     def wind(self) -> Vector:
-        """Velocity of the air where it is (m/s, world)."""
+        """Velocity of the air at the vehicle (m/s, world)."""
 
     def ray(self, start: Vector, end: Vector) -> Hit | None:
-        """Return what a ray (m, world) meets first that is not the vehicle itself; None for nothing."""
+        """Return the first hit of a ray (m, world), ignoring the vehicle; None if it hits nothing."""
 
     def contacts(self) -> list[Contact]:
-        """Return what the vehicle touched in the last sub-step."""
+        """Return the vehicle's contacts in the last sub-step."""
 
 
 @dataclass(frozen=True)
 class Fitting:
-    """How one sensor is fitted to a vehicle."""
+    """The connection of a sensor to its vehicle."""
 
-    name: str  # of vehicle and sensor, such as drone/imu: no other has it, and its noise depends on it
+    name: str  # unique, such as drone/imu; seeds the noise
     carrier: Carrier
-    pose: Callable[[], Matrix]  # world from the sensor's frame
+    pose: Callable[[], Matrix]  # transform world-from-sensor
     sub_step: float  # s
 
 
 class Reading(NamedTuple):
-    """A sample as it was measured, noise included."""
+    """A sample, noise included."""
 
-    at: int  # (sub-)steps since the start of the run when it was measured
-    value: Any  # what the sensor's kind makes of it
+    at: int  # time of the measurement, in (sub-)steps since the start of the run
+    value: Any  # its type depends on the sensor's kind
 
 
 class Output(NamedTuple):
-    """A topic on which every reading becomes a message."""
+    """A topic on which every reading is published."""
 
-    suffix: str  # after the sensor's own topic: '' or '/data'
-    kind: str  # of message, such as sensor_msgs/Imu
-    fields: Callable[[Any, Mapping[str, Any]], Fields]  # of a reading's value, with this std_msgs/Header
+    suffix: str  # appended to the sensor's topic: '' or '/data'
+    kind: str  # message type, such as sensor_msgs/Imu
+    fields: Callable[[Any, Mapping[str, Any]], Fields]  # (value of a reading, std_msgs/Header) -> message
 
 
 class Sensor(ABC):
-    """Something that samples when its period is over: instruments count sub-steps, cameras steps."""
+    """A periodic sampler. Instruments count sub-steps, cameras count steps."""
 
     def __init__(self, period: int):
-        """Take the number of (sub-)steps between two samples."""
+        """`period`: number of (sub-)steps between two samples."""
         self.period = period
-        self.latest: Reading | None = None  # None before the first
+        self.latest: Reading | None = None  # None before the first sample
 
     def is_due(self, count: int) -> bool:
-        """Tell whether a sample is due after `count` (sub-)steps since the start of the run."""
+        """Return whether a sample is due after `count` (sub-)steps since the start of the run."""
         return count % self.period == 0
 
     @abstractmethod
     def reset(self) -> None:
-        """Begin anew, as at the start of a run."""
+        """Return to the state at the start of a run."""
 
     @abstractmethod
     def save_state(self) -> Restore:
-        """Return a function that brings back all that the sensor is now; it may be called again and again."""
+        """Return a function that restores the sensor's present state; it may be called repeatedly."""
 
 
 class Instrument(Sensor):
-    """A sensor that measures numbers. Its noise is its own: of its seed, its vehicle's name and its own name.
+    """A sensor that measures numbers. Its noise is seeded by `seed` and the names of its vehicle and itself.
 
-    `readings` are those that came since whoever uses them last cleared the list.
+    `readings` holds the new readings; the publisher clears the list.
     """
 
     outputs: tuple[Output, ...]
 
     def __init__(self, parameters: SensorParameters, fitting: Fitting):
-        """Take what it is and where; `reset` comes before the first look."""
+        """Create it; call `reset` before `look`."""
         super().__init__(parameters.period(fitting.sub_step))
         self.parameters = parameters
         self.fitting = fitting
@@ -233,30 +233,30 @@ class Instrument(Sensor):
         self.interval = self.period * fitting.sub_step  # s
         self.readings: list[Reading] = []
         self._delay = round(parameters.latency / fitting.sub_step)
-        self._queue: deque[tuple[int, Reading]] = deque()  # samples, and the count at which each is there
+        self._queue: deque[tuple[int, Reading]] = deque()  # (count at which the sample becomes a reading, sample)
         self._noises: list[Noise] = []
         self._random = np.random.default_rng()
 
     def make_noise(self, parameters: NoiseParameters, axes: int) -> Noise:
-        """Return the noise of one of its measurements; what has been made so starts and goes back with the sensor."""
+        """Return the noise of a measurement of `axes` numbers. The sensor resets, saves and restores it."""
         noise = Noise(parameters, axes, self.interval)
         self._noises.append(noise)
         return noise
 
     def change_noise(self, parameters: SensorParameters) -> None:
-        """Measure with the noise of these parameters, which are its own in all else."""
+        """Replace the noise parameters; `parameters` differs from the present ones in nothing else."""
         changed = dict(_noises(parameters))
-        paths = {id(one): path for path, one in _noises(self.parameters)}
+        paths = {id(noise): path for path, noise in _noises(self.parameters)}
         for noise in self._noises:
             noise.change(changed[paths[id(noise.parameters)]])
         self.parameters = parameters
 
     @abstractmethod
     def sample(self) -> Any:
-        """Return the value of a sample taken now, noise included."""
+        """Take a sample and return its value, noise included."""
 
     def look(self, count: int) -> None:
-        """Take part in a sub-step, `count` of which there have been since the start of the run."""
+        """Process a sub-step, the `count`-th since the start of the run."""
         if self.is_due(count):
             self._queue.append((count + self._delay, Reading(count, self.sample())))
         while self._queue and self._queue[0][0] <= count:
@@ -264,75 +264,75 @@ class Instrument(Sensor):
             self.readings.append(self.latest)
 
     def reset(self) -> None:
-        """Begin anew: the same noise in every run."""
+        """Return to the state at the start of a run; every run has the same noise."""
         self.latest = None
         self.readings.clear()
         self._queue.clear()
-        words = [self.parameters.seed, *self.fitting.name.encode()]
-        self._random = np.random.default_rng(np.random.SeedSequence(words))
+        entropy = [self.parameters.seed, *self.fitting.name.encode()]
+        self._random = np.random.default_rng(np.random.SeedSequence(entropy))
         for noise in self._noises:
             noise.restart(self._random)
 
     def save_state(self) -> Restore:
-        """Return a function that brings back noise, latency and readings."""
-        own = saved(self, "parameters", "latest", "readings", "_queue")
-        return in_turn(own, saved(self._random.bit_generator, "state"), *(one.save_state() for one in self._noises))
+        """Return a function that restores noise, delayed samples and readings."""
+        samples = saved(self, "parameters", "latest", "readings", "_queue")
+        return in_turn(samples, saved(self._random.bit_generator, "state"), *(n.save_state() for n in self._noises))
 
     def header(self, reading: Reading) -> dict[str, Any]:
-        """Return the header of a reading's message: when it was measured (s of simulated time), and in which frame."""
+        """Return the std_msgs/Header of a reading: time of the measurement (s, simulated) and frame."""
         return {"stamp": reading.at * self.fitting.sub_step, "frame_id": self.parameters.frame}
 
     def read(self) -> Fields | None:
-        """Return the last reading as the fields of its first message; None before there is one."""
+        """Return the latest reading as the fields of its first message; None before the first reading."""
         if self.latest is None:
             return None
         return self.outputs[0].fields(self.latest.value, self.header(self.latest))
 
 
-# How sensors fail: they fall silent, or say the same thing over and over.
+# silent: no readings; frozen: repeats the same value.
 Failure = Literal["ok", "silent", "frozen"]
 
 
 class Failing:
-    """Takes the place of a failing instrument, which goes on measuring: the fault does not change its later noise."""
+    """Stands in for a failed instrument, which keeps measuring so that the fault does not change its later noise."""
 
     def __init__(self, instrument: Instrument, failure: Failure):
-        """Begin to fail; what is frozen before its first reading freezes with that."""
+        """Start the failure. An instrument frozen before its first reading freezes at that reading."""
         self._instrument = instrument
         self._frozen = failure == "frozen"
         self._last = instrument.latest
 
     def look(self, count: int) -> None:
-        """Take part in a sub-step; new readings are dropped, or each has the frozen value instead."""
-        own = self._instrument
-        known = len(own.readings)
-        own.look(count)
-        new = own.readings[known:]
+        """Process a sub-step; drop its readings, or replace their values by the frozen one."""
+        instrument = self._instrument
+        old_count = len(instrument.readings)
+        instrument.look(count)
+        new = instrument.readings[old_count:]
         if not new:
             return
-        del own.readings[known:]
+        del instrument.readings[old_count:]
         if self._frozen:
             value = (self._last or new[0]).value
-            own.readings += [Reading(one.at, value) for one in new]
-            self._last = own.readings[-1]
-        own.latest = self._last
+            instrument.readings += [Reading(reading.at, value) for reading in new]
+            self._last = instrument.readings[-1]
+        instrument.latest = self._last
 
 
-def _noises(model: Checked, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], NoiseParameters]]:
-    """Yield the noises in a sensor's parameters, by the keys that lead to them."""
+def _noises(model: Checked, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], NoiseParameters]]:
+    """Yield all noise parameters with the path of keys to them."""
     for key, value in model:
         if isinstance(value, NoiseParameters):
-            yield (*above, key), value
+            yield (*path, key), value
         elif isinstance(value, Checked):
-            yield from _noises(value, (*above, key))
+            yield from _noises(value, (*path, key))
 
 
 def xyz(vector: Sequence[float]) -> dict[str, float]:
-    """Return three numbers as the fields of geometry_msgs/Vector3 and Point."""
+    """Return a vector as the fields of geometry_msgs/Vector3 or Point."""
     x, y, z = vector
     return {"x": x, "y": y, "z": z}
 
 
 def diagonal(first: float, second: float, third: float) -> list[float]:
-    """Return a covariance of three independent axes, 9 numbers row by row."""
+    """Return a 3 x 3 diagonal covariance, row-major."""
     return [first, 0.0, 0.0, 0.0, second, 0.0, 0.0, 0.0, third]

@@ -1,6 +1,6 @@
-"""The ground truth of a camera's picture: the object of each pixel, boxes around objects, and the optical flow.
+"""Ground truth of a camera image: the object of each pixel, bounding boxes, and optical flow.
 
-All is of the moment of the picture, and costs nothing as long as nobody asks for it.
+All parts belong to the moment of the image, and are computed only on request.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from drone_sim.shapes.shape import DrawnShape
 from drone_sim.shapes.visual import Visual
 
 VEHICLE = "vehicle"  # the category of vehicles
-_COPY = re.compile(r"[\d#_\[\]. -]+$")  # what names end with that are alike but for a number
-_FARTHER = 1.02  # times the depth of before, and the point was behind something then
-_NEAREST = 1e-3  # m, ahead of the camera
+_COPY = re.compile(r"[\d#_\[\]. -]+$")  # the suffix of numbered copies
+_HIDDEN = 1.02  # a point was hidden if its distance exceeded the depth by this factor ...
+_HIDDEN_BY = 1e-3  # ... and this distance, m
 
 
 class Identity(NamedTuple):
-    """The object that a visual belongs to: its name in the scene, and its category."""
+    """The object of a visual: its name in the scene, and its category."""
 
     name: str
     category: str
 
 
 class Box2D(NamedTuple):
-    """A box in the picture, px: its left upper and right lower corner, which are the borders of pixels."""
+    """A box in the image, px, from the outer border of its first pixels to that of its last ones."""
 
     left: float
     top: float
@@ -44,19 +44,19 @@ class Box2D(NamedTuple):
 
     @property
     def area(self) -> float:
-        """In px²."""
+        """Area in px²."""
         return max(0.0, self.right - self.left) * max(0.0, self.bottom - self.top)
 
 
 class Seen(NamedTuple):
-    """An object that the picture shows.
+    """An object visible in the image.
 
-    visible: around its pixels. full: around all of it, as if nothing hid it and the picture were larger, and around
-    `visible`, which can be larger by part of a pixel. For a pinhole, the object ends at the near plane. Through a
-    plumb_bob or rational_polynomial lens, an object that reaches behind the camera has no other `full` than `visible`.
-    occlusion: the share of what the picture would show of it alone that something hides; truncation: the share of
-    `full` that is outside the picture, both 0 to 1. pose: the optical frame from the middle of its box (4, 4); size: of
-    that box, m.
+    visible: box around its pixels. full: box around the whole object, without occlusion and image borders, and around
+    `visible`, which can be larger by a part of a pixel. For a pinhole, the object is cut at the near plane. With a
+    plumb_bob or rational_polynomial lens, `full` is `visible` if the object extends behind the camera.
+    occlusion: the hidden share of the pixels that it would have alone; truncation: the share of `full` outside the
+    image; both 0 to 1. pose: transform optical-from-box, with the origin in the box's centre (4, 4); size: of that 3-D
+    box, m.
     """
 
     number: int
@@ -72,33 +72,33 @@ class Seen(NamedTuple):
 
 @dataclass
 class Numbered:
-    """The objects of a scene by their numbers in masks: from 1; 0 is nobody."""
+    """The numbers of a scene's objects in masks: 1, 2, ...; 0 is background."""
 
-    instances: np.ndarray  # of the visuals, (N,)
-    identities: list[Identity] = field(default_factory=list)  # of the numbers from 1
-    categories: list[str] = field(default_factory=list)  # of their numbers from 1
+    instances: np.ndarray  # number of each visual, (N,)
+    identities: list[Identity] = field(default_factory=list)  # of the objects 1, 2, ...
+    categories: list[str] = field(default_factory=list)  # of the category numbers 1, 2, ...
 
     @classmethod
     def of(cls, visuals: Sequence[Identity]) -> Numbered:
-        """Number the objects of the visuals, in the order in which they first appear."""
+        """Number the objects of the visuals in the order of their first appearance."""
         identities = list(dict.fromkeys(visuals))
-        numbers = {one: number for number, one in enumerate(identities, 1)}
-        instances = np.array([numbers[one] for one in visuals], dtype=np.uint16)
-        return cls(instances, identities, sorted({one.category for one in identities}))
+        numbers = {identity: number for number, identity in enumerate(identities, 1)}
+        instances = np.array([numbers[identity] for identity in visuals], dtype=np.uint16)
+        return cls(instances, identities, sorted({identity.category for identity in identities}))
 
     def category_mask(self, instances: np.ndarray) -> np.ndarray:
-        """Return the numbers of categories, from those of instances."""
-        table = [0, *(self.categories.index(one.category) + 1 for one in self.identities)]
+        """Return the category numbers for a mask of instance numbers."""
+        table = [0, *(self.categories.index(identity.category) + 1 for identity in self.identities)]
         return np.array(table, dtype=np.uint16)[instances]
 
 
 def category_of(name: str) -> str:
-    """Return the category of an object whose entry names none: its name without the number at its end."""
+    """Return the default category of an object: its name without the number at the end."""
     return _COPY.sub("", name) or name
 
 
 class PictureTruth:
-    """The ground truth of one picture; each part is made when it is first asked for."""
+    """The ground truth of an image; each part is computed at its first use."""
 
     def __init__(
         self,
@@ -109,108 +109,108 @@ class PictureTruth:
         visuals: Sequence[Visual],
         numbered: Numbered,
     ):
-        """`draw` returns outputs of the renderer; `alone` how many pixels each object has alone, by its number."""
+        """`draw` renders outputs; `alone` returns each object's number of pixels without occlusion, by its number."""
         self._draw, self._alone = draw, alone
         self.intrinsics, self.moment = intrinsics, moment
         self._visuals, self.numbered = visuals, numbered
         self._drawn: dict[str, np.ndarray] = {}
 
     def want(self, names: Sequence[str]) -> None:
-        """Draw these outputs, in one pass, as far as they are not drawn."""
-        missing = [one for one in names if one not in self._drawn]
+        """Render those of the outputs `names` that are missing, in one pass."""
+        missing = [name for name in names if name not in self._drawn]
         if missing:
             self._drawn.update(self._draw(missing))
 
     @property
     def drawn(self) -> tuple[str, ...]:
-        """The outputs that have been asked for, the picture aside."""
+        """Names of the outputs rendered so far, without the colour image."""
         return tuple(name for name in self._drawn if name != COLOR)
 
     def output(self, name: str) -> np.ndarray:
-        """Return one of `render.outputs.OUTPUTS`, or the picture."""
+        """Return one of `render.outputs.OUTPUTS`, or the colour image."""
         self.want([name])
         return self._drawn[name]
 
     @property
     def categories(self) -> np.ndarray:
-        """The numbers of categories, (height, width) uint16."""
+        """Mask of category numbers, (height, width) uint16."""
         return self.numbered.category_mask(self.output("instance"))
 
     @property
     def points(self) -> np.ndarray:
-        """Where what is seen is, in the optical frame, m, (height, width, 3) float32; NaN where nothing is."""
+        """The surface point of each pixel in the optical frame, m, (height, width, 3) float32; NaN for no surface."""
         rays = self.intrinsics.rays
         along = rays if self.intrinsics.is_fisheye else rays / rays[..., 2:]
         return np.asarray(along * self.output("depth")[..., None], dtype=np.float32)
 
     def flow(self, depth_before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the optical flow since the picture before, and where it is known.
+        """Return the optical flow since the previous image, and the mask of pixels where it is known.
 
-        (height, width, 2) float32, px to the right and down; and (height, width) bool: not of what was outside that
-        picture, or hidden in it, as its depths `depth_before` tell.
+        The flow is (height, width, 2) float32, px to the right and down. The mask is (height, width) bool; a point is
+        not known if it was outside the previous image, or hidden according to that image's depth `depth_before`.
         """
         self.want(["depth", "before"])
         before = self.output("before")
-        then = self.intrinsics.project(before)
-        known = np.isfinite(then).all(axis=-1)
-        column, row = (np.rint(np.nan_to_num(one)).astype(np.intp) for one in (then[..., 0], then[..., 1]))
+        source = self.intrinsics.project(before)
+        known = np.isfinite(source).all(axis=-1)
+        column, row = (np.rint(np.nan_to_num(axis)).astype(np.intp) for axis in (source[..., 0], source[..., 1]))
         height, width = depth_before.shape
         known &= (column >= 0) & (row >= 0) & (column < width) & (row < height)
         shown = np.where(known, depth_before[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)], np.nan)
-        away = np.linalg.norm(before, axis=-1) if self.intrinsics.is_fisheye else before[..., 2]
-        known &= away < _FARTHER * shown + _NEAREST
-        flow = np.where(known[..., None], self.intrinsics.pixels - then, 0.0)
+        distance = np.linalg.norm(before, axis=-1) if self.intrinsics.is_fisheye else before[..., 2]
+        known &= distance < _HIDDEN * shown + _HIDDEN_BY
+        flow = np.where(known[..., None], self.intrinsics.pixels - source, 0.0)
         return flow.astype(np.float32), known
 
     def seen(self) -> list[Seen]:
-        """Return the objects of which a pixel is seen, floor and all, by their numbers."""
+        """Return all objects with a visible pixel, including the floor, in the order of their numbers."""
         mask = self.output("instance")
         counts, alone = np.bincount(mask.ravel(), minlength=len(self.numbered.identities) + 1), self._alone()
-        found = []
+        objects = []
         for number in np.flatnonzero(counts[1:]) + 1:
             rows, columns = np.any(mask == number, axis=1), np.any(mask == number, axis=0)
-            (top, bottom), (left, right) = (np.flatnonzero(one)[[0, -1]] for one in (rows, columns))
+            (top, bottom), (left, right) = (np.flatnonzero(has_pixel)[[0, -1]] for has_pixel in (rows, columns))
             visible = Box2D(left - 0.5, top - 0.5, right + 0.5, bottom + 0.5)
-            pose, size, corners = self._solid(number)
-            full = self._around(number, corners, visible)
+            pose, size, corners = self._box(number)
+            full = self._full_box(number, corners, visible)
             inside = Box2D(
                 max(full.left, -0.5), max(full.top, -0.5),
                 min(full.right, self.intrinsics.width - 0.5), min(full.bottom, self.intrinsics.height - 0.5),
             )  # fmt: skip
-            count, whole = int(counts[number]), max(int(alone[number]), int(counts[number]))
-            shares = 1 - count / whole, 1 - inside.area / full.area if full.area > 0 else 0.0
+            count, unoccluded = int(counts[number]), max(int(alone[number]), int(counts[number]))
+            shares = 1 - count / unoccluded, 1 - inside.area / full.area if full.area > 0 else 0.0
             identity = self.numbered.identities[number - 1]
-            found.append(Seen(int(number), identity, count, visible, full, *shares, pose, size))
-        return found
+            objects.append(Seen(int(number), identity, count, visible, full, *shares, pose, size))
+        return objects
 
-    def _solid(self, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the pose of an object's box and its size, and its corners, (n, 3), all in the optical frame.
+    def _box(self, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return pose (4, 4), size and vertices (n, 3) of an object, all in the optical frame.
 
-        The box stands as the object's first visual does.
+        Its box has the axes of the object's first visual.
         """
         corners = self._optical(number, _outline)
         optical = np.linalg.inv(self.moment.camera_pose)
         frame = optical @ self.moment.poses[np.flatnonzero(self.numbered.instances == number)[0]]
         frame[:3, :3] /= np.linalg.norm(frame[:3, :3], axis=0)
-        own = (corners - frame[:3, 3]) @ frame[:3, :3]
-        low, high = own.min(axis=0), own.max(axis=0)
+        in_box_axes = (corners - frame[:3, 3]) @ frame[:3, :3]
+        low, high = in_box_axes.min(axis=0), in_box_axes.max(axis=0)
         frame[:3, 3] += frame[:3, :3] @ ((low + high) / 2)
         return frame, high - low, corners
 
     def _optical(self, number: int, points: Callable[[DrawnShape], np.ndarray]) -> np.ndarray:
-        """Return an object's points in the optical frame, (n, 3), from those of each of its shapes."""
+        """Return the `points` of all shapes of an object, in the optical frame, (n, 3)."""
         optical = np.linalg.inv(self.moment.camera_pose)
-        found = []
-        for one in np.flatnonzero(self.numbered.instances == number):
-            pose = optical @ self.moment.poses[one]
-            found.append(points(self._visuals[one].shape) @ pose[:3, :3].T + pose[:3, 3])
-        return np.concatenate(found)
+        pieces = []
+        for index in np.flatnonzero(self.numbered.instances == number):
+            pose = optical @ self.moment.poses[index]
+            pieces.append(points(self._visuals[index].shape) @ pose[:3, :3].T + pose[:3, 3])
+        return np.concatenate(pieces)
 
-    def _around(self, number: int, corners: np.ndarray, visible: Box2D) -> Box2D:
-        """Return the box in the picture around an object's corners and around `visible`, as `Seen.full`."""
+    def _full_box(self, number: int, corners: np.ndarray, visible: Box2D) -> Box2D:
+        """Return `Seen.full` of an object with these corners."""
         lens = self.intrinsics
         if not isinstance(lens, Distorted) and (corners[:, 2] < lens.near).any():
-            corners = _cut(self._optical(number, _triangle_corners).reshape(-1, 3, 3), lens.near)
+            corners = _clip_near(self._optical(number, _triangle_corners).reshape(-1, 3, 3), lens.near)
         pixels = lens.project(corners)
         if not np.isfinite(pixels).all():
             return visible
@@ -219,42 +219,42 @@ class PictureTruth:
 
 
 def described(objects: Sequence[Seen]) -> list[dict[str, Any]]:
-    """Return objects as JSON has them: px, m, and the pose of each box in the optical frame, quaternions xyzw."""
+    """Return objects as JSON values: px, m, and poses optical-from-box with quaternions xyzw."""
     return [
         {
-            "number": one.number, **one.identity._asdict(), "pixels": one.pixels,
-            "visible": [round(float(value), 2) for value in one.visible],
-            "full": [round(float(value), 2) for value in one.full],
-            "occlusion": round(one.occlusion, 4), "truncation": round(one.truncation, 4),
-            "position": one.pose[:3, 3].round(5).tolist(),
-            "orientation": [round(value, 6) for value in quaternion_of(one)],
-            "size": one.size.round(5).tolist(),
+            "number": seen.number, **seen.identity._asdict(), "pixels": seen.pixels,
+            "visible": [round(float(value), 2) for value in seen.visible],
+            "full": [round(float(value), 2) for value in seen.full],
+            "occlusion": round(seen.occlusion, 4), "truncation": round(seen.truncation, 4),
+            "position": seen.pose[:3, 3].round(5).tolist(),
+            "orientation": [round(value, 6) for value in quaternion_of(seen)],
+            "size": seen.size.round(5).tolist(),
         }
-        for one in objects
+        for seen in objects
     ]  # fmt: skip
 
 
-def quaternion_of(one: Seen) -> tuple[float, ...]:
-    """Return how an object's box is turned in the optical frame, xyzw."""
-    return tuple(map(float, to_quaternion(tuple(one.pose[:3].ravel()))))
+def quaternion_of(seen: Seen) -> tuple[float, ...]:
+    """Return the orientation of an object's box in the optical frame, a quaternion xyzw."""
+    return tuple(map(float, to_quaternion(tuple(seen.pose[:3].ravel()))))
 
 
 @lru_cache(maxsize=1024)
 def _outline(shape: DrawnShape) -> np.ndarray:
-    """Return the corners of a shape's triangles, each once, (n, 3), m."""
+    """Return the distinct corners of a shape's triangles, (n, 3), m."""
     return np.asarray(np.unique(_triangle_corners(shape), axis=0))
 
 
 @lru_cache(maxsize=64)
 def _triangle_corners(shape: DrawnShape) -> np.ndarray:
-    """Return the corners of a shape's triangles, three in a row for each, (n, 3), m."""
+    """Return the corners of a shape's triangles, three consecutive rows per triangle, (n, 3), m."""
     return np.concatenate([part.corners.reshape(-1, 3) for part in shape.triangles()])
 
 
-def _cut(triangles: np.ndarray, near: float) -> np.ndarray:
+def _clip_near(triangles: np.ndarray, near: float) -> np.ndarray:
     """Return the corners, (n, 3), of the parts of triangles (m, 3, 3) whose z is at least `near`."""
     starts, ends = triangles.reshape(-1, 3), np.roll(triangles, -1, axis=1).reshape(-1, 3)
     crossing = (starts[:, 2] < near) != (ends[:, 2] < near)
-    starts_crossing, along = starts[crossing], (ends - starts)[crossing]
-    cuts = starts_crossing + along * ((near - starts_crossing[:, 2:]) / along[:, 2:])
+    starts_crossing, edges = starts[crossing], (ends - starts)[crossing]
+    cuts = starts_crossing + edges * ((near - starts_crossing[:, 2:]) / edges[:, 2:])
     return np.concatenate([starts[starts[:, 2] >= near], cuts])

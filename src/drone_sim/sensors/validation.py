@@ -1,4 +1,4 @@
-"""What cameras and other sensors may be beside each other, and beside the vehicle's own topics."""
+"""Checks for conflicting objects, topics and frames among the cameras and sensors of a vehicle."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from drone_sim.config.types import Location, ParameterError
 from drone_sim.sensors.camera_parameters import MAX_PIXELS, CameraParameters
 from drone_sim.sensors.sensor import SensorParameters
 
-# What a vehicle publishes and hears in its namespace, beside its sensors.
+# Topics in a vehicle's namespace, other than those of its sensors.
 RESERVED_TOPICS = (
     *("cmd_vel", "set_pose", "initialpose", "push", "target_pose", "odom", "propellers", "joint_states"),
     *("set_wind", "weather", "faults", "takeoff", "land", "reset", "home", "goto", "state", "hears_commands"),
@@ -20,25 +20,25 @@ RESERVED_TOPICS = (
 
 
 def check_sensors(cameras: Mapping[str, CameraParameters], sensors: Mapping[str, SensorParameters]) -> None:
-    """Raise ParameterError where two claim the same object, topic or frame, or one claims the drone's own topic."""
+    """Raise ParameterError if two sensors claim one object, topic or frame, or one claims a topic of the vehicle."""
     _check_cameras(cameras)
-    topics = {topic: "the drone's own" for topic in RESERVED_TOPICS}
+    topics = {topic: "the drone's own topic" for topic in RESERVED_TOPICS}
     objects: dict[str, str] = {}
-    for kind, several in (("cameras", cameras), ("sensors", sensors)):
-        for name, one in several.items():
-            _claim_object(objects, (kind, name), one.object or name)
-            _claim_topics(topics, (kind, name), one.topic, one.topics())
+    for kind, group in (("cameras", cameras), ("sensors", sensors)):
+        for name, sensor in group.items():
+            _claim_object(objects, (kind, name), sensor.object or name)
+            _claim_topics(topics, (kind, name), sensor.topic, sensor.topics())
     _check_frames(cameras, sensors)
 
 
 def check_rates(sensors: Mapping[str, SensorParameters], sub_step: float, above: Location = ()) -> None:
-    """Raise ParameterError for a sensor of which `sub_step` (s) does not divide the period.
+    """Raise ParameterError for a sensor whose period or latency is not a multiple of `sub_step` (s).
 
-    `above` is where the key `sensors` stands among the parameters.
+    `above` is the path of keys to the key `sensors`.
     """
-    for name, one in sensors.items():
+    for name, sensor in sensors.items():
         try:
-            one.check(sub_step)
+            sensor.check(sub_step)
         except ParameterError as error:
             raise error.below(*above, "sensors", name) from None
 
@@ -46,41 +46,41 @@ def check_rates(sensors: Mapping[str, SensorParameters], sub_step: float, above:
 def _check_cameras(cameras: Mapping[str, CameraParameters]) -> None:
     pixels = sum(camera.width * camera.height for camera in cameras.values())
     if pixels > MAX_PIXELS:
-        raise ParameterError(f"{pixels} pixels in all; at most {MAX_PIXELS} are allowed", ("cameras",))
+        raise ParameterError(f"{pixels} pixels in total; at most {MAX_PIXELS} are allowed", ("cameras",))
     for name, camera in cameras.items():
         if camera.near >= camera.far:
             raise ParameterError(f"must be less than far = {camera.far}", ("cameras", name, "near"), str(camera.near))
 
 
-def _claim_object(taken: dict[str, str], who: tuple[str, str], name: str) -> None:
-    here = "/".join(who)
+def _claim_object(taken: dict[str, str], keys: tuple[str, str], name: str) -> None:
+    path = "/".join(keys)
     if name in taken:
-        raise ParameterError(f"is also the name of {taken[name]}", (*who, "object"), f"'{name}'")
-    taken[name] = here
+        raise ParameterError(f"is the object of {taken[name]} already", (*keys, "object"), f"'{name}'")
+    taken[name] = path
 
 
-def _claim_topics(taken: dict[str, str], who: tuple[str, str], given: str, topics: Iterable[tuple[str, str]]) -> None:
-    here = "/".join(who)
+def _claim_topics(taken: dict[str, str], keys: tuple[str, str], base: str, topics: Iterable[tuple[str, str]]) -> None:
+    path = "/".join(keys)
     for topic, what in topics:
         if topic in taken:
             raise ParameterError(
                 f"its {what} would be {topic}, which is {taken[topic]}; "
-                "use a topic with a namespace, such as rear/image",
-                (*who, "topic"),
-                f"'{given}'",
+                "give it a namespace of its own, such as rear/image",
+                (*keys, "topic"),
+                f"'{base}'",
             )
-        taken[topic] = f"the {what} of {here}"
+        taken[topic] = f"the {what} of {path}"
 
 
 def _check_frames(cameras: Mapping[str, CameraParameters], sensors: Mapping[str, SensorParameters]) -> None:
-    """Raise ParameterError where one frame would be at two places; the URDF's links are looked at by the vehicle."""
+    """Raise ParameterError if a frame would have two poses; the vehicle checks the URDF's links."""
     taken = {camera.frame: f"cameras/{name}" for name, camera in cameras.items() if camera.mount is not None}
     taken.update({"Track_base": "the vehicle", "world": "the scene"})
-    first: dict[str, tuple[str, SensorParameters]] = {}
-    for name, one in sensors.items():
-        other, before = first.setdefault(one.frame, (name, one))
-        owner = taken.get(one.frame)
-        if (before.mount, before.default_mount) != (one.mount, one.default_mount):
-            owner = f"sensors/{other}, which sits elsewhere"
+    first_users: dict[str, tuple[str, SensorParameters]] = {}
+    for name, sensor in sensors.items():
+        other, before = first_users.setdefault(sensor.frame, (name, sensor))
+        owner = taken.get(sensor.frame)
+        if (before.mount, before.default_mount) != (sensor.mount, sensor.default_mount):
+            owner = f"sensors/{other}, which has another mount"
         if owner:
-            raise ParameterError(f"is that of {owner}", ("sensors", name, "frame"), f"'{one.frame}'")
+            raise ParameterError(f"is already the frame of {owner}", ("sensors", name, "frame"), f"'{sensor.frame}'")

@@ -1,4 +1,4 @@
-"""What draws the pictures of all cameras."""
+"""Renders the images of all cameras."""
 
 from __future__ import annotations
 
@@ -23,72 +23,72 @@ from drone_sim.shapes.visual import Visual
 _LOG = logging.getLogger(__name__)
 TINY = "TinyRenderer"
 _OUT_OF_SIGHT = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -1e9], [0, 0, 0, 1]])
-_AWAY = 1.0  # m, of what is seen: how far it moves in a picture
+_DISTANCE = 1.0  # m, assumed distance of objects, for their speed in the image
 
 
 class Subject(Protocol):
-    """What a picture is taken of."""
+    """The bodies that images show."""
 
-    changes: int  # another number than before whenever a picture of it may look different
+    changes: int  # changes whenever an image may look different
 
     def visuals(self) -> list[Visual]:
-        """Return everything that can be drawn."""
+        """Return all visuals."""
 
     def visual_poses(self) -> np.ndarray:
-        """Return the poses world from visual (N, 4, 4), in the same order."""
+        """Return the poses world-from-visual (N, 4, 4), in the order of `visuals`."""
 
     def visual_velocities(self) -> np.ndarray:
-        """Return the velocities of their origins and of their turns, (N, 6), m/s and rad/s in the world."""
+        """Return linear (m/s) and angular (rad/s) velocities in the world, (N, 6)."""
 
     def tiny_picture(
         self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return RGB (height, width, 3) and depth (height, width), drawn without OpenGL."""
+        """Return RGB (height, width, 3) and depth (height, width), rendered without OpenGL."""
 
 
 class TurningBlades(Protocol):
-    """The blades of a vehicle's propellers, which turn in pictures alone."""
+    """The blades of a vehicle's propellers, which rotate only in images."""
 
-    turned: bool  # by a script, since they were shown
+    turned: bool  # whether a script has rotated them since the last `show`
 
     def show(self) -> None:
-        """Turn them in the subject's pictures to where they are."""
+        """Update the rotation of their visuals."""
 
 
 class Vision:
-    """Takes pictures of a subject: with OpenGL where EGL is to be had, with the subject's own renderer elsewhere."""
+    """Renders images of a subject with OpenGL or, without EGL, with the subject's `tiny_picture`."""
 
     def __init__(self, samples: int = 0):
-        """Make the renderer when the first picture is asked for, after `look_at`: not every run needs one.
+        """Create it; call `look_at` next. The renderer is created for the first image, since not every run needs it.
 
-        `samples` per pixel smooth the edges, as far as the renderer can.
+        `samples`: per pixel, for smooth edges; TinyRenderer ignores them.
         """
         self._samples = samples
         self._renderer: Renderer | None = None
         self._fallback = False
-        self.pictures, self.seconds = 0, 0.0  # taken by now, and the real time that they took
+        self.pictures, self.seconds = 0, 0.0  # number of images so far, and their total rendering time (wall clock)
 
     def look_at(
         self, subject: Subject, blades: Collection[TurningBlades], identify: Callable[[], list[Identity]] = list
     ) -> None:
-        """Take the pictures of this subject from now on, in which blades turn when somebody looks.
+        """Set the subject. Its blades are rotated only when an image is rendered.
 
-        `identify` returns for each of the subject's visuals, in their order, which object it belongs to.
+        `identify` returns the object of each visual, in the order of the visuals.
         """
         self._subject, self._blades, self._identify = subject, blades, identify
-        self._shown = -1  # the subject's changes, when its blades were turned
+        self._shown = -1  # the subject's `changes` at the last rotation of the blades
 
     def picture(self, kind: str, intrinsics: Lens, pose: np.ndarray, shown: np.ndarray | None = None) -> np.ndarray:
-        """Return the picture from `pose` (4, 4), world from optical frame.
+        """Return the image from `pose` (4, 4), world-from-optical.
 
-        `kind` "color": (height, width, 3) uint8 RGB. "depth": (height, width) float32, metres along the
-        optical z, NaN beyond the far plane. `shown` (N,) says which visuals there are, None: all. Raises ValueError for
-        an orthographic one, or one of some visuals, where there is no OpenGL.
+        `kind` "color": (height, width, 3) uint8 RGB. "depth": (height, width) float32, metres along the optical z, NaN
+        beyond the far plane. `shown` (N,): mask of the visuals to render, None: all. Without OpenGL, raises ValueError
+        for an orthographic camera, a distorted lens, or `shown`.
         """
         with self.taking() as renderer:
             if renderer is None:
                 if shown is not None:
-                    raise ValueError("a picture of only some objects needs OpenGL, and there is no EGL here")
+                    raise ValueError("an image of only some objects needs OpenGL, but EGL is not available")
                 return self._tiny_picture(kind, intrinsics, pose)
             render = renderer.render if kind == COLOR else renderer.render_depth
             return render(intrinsics, pose, self._poses(shown))
@@ -100,30 +100,30 @@ class Vision:
     def numbers(
         self, intrinsics: Lens, pose: np.ndarray, numbers: np.ndarray, shown: np.ndarray | None = None
     ) -> np.ndarray:
-        """Return for each pixel the number of its visual, one of `numbers`, (height, width) uint16; 0 for none.
+        """Return for each pixel the number of its visual in `numbers`, (height, width) uint16; 0 for no surface.
 
-        `shown` as for `picture`. Raises ValueError where there is no OpenGL.
+        `shown` as for `picture`. Raises ValueError without OpenGL.
         """
         self._open()
         if self._renderer is None:
-            raise ValueError("a picture of the object of each pixel needs OpenGL, and there is no EGL here")
-        self._turn_blades()
+            raise ValueError("an image of the object of each pixel needs OpenGL, but EGL is not available")
+        self._rotate_blades()
         self._renderer.set_visuals(self._subject.visuals())
         drawn = self._renderer.render_outputs(("instance",), intrinsics, pose, self._poses(shown), instances=numbers)
         return drawn["instance"]
 
     def light(self, lens: Intrinsics, pose: np.ndarray, velocity: np.ndarray, shutter: Shutter) -> np.ndarray:
-        """Return the light of the picture from `pose`, (height, width, 3) float32; white is 1.
+        """Return the linear light of the image from `pose`, (height, width, 3) float32; white is 1.
 
-        `velocity` is that of the optical frame's origin and of its turn, (6,), m/s and rad/s in the world. Camera and
-        bodies keep their velocities while the shutter is open. Without OpenGL the exposure takes no time.
+        `velocity` is the linear (m/s) and angular (rad/s) velocity of the optical frame in the world, (6,). Camera and
+        bodies keep their velocities during the exposure. Without OpenGL the exposure is instantaneous.
         """
-        speed = lens.fx * (np.linalg.norm(velocity[3:]) + np.linalg.norm(velocity[:3]) / _AWAY)
+        speed = lens.fx * (np.linalg.norm(velocity[3:]) + np.linalg.norm(velocity[:3]) / _DISTANCE)
         with self.taking() as renderer:
             if renderer is None:
                 return decoded(self._tiny_picture(COLOR, lens, pose))
             poses, velocities = self._subject.visual_poses(), self._subject.visual_velocities()
-            speed += lens.fx * np.linalg.norm(velocities[:, :3], axis=1).max(initial=0.0) / _AWAY
+            speed += lens.fx * np.linalg.norm(velocities[:, :3], axis=1).max(initial=0.0) / _DISTANCE
 
             def draw(after: float, first: int, end: int) -> np.ndarray:
                 now = moved(pose, velocity, after), moved(poses, velocities, after)
@@ -133,23 +133,23 @@ class Vision:
 
     @contextmanager
     def taking(self) -> Iterator[Renderer | None]:
-        """Count a picture, and the time that it takes; give what draws it, None where there is no OpenGL."""
+        """Count an image and its rendering time; yield the renderer, None without OpenGL."""
         self._open()
-        began = time.perf_counter()
-        self._turn_blades()
+        start = time.perf_counter()
+        self._rotate_blades()
         if self._renderer is not None:
             self._renderer.set_visuals(self._subject.visuals())
         yield self._renderer
         self.pictures += 1
-        self.seconds += time.perf_counter() - began
+        self.seconds += time.perf_counter() - start
 
     def truth(self, intrinsics: Intrinsics, pose: np.ndarray, before: Moment | None) -> PictureTruth | None:
-        """Return the truth of the picture from `pose`, with the flow since `before`; None where there is no OpenGL."""
+        """Return the ground truth of the image from `pose`, with the flow since `before`; None without OpenGL."""
         self._open()
         renderer = self._renderer
         if renderer is None:
             return None
-        self._turn_blades()
+        self._rotate_blades()
         visuals, poses = self._subject.visuals(), np.array(self._subject.visual_poses())
         numbered = Numbered.of(self._identify())
         renderer.set_visuals(visuals)
@@ -165,7 +165,7 @@ class Vision:
 
     def _tiny_picture(self, kind: str, intrinsics: Lens, pose: np.ndarray) -> np.ndarray:
         if isinstance(intrinsics, (Orthographic, Distorted)):
-            raise ValueError("an orthographic picture, or one through a lens, needs OpenGL, and there is no EGL here")
+            raise ValueError("an orthographic camera or a distorted lens needs OpenGL, but EGL is not available")
         vertical_fov = 2 * np.arctan(intrinsics.height / 2 / intrinsics.fy)
         color, depth = self._subject.tiny_picture(
             pose, intrinsics.width, intrinsics.height, vertical_fov, intrinsics.near, intrinsics.far
@@ -174,7 +174,7 @@ class Vision:
 
     @property
     def renderer(self) -> str:
-        """What draws: OpenGL's name for it, "TinyRenderer", or '' before the first picture."""
+        """OpenGL's name of the renderer, "TinyRenderer", or '' before the first image."""
         if self._renderer is not None:
             return self._renderer.description
         return TINY if self._fallback else ""
@@ -186,19 +186,19 @@ class Vision:
             self._renderer = Renderer(samples=self._samples)
         except RendererUnavailable as error:
             self._fallback = True
-            _LOG.warning("%s; pictures come from PyBullet's TinyRenderer, at a few frames per second", error)
+            _LOG.warning("%s; images are rendered by PyBullet's TinyRenderer, at a few frames per second", error)
 
     @property
     def changes(self) -> int:
-        """Return another number than before whenever a picture may look different."""
-        self._turn_blades()
+        """A number that changes whenever an image may look different."""
+        self._rotate_blades()
         return self._subject.changes
 
-    def _turn_blades(self) -> None:
-        """Turn the blades, once for all cameras."""
-        if self._shown != self._subject.changes or any(one.turned for one in self._blades):
-            for one in self._blades:
-                one.show()
+    def _rotate_blades(self) -> None:
+        """Rotate the blades' visuals, once per change for all cameras."""
+        if self._shown != self._subject.changes or any(blades.turned for blades in self._blades):
+            for blades in self._blades:
+                blades.show()
             self._shown = self._subject.changes
 
     def close(self) -> None:

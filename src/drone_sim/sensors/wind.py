@@ -1,4 +1,4 @@
-"""An anemometer: the velocity of the air where the vehicle is, as one that stands there would measure it."""
+"""An anemometer: the velocity of the air at the vehicle, relative to the ground, not to the vehicle."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ class WindParameters(SensorParameters):
     noise: NoiseParameters = NoiseParameters()  # m/s
 
     def make(self, fitting: Fitting) -> Wind:
-        """Return the instrument; `reset` comes before its first look."""
+        """Return the instrument; call its `reset` before `look`."""
         return Wind(self, fitting)
 
 
 class Wind(Instrument):
-    """Measures the wind, gusts included."""
+    """Measures the wind, including gusts."""
 
     parameters: WindParameters
 
     def __init__(self, parameters: WindParameters, fitting: Fitting):
-        """Take what it is like and where it sits."""
+        """Create it; call `reset` before `look`."""
         super().__init__(parameters, fitting)
         self._noise = self.make_noise(parameters.noise, 3)
         self.outputs = (Output("", "geometry_msgs/Vector3Stamped", self._message),)

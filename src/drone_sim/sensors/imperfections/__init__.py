@@ -1,7 +1,6 @@
-"""What sets a camera's pictures apart from what is drawn.
+"""Imperfections of a camera, applied to its rendered images.
 
-Each imperfection is a file, and has its line here: they come in the order in which light meets them. All are off
-unless a camera's parameters say otherwise.
+Each imperfection has its own file and an entry here, in the order of the light's path. All are off by default.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from drone_sim.sensors.imperfections.vignette import VignetteParameters
 
 
 class Imperfections(Checked):
-    """A camera's imperfections; by default there are none."""
+    """Parameters of a camera's imperfections, all off by default."""
 
     shutter: ShutterParameters = ShutterParameters()
     vignette: VignetteParameters = VignetteParameters()

@@ -1,12 +1,12 @@
-"""How long the sensor is exposed, and how much its signal is amplified; set, or following what is seen.
+"""Exposure time and gain of the image sensor, fixed or automatic.
 
     light' = light · time / reference · 10^(gain / 20)
 
-With automatic exposure, the product approaches the value that brings the mean luminance (ITU-R BT.709) to 18 %, middle
-grey: `settling` is the time constant, after which 1/e of the distance, in stops, is left. The exposure time changes
-first, up to the value that is set, then the gain, up to its own. As in real cameras, a picture's exposure follows from
-the light measured before it; the first picture's from its own. The light is measured in a small picture whenever one is
-due, so that it does not matter who looks.
+Automatic exposure controls the product of time and gain so that the mean luminance (ITU-R BT.709) approaches 18 %,
+middle grey. `settling` is the time constant, after which 1/e of the difference, in stops, is left. The exposure time
+changes first, up to the configured value, then the gain, up to its configured value. As in real cameras, an image's
+exposure depends on light measured before it; the first image is metered itself. The light is measured in a small image
+whenever an image is due, so that the result does not depend on viewers.
 """
 
 from __future__ import annotations
@@ -24,83 +24,83 @@ from drone_sim.sensors.imperfections.imperfection import Imperfection, Shot
 
 _GREY = 0.18
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
-_DARKEST = 1e-4  # mean luminance that is told from black
-_SHORTEST = 1e-6  # s
+_MIN_LUMINANCE = 1e-4  # minimum mean luminance; avoids a division by 0
+_MIN_TIME = 1e-6  # s
 
 
 class ExposureParameters(Imperfection):
     """Exposure time and gain."""
 
     time: Annotated[Finite, Within(1e-6, 1, or_zero=True), Unit("s")] = Field(
-        default=0.0, description="moving things are blurred over this time; 0: an instant, as bright as it is drawn"
+        default=0.0, description="moving objects are blurred over this time; 0: no blur, the rendered brightness"
     )
     gain: Annotated[Finite, Within(0, 60), Unit("dB")] = 0.0
-    automatic: Switch = Field(default=False, description="true: time and gain are the largest values that it uses")
+    automatic: Switch = Field(default=False, description="true: time and gain are the upper limits")
     reference: Annotated[Finite, Within(1e-6, 1), Unit("s")] = Field(
-        default=0.01, description="the exposure time with normal brightness, without gain"
+        default=0.01, description="the exposure time that gives the rendered brightness without gain"
     )
     settling: Annotated[Finite, Within(0, 60), Unit("s")] = Field(
-        default=0.2, description="how slowly the automatic exposure follows the picture"
+        default=0.2, description="time constant of the automatic exposure"
     )
 
     def model_post_init(self, _context: Any) -> None:
-        """Refuse to follow without an exposure time."""
+        """Raise ParameterError for automatic exposure without `time`."""
         if self.automatic and not self.time:
-            raise ParameterError("needs `time`, the longest exposure time", ("automatic",), "true")
+            raise ParameterError("needs time, the longest exposure time", ("automatic",), "true")
 
     @property
     def is_on(self) -> bool:
-        """Whether it changes the pictures."""
+        """Whether it changes the images."""
         return self.time > 0 or self.gain > 0
 
     @property
     def most(self) -> float:
-        """How much brighter than drawn pictures can be."""
+        """The largest brightness of images, relative to the rendered ones."""
         brightness = self.time / self.reference if self.time else 1.0
         return brightness * 10 ** (self.gain / 20)
 
     def settings(self, brightness: float) -> tuple[float, float]:
-        """Return exposure time (s) and gain (a factor) that make pictures so much brighter than drawn."""
+        """Return exposure time (s) and gain (a factor) for a brightness relative to the rendered image."""
         if not self.time:
             return 0.0, brightness
-        time = min(max(brightness * self.reference, _SHORTEST), self.time)
+        time = min(max(brightness * self.reference, _MIN_TIME), self.time)
         return time, max(1.0, brightness * self.reference / time)
 
     def apply(self, light: np.ndarray, shot: Shot) -> np.ndarray:
-        """Brighten or darken it."""
+        """Return the light scaled by exposure time and gain."""
         light *= np.float32((shot.exposure / self.reference if shot.exposure else 1.0) * shot.gain)
         return light
 
 
 class ExposureControl:
-    """The present exposure of a camera: how much brighter its pictures are than drawn."""
+    """The present exposure of a camera, as brightness relative to the rendered images."""
 
     def __init__(self) -> None:
-        """Know nothing of what is seen yet."""
+        """Start without a measurement."""
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was seen."""
+        """Forget all measurements."""
         self._brightness, self._wanted, self._at = 0.0, 1.0, 0.0
 
     @property
     def has_seen_nothing(self) -> bool:
-        """Whether `meter` has to be called before there is a brightness."""
+        """Whether `meter` must be called before `brightness`."""
         return self._brightness == 0.0
 
     def brightness(self, parameters: ExposureParameters, now: float) -> float:
-        """Return the brightness of a picture at a time (s)."""
+        """Return the brightness of an image at the time `now` (s)."""
         if not parameters.automatic:
             return parameters.most
         left = math.exp((self._at - now) / parameters.settling) if parameters.settling else float(now == self._at)
         return min(self._wanted * (self._brightness / self._wanted) ** left, parameters.most)
 
     def meter(self, light: np.ndarray, brightness: float | None, now: float) -> None:
-        """Measure the light of a picture at a time (s), before it is brightened; it was taken with this brightness."""
+        """Set the target from a rendered image at `now` (s). `brightness`: the present value, None: the target."""
         mean = float(np.dot(cv2.mean(light)[:3], _LUMINANCE))
-        self._wanted, self._at = _GREY / max(mean, _DARKEST), now
+        self._wanted, self._at = _GREY / max(mean, _MIN_LUMINANCE), now
         self._brightness = self._wanted if brightness is None else brightness
 
     def save_state(self) -> Restore:
-        """Return a function that brings it back."""
+        """Return a function that restores the exposure."""
         return saved(self, "_brightness", "_wanted", "_at")

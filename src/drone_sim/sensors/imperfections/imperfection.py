@@ -1,4 +1,4 @@
-"""What an imperfection is: parameters, and what becomes of light by them."""
+"""Base class of imperfections: parameters with a function of the light."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from drone_sim.render.intrinsics import Intrinsics
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture that is taken: through which lens, exposed for how long (s), amplified by how much.
+    """The settings of one image: camera model, exposure time (s) and gain (a factor).
 
-    `normal` returns standard normal numbers for each pixel and colour, float32, by a seed: always the same for a
-    picture of the same camera and time.
+    `normal(seed)` returns standard normal numbers for each pixel and colour, float32, which depend only on the seed,
+    the camera and the time.
     """
 
     lens: Intrinsics
@@ -26,13 +26,13 @@ class Shot:
 
 
 class Imperfection(Checked):
-    """The parameters of an imperfection, which is off by default."""
+    """Parameters of an imperfection, which is off by default."""
 
     @property
     def is_on(self) -> bool:
-        """Whether it changes the pictures."""
+        """Whether it changes the images."""
         raise NotImplementedError
 
     def apply(self, light: np.ndarray, shot: Shot) -> np.ndarray:
-        """Return what becomes of light (height, width, 3) float32, of which white is 1; it may be changed itself."""
+        """Return the changed light (height, width, 3) float32; white is 1. `light` may be modified in place."""
         return light

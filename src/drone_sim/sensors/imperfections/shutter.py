@@ -1,4 +1,4 @@
-"""A rolling shutter exposes the rows of a picture one after another: light is gathered so, as render.shutter says."""
+"""Parameters of a rolling shutter, which exposes the rows of an image one after another: see render.shutter."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drone_sim.sensors.imperfections.imperfection import Imperfection
 
 
 class ShutterParameters(Imperfection):
-    """How the rows of a picture are exposed."""
+    """Timing of the exposure of rows."""
 
     readout: Annotated[Finite, Within(0, 1), Unit("s")] = Field(
         default=0.0, description="from the first row to the last; 0: all rows at once"
@@ -19,5 +19,5 @@ class ShutterParameters(Imperfection):
 
     @property
     def is_on(self) -> bool:
-        """Whether it changes the pictures."""
+        """Whether it changes the images."""
         return self.readout > 0

@@ -1,9 +1,9 @@
-"""A lens lets less light through to the corners of a picture.
+"""Vignetting: the image gets darker towards its corners.
 
     E = E0 cosⁿ θ,  θ the angle of a pixel's ray from the optical axis
 
-With n = 4 it is the law of a thin lens (R. Kingslake, Optics in Photography, SPIE 1992, chapter 6). No light comes from
-90 degrees off the axis or more.
+n = 4 is the law of a thin lens (R. Kingslake, Optics in Photography, SPIE 1992, chapter 6). Pixels 90 degrees or more
+off the axis get no light.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from drone_sim.sensors.imperfections.imperfection import Imperfection, Shot
 
 
 class VignetteParameters(Imperfection):
-    """How much darker the corners are."""
+    """Strength of the vignetting."""
 
     power: Annotated[Finite, Within(0, 20)] = Field(
         default=0.0, description="power of the cosine of the angle from the optical axis; 4: a thin lens; 0: none"
@@ -28,11 +28,11 @@ class VignetteParameters(Imperfection):
 
     @property
     def is_on(self) -> bool:
-        """Whether it changes the pictures."""
+        """Whether it changes the images."""
         return self.power > 0
 
     def apply(self, light: np.ndarray, shot: Shot) -> np.ndarray:
-        """Darken it."""
+        """Return the darkened light."""
         light *= _share(shot.lens, self.power)
         return light
 
