@@ -765,9 +765,7 @@ def test_they_are_brought_anew_whenever_the_scene_is_asked_for(beside):
 def test_a_broken_file_as_a_scene_gets_one_line(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "a.ttt").write_bytes(container(b"", length=9))
-    with pytest.raises(
-        parameters.ParameterError, match=r"parameter scene_file = .*a\.ttt: is cut off: it has 0 of 9 bytes"
-    ):
+    with pytest.raises(parameters.ParameterError, match=r"parameter scene_file = .*a\.ttt: is truncated: 0 of 9 bytes"):
         parameters.load({"scene_file": str(tmp_path / "a.ttt")})
     assert not any((tmp_path / "cache").rglob("*.yaml"))
 

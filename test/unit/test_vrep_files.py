@@ -225,7 +225,7 @@ def test_a_payload_cut_at_every_byte_is_never_more_than_one_line():
 def test_a_compressed_file_that_is_cut():
     whole = a_file(compressed=True)
     for length in (1021, 1022, 1100, 1021 + 320, len(whole) - 2):
-        with pytest.raises(VrepFileError, match=r"is cut|ends within its Huffman tree"):
+        with pytest.raises(VrepFileError, match=r"is truncated|ends within its Huffman tree"):
             read(whole[:length])
 
 
@@ -252,25 +252,25 @@ def _chain(length):
 REFUSED = {
     "empty": (b"", "is empty"),
     "foreign": (b"solid cube" * 200, "is not a file of V-REP"),
-    "no header": (b"VREP1234", "is cut"),
+    "no header": (b"VREP1234", "is truncated"),
     "too new": (container(b"", version=30)[:8] + struct.pack("<i", 30) + container(b"")[12:], "has format"),
     "too old": (container(b"", version=12), "has format 12"),
     "compressed otherwise": (container(b"")[:12] + b"\7" + container(b"")[13:], "has compression 7"),
-    "negative length": (container(b"", length=-5), "has -5 bytes"),
+    "negative length": (container(b"", length=-5), "-5 bytes"),
     "huge": (container(b"", length=2**31 - 1), "at most"),
-    "longer than it is": (container(b"EOF", length=1000), "is cut off: it has 3 of 1000 bytes"),
-    "no end": (container(b""), "EOF, is missing"),
-    "one leaf": (container(b"x" * 100, compressed=True)[:1021] + b"\xff" * 100, "Huffman tree of one leaf"),
-    "endless tree": (container(b"x" * 100, compressed=True)[:1021] + b"\0" * 5000, "Huffman tree of more than"),
+    "longer than it is": (container(b"EOF", length=1000), "3 of 1000 bytes"),
+    "no end": (container(b""), "has no EOF"),
+    "one leaf": (container(b"x" * 100, compressed=True)[:1021] + b"\xff" * 100, "single leaf"),
+    "endless tree": (container(b"x" * 100, compressed=True)[:1021] + b"\0" * 5000, "more than 256 leaves"),
     "a loop of parents": (file(scene_object("DMY", 0, "A", 1), scene_object("DMY", 1, "B", 0)), "object A: is its own"),
     "its own parent": (file(scene_object("DMY", 0, "A", 0)), "object A: is its own ancestor"),
     "no such parent": (file(scene_object("DMY", 0, "A", 7)), "object A: its parent 7 is not in the file"),
-    "a handle twice": (file(scene_object("DMY", 0, "A"), scene_object("DMY", 0, "B")), "has the same handle 0"),
+    "a handle twice": (file(scene_object("DMY", 0, "A"), scene_object("DMY", 0, "B")), "same handle 0"),
     "not a number": (file(scene_object("DMY", 0, "A", at=(math.nan, 0, 0))), "object A: Cfq: the number nan"),
-    "no rotation": (file(scene_object("DMY", 0, "A", turned=(0, 0, 0, 0))), "object A: _fq: its quaternion has"),
+    "no rotation": (file(scene_object("DMY", 0, "A", turned=(0, 0, 0, 0))), "object A: _fq: the quaternion has"),
     "no such vertex": (
         file(shape(0, "S", mesh().replace(packed([0, 1, 2]), packed([0, 1, 9])))),
-        "object S: a face names a vertex that does not exist",
+        "object S: a face refers to a vertex",
     ),
     "no such mesh": (file(shape(0, "S", mesh(inline=False))), "object S: Vev: the file has no mesh 0"),
     "many parameters": (

@@ -1,1 +1,1 @@
-"""V-REP's and CoppeliaSim's own files (.ttt scenes, .ttm models): bytes in, what stands in them out."""
+"""Reader for binary scenes (.ttt) and models (.ttm) of V-REP and CoppeliaSim."""

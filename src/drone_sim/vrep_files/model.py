@@ -1,4 +1,4 @@
-"""What stands in a V-REP file, as plain immutable values: metres, kilograms, radians, quaternions xyzw."""
+"""The content of a V-REP file as immutable values, in m, kg, rad, quaternions xyzw."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ SUFFIXES = (".ttt", ".ttm")
 
 
 class VrepFileError(ValueError):
-    """A V-REP file is refused; the message is one line that says what is wrong, and where."""
+    """A V-REP file cannot be read. The message is one line with the place and the reason."""
 
 
 @contextmanager
 def within(where: str) -> Iterator[None]:
-    """Put the place before what is said of a file."""
+    """Prefix a VrepFileError with the place in the file."""
     try:
         yield
     except VrepFileError as error:
@@ -28,13 +28,13 @@ def within(where: str) -> Iterator[None]:
 
 Rgba = tuple[float, float, float, float]
 ORIGIN = Pose((0.0, 0.0, 0.0))
-# What a model says of itself and all below it.
+# Flags of a model, which apply to all objects below it too.
 NOT_DYNAMIC, NOT_RESPONDABLE, INVISIBLE, WITHOUT_SCRIPTS = 0x20, 0x40, 0x100, 0x200
 
 
 @dataclass(frozen=True)
 class VrepPrimitive:
-    """A simple form: its word, full extents along x, y and z (m), and its place in the shape's frame."""
+    """A primitive: its type, full extents along x, y and z (m), and pose in the shape's frame."""
 
     word: str  # plane, disc, cuboid, spheroid, cylinder, cone, heightfield or capsule
     size: tuple[float, float, float]
@@ -51,9 +51,9 @@ class VrepTexture:
 
 @dataclass(frozen=True, eq=False)
 class VrepCover:
-    """A texture on a mesh: where each corner of its faces lies on it, (m, 3, 2), 0..1, v upwards.
+    """A texture on a mesh. `corners`: uv of each corner of each face, (m, 3, 2), 0..1, v upwards.
 
-    `is_decal`: the mesh's own colour does not show.
+    `is_decal`: the texture replaces the mesh's colour.
     """
 
     texture: VrepTexture
@@ -74,7 +74,7 @@ class VrepMesh:
 
 @dataclass(frozen=True)
 class VrepInertia:
-    """Principal moments divided by the mass (m²), about a frame in the shape's."""
+    """Principal moments of inertia divided by the mass (m²), and the principal frame in the shape's frame."""
 
     pose: Pose
     moments: tuple[float, float, float]
@@ -82,7 +82,7 @@ class VrepInertia:
 
 @dataclass(frozen=True)
 class VrepShape:
-    """What has a surface, and may have a mass (kg)."""
+    """A shape: meshes and a mass (kg)."""
 
     meshes: tuple[VrepMesh, ...]
     mass: float
@@ -93,23 +93,23 @@ class VrepShape:
 
 @dataclass(frozen=True)
 class VrepJoint:
-    """A joint along its z axis; its position (rad, m, or a pose), limits None where it is cyclic."""
+    """A joint along its z axis. `position` is in rad or m; `limits` is None for a cyclic joint."""
 
     kind: str  # revolute, prismatic, spherical or screw
     position: float
     limits: tuple[float, float] | None
-    turn: Pose  # of a spherical one
-    lead: float  # m per turn, of a screw
+    turn: Pose  # orientation of a spherical joint
+    lead: float  # m per revolution of a screw
     mode: str  # kinematic, passive, velocity or position
-    target: float  # rad/s or m/s, rad or m, as the mode needs it
+    target: float  # rad/s or m/s in mode velocity, otherwise rad or m
     max_force: float  # N m or N
 
 
 @dataclass(frozen=True)
 class VrepDummy:
-    """A frame; the handle of the dummy that it is linked to, -1 for none; the points of a path of 4.x.
+    """A dummy. `linked`: handle of the dummy that it is linked to, -1 for none; `path`: points of a 4.x path.
 
-    Each is x, y, z (m) and a quaternion x, y, z, w. `holds`: the dynamics keeps both linked dummies at one place.
+    Each point is x, y, z (m) and a quaternion x, y, z, w.
     """
 
     size: float
@@ -120,7 +120,7 @@ class VrepDummy:
 
 @dataclass(frozen=True)
 class VrepControlPoint:
-    """A control point of a path: its pose, its curve, what it carries, and its speed, 0 to 1, of the path's own."""
+    """A control point of a path: pose, Bézier factors and count, flags, channels, speed (0 to 1, relative to the path's)."""
 
     pose: Pose
     before: float
@@ -134,9 +134,9 @@ class VrepControlPoint:
 
 @dataclass(frozen=True)
 class VrepPath:
-    """A path of 3.x: its control points, switches, how its length is counted (0 to 6), and where a follower is (m).
+    """A path of 3.x. `counts`: how its length is computed (0 to 6); `along`: position on it (m).
 
-    `has_surface`: whether a body is drawn along it; `broken`: how many more points there are, without a valid position.
+    `has_surface`: whether it has a visible body; `broken`: number of skipped points without a valid position.
     """
 
     points: tuple[VrepControlPoint, ...]
@@ -151,19 +151,19 @@ class VrepPath:
 
 @dataclass(frozen=True)
 class VrepCamera:
-    """What looks along +z, +y up; the angle (rad) spans the larger side, the size (m) of an orthographic one too."""
+    """A camera along +z, y up. `angle` (rad), or `size` (m) if orthographic, spans the larger side of the image."""
 
     is_perspective: bool
     angle: float
     size: float
     near: float
     far: float
-    resolution: tuple[int, int] | None = None  # px, of a vision sensor
+    resolution: tuple[int, int] | None = None  # px, of a vision sensor only
 
 
 @dataclass(frozen=True)
 class VrepProximitySensor:
-    """What measures the distance along +z: kind pyramid, cylinder, disc, cone or ray; m and rad."""
+    """A proximity sensor along +z; kind: pyramid, cylinder, disc, cone or ray; m and rad."""
 
     kind: str
     offset: float
@@ -175,7 +175,7 @@ class VrepProximitySensor:
 
 @dataclass(frozen=True)
 class Other:
-    """An object of which only its place is known: force sensor, light, path, graph, ..."""
+    """An object whose type-specific data is not read: force sensor, light, graph, ..."""
 
     kind: str
 
@@ -185,40 +185,40 @@ Kind = VrepShape | VrepJoint | VrepDummy | VrepPath | VrepCamera | VrepProximity
 
 @dataclass(frozen=True)
 class VrepScript:
-    """A script on an object (its handle; -1 for the main script); since 4.9 it is an object of its own.
+    """A script of an object (its handle; -1 for the main script). Since 4.9 a script is also an object itself.
 
-    `parent_is_proxy`: whether paths of such an object begin at its parent, as if the script came from an older file.
+    `parent_is_proxy`: object paths of such a script start at its parent, as in older files.
     """
 
     object: int
-    kind: str  # main, child or customization, or another's number
+    kind: str  # main, child, customization or `of type NUMBER`
     text: str
     is_enabled: bool = True
     language: str = "lua"
     parameters: tuple[tuple[str, str], ...] = ()
     is_stock_main: bool = False
-    own_object: int = -1  # handle of the script as an object, -1 where it is none
+    own_object: int = -1  # handle of the script object, -1 if there is none
     parent_is_proxy: bool = False
 
     @property
     def is_embedded(self) -> bool:
-        """Whether its paths begin at the object that it is on, not at the script as an object of its own."""
+        """Whether its object paths start at the object that it is attached to, not at the script object."""
         return self.own_object == -1 or self.parent_is_proxy
 
 
 @dataclass(frozen=True)
 class VrepCollectionItem:
-    """What belongs to a collection: an object by its handle, what hangs on it, what it hangs on, or all there are."""
+    """An item of a collection: an object (handle), its tree, its chain of ancestors, or all objects of the scene."""
 
     what: str  # single, tree, chain or all
     object: int
-    removes: bool  # from what the items before it say
-    without: bool  # of a tree or chain: whether it leaves out the object itself
+    removes: bool  # whether it removes these objects from those of the items before
+    without: bool  # for tree and chain: without the object itself
 
 
 @dataclass(frozen=True)
 class VrepCollection:
-    """Objects under a name."""
+    """A named collection of objects."""
 
     name: str
     items: tuple[VrepCollectionItem, ...]
@@ -226,12 +226,12 @@ class VrepCollection:
 
 @dataclass(frozen=True)
 class VrepObject:
-    """An object: its handle in the file, its parent's (-1 for none), and its pose in the parent's frame."""
+    """An object: its handle in the file, its parent's handle (-1 for none), and its pose in the parent's frame."""
 
     handle: int
     parent: int
     name: str  # unique in the file
-    alias: str  # '' where the file has none
+    alias: str  # '' if the file has none
     pose: Pose
     of: Kind
     is_model: bool = False
@@ -243,16 +243,16 @@ class VrepObject:
 
     @property
     def shape(self) -> VrepShape | None:
-        """What it is, where it is a shape."""
+        """Its shape; None if it is not one."""
         return self.of if isinstance(self.of, VrepShape) else None
 
 
-BULLET = 0  # the number of that physics engine; 1 is ODE, others Vortex, Newton, MuJoCo
+BULLET = 0  # V-REP's number for this physics engine; 1 is ODE, then Vortex, Newton, MuJoCo
 
 
 @dataclass(frozen=True)
 class VrepSettings:
-    """What a file says of the world: steps (s), gravity (m/s²); None where it says nothing, as models do."""
+    """World settings: time steps (s), gravity (m/s²). None if the file has none, as models."""
 
     time_step: float | None = None
     dynamics_step: float | None = None
@@ -263,9 +263,9 @@ class VrepSettings:
 
 @dataclass(frozen=True)
 class VrepFile:
-    """A scene or a model."""
+    """A scene or model file."""
 
-    version: int  # of its format
+    version: int  # of the format
     program: str  # such as 3.6.1
     objects: tuple[VrepObject, ...]  # a parent before its children
     scripts: tuple[VrepScript, ...]

@@ -1,4 +1,4 @@
-"""Objects: what all have in common, and what joints, dummies, paths, cameras and sensors have of their own."""
+"""Reads objects: their common data, and that of joints, dummies, paths, cameras and sensors."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SCRIPT = "SCT"
 
 
 def read_object(tag: str, data: bytes, pools: Pools) -> VrepObject:
-    """Return an object. Raises VrepFileError, which names it."""
+    """Return an object. Raises VrepFileError that names the object."""
     base, *more = levels(data, 3)
     handle, parent = base.integers("Ids", count=2) or (-1, -1)
     name = base.text("Nme")
@@ -45,7 +45,7 @@ def read_object(tag: str, data: bytes, pools: Pools) -> VrepObject:
             raise VrepFileError("has no handle")
         sizes = base.numbers("_fa", "Sfa", 1)
         kind = _read(tag, more[0] if more else Level(), pools)
-        if isinstance(kind, VrepDummy):  # which is a path of 4.x, where it has points
+        if isinstance(kind, VrepDummy):  # a dummy with points is a path of 4.x
             kind = replace(kind, path=read_path(base.find("Cda")))
         return VrepObject(
             handle=handle,
@@ -63,34 +63,34 @@ def read_object(tag: str, data: bytes, pools: Pools) -> VrepObject:
 
 
 def is_object(tag: str) -> bool:
-    """Tell whether a chunk of the file is an object."""
+    """Return whether a chunk with this tag is an object."""
     return tag in _READERS or tag in _OTHERS
 
 
 def script_of(data: bytes) -> bytes | None:
-    """Return the script within a script object."""
-    found = levels(data, 3)
-    return found[1].find("Soo") if len(found) > 1 else None
+    """Return the data of the script in a script object; None if it has none."""
+    object_levels = levels(data, 3)
+    return object_levels[1].find("Soo") if len(object_levels) > 1 else None
 
 
-def _read(tag: str, own: Level, pools: Pools) -> Kind:
+def _read(tag: str, class_level: Level, pools: Pools) -> Kind:
     if tag == "SHP":
-        return read_shape(own, pools)
-    return _READERS[tag](own) if tag in _READERS else Other(_OTHERS[tag])
+        return read_shape(class_level, pools)
+    return _READERS[tag](class_level) if tag in _READERS else Other(_OTHERS[tag])
 
 
-def _joint(own: Level) -> Kind:
-    kind = _JOINTS.get(own.integer("Jtt", default=10), "revolute")
-    low, span = own.numbers("_mr", "Pmr", 2) or (0.0, 0.0)
-    position = own.numbers("_rt", "Prt", 1) or (0.0,)
-    turn = own.numbers("_st", "Jst", 4)
-    lead = own.numbers("Sld", "", 1) or [math.tau * per_radian for per_radian in own.numbers("", "Jsp", 1) or (0.0,)]
-    velocity, force = own.numbers("_mp", "Dmp", 2) or (0.0, 0.0)
-    mode, (target,) = _mode(own), own.numbers("_tp", "Dtp", 1) or (0.0,)
+def _joint(joint: Level) -> Kind:
+    kind = _JOINTS.get(joint.integer("Jtt", default=10), "revolute")
+    low, span = joint.numbers("_mr", "Pmr", 2) or (0.0, 0.0)
+    position = joint.numbers("_rt", "Prt", 1) or (0.0,)
+    turn = joint.numbers("_st", "Jst", 4)
+    lead = joint.numbers("Sld", "", 1) or [math.tau * pitch for pitch in joint.numbers("", "Jsp", 1) or (0.0,)]
+    velocity, force = joint.numbers("_mp", "Dmp", 2) or (0.0, 0.0)
+    mode, (target,) = _mode(joint), joint.numbers("_tp", "Dtp", 1) or (0.0,)
     return VrepJoint(
         kind="screw" if kind == "revolute" and lead[0] else kind,
         position=position[0],
-        limits=None if own.bits("Va9") & _CYCLIC or kind == "spherical" else (low, low + span),
+        limits=None if joint.bits("Va9") & _CYCLIC or kind == "spherical" else (low, low + span),
         turn=ORIGIN if turn is None else quaternion_first((*turn, 0.0, 0.0, 0.0), "_st"),
         lead=lead[0],
         mode=mode,
@@ -99,50 +99,46 @@ def _joint(own: Level) -> Kind:
     )
 
 
-def _mode(own: Level) -> str:
-    if own.integer("Jmd") != _DYNAMIC_MODE:
+def _mode(joint: Level) -> str:
+    if joint.integer("Jmd") != _DYNAMIC_MODE:
         return "kinematic"
-    switches = own.bits("Va9")
+    switches = joint.bits("Va9")
     if not switches & _MOTOR:
         return "passive"
     return "position" if switches & _POSITION_CONTROL else "velocity"
 
 
-_LOOP_CLOSURE = 0  # type of a link between dummies: sim_dummy_linktype_dynamics_loop_closure
+def _dummy(dummy: Level) -> Kind:
+    size = dummy.numbers("_y2", "Dy2", 1) or (0.01,)
+    return VrepDummy(size[0], dummy.integer("Lli", default=-1))
 
 
-def _dummy(own: Level) -> Kind:
-    size = own.numbers("_y2", "Dy2", 1) or (0.01,)
-    linked = own.integer("Lli", default=-1)
-    return VrepDummy(size[0], linked, linked >= 0 and own.integer("Dl2") == _LOOP_CLOSURE)
+def _vision_sensor(sensor: Level) -> Kind:
+    size, angle, near, far = sensor.numbers("_cp", "Ccp", 4) or (1.0, math.pi / 3, 0.01, 10.0)
+    width, height = sensor.integers("Res", count=2) or (32, 32)
+    return VrepCamera(bool(sensor.bits("Va3", "Var") & 1), angle, size, near, far, (width, height))
 
 
-def _vision_sensor(own: Level) -> Kind:
-    size, angle, near, far = own.numbers("_cp", "Ccp", 4) or (1.0, math.pi / 3, 0.01, 10.0)
-    width, height = own.integers("Res", count=2) or (32, 32)
-    return VrepCamera(bool(own.bits("Va3", "Var") & 1), angle, size, near, far, (width, height))
-
-
-def _camera(own: Level) -> Kind:
-    size, angle = own.numbers("_p3", "Cp3", 2) or (1.0, math.pi / 3)
-    near, far = own.numbers("_cp", "Ccp", 2) or (0.05, 500.0)
-    perspective = bool(own.bits("Ca3") & 2) if own.find("Ca3") is not None else own.integer("Cpm", default=1) != 0
+def _camera(data: Level) -> Kind:
+    size, angle = data.numbers("_p3", "Cp3", 2) or (1.0, math.pi / 3)
+    near, far = data.numbers("_cp", "Ccp", 2) or (0.05, 500.0)
+    perspective = bool(data.bits("Ca3") & 2) if data.find("Ca3") is not None else data.integer("Cpm", default=1) != 0
     return VrepCamera(perspective, angle, size, near, far)
 
 
-def _proximity_sensor(own: Level) -> Kind:
-    data = own.find("Vod")
+def _proximity_sensor(sensor: Level) -> Kind:
+    data = sensor.find("Vod")
     volume = Level() if data is None else level(data)
-    kind = _SENSORS.get(own.integer("Snt"), "ray")
+    kind = _SENSORS.get(sensor.integer("Snt"), "ray")
     numbers = volume.unchecked("_s3", "Ss3", 9) or (0.0,) * 9
-    # V-REP leaves what a kind does not need as it happens to be in memory.
+    # V-REP writes uninitialised memory into the numbers that a kind does not use.
     used = finite(tuple(number if index in _USED[kind] else 0.0 for index, number in enumerate(numbers)), "Ss3")
     offset, reach, x, y, _, _, radius, _, angle = used
     return VrepProximitySensor(kind, offset, reach, (x, y), radius, angle)
 
 
 _READERS: dict[str, Callable[[Level], Kind]] = {
-    "SHP": lambda own: Other("shape"),  # which needs the file's pools: see _read
+    "SHP": lambda _level: Other("shape"),  # read by _read, since it needs the pools
     "JNT": _joint,
     "DMY": _dummy,
     "RSN": _vision_sensor,

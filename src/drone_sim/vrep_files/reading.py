@@ -1,4 +1,4 @@
-"""A whole file: its objects in a tree, its scripts, its settings."""
+"""Reads a whole file: its tree of objects, scripts, collections and settings."""
 
 from __future__ import annotations
 
@@ -26,51 +26,51 @@ from drone_sim.vrep_files.scripts import read_script
 from drone_sim.vrep_files.shapes import Pools
 
 _PRESET_STEPS = (0.2, 0.1, 0.05, 0.025, 0.01)  # s, of `Spi` 0 to 4
-_PRESETS = 5  # modes of the dynamics below this have a step of their own
+_PRESETS = 5  # dynamics modes below this number are presets with a fixed step
 _PRESET_DYNAMICS_STEP = 0.005  # s
 
 
 def with_simulation(settings: VrepSettings, data: bytes) -> VrepSettings:
-    """Return the settings with what a `SIM` says. Raises VrepFileError."""
-    own = level(data)
-    preset = own.integer("Spi", default=-1)
-    step = own.numbers("_t3", "St3", 1)
+    """Return the settings updated from a `SIM` chunk. Raises VrepFileError."""
+    simulation = level(data)
+    preset = simulation.integer("Spi", default=-1)
+    step = simulation.numbers("_t3", "St3", 1)
     if step is not None:
         return replace(settings, time_step=step[0])
     if 0 <= preset < len(_PRESET_STEPS):
         return replace(settings, time_step=_PRESET_STEPS[preset])
-    micro = own.find("St2")
+    micro = simulation.find("St2")
     if micro is not None:
         return replace(settings, time_step=unpack("<Q", micro, "St2")[0] / 1e6)
-    seconds = own.find("Sts")
+    seconds = simulation.find("Sts")
     if seconds is not None:
         return replace(settings, time_step=finite(singles("<f", seconds, "Sts"), "Sts")[0])
     return settings
 
 
 def with_dynamics(settings: VrepSettings, data: bytes) -> VrepSettings:
-    """Return the settings with what a `DYN` says. Raises VrepFileError."""
-    own = level(data)
-    width = "d" if own.find("_n3") is not None else "f"
-    found = own.find("_n3", "En3", "En2", "Eng")
-    if found is None:
+    """Return the settings updated from a `DYN` chunk. Raises VrepFileError."""
+    dynamics = level(data)
+    width = "d" if dynamics.find("_n3") is not None else "f"
+    engine_data = dynamics.find("_n3", "En3", "En2", "Eng")
+    if engine_data is None:
         return settings
-    engine, x, y, z, mode = unpack(f"<i3{width}i", found, "_n3")
-    if own.find("_n3", "En3") is None:
+    engine, x, y, z, mode = unpack(f"<i3{width}i", engine_data, "_n3")
+    if dynamics.find("_n3", "En3") is None:
         mode += 1
-    gravity = finite((x, y, z) if width == "d" else tuple(float(str(np.float32(one))) for one in (x, y, z)), "_n3")
-    step = own.numbers("_tp", "Stp", 1)
+    gravity = finite((x, y, z) if width == "d" else tuple(float(str(np.float32(value))) for value in (x, y, z)), "_n3")
+    step = dynamics.numbers("_tp", "Stp", 1)
     seconds = step[0] if step is not None else _PRESET_DYNAMICS_STEP if mode < _PRESETS else None
     return replace(settings, engine=engine, gravity=(gravity[0], gravity[1], gravity[2]), dynamics_step=seconds)
 
 
 MAX_OBJECTS = 20_000
-_DEEPEST = 200  # objects below each other
+_MAX_DEPTH = 200  # of the object tree
 _SETTINGS = {"SIM": with_simulation, "DYN": with_dynamics}
 
 
 def read_file(path: str | Path) -> VrepFile:
-    """Return what is in a file. Raises VrepFileError, in one line that names it."""
+    """Read a file. Raises VrepFileError, in one line that names the file."""
     with within(str(path)):
         try:
             content = read_bytes(path, MAX_SIZE)
@@ -82,7 +82,7 @@ def read_file(path: str | Path) -> VrepFile:
 
 
 def read(content: bytes) -> VrepFile:
-    """Return what a file's bytes hold. Raises VrepFileError."""
+    """Read the bytes of a file. Raises VrepFileError."""
     container = open_container(content)
     pools, settings = Pools(), VrepSettings()
     objects: list[VrepObject] = []
@@ -105,47 +105,47 @@ def read(content: bytes) -> VrepFile:
             with within(tag):
                 settings = _SETTINGS[tag](settings, data)
         if len(objects) > MAX_OBJECTS:
-            raise VrepFileError(f"holds more than {MAX_OBJECTS} objects")
+            raise VrepFileError(f"has more than {MAX_OBJECTS} objects")
     program = f"{container.program // 10000}.{container.program // 100 % 100}.{container.program % 100}"
     return VrepFile(container.version, program, _tree(objects), tuple(scripts), settings, tuple(collections))
 
 
-def _script_in(tag: str, data: bytes, one: VrepObject) -> list[VrepScript]:
-    """Return the script of a script object, which acts on the object's parent."""
-    found = script_of(data) if tag == SCRIPT else None
-    if found is None:
+def _script_in(tag: str, data: bytes, script_object: VrepObject) -> list[VrepScript]:
+    """Return the script of a script object, attached to that object's parent; [] for other objects."""
+    script = script_of(data) if tag == SCRIPT else None
+    if script is None:
         return []
-    with within(f"object {one.name}"):
-        return [replace(read_script(found, owner=one.parent), own_object=one.handle)]
+    with within(f"object {script_object.name}"):
+        return [replace(read_script(script, owner=script_object.parent), own_object=script_object.handle)]
 
 
 def _tree(objects: list[VrepObject]) -> tuple[VrepObject, ...]:
-    """Return the objects, a parent before its children, which it is given. Raises VrepFileError."""
-    by_handle = {one.handle: one for one in objects}
+    """Fill `children` and return the objects, each parent before its children. Raises VrepFileError."""
+    by_handle = {obj.handle: obj for obj in objects}
     if len(by_handle) != len(objects):
-        twice = next(handle for handle, count in Counter(one.handle for one in objects).items() if count > 1)
-        raise VrepFileError(f"object {by_handle[twice].name}: another object has the same handle {twice}")
+        duplicate = next(handle for handle, count in Counter(obj.handle for obj in objects).items() if count > 1)
+        raise VrepFileError(f"object {by_handle[duplicate].name}: another object has the same handle {duplicate}")
     roots = []
-    for one in objects:
-        if one.parent == -1:
-            roots.append(one)
-        elif one.parent in by_handle:
-            by_handle[one.parent].children.append(one)
+    for obj in objects:
+        if obj.parent == -1:
+            roots.append(obj)
+        elif obj.parent in by_handle:
+            by_handle[obj.parent].children.append(obj)
         else:
-            raise VrepFileError(f"object {one.name}: its parent {one.parent} is not in the file")
+            raise VrepFileError(f"object {obj.name}: its parent {obj.parent} is not in the file")
     ordered: list[VrepObject] = []
     for root in roots:
         _add_below(root, ordered, 0)
     if len(ordered) != len(objects):
-        there = {one.handle for one in ordered}
-        lost = next(one for one in objects if one.handle not in there)
-        raise VrepFileError(f"object {lost.name}: is its own ancestor")
+        reached = {obj.handle for obj in ordered}
+        unreached = next(obj for obj in objects if obj.handle not in reached)
+        raise VrepFileError(f"object {unreached.name}: is its own ancestor")
     return tuple(ordered)
 
 
-def _add_below(one: VrepObject, ordered: list[VrepObject], depth: int) -> None:
-    if depth > _DEEPEST:
-        raise VrepFileError(f"object {one.name}: has more than {_DEEPEST} ancestors")
-    ordered.append(one)
-    for child in one.children:
+def _add_below(obj: VrepObject, ordered: list[VrepObject], depth: int) -> None:
+    if depth > _MAX_DEPTH:
+        raise VrepFileError(f"object {obj.name}: is deeper than {_MAX_DEPTH} levels in the tree")
+    ordered.append(obj)
+    for child in obj.children:
         _add_below(child, ordered, depth + 1)

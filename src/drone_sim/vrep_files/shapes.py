@@ -1,6 +1,6 @@
-"""Shapes: one mesh, or a compound of meshes and compounds, with mass and inertia.
+"""Reads shapes: a mesh or a compound of meshes and compounds, with mass and inertia.
 
-A mesh has vertices and faces, from pools that all shapes share or in place, a colour, and may have a simple form.
+A mesh has vertices and faces, stored in place or in pools shared by all shapes, a colour, and may be a primitive.
 """
 
 from __future__ import annotations
@@ -24,55 +24,55 @@ from drone_sim.vrep_files.model import (
 from drone_sim.vrep_files.textures import read_cover, read_texture
 
 MAX_TRIANGLES = 3_000_000  # of a file
-_WORDS = ("", "plane", "disc", "cuboid", "spheroid", "cylinder", "cone", "heightfield", "capsule")
-_NO_OPACITY = 4  # the bit of `Var` that says that `Trf` does not count
+_PRIMITIVES = ("", "plane", "disc", "cuboid", "spheroid", "cylinder", "cone", "heightfield", "capsule")
+_NO_OPACITY = 4  # bit of `Var`: ignore `Trf`
 _GREY: Rgba = (0.7, 0.7, 0.7, 1.0)
-_REST = (31, 8191, 2097151, 536870911)  # taken from a packed index with 0 to 3 bytes more
+_PACKED_OFFSETS = (31, 8191, 2097151, 536870911)  # offset of a packed index difference with 0 to 3 extra bytes
 
 
 @dataclass
 class Pools:
-    """Vertices, faces and textures that stand once in a file, for all shapes that use them."""
+    """Vertices, faces and textures that are stored once in a file and shared by its shapes."""
 
     vertices: list[np.ndarray] = field(default_factory=list)
     faces: list[np.ndarray] = field(default_factory=list)
     textures: dict[int, VrepTexture] = field(default_factory=dict)
-    triangles: int = 0  # read so far, each mesh counted
+    triangles: int = 0  # read so far, shared meshes counted repeatedly
 
     def add(self, data: bytes, tag: str) -> None:
-        """Take the pools of a `VIN`, or the texture of a `TEX`. Raises VrepFileError."""
+        """Add the pools of a `VIN` chunk, or the texture of a `TEX` chunk. Raises VrepFileError."""
         if tag == "TEX":
             self.textures.update([read_texture(data)])
             return
-        for one in level(data).chunks:
-            if one.tag == "Ver":
-                self.vertices.append(_vertices(one.data))
-            elif one.tag == "Ind":
-                self.faces.append(_triples(np.frombuffer(one.data[: len(one.data) // 4 * 4], "<i4"), "Ind"))
-            elif one.tag == "In2":
-                self.faces.append(_packed(one.data))
+        for chunk in level(data).chunks:
+            if chunk.tag == "Ver":
+                self.vertices.append(_vertices(chunk.data))
+            elif chunk.tag == "Ind":
+                self.faces.append(_triples(np.frombuffer(chunk.data[: len(chunk.data) // 4 * 4], "<i4"), "Ind"))
+            elif chunk.tag == "In2":
+                self.faces.append(_packed(chunk.data))
 
 
 def read_mesh(outside: Level, inside: Level, pools: Pools) -> VrepMesh:
-    """Return the mesh of a wrapper's and a mesh's level. Raises VrepFileError."""
+    """Return the mesh from its wrapper level (outside) and mesh level (inside). Raises VrepFileError."""
     pose = position_first(inside.numbers("_pf", "Ppf", 7), "_pf")
-    turn = np.array(pose.matrix).reshape(3, 4)
-    vertices = _picked(inside, ("Vev", "Ver"), pools.vertices, _vertices)
-    faces = _picked(inside, ("Inv", "In2"), pools.faces, _packed)
+    transform = np.array(pose.matrix).reshape(3, 4)
+    vertices = _from_pool(inside, ("Vev", "Ver"), pools.vertices, _vertices)
+    faces = _from_pool(inside, ("Inv", "In2"), pools.faces, _packed)
     pools.triangles += len(faces)
     if pools.triangles > MAX_TRIANGLES:
-        raise VrepFileError(f"holds more than {MAX_TRIANGLES} triangles")
+        raise VrepFileError(f"has more than {MAX_TRIANGLES} triangles")
     if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
-        raise VrepFileError("a face names a vertex that does not exist")
+        raise VrepFileError("a face refers to a vertex that does not exist")
     cover = read_cover(inside, vertices, faces, pools.textures)
-    placed = vertices @ turn[:, :3].T + turn[:, 3]
+    placed = vertices @ transform[:, :3].T + transform[:, 3]
     return VrepMesh(placed, faces, _color(inside), _primitive(inside, pose), cover)
 
 
-def _picked(
+def _from_pool(
     inside: Level, tags: tuple[str, str], pool: list[np.ndarray], read: Callable[[bytes], np.ndarray]
 ) -> np.ndarray:
-    """Return an array from a pool, by the index under the first tag, or what is in place under the second."""
+    """Return the array in the pool at the index of the first tag or, without it, the array under the second tag."""
     index = inside.integer(tags[0], default=-1)
     if inside.find(tags[0]) is None:
         data = inside.find(tags[1])
@@ -83,35 +83,35 @@ def _picked(
 
 
 def _vertices(data: bytes) -> np.ndarray:
-    found = _triples(np.frombuffer(data[: len(data) // 4 * 4], "<f4"), "Ver").astype(float)
-    if not (np.abs(found) < 1e6).all():  # nor a NaN
-        raise VrepFileError("Ver: a vertex is not finite, or 1000 km away")
-    return found
+    vertices = _triples(np.frombuffer(data[: len(data) // 4 * 4], "<f4"), "Ver").astype(float)
+    if not (np.abs(vertices) < 1e6).all():  # also false for NaN
+        raise VrepFileError("Ver: a vertex is not finite or more than 1000 km away")
+    return vertices
 
 
 def _triples(values: np.ndarray, tag: str) -> np.ndarray:
     if len(values) % 3:
-        raise VrepFileError(f"{tag}: {len(values)} numbers, not a multiple of 3")
+        raise VrepFileError(f"{tag}: {len(values)} numbers; must be a multiple of 3")
     return values.reshape(-1, 3)
 
 
 def _packed(data: bytes) -> np.ndarray:
-    """Return the faces of an `In2`: indices as differences, each of 1 to 4 bytes."""
+    """Return the faces of an `In2` chunk: differences of indices, each packed into 1 to 4 bytes."""
     count = unpack("<i", data, "In2")[0]
     if not 0 <= count <= len(data) - 4:
         raise VrepFileError(f"In2: {count} indices do not fit")
     indices, at, index = [], 4, 0
     for _ in range(count):
-        more = data[at] >> 6 if at < len(data) else 0
-        piece = data[at : at + 1 + more]
-        if len(piece) != 1 + more:
-            raise VrepFileError("In2: is cut off")
+        extra = data[at] >> 6 if at < len(data) else 0
+        piece = data[at : at + 1 + extra]
+        if len(piece) != 1 + extra:
+            raise VrepFileError("In2: is truncated")
         difference = piece[0] & 63
         for number, byte in enumerate(piece[1:]):
             difference += byte << (6 + 8 * number)
-        index += difference - _REST[more]
+        index += difference - _PACKED_OFFSETS[extra]
         indices.append(index)
-        at += 1 + more
+        at += 1 + extra
     return _triples(np.array(indices, dtype=np.int64), "In2")
 
 
@@ -121,10 +121,10 @@ def _primitive(inside: Level, pose: Pose) -> VrepPrimitive | None:
         return None
     width = "d" if inside.find("_pr") is not None else "f"
     kind, *size = unpack(f"<i3{width}", data, "_pr")
-    if not 0 < kind < len(_WORDS):
+    if not 0 < kind < len(_PRIMITIVES):
         return None
     x, y, z = finite(tuple(size), "_pr")
-    return VrepPrimitive(_WORDS[kind], (abs(x), abs(y), abs(z)), pose)
+    return VrepPrimitive(_PRIMITIVES[kind], (abs(x), abs(y), abs(z)), pose)
 
 
 def _color(inside: Level) -> Rgba:
@@ -140,7 +140,7 @@ def _color(inside: Level) -> Rgba:
 
 
 def _rgb(parts: Level) -> Sequence[float]:
-    """Return red, green and blue: ambient and diffuse light in one since `Cl3`, apart before."""
+    """Return red, green and blue. `Cl3` has one colour; older chunks have ambient and diffuse colours."""
     data = parts.find("Cl3")
     if data is not None:
         return finite(unpack("<3f", data, "Cl3"), "Cl3")
@@ -152,16 +152,16 @@ def _rgb(parts: Level) -> Sequence[float]:
     return [(ambient + diffuse / 2) / 0.85 for ambient in light[:3]]
 
 
-_DEEPEST = 16  # compounds within compounds
-_MOST_MESHES = 20_000  # of a shape
+_MAX_DEPTH = 16  # of nested compounds
+_MAX_MESHES = 20_000  # of a shape
 _MESHES, _COMPOUNDS = ("Gst", "Geo"), ("Gsg", "Wrp")
 _NOT_STATIC, _RESPONDABLE = 0x80, 0x01
 
 
-def read_shape(own: Level, pools: Pools) -> VrepShape:
+def read_shape(class_level: Level, pools: Pools) -> VrepShape:
     """Return a shape from its class level. Raises VrepFileError."""
     mass, inertia, meshes = 1.0, None, []
-    data = own.find("Ge2")
+    data = class_level.find("Ge2")
     for chunk in levels(data, 2)[0].chunks if data is not None else ():
         if chunk.tag in (*_MESHES, *_COMPOUNDS):
             wrapper = levels(chunk.data, 3)[0]
@@ -172,22 +172,22 @@ def read_shape(own: Level, pools: Pools) -> VrepShape:
         meshes=tuple(meshes),
         mass=mass,
         inertia=inertia,
-        is_dynamic=bool(own.bits("Sss") & _NOT_STATIC),
-        is_respondable=bool(own.bits("Ss3", "Ss2") & _RESPONDABLE),
+        is_dynamic=bool(class_level.bits("Sss") & _NOT_STATIC),
+        is_respondable=bool(class_level.bits("Ss3", "Ss2") & _RESPONDABLE),
     )
 
 
 def _meshes(tag: str, data: bytes, pools: Pools, depth: int) -> list[VrepMesh]:
-    if depth > _DEEPEST:
-        raise VrepFileError(f"compounds within compounds, deeper than {_DEEPEST}")
-    found = levels(data, 3)
+    if depth > _MAX_DEPTH:
+        raise VrepFileError(f"compounds are nested deeper than {_MAX_DEPTH}")
+    object_levels = levels(data, 3)
     if tag in _MESHES:
-        return [read_mesh(found[0], found[1] if len(found) > 1 else Level(), pools)]
+        return [read_mesh(object_levels[0], object_levels[1] if len(object_levels) > 1 else Level(), pools)]
     meshes: list[VrepMesh] = []
-    for part in (part for one in found for part in one.chunks if part.tag in (*_MESHES, *_COMPOUNDS)):
+    for part in (part for inner in object_levels for part in inner.chunks if part.tag in (*_MESHES, *_COMPOUNDS)):
         meshes += _meshes(part.tag, part.data, pools, depth + 1)
-        if len(meshes) > _MOST_MESHES:
-            raise VrepFileError(f"a compound of more than {_MOST_MESHES} meshes")
+        if len(meshes) > _MAX_MESHES:
+            raise VrepFileError(f"a compound has more than {_MAX_MESHES} meshes")
     return meshes
 
 
