@@ -101,8 +101,8 @@ class LensView:
             return without_alpha(cv2.remap(stack, *self._smooth, cv2.INTER_LINEAR, dst=self._rgba), out)
 
         drawn = dict(draw(tuple(names) if "before" not in names or "depth" in names else (*names, "depth"), colors))
-        pictures = {name: drawn.pop(name) for name in (COLOR,) if name in drawn}
-        resampled = {**self.gather(drawn, rotation), **pictures}
+        images = {name: drawn.pop(name) for name in (COLOR,) if name in drawn}
+        resampled = {**self.gather(drawn, rotation), **images}
         return {name: resampled[name] for name in names}
 
     def gather(self, drawn: Mapping[str, np.ndarray], rotation: np.ndarray | None = None) -> dict[str, np.ndarray]:
@@ -118,8 +118,8 @@ class LensView:
         if "before" in drawn and rotation is not None:  # the point moved like its nearest pixel
             offset = self._ray * depth[..., None] - self._nearest_ray * nearest[..., None]
             gathered["before"] = (gathered["before"] + offset @ rotation.T).astype(np.float32)
-        for name, picture in gathered.items():
-            picture[~self._has_ray] = np.nan if name in ("depth", "before") else 0
+        for name, output in gathered.items():
+            output[~self._has_ray] = np.nan if name in ("depth", "before") else 0
         return gathered
 
     def _interpolate_depth(self, stack: np.ndarray, nearest: np.ndarray) -> np.ndarray:

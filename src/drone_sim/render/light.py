@@ -22,9 +22,9 @@ _LIGHTS = _to_light(np.arange(256) / 255).astype(np.float32)
 _VALUES = np.rint(255 * _to_value(np.arange(_STEPS + 1) / _STEPS)).astype(np.uint8)
 
 
-def decoded(picture: np.ndarray, share: float = 1.0) -> np.ndarray:
+def decoded(image: np.ndarray, share: float = 1.0) -> np.ndarray:
     """Return the linear light of an image (height, width, 3) uint8, times `share`, as float32; white is 1."""
-    return np.asarray(cv2.LUT(picture, _LIGHTS * np.float32(share)))
+    return np.asarray(cv2.LUT(image, _LIGHTS * np.float32(share)))
 
 
 def encoded(light: np.ndarray) -> np.ndarray:

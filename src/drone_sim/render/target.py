@@ -89,9 +89,9 @@ def _dtype_name(dtype: type) -> str:
     return f"{'u' if np.issubdtype(dtype, np.integer) else 'f'}{np.dtype(dtype).itemsize}"
 
 
-def without_alpha(picture: np.ndarray, out: np.ndarray | None) -> np.ndarray:
+def without_alpha(rgba: np.ndarray, out: np.ndarray | None) -> np.ndarray:
     """Return RGB of RGBA, written into `out` if given; raises ValueError if that does not fit."""
-    return np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGBA2RGB, dst=_check_out(out, (*picture.shape[:2], 3), np.uint8)))
+    return np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB, dst=_check_out(out, (*rgba.shape[:2], 3), np.uint8)))
 
 
 def _check_out(out: np.ndarray | None, shape: tuple[int, ...], dtype: type) -> np.ndarray:

@@ -289,7 +289,7 @@ class Instrument(Sensor):
         return self.outputs[0].fields(self.latest.value, self.header(self.latest))
 
 
-# silent: no readings; frozen: repeats the same value.
+# Failures of a sensor; silent: no readings, frozen: repeats the same value.
 Failure = Literal["ok", "silent", "frozen"]
 
 

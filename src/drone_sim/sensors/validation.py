@@ -61,15 +61,15 @@ def _claim_object(taken: dict[str, str], keys: tuple[str, str], name: str) -> No
 
 def _claim_topics(taken: dict[str, str], keys: tuple[str, str], base: str, topics: Iterable[tuple[str, str]]) -> None:
     path = "/".join(keys)
-    for topic, what in topics:
+    for topic, content in topics:
         if topic in taken:
             raise ParameterError(
-                f"its {what} would be {topic}, which is {taken[topic]}; "
+                f"its {content} would be {topic}, which is {taken[topic]}; "
                 "give it a namespace of its own, such as rear/image",
                 (*keys, "topic"),
                 f"'{base}'",
             )
-        taken[topic] = f"the {what} of {path}"
+        taken[topic] = f"the {content} of {path}"
 
 
 def _check_frames(cameras: Mapping[str, CameraParameters], sensors: Mapping[str, SensorParameters]) -> None:

@@ -120,7 +120,7 @@ class VrepDummy:
 
 @dataclass(frozen=True)
 class VrepControlPoint:
-    """A control point of a path: pose, Bézier factors and count, flags, channels, speed (0 to 1, relative to the path's)."""
+    """A control point of a path: pose, Bézier factors and count, flags, channels, speed (0 to 1, of the path's own)."""
 
     pose: Pose
     before: float
