@@ -150,12 +150,12 @@ class DrawBatches:
         floor = self.floors[0]
         return float(poses[floor.members[0], 2, 3] + floor.surface.top * self._scales[floor.first, 0, 2])
 
-    def glass_from_far(self, away: Callable[[np.ndarray], float], poses: np.ndarray) -> list[Batch]:
-        """Return the transparent batches, farthest first; `away` returns the distance of a point (3,) in the world."""
+    def glass_from_far(self, distance: Callable[[np.ndarray], float], poses: np.ndarray) -> list[Batch]:
+        """Return the transparent batches, farthest first; `distance` is that of a point (3,) in the world."""
 
         def depth(batch: Batch) -> float:
             pose = poses[batch.members[0]]
-            return away(pose[:3, :3] @ (batch.surface.centre * self._scales[batch.first, 0]) + pose[:3, 3])
+            return distance(pose[:3, :3] @ (batch.surface.centre * self._scales[batch.first, 0]) + pose[:3, 3])
 
         return sorted(self.glass, key=depth, reverse=True) if len(self.glass) > 1 else self.glass
 

@@ -35,10 +35,10 @@ def pixels(
     other numbers and poses.
     """
     counts = np.zeros(int(instances.max(initial=0)) + 1, dtype=np.int64)
-    nowhere = np.eye(4)
-    nowhere[2, 3] = -1e9  # m, far below everything that a camera sees
+    hidden_pose = np.eye(4)
+    hidden_pose[2, 3] = -1e9  # m, far below everything that a camera sees
     for number in np.unique(instances):
         is_part = instances == number
-        covered_pixels = mask(is_part.astype(np.uint16), np.where(is_part[:, None, None], poses, nowhere))
+        covered_pixels = mask(is_part.astype(np.uint16), np.where(is_part[:, None, None], poses, hidden_pose))
         counts[number] = covered_pixels.sum(dtype=np.int64)
     return counts

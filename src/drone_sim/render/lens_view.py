@@ -53,8 +53,8 @@ class _Tile(NamedTuple):
         slopes = tile_rays[:, :2] / tile_rays[:, 2:]
         low, high = slopes.min(axis=0), slopes.max(axis=0)
         focal = min(most, math.sqrt(_PIXEL_RATIO * len(pixels) / max(float(np.prod(high - low)), 1e-12)))
-        wide, tall = (math.ceil(extent) + 2 * _MARGIN + 1 for extent in focal * (high - low))
-        return cls(pixels, axes, slopes, tile_rays[:, 2], focal, (wide, tall), _MARGIN - focal * low)
+        width, height = (math.ceil(extent) + 2 * _MARGIN + 1 for extent in focal * (high - low))
+        return cls(pixels, axes, slopes, tile_rays[:, 2], focal, (width, height), _MARGIN - focal * low)
 
 
 class LensView:
@@ -141,9 +141,9 @@ def _tiles(lens: Distorted, has_ray: np.ndarray) -> list[_Tile]:
             if not valid.any():
                 continue
             rays = lens.rays[np.ix_(rows, columns)]
-            half = max(1, len(columns) // 2)
-            across = np.nansum(rays[:, half:], axis=(0, 1)) / max(1, valid[:, half:].sum())
-            across -= np.nansum(rays[:, :half], axis=(0, 1)) / max(1, valid[:, :half].sum())
+            centre = max(1, len(columns) // 2)
+            across = np.nansum(rays[:, centre:], axis=(0, 1)) / max(1, valid[:, centre:].sum())
+            across -= np.nansum(rays[:, :centre], axis=(0, 1)) / max(1, valid[:, :centre].sum())
             pixels = (rows[:, None] * wide + columns)[valid]
             tiles.append(_Tile.of(pixels, rays[valid], across, lens.fx))
     return tiles

@@ -61,7 +61,7 @@ class _View(NamedTuple):
     def role(self, kind: str, outputs: tuple[str, ...] = ()) -> Role:
         return Role(kind, outputs, self.tiles, bool(outputs) and isinstance(self.intrinsics, Orthographic))
 
-    def away(self, point: np.ndarray) -> float:
+    def distance(self, point: np.ndarray) -> float:
         """Return a distance of a point in the world, m, by which transparent objects are sorted."""
         if self.tiles > 1:
             return float(np.linalg.norm(point - self.camera_pose[:3, 3]))
@@ -250,7 +250,7 @@ class Renderer:
             if batches.glass:
                 gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
                 gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
-                self._draw_batches(gl, batches.glass_from_far(view.away, view.poses), role)
+                self._draw_batches(gl, batches.glass_from_far(view.distance, view.poses), role)
             if outputs and (batches.glass or batches.ground):  # outputs need a pass without blending
                 target.use(color=False)
                 gl.enable_only(gl.DEPTH_TEST)

@@ -188,7 +188,7 @@ class PictureTruth:
 
         Its box has the axes of the object's first visual.
         """
-        corners = self._optical(number, _outline)
+        corners = self._optical(number, _vertices)
         optical = np.linalg.inv(self.moment.camera_pose)
         frame = optical @ self.moment.poses[np.flatnonzero(self.numbered.instances == number)[0]]
         frame[:3, :3] /= np.linalg.norm(frame[:3, :3], axis=0)
@@ -240,7 +240,7 @@ def quaternion_of(seen: Seen) -> tuple[float, ...]:
 
 
 @lru_cache(maxsize=1024)
-def _outline(shape: DrawnShape) -> np.ndarray:
+def _vertices(shape: DrawnShape) -> np.ndarray:
     """Return the distinct corners of a shape's triangles, (n, 3), m."""
     return np.asarray(np.unique(_triangle_corners(shape), axis=0))
 

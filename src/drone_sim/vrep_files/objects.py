@@ -83,7 +83,7 @@ def _joint(joint: Level) -> Kind:
     kind = _JOINTS.get(joint.integer("Jtt", default=10), "revolute")
     low, span = joint.numbers("_mr", "Pmr", 2) or (0.0, 0.0)
     position = joint.numbers("_rt", "Prt", 1) or (0.0,)
-    turn = joint.numbers("_st", "Jst", 4)
+    quaternion = joint.numbers("_st", "Jst", 4)
     lead = joint.numbers("Sld", "", 1) or [math.tau * pitch for pitch in joint.numbers("", "Jsp", 1) or (0.0,)]
     velocity, force = joint.numbers("_mp", "Dmp", 2) or (0.0, 0.0)
     mode, (target,) = _mode(joint), joint.numbers("_tp", "Dtp", 1) or (0.0,)
@@ -91,7 +91,7 @@ def _joint(joint: Level) -> Kind:
         kind="screw" if kind == "revolute" and lead[0] else kind,
         position=position[0],
         limits=None if joint.bits("Va9") & _CYCLIC or kind == "spherical" else (low, low + span),
-        turn=ORIGIN if turn is None else quaternion_first((*turn, 0.0, 0.0, 0.0), "_st"),
+        turn=ORIGIN if quaternion is None else quaternion_first((*quaternion, 0.0, 0.0, 0.0), "_st"),
         lead=lead[0],
         mode=mode,
         target=velocity if mode == "velocity" else target,

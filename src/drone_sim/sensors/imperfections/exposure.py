@@ -96,7 +96,7 @@ class ExposureControl:
         return min(self._wanted * (self._brightness / self._wanted) ** left, parameters.most)
 
     def meter(self, light: np.ndarray, brightness: float | None, now: float) -> None:
-        """Set the target from a rendered image at `now` (s). `brightness`: the present value, None: the target."""
+        """Set the target from a rendered image at `now` (s). `brightness`: the present value (None: the target)."""
         mean = float(np.dot(cv2.mean(light)[:3], _LUMINANCE))
         self._wanted, self._at = _GREY / max(mean, _MIN_LUMINANCE), now
         self._brightness = self._wanted if brightness is None else brightness
