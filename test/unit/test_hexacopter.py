@@ -117,7 +117,7 @@ def test_propellers_5_and_6_have_names_in_files_and_in_tuning(simulate):
     assert sum(name.startswith("faults/propellers/") for name in tuning.values()) == 6
     tuning.change({"faults/propellers/right": 0.5})
     assert simulation.drone.faults.now.propellers == (1, 1, 1, 1, 0.5, 1)
-    with pytest.raises(ParameterError, match=r"Quadricopter_propeller_respondable6' is no object of a vehicle"):
+    with pytest.raises(ParameterError, match="respondable6"):
         parameters.load(six)
 
 

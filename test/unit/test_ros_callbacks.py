@@ -212,6 +212,7 @@ def test_to_resume_what_is_not_paused_says_how_to_pause(simulation, monkeypatch)
     monkeypatch.setattr(services, "VehiclesParameter", mock.Mock())
     monkeypatch.setattr(rospy, "Service", mock.Mock())
     monkeypatch.setattr(rospy, "logwarn", warnings.append)
+    monkeypatch.setattr(services, "scene_parameter", str)
     offered = services.Services(player, Inbox(), lambda: None)
     assert "pause true` pauses" in offered.pause(False) and len(warnings) == 1
     assert offered.pause(True) == "paused"

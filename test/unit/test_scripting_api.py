@@ -175,7 +175,7 @@ def test_images_come_with_the_bottom_row_first(sim):
 
 
 def test_what_cannot_be_drawn_is_said_once(sim, caplog):
-    with caplog.at_level(logging.INFO):
+    with caplog.at_level(logging.DEBUG, "drone_sim.script"):
         first = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 10)
         second = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 10)
         for _ in range(3):

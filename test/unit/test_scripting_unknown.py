@@ -41,7 +41,7 @@ def _failed(tmp_path):
         ("simUI.creat('')", "simUI has no 'creat'; near names are create"),
         ("sim.createIkGroup(1)", "there is no sim.createIkGroup here: inverse kinematics is not supported"),
         ("simCreateIkGroup(1)", "there is no simCreateIkGroup here: inverse kinematics is not supported"),
-        ("local s = 'AB' print(s[1])", "a string has no [1]: uint8[] is a string here"),
+        ("local s = 'AB' print(s[1])", "a string has no [1]: a uint8[] field is a string here"),
         ("simExtROS_enablePublisher('x')", "there is no simExtROS_enablePublisher here: the plugin of V-REP 3.0"),
     ],
 )
