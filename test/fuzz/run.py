@@ -34,6 +34,7 @@ KINDS = (
     "connections",
     "legacy_commands",
     "bags",
+    "archives",
     "browsers",
     "parameters",
     "scenes",

@@ -8,20 +8,26 @@ from __future__ import annotations
 import contextlib
 import importlib
 import io
+import itertools
 import logging
 import math
+import os
+import shutil
 import socket
+import stat
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import cbor2
 import zmq
 from case import Case
 
 from drone_sim.config.types import ParameterError
+from drone_sim.grading.submissions.folders import submissions_of
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.mechanics.urdf import UrdfError
 from drone_sim.offline import fly
@@ -245,6 +251,59 @@ def _bags(case: Case, folder: Path) -> str:
     return one_line(said, folder) if said else ""
 
 
+# ---- zips of a class
+
+
+def _archives(case: Case, folder: Path) -> str:
+    """Find what a class has handed in; nothing may change outside `store`, and the good student's script is found."""
+    store, canary = folder / "results" / "store", folder / "canary"
+    store.parent.mkdir()
+    canary.write_text("here")
+    before = _listed(folder)
+    removed: list[Path] = []
+    with _recorded_removals(removed):
+        try:
+            found = submissions_of(str(folder / "class.zip"), store)
+        except ValueError as refusal:
+            if case.data == "whole":
+                raise Fault(f"a good student is refused with the others: {refusal!r:.300}") from None
+            return one_line(str(refusal), folder)
+        finally:
+            outside = [one for one in removed if one == store or not one.is_relative_to(store)]
+            if outside:
+                raise Fault(f"these would have been removed: {outside!r:.300}")
+            if {path: kind for path, kind in _listed(folder).items() if not path.is_relative_to(store)} != before:
+                raise Fault("something was written out of the store")
+            if any(kind not in (stat.S_IFREG, stat.S_IFDIR) for kind in _listed(store).values()):
+                raise Fault("something that is neither a file nor a folder was made")
+    good = [one for one in found if one.name == "Good"]
+    is_found = len(good) == 1 and not good[0].error and Path(good[0].script).is_file()
+    if case.data == "whole" and not is_found:
+        raise Fault(f"the good student: {good!r:.500}")
+    return next((one_line(one.error, folder) for one in found if one.error), "")
+
+
+def _listed(folder: Path) -> dict[Path, int]:
+    """Return what lies in a folder, and the kind of each."""
+    names = (os.path.join(here, name) for here, *several in os.walk(folder) for name in itertools.chain(*several))
+    return {Path(name): stat.S_IFMT(os.lstat(name).st_mode) for name in names}
+
+
+@contextlib.contextmanager
+def _recorded_removals(paths: list[Path]) -> Iterator[None]:
+    """Let no tree and no file be removed, and keep which would be."""
+
+    def record(path: Any, *_: Any, dir_fd: int | None = None, **__: Any) -> None:
+        folder = os.getcwd() if dir_fd is None else os.readlink(f"/proc/self/fd/{dir_fd}")
+        named = os.path.join(folder, path)
+        paths.append(Path(os.path.realpath(os.path.dirname(named)), os.path.basename(named)))
+
+    with contextlib.ExitStack() as patched:
+        for owner, name in ((shutil, "rmtree"), (os, "unlink"), (os, "remove"), (os, "rmdir")):
+            patched.enter_context(mock.patch.object(owner, name, record))
+        yield
+
+
 # ---- messages
 
 
@@ -432,5 +491,6 @@ _TRIALS: dict[str, Callable[[Case, Path], Any]] = {
     "connections": _connections,
     "legacy_commands": _legacy_commands,
     "bags": _bags,
+    "archives": _archives,
     "browsers": _browsers,
 }

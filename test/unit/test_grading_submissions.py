@@ -1,5 +1,6 @@
 """What a class hands in: folders, zips of Moodle and Gradescope, tables; hostile ones; who is alike."""
 
+import os
 import stat
 import zipfile
 from pathlib import Path
@@ -8,7 +9,8 @@ import pytest
 from graded import read_plan
 
 from drone_sim.grading import grade, tasks
-from drone_sim.grading.submissions import archive, similarity
+from drone_sim.grading.jobs.files import Unreadable
+from drone_sim.grading.submissions import archive, folders, similarity
 from drone_sim.grading.submissions.folders import submissions_of
 from drone_sim.grading.submissions.submission import Person, Submission, names_of
 
@@ -142,15 +144,18 @@ def test_a_table_of_names_and_paths(tmp_path):
         ("a,b\n1,2\n", r"line 1: must name the columns name, path \(and may id, email\), not 'a,b'"),
         ("name,path\nAda,\n", "line 2: must have a name and a path"),
         ("", "line 1: must name the columns"),
+        (f"name,path\nAda,{'x' * 200_000}\n", "is not a table that can be read: field larger"),
     ):
         (tmp_path / "class.csv").write_text(text)
         with pytest.raises(ValueError, match=said):
             submissions_of(str(tmp_path / "class.csv"), tmp_path / "store")
 
 
-def _link():
-    info = zipfile.ZipInfo("link.py")
-    info.external_attr = (stat.S_IFLNK | 0o777) << 16
+def _member(name="link.py", kind=stat.S_IFREG, method=zipfile.ZIP_DEFLATED):
+    info = zipfile.ZipInfo("replaced")
+    info.filename = name  # as it stands, with a NUL
+    info.external_attr = (kind | 0o777) << 16
+    info.compress_type = method
     return info
 
 
@@ -159,7 +164,13 @@ HOSTILE = {  # what a student's zip holds, and what is said of it
     "many files": ({f"{number}.txt": "" for number in range(1001)}, "holds more than 1000 files"),
     "a path outside": ({"../../evil.py": SCRIPT}, "holds a path that leads out of it: '../../evil.py'"),
     "an absolute path": ({"/tmp/evil.py": SCRIPT}, "holds a path that leads out of it: '/tmp/evil.py'"),
-    "a link": ({_link(): "/etc/passwd"}, "holds something that is not a regular file: 'link.py'"),
+    "Windows": ({"my\\main.py": SCRIPT}, "holds a path that leads out of it: 'my\\\\main.py'"),
+    "a NUL": ({_member("my.py\0.txt"): SCRIPT}, "holds a path that leads out of it: 'my.py\\x00.txt'"),
+    "deep": ({"a/" * 64 + "my.py": SCRIPT}, "holds a path of more than 64 folders: "),
+    "a link": ({_member(kind=stat.S_IFLNK): "/etc/passwd"}, "holds something that is not a regular file: 'link.py'"),
+    "a FIFO": ({_member("fifo.py", stat.S_IFIFO): ""}, "holds something that is not a regular file: 'fifo.py'"),
+    "a bomb of another kind": ({_member("a.bin", method=zipfile.ZIP_LZMA): bytes(9)}, "neither stored nor deflated"),
+    "a name twice": ({_member("my.py"): SCRIPT, "my.py": SCRIPT}, "cannot be unpacked: File exists"),
     "too long a name": ({"x" * 300: ""}, "cannot be unpacked: File name too long"),
     "a file that is a folder": ({"a": "", "a/b": ""}, "cannot be unpacked: "),
     "no zip": (b"PK\x03\x04 and nothing more", "is not a zip that can be read: File is not a zip file"),
@@ -170,6 +181,7 @@ def test_hostile_zips_cost_their_own_marks_and_leave_nothing_outside(tmp_path, m
     monkeypatch.setattr(archive, "LARGEST", 2**20)
     members = {f"{moodle('Good', 1)}/my.py": SCRIPT}
     for number, (what, (content, _)) in enumerate(HOSTILE.items(), start=2):
+        (tmp_path / "s.zip").unlink(missing_ok=True)
         raw = content if isinstance(content, bytes) else zipped(tmp_path / "s.zip", content).read_bytes()
         members[moodle(what, number, "s.zip")] = raw
     whole = zipped(tmp_path / "class.zip", {**members, f"{moodle('Bad', 99)}/../../../evil.py": SCRIPT})
@@ -183,6 +195,90 @@ def test_hostile_zips_cost_their_own_marks_and_leave_nothing_outside(tmp_path, m
     (tmp_path / "broken.zip").write_bytes(whole.read_bytes()[:-30])
     with pytest.raises(ValueError, match=r"broken.zip': is not a zip that can be read"):
         submissions_of(str(tmp_path / "broken.zip"), tmp_path / "store")
+
+
+@pytest.fixture(name="removed")
+def _removed(monkeypatch):
+    """Trees that were to be removed: none is, whatever goes wrong."""
+    paths = []
+    monkeypatch.setattr("shutil.rmtree", lambda path, *_, **__: paths.append(Path(path)))
+    return paths
+
+
+OUT = {  # a member's name, and to whom it belongs
+    **dict.fromkeys(("/", "//x", "..", "/home/x.py", "../z", "../../z"), ""),
+    "\\x/..": "\\x",
+    "Bad_9_assignsubmission_file_/../../z": "Bad",
+    "/Ada Lovelace_1_assignsubmission_file_/my.py": "",
+    "Bad_9_assignsubmission_file_..": "Bad",
+    "Bad_9_assignsubmission_file_a\\b.py": "Bad",
+    "alone/../x": "alone",
+}
+
+
+@pytest.mark.parametrize("around", ["", "export/"])
+@pytest.mark.parametrize("name", OUT)
+def test_a_member_that_leads_out_costs_its_student_and_nobody_else(tmp_path, removed, name, around):
+    good = {f"{around}{moodle(who, number)}/my.py": SCRIPT for number, who in enumerate(("Ada", "Bo", "Che"), start=1)}
+    path = zipped(tmp_path / "class.zip", {**good, name if name[0] in "./" else around + name: "", _member("../y"): ""})
+    submissions = found(path, tmp_path)
+    for who in ("Ada", "Bo", "Che"):
+        one = submissions.pop(who)
+        assert one.error == "" and Path(one.script).read_text() == SCRIPT
+    assert "leads out" in submissions.pop("class.zip").error or "_.." in name
+    if OUT[name]:
+        assert submissions.pop(OUT[name]).error
+    assert not submissions
+    assert all(one.is_relative_to(tmp_path / "store") and one != tmp_path / "store" for one in removed)
+    written = {one.relative_to(tmp_path).parts[0] for one in tmp_path.rglob("*")}
+    assert written == {"class.zip", "store"} and not [*tmp_path.rglob("z"), *tmp_path.rglob("y")]
+
+
+def test_one_bomb_of_several_parts_leaves_room_for_the_others(tmp_path, monkeypatch):
+    monkeypatch.setattr(archive, "_ROOM", 2 * 2**20)
+    monkeypatch.setattr(archive, "_RATIO", 1)
+    bombs = {f"{number}/my.py": SCRIPT + "#" * 1_000_000 for number in range(4)}
+    path = zipped(tmp_path / "class.zip", {**bombs, "good/my.py": SCRIPT})
+    errors = {one.script.split("/")[-1]: one.error for one in submissions_of(str(path), tmp_path / "store") if one.error}
+    assert [*errors] == ["2", "3"] and all("more than is left" in one for one in errors.values())
+
+
+def test_a_students_file_named_as_anothers_is_that_students(tmp_path):
+    name = moodle("Ada", 7, moodle("Bob", 8, "my.py"))
+    (one,) = submissions_of(str(zipped(tmp_path / "class.zip", {name: SCRIPT})), tmp_path / "store")
+    assert one.people == (Person("Ada", "7"),) and not one.error
+
+
+def test_names_in_gradescopes_file_are_texts(tmp_path):
+    aliases = "".join(f"  a{number}: &a{number} [{f'*a{number - 1}, ' * 9}]\n" for number in range(1, 6))
+    people = f"submission_1:\n  a0: &a0 [x]\n{aliases}  :submitters:\n  - :name: *a5\n"
+    members = {"submission_metadata.yml": people, "submission_1/my.py": SCRIPT}
+    with pytest.raises(ValueError, match=":submitters:"):
+        submissions_of(str(zipped(tmp_path / "export.zip", members)), tmp_path / "store")
+
+
+def test_what_is_odd_in_a_folder_costs_nobody_else(tmp_path, monkeypatch):
+    folder = tmp_path / "class"
+    laid(folder, good_dot_py=SCRIPT, unreadable_dot_py=SCRIPT)
+    laid(tmp_path, solution__my_dot_py=SCRIPT)
+    zipped(tmp_path / "solution.zip", {"my.py": SCRIPT})
+    for name in ("solution", "solution.zip"):
+        (folder / moodle("Eve", len(name))).with_suffix(Path(name).suffix).symlink_to(tmp_path / name)
+    os.mkfifo(folder / moodle("Fifo", 1, "my.zip"))
+    (folder / moodle("Folder", 2, "my.zip")).mkdir()
+    (folder / moodle("Loop", 3, "my.zip")).symlink_to(moodle("Loop", 3, "my.zip"))
+    reads = folders.is_child_script
+
+    def is_child_script(path):
+        if path.name == "unreadable.py":
+            raise Unreadable(f"{path}: Permission denied")
+        return reads(path)
+
+    monkeypatch.setattr(folders, "is_child_script", is_child_script)
+    submissions = submissions_of(str(folder), tmp_path / "store")
+    assert {Path(one.script).name for one in submissions if not one.error} == {"good.py", "unreadable.py"}
+    errors = {f"{one.name} {one.error}" for one in submissions if one.error}
+    assert len(errors) == 5 and sum("leads out of its folder" in one for one in errors) == 2
 
 
 def test_a_zip_that_lies_about_its_sizes_is_refused(tmp_path):

@@ -1,5 +1,6 @@
-"""Files are written whole or not at all."""
+"""Files are written whole or not at all, and removed only below a folder."""
 
+import ast
 import os
 import resource
 import stat
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from drone_sim.files import writing
+from drone_sim.files import containment, writing
 from drone_sim.offline.fly import main
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
@@ -98,3 +99,83 @@ def test_a_device_is_written_directly(tmp_path, capfd):
     writing.write(tmp_path / "fifo", "through")
     assert os.read(end, 100) == b"through"
     os.close(end)
+
+
+# ---- below a folder
+
+
+@pytest.fixture(name="removed")
+def _removed(monkeypatch):
+    """Paths that were to be removed: nothing is, whatever goes wrong."""
+    paths = []
+    monkeypatch.setattr("shutil.rmtree", lambda path, *_, **__: paths.append(str(path)))
+    monkeypatch.setattr(Path, "unlink", lambda path, missing_ok=False: paths.append(str(path)))
+    return paths
+
+
+LEADS_OUT = ("/", "//", "..", ".", "", "../z", "a/../..", "a/../../z", "/etc", "link/z", "link/../z", "a/link/..")
+
+
+@pytest.mark.parametrize("name", LEADS_OUT)
+def test_a_path_out_of_its_folder_is_refused(tmp_path, removed, name):
+    folder = tmp_path / "folder"
+    (folder / "a").mkdir(parents=True)
+    (folder / "link").symlink_to("/usr/share")
+    (folder / "a/link").symlink_to("/usr/share/")
+    for action in (lambda: containment.below(folder, name), lambda: containment.remove(folder / name, folder)):
+        with pytest.raises(containment.Outside):
+            action()
+    assert removed == []
+
+
+def test_what_lies_below_its_folder_is_removed_and_a_link_is_not_followed(tmp_path, removed):
+    folder = tmp_path / "folder"
+    (folder / "a/b").mkdir(parents=True)
+    (folder / "file").touch()
+    (folder / "link").symlink_to(tmp_path)
+    (tmp_path / "way").symlink_to(folder)
+    for name in ("a", "a/b", "file", "link", "nothing", "x" * 300):
+        containment.remove(tmp_path / "way" / name, within=folder)
+    assert removed == [str(folder / name) for name in ("a", "a/b", "file", "link")]
+
+
+# What removes or renames by itself, and with which names: none of them comes from outside. Whoever adds a place names it
+# here; for a tree, for files in a loop, or for a name from outside, `drone_sim.files.containment` is the way.
+KNOWN = {
+    "editing/drafts.py": 3,  # its own draft
+    "files/containment.py": 2,
+    "files/writing.py": 3,  # its own temporary files
+    "grading/jobs/job.py": 3,  # named by hashes
+    "grading/submissions/archive.py": 1,  # a temporary folder, which is named by a hash
+    "importing/cache.py": 1,  # a temporary folder, which is named by a hash
+    "ros/cockpit/editor/script_store.py": 3,  # checked by `_checked` and `_place`
+    "ros/cockpit/server/address.py": 2,  # named by the port
+    "world/assemblies.py": 1,  # temporary files of BulletFiles
+    "world/bodies.py": 1,
+}
+REMOVALS = {"unlink", "rmdir", "rmtree", "removedirs", "renames"}
+OF_MODULES = {"remove", "rename", "replace", "link", "move"}
+
+
+def _removals(tree):
+    """Yield the calls in a module that remove or rename files, and whether each is in a loop."""
+    loops = (ast.For, ast.While, ast.ListComp, ast.SetComp, ast.GeneratorExp, ast.DictComp)
+    inside = {id(one) for loop in ast.walk(tree) if isinstance(loop, loops) for one in ast.walk(loop)}
+    for call in (one for one in ast.walk(tree) if isinstance(one, ast.Call)):
+        name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+        owner = ast.unparse(call.func.value) if isinstance(call.func, ast.Attribute) else ""
+        is_of_path = name in ("rename", "replace") and len(call.args) == 1 and not call.keywords and owner
+        if name in REMOVALS or is_of_path or (owner in ("os", "shutil") and name in OF_MODULES):
+            yield name, id(call) in inside
+
+
+def test_only_known_places_remove_or_rename_files_and_none_does_in_a_loop():
+    found = {}
+    for path in sorted((SOURCE / "drone_sim").rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        name, calls = str(path.relative_to(SOURCE / "drone_sim")), list(_removals(ast.parse(text)))
+        assert "rmtree" not in text or name == "files/containment.py", name
+        assert not any(in_loop for _, in_loop in calls), name
+        if calls:
+            found[name] = len(calls)
+    assert found == KNOWN

@@ -6,12 +6,13 @@ deleted at any time. XDG_CACHE_HOME names another place than ~/.cache.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import logging
-import shutil
 import tempfile
 from pathlib import Path
 
+from drone_sim.files.containment import remove
 from drone_sim.files.resources import cache_path, read_bytes
 from drone_sim.importing.folder import word
 from drone_sim.vrep_files.container import MAX_SIZE
@@ -66,4 +67,5 @@ def _import_into(path: Path, folder: Path) -> None:
         if not (folder / SCENE).is_file():  # nor has another process made it
             raise
     finally:
-        shutil.rmtree(unfinished, ignore_errors=True)
+        with contextlib.suppress(OSError):
+            remove(unfinished, within=folder.parent)

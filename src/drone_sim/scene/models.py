@@ -14,6 +14,7 @@ import numpy as np
 
 from drone_sim.config.types import Checked, FoundFile, ParameterError, read_yaml
 from drone_sim.files import mesh_files, writing, yaml_files
+from drone_sim.files.containment import remove
 from drone_sim.files.resources import MEBIBYTE, cache_path
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
@@ -140,7 +141,7 @@ def _make_room(files: Iterable[Path], used: Collection[str]) -> None:
     for count, (stat, one) in enumerate(sorted(found, key=lambda pair: -pair[0].st_mtime_ns)):
         size += stat.st_size
         if (count >= _MOST_MESHES or size > _MOST_BYTES) and str(one) not in used:
-            one.unlink(missing_ok=True)
+            remove(one, within=_made_meshes())
 
 
 def plain(values: Checked, folder: Path | None) -> dict[str, Any]:

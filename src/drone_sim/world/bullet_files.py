@@ -12,6 +12,7 @@ from xml.etree import ElementTree as Xml
 import cv2
 
 from drone_sim.files import images, mesh_files
+from drone_sim.files.containment import remove
 
 # PyBullet caches some files by name until the process ends, so no name is used twice.
 _NUMBERS = itertools.count()
@@ -38,7 +39,7 @@ class BulletFiles:
     def drop_old(self) -> None:
         """Remove the oldest meshes if there are many: PyBullet reads each only once."""
         while len(self._meshes) > _MAX_OLD_MESHES:
-            Path(self._meshes.pop(next(iter(self._meshes)))).unlink(missing_ok=True)
+            remove(self._meshes.pop(next(iter(self._meshes))), within=self._folder.name)
 
     def write(self, content: bytes, suffix: str) -> str:
         """Write a file; return its path. Raises RuntimeError, in one line, if it cannot be written."""

@@ -11,7 +11,6 @@ import hashlib
 import json
 import os
 import platform
-import shutil
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from drone_sim.files import writing
+from drone_sim.files.containment import remove
 from drone_sim.files.resources import cache_path, package_path
 from drone_sim.grading.flight import ungraded
 from drone_sim.grading.jobs import files
@@ -184,7 +184,7 @@ class ResultStore:
         """Remove the plan's results. Raises OSError."""
         self._file.unlink(missing_ok=True)
         for path in self._tables.glob("*.csv"):
-            path.unlink(missing_ok=True)
+            remove(path, within=self._tables)
 
 
 def forget_old(folder: Path, days: float) -> None:
@@ -193,7 +193,7 @@ def forget_old(folder: Path, days: float) -> None:
     for path in (*folder.glob("*.jsonl"), *folder.glob("*-tables/*"), *unpacked(folder).glob("*")):
         with contextlib.suppress(OSError):
             if path.stat().st_mtime < oldest:
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
+                remove(path, within=folder)
 
 
 def _read(line: str) -> tuple[str, Result | None]:

@@ -11,16 +11,15 @@ import functools
 import json
 import os
 import random
-import shutil
 import socket
 import stat
 import sys
-import tempfile
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from drone_sim.files.containment import remove
 from drone_sim.grading.jobs import system_calls
 from drone_sim.grading.jobs.limited_process import LimitedProcess, open_to_itself
 from drone_sim.grading.jobs.server import GONE, HANDED_IN, HUNG_UP, Requests
@@ -42,7 +41,7 @@ def main() -> None:
     except OSError as error:
         print(f"grade: scripts can share memory and use a network: {error.strerror}", file=sys.stderr)
     requests = Requests()
-    folders = [tempfile.gettempdir(), *([HANDED_IN] if is_alone else [])]
+    folders = [os.environ["TMPDIR"], *([HANDED_IN] if is_alone else [])]
     with contextlib.suppress(*GONE):
         for request, door in requests:
             for path in request["handed_in"]:
@@ -91,10 +90,7 @@ def _cleared(folder: str) -> bool:
     os.chmod(folder, stat.S_IRWXU)
     for entry in os.scandir(folder):
         with contextlib.suppress(OSError, RecursionError):
-            if entry.is_dir(follow_symlinks=False):
-                shutil.rmtree(entry.path)
-            else:
-                os.unlink(entry.path)
+            remove(entry.path, within=folder)
     return not os.listdir(folder)
 
 

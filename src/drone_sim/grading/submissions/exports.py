@@ -17,27 +17,28 @@ METADATA = "submission_metadata.yml"
 _LARGEST = 64 * 2**20  # bytes: it repeats what the autograder has said
 _MOST_PEOPLE = 20  # of a group
 _GRADESCOPE = re.compile(r"submission_\d+")
-# Moodle's folder of somebody's files, or the beginning of each file's name where the export has no folders.
-_MOODLE = re.compile(r"(?P<name>.+)_(?P<number>\d+)_assignsubmission_[a-z]+(?:_(?P<file>.*))?", re.DOTALL)
+# Moodle's folder of somebody's files, or the beginning of each file's name where the export has no folders. The name is
+# the shortest possible: a student may call a file `Bob_8_assignsubmission_file_my.py`.
+_MOODLE = re.compile(r"(?P<name>.+?)_(?P<number>\d+)_assignsubmission_[a-z]+(?:_(?P<file>.*))?", re.DOTALL)
 _LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # every value is text, and no tag makes anything else
 
 
 def arranged(paths: Sequence[Parts]) -> list[tuple[str, Parts]]:
-    """Return for each path in a class's zip the folder that it belongs into ('': none), and its path in there."""
+    """Return for each path in a class's zip the part that it belongs to, and its path in there: () for a mere file."""
     first = {parts[0] for parts in paths}
-    if len(first) == 1 and all(len(parts) > 1 for parts in paths) and not _is_somebodys(*first):
-        paths = [parts[1:] for parts in paths]  # a folder around all of them, such as Gradescope's
+    if len(first) == 1 and any(len(parts) > 1 for parts in paths) and not _is_somebodys(*first):
+        paths = [parts[1:] or parts for parts in paths]  # a folder around all of them, such as Gradescope's
     return [_arranged(parts) for parts in paths]
 
 
 def _is_somebodys(name: str) -> bool:
-    return bool(_MOODLE.fullmatch(name) or _GRADESCOPE.fullmatch(name) or name == "..")
+    return bool(_MOODLE.fullmatch(name) or _GRADESCOPE.fullmatch(name))
 
 
 def _arranged(parts: Parts) -> tuple[str, Parts]:
     found = _MOODLE.fullmatch(parts[0])
     if found is None:
-        return ("", parts) if len(parts) == 1 else (parts[0], parts[1:])
+        return parts[0], parts[1:]
     inside = parts[1:] if len(parts) > 1 else (found["file"] or "",)
     return f"{found['name']}_{found['number']}_assignsubmission_file_", inside
 
@@ -64,4 +65,8 @@ def people_in(folder: Path) -> dict[str, tuple[Person, ...]]:
 
 
 def _person(said: Mapping[str, Any]) -> Person:
-    return Person(str(said[":name"]), id=str(said.get(":sid", "")), email=str(said.get(":email", "")))
+    values = said[":name"], said.get(":sid", ""), said.get(":email", "")
+    if not all(isinstance(one, str) for one in values):  # lists of aliases of lists would be long texts
+        raise TypeError
+    name, number, email = values
+    return Person(name, id=number, email=email)

@@ -65,7 +65,9 @@ def _of_folder(folder: Path, store: Path) -> list[Submission]:
         if entry in files:
             found.append(Submission(str(entry), whose))
         elif (entry.is_dir() and entry.suffix not in _ENDINGS) or entry.suffix.lower() == ".zip":
-            one = _looked_up(Submission(str(entry), whose), store)
+            leads_out = entry.is_symlink() and not Path(os.path.realpath(entry)).is_relative_to(folder.resolve())
+            error = f"{shown(entry.name)}: is a link that leads out of its folder" if leads_out else ""
+            one = _looked_up(Submission(str(entry), whose, error), store)
             if not one.error or whose or not files:  # beside scripts it may be a folder of theirs
                 found.append(one)
     return found
@@ -77,8 +79,11 @@ def _people(name: str) -> tuple[exports.Person, ...]:
 
 
 def _may_fly(path: Path) -> bool:
-    """Tell whether a file is a child script; what cannot be read is said in its own flights."""
-    return path.is_symlink() or not path.is_file() or is_child_script(path)
+    """Return whether a file is a child script; a file that cannot be read counts as one, whose flights say so."""
+    try:
+        return path.is_symlink() or not path.is_file() or is_child_script(path)
+    except Unreadable:
+        return True
 
 
 def _looked_up(one: Submission, store: Path) -> Submission:
@@ -94,6 +99,8 @@ def _looked_up(one: Submission, store: Path) -> Submission:
         return one
     except (Refused, Unreadable) as error:
         return replace(one, error=f"{shown(path.name)}: {error}")
+    except (PermissionError, RecursionError):
+        return replace(one, error=f"{shown(path.name)}: holds a folder that cannot be read, or too many in each other")
 
 
 def _only_script(folder: Path, store: Path) -> Path:

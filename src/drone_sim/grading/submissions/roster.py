@@ -23,9 +23,12 @@ def listed(path: Path) -> list[Submission]:
     Raises ValueError, in one line that names file and line.
     """
     found: dict[str, tuple[Person, ...]] = {}
-    for person, name in _rows(path):
-        script = os.path.normpath(path.absolute().parent / name)
-        found[script] = (*found.get(script, ()), person)
+    try:
+        for person, name in _rows(path):
+            script = os.path.normpath(path.absolute().parent / name)
+            found[script] = (*found.get(script, ()), person)
+    except csv.Error as error:
+        raise ValueError(f"{path}: is not a table that can be read: {error}") from None
     return [
         Submission(script, people, "" if os.path.lexists(script) else f"{script}: no such file")
         for script, people in found.items()

@@ -15,7 +15,6 @@ import itertools
 import json
 import math
 import re
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,6 +23,7 @@ import jinja2
 import numpy as np
 
 from drone_sim.files import writing
+from drone_sim.files.containment import remove
 from drone_sim.grading.flight_record import columns_of
 from drone_sim.grading.outputs import by_script as naming
 from drone_sim.grading.outputs.by_script import ScriptResults, by_script, criteria_of
@@ -115,7 +115,7 @@ def write(
     check(folder)
     path = Path(folder)
     for name in _MADE_ANEW:
-        shutil.rmtree(path / name, ignore_errors=True)
+        remove(path / name, within=path)
         (path / name).mkdir(parents=True)
     _lay_shared(path / "files")
     scene = _assignment("scene", scene_of(plan.parameters().scene))
