@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import re
 import reprlib
 from collections.abc import Iterable
 from typing import Any
 
 MAX_NAME = 64  # characters of a name, in any file
 _MOST_NAMES = 12  # in an error message
+# Control characters, what turns the direction of writing, and halves of characters.
+_CONTROLS = re.compile("[^\t\n\x20-\x7e\xa0-\u2029\u202f-\u2065\u206a-\ud7ff\ue000-\U0010ffff]")
 _SHORT = reprlib.Repr()
 _SHORT.maxstring, _SHORT.maxother, _SHORT.maxlevel = 300, 60, 3
 
@@ -26,6 +29,11 @@ def shown(value: Any) -> str:
 def printable(text: str) -> str:
     """Return a text with ? for what is not printable: control characters, line ends, undecodable bytes of names."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
+def escaped(text: str) -> str:
+    r"""Return a text in which control characters can be seen: ESC as `\x1b`. Tabs and line ends stay as they are."""
+    return _CONTROLS.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 def encodable(text: str) -> str:

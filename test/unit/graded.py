@@ -6,7 +6,7 @@ from drone_sim.grading import plan as plans
 from drone_sim.grading.result import Outcome, result_of
 from drone_sim.offline.recording import Recording
 
-EVIL = "<script>alert(1)</script>&\"'\x1b[31m\x07\ud800"
+EVIL = "<script>alert(1)</script>&\"'\x1b[31m\x07\0\x9b\u202e\ud800"
 PLAN = """
 title: Hover & <b>more</b>
 duration: 4

@@ -26,7 +26,7 @@ def test_a_rise_time_is_counted_between_the_rows_and_from_where_the_step_begins(
     outcome = judged(flight, "rise_time", of="vx", after=3.0, to=1.5, at_most=1.0)
     assert outcome.value == pytest.approx(0.5 * math.log(9), abs=1e-3)
     assert not outcome.passed
-    assert outcome.said == f"rose in {outcome.value:.4g} s; at most 1 s are allowed"
+    assert outcome.said == f"rose in {outcome.value:.4g} s; at most 1 s is allowed"
     assert outcome.at == pytest.approx(3.0 + 0.5 * math.log(10), abs=1e-3)
 
 
@@ -125,7 +125,7 @@ def test_places_are_reached_between_the_rows_and_in_order():
     assert passed.at == pytest.approx(4.75)
     backwards = judged(ahead, "reach", places=gates[::-1], within=0.12, partial=True, points=4)
     assert (backwards.passed, backwards.points) == (False, 2.0)
-    assert backwards.said == "reached 1 of 2; it came to 3.5 m of place 2, 0.12 m are allowed"
+    assert backwards.said == "reached 1 of 2; it came to 3.5 m of place 2, at most 0.12 m is allowed"
     assert not judged(ahead, "reach", places=gates, within=0.12, until=4.0).passed
 
 
@@ -202,7 +202,7 @@ def test_a_landing_has_a_place_and_a_speed():
     assert outcome.value == pytest.approx(0.2)
     assert outcome.said == "landed at 4.00 s 0.2 m from its place with 0.5 m/s"
     assert not judged(_landing(x=0.4), "landed", at=[0, 0], within=0.3).passed
-    assert "0.4 m/s are allowed" in judged(_landing(), "landed", softly=0.4).said
+    assert "at most 0.4 m/s is allowed" in judged(_landing(), "landed", softly=0.4).said
     assert judged(_landing(), "landed", stands_on="Pad").said == "stands on Floor, not on Pad"
 
 

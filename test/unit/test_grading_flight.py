@@ -125,6 +125,29 @@ def test_a_plan_names_the_files_that_it_is_made_of(written, tmp_path):
     assert steps.files == [tmp_path / "steps.yaml", scene, tmp_path / "other.yaml"]
 
 
+ALONG = """
+duration: 1
+scene: scene.yaml
+spread: {objects: {Way: [1, 1, 0]}}
+criteria:
+  - {kind: path, name: named, along: Way, at_most: 9}
+  - {kind: path, name: said, along: [[2, 1, 1], [2, 4, 1], [0, 4, 1], [2, 1, 1]], at_most: 9}
+"""
+
+
+def test_a_path_of_the_scene_can_be_what_is_flown_along(written, tmp_path, monkeypatch):
+    way = "{name: Way, kind: path, closed: true, points: [[0, 0, 0], [3, 0, 0], [3, 2, 0]], parent: Frame}"
+    frame = "{name: Frame, kind: dummy, position: [2, 1, 1], rpy: [0, 0, 1.5707963267948966]}"
+    monkeypatch.setitem(globals(), "SCENE", f"{SCENE}  - {frame}\n  - {way}\n")
+    steps = written(ALONG)
+    named, as_said = flight.grade(steps).outcomes
+    assert named.value == pytest.approx(as_said.value) and named.value > 1 and "is allowed" in named.said
+    named, as_said = flight.grade(steps, seed=1).outcomes
+    assert abs(named.value - as_said.value) > 0.01  # which the seed has moved
+    with pytest.raises(PlanError, match=r"line 6: criteria/0/along = 'Wa': no such path; near names are Way"):
+        written(ALONG.replace("Way, at", "Wa, at"))
+
+
 def test_changes_are_laid_over_the_plan(written):
     steps = written()
     lazy = flight.grade(steps, changes={"control": {"Kvcorr": 0.0}})

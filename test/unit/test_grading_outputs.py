@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import pytest
 from graded import EVIL, PLAN, read_plan, result
 
+from drone_sim.grading.flight import ungraded
 from drone_sim.grading.outputs import as_json, gradescope, junit, marks, table
 from drone_sim.grading.outputs.by_script import by_script
 from drone_sim.grading.submissions.submission import Person, Submission, names_of
@@ -107,6 +108,7 @@ def test_junit_is_xml_whatever_names_and_errors_hold(plan, tmp_path):
     junit.write(plan, [result(EVIL, error=EVIL, passed=(False, False), names=(EVIL, EVIL))], tmp_path / "r.xml")
     root = ElementTree.parse(tmp_path / "r.xml").getroot()
     assert "<script>alert(1)" in root.find(".//error").get("message")
+    assert r"\x1b[31m\x07\x00\x9b\u202e\ud800" in root.find(".//error").text
 
 
 def test_gradescope_gets_the_mean_over_the_flights(plan):
@@ -215,6 +217,17 @@ def test_marks_are_as_moodle_reads_them(tmp_path):
     assert bo["Maximum Grade"] == "3" and bo["Feedback comments"] == "1 of 2 flights passed; failed: no_contact in 1"
     assert (che["Full name"], che["Grade"], script["Full name"]) == ("Che", "2.5", "c.py")
     assert script["Feedback comments"] == "0 of 1 flights passed; ended by an error: 1"
+
+
+def test_the_marks_name_an_error_by_which_nothing_was_flown(plan, tmp_path):
+    why = "[load] /class/b.py:1: SyntaxError: invalid syntax\x1b[31m"
+    broken = [ungraded(plan, "/class/b.py", seed, {}, why) for seed in range(3)]
+    later = [result("c.py", seed, (False, True), error="[actuation] c.py:4: boom") for seed in range(3)]
+    submissions = [Submission("/class/b.py", (Person("Bo"),)), Submission("c.py")]
+    marks.write(submissions, by_script([*broken, *later]), tmp_path / "m.csv")
+    bo, che = (row["Feedback comments"] for row in csv.DictReader((tmp_path / "m.csv").read_text().splitlines()))
+    assert bo.startswith("not flown: [load] b.py:1: SyntaxError: invalid syntax") and "failed" not in bo
+    assert "not flown" not in che and "failed: forward in 3" in che and "ended by an error: 3" in che
 
 
 def test_a_plan_without_a_title_goes_by_its_name(tmp_path):

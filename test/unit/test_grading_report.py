@@ -1,6 +1,7 @@
 """The report for the browser, as files; test/web opens it."""
 
 import json
+import re
 from html.parser import HTMLParser
 
 import pytest
@@ -57,6 +58,12 @@ def test_names_and_errors_are_text(report):
     assert "<script>alert(1)</script>" in Page(report / "index.html").text
 
 
+def test_control_characters_can_be_seen(report):
+    for path in (one for one in report.rglob("*") if one.is_file()):
+        assert not re.search("[\0-\x08\x0b-\x1f\x7f-\x9f\u202e]", path.read_text(encoding="utf-8")), path
+    assert r"\x1b[31m\x07\x00\x9b\u202e\ud800" in Page(report / "index.html").text
+
+
 def test_a_flights_figures_are_those_of_its_table(report):
     (file,) = report.glob("scripts/*/flights/*.js")
     name, _, figures = file.read_text().partition(" = ")
@@ -77,7 +84,8 @@ def test_objects_stand_as_boxes_where_the_scene_has_them(report):
 
 def test_the_teachers_page_ranks_counts_and_holds_similar_scripts_side_by_side(tmp_path):
     text = "\n".join(f"x = sim.getObjectPosition(h, -1)[0]{' * x + 1' * number}" for number in range(20))
-    scripts = {"a.py": text, "b.py": "# <b>\n" + text.replace("x", "y"), "c.py": "def sysCall_init(): pass"}
+    other = "# <b>\x0c\x85\u2028\r\n" + text.replace("x", "y").replace("\n", "\r\n")  # lines that end in one way only
+    scripts = {"a.py": text, "b.py": other, "c.py": "def sysCall_init(): pass"}
     results = [result("a.py"), result("b.py", passed=(False, True)), result("c.py", passed=(False, False))]
     report.write(read_plan(tmp_path), results, lambda _: None, tmp_path / "out", {"b.py": "Ada"}, scripts)
     index = Page(tmp_path / "out/index.html")
@@ -87,7 +95,25 @@ def test_the_teachers_page_ranks_counts_and_holds_similar_scripts_side_by_side(t
     assert "similar/1.html" in index.links
     beside = Page(tmp_path / "out/similar/1.html")
     assert beside.tags.count("pre") == 2 and beside.tags.count("b") == 0 and beside.tags.count("span") == 41
-    assert "# <b>\ny = sim.getObjectPosition" in beside.text
+    assert "# <b>\\x0c\\x85\u2028\ny = sim.getObjectPosition" in beside.text
+
+
+def test_a_students_folder_keeps_the_letters_of_the_name(tmp_path):
+    names = {
+        "1.py": "Kurt Go\u0308del",
+        "2.py": "\u674e \u660e",
+        "3.py": "Dr. J. No",
+        "4.py": "\u0905\u092e\u093f\u0924",
+        "5.py": "a/../<b>\x1b",
+    }
+    report.write(read_plan(tmp_path), [result(one) for one in names], lambda _: None, tmp_path / "out", names)
+    found = sorted(one.name for one in (tmp_path / "out/scripts").iterdir())
+    assert found[:4] == ["01-Kurt_G\xf6del", "02-\u674e_\u660e", "03-Dr_J_No", "04-\u0905\u092e\u093f\u0924"]
+    assert re.fullmatch(r"05-[\w-]+", found[4])
+    index = Page(tmp_path / "out/index.html")
+    assert all(
+        (tmp_path / "out" / one).is_file() for one in index.links if one.startswith("scripts/") and "#" not in one
+    )
 
 
 def test_another_report_takes_the_place_of_the_first_and_nothing_else(tmp_path):

@@ -239,7 +239,9 @@ def test_one_bomb_of_several_parts_leaves_room_for_the_others(tmp_path, monkeypa
     monkeypatch.setattr(archive, "_RATIO", 1)
     bombs = {f"{number}/my.py": SCRIPT + "#" * 1_000_000 for number in range(4)}
     path = zipped(tmp_path / "class.zip", {**bombs, "good/my.py": SCRIPT})
-    errors = {one.script.split("/")[-1]: one.error for one in submissions_of(str(path), tmp_path / "store") if one.error}
+    errors = {
+        one.script.split("/")[-1]: one.error for one in submissions_of(str(path), tmp_path / "store") if one.error
+    }
     assert [*errors] == ["2", "3"] and all("more than is left" in one for one in errors.values())
 
 

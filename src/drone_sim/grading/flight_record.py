@@ -44,6 +44,7 @@ class FlightRecord:
     values: Mapping[str, Sequence[ValueChange]] = field(default_factory=dict)  # by the names of signals and topics
     other_poses: Mapping[str, np.ndarray] = field(default_factory=dict)  # (N, 7): position, quaternion xyzw, by name
     found: Mapping[str, Sequence[str]] = field(default_factory=dict)  # names of objects, by the path that finds them
+    lines: Mapping[str, np.ndarray] = field(default_factory=dict)  # (K, 3): the scene's paths at the start, m, world
 
     @cached_property
     def columns(self) -> dict[str, np.ndarray]:

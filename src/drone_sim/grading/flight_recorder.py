@@ -13,7 +13,8 @@ import numpy as np
 
 from drone_sim.grading.flight_record import ContactEvent, FlightRecord, ValueChange
 from drone_sim.grading.plan import Plan
-from drone_sim.mechanics.frames import position, to_quaternion
+from drone_sim.mechanics.frames import position, to_quaternion, transform
+from drone_sim.mechanics.path import Path
 from drone_sim.offline.recording import COLUMNS, Recording
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api import object_paths
@@ -47,6 +48,7 @@ class FlightRecorder:
         self.look: Callable[[int], None] | None = None  # for Simulation.step
         self._each_step: list[Callable[[], None]] = [functools.partial(self._recording.add, simulation)]
         self._add_recorders(plan, backend)
+        self._lines = {name: self._line(name) for one in plan.criteria for name in one.lines}
 
     def _add_recorders(self, plan: Plan, backend: OfflineBackend) -> None:
         if any(one.needs_contacts for one in plan.criteria):
@@ -96,6 +98,7 @@ class FlightRecorder:
             self._values,
             {name: np.array(poses) for name, poses in self._other_poses.items()},
             self._found,
+            self._lines,
         )
 
     @property
@@ -127,6 +130,16 @@ class FlightRecorder:
                 kept.append(ValueChange(self._simulation.time, now))
 
         self._each_step.append(look)
+
+    def _line(self, name: str) -> np.ndarray:
+        """Return the points (K, 3) of a path, in m, in the world. Raises ValueError for what is no path."""
+        objects = self._simulation.context.objects
+        handle = objects.handle(name)
+        path = objects[handle]
+        if not isinstance(path, Path) or len(path.points) < 2:
+            raise ValueError(f"'{name}' is not a path with two points or more")
+        matrix = objects.matrix(handle)
+        return np.array([transform(matrix, one) for one in path.points])
 
     def _pose(self, vehicle_name: str, handle: int) -> tuple[float, ...]:
         """Return position (m) and quaternion (xyzw) of a vehicle or object, in the world; NaN once it is gone."""

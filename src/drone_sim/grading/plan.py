@@ -235,6 +235,12 @@ def _check_with(plan: Plan, parameters: Parameters) -> None:
     if plan.vehicle and plan.vehicle not in names:
         near = near_names(plan.vehicle, names)
         raise ParameterError(f"no such vehicle; {near}", ("vehicle",), shown(plan.vehicle))
+    paths = [one.name for one in parameters.scene.objects if getattr(one, "kind", "") in ("path", "curved_path")]
+    for index, criterion in enumerate(plan.criteria):
+        for name in criterion.lines:
+            if name not in paths and "/" not in name:
+                near = near_names(name, paths) if paths else "the scene has none"
+                raise ParameterError(f"no such path; {near}", ("criteria", index, "along"), shown(name))
     check_objects(parameters, plan.spread)
 
 

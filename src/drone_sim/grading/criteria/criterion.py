@@ -111,6 +111,11 @@ class Criterion(Checked):
         return ()
 
     @property
+    def lines(self) -> tuple[str, ...]:
+        """Names of the scene's paths that it needs in FlightRecord.lines."""
+        return ()
+
+    @property
     def signals(self) -> tuple[str, ...]:
         """Names of signals that it asks for in FlightRecord.values."""
         return ()
@@ -173,7 +178,7 @@ class AtMostCriterion(Criterion):
 
     def _compared(self, value: float, said: str, at: float | None = None) -> Outcome:
         """Return the outcome of a figure; `said` is a sentence about how it came about, `at` when (s)."""
-        return self._outcome(value <= self.at_most, f"{said}; {self.allowed} are allowed", value, self.unit, at)
+        return self._outcome(value <= self.at_most, f"{said}; {self.allowed} is allowed", value, self.unit, at)
 
 
 # ---- distances

@@ -65,9 +65,9 @@ class Landed(Criterion):
         self._check_ground(flight, end)
         wrong, distance = [], self._distance(part)
         if distance is not None and distance > self.within:
-            wrong.append(f"{figure(self.within, 'm')} are allowed")
+            wrong.append(f"at most {figure(self.within, 'm')} is allowed")
         if self.softly is not None and speed > self.softly:
-            wrong.append(f"{figure(self.softly, 'm/s')} are allowed")
+            wrong.append(f"at most {figure(self.softly, 'm/s')} is allowed")
         where = "" if distance is None else f" {figure(distance, 'm')} from {self._there}"
         said = f"landed at {down:.2f} s{where} with {figure(speed, 'm/s')}"
         value, unit = (speed, "m/s") if distance is None else (distance, "m")
@@ -106,7 +106,9 @@ def _touch_down(flight: FlightRecord, end: float) -> float:
     if not len(stay) or end - stay[-1] > _SETTLING:
         raise Missed(f"is in the air at {end:.2f} s, {figure(float(flight.rows[last, 3]), 'm')} high")
     if not speed <= _AT_REST:
-        raise Missed(f"still moves with {figure(speed, 'm/s')} at {end:.2f} s; {figure(_AT_REST, 'm/s')} are allowed")
+        raise Missed(
+            f"still moves with {figure(speed, 'm/s')} at {end:.2f} s; at most {figure(_AT_REST, 'm/s')} is allowed"
+        )
     if stay[0] - flight.times[0] < _SETTLING:
         raise Missed("never took off")
     return float(stay[0])

@@ -28,7 +28,7 @@ class NoContact(Criterion):
         first, last = part.times[[0, -1]]
         found = [one for one in part.flight.contacts if first <= one.at <= last and one.what not in self.allow]
         if not found:
-            return self._outcome(True, "touched nothing that it may not", 0.0)
+            return self._outcome(True, "touched nothing it was not allowed to", 0.0)
         what = list(dict.fromkeys(one.what for one in found))
         said = f"touched {what[0]} at {found[0].at:.2f} s{''.join(f', then {one}' for one in what[1:])}"
         said = f"{said}; it may touch {self.allowed}"

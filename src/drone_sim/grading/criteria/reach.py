@@ -60,7 +60,7 @@ class Reach(Criterion):
             here = _first_within(way, here, there, self.within)
             if here.distance > self.within:
                 near, allowed = figure(here.distance, "m"), figure(self.within, "m")
-                said = f"it came to {near} of place {number + 1}, {allowed} are allowed"
+                said = f"it came to {near} of place {number + 1}, at most {allowed} is allowed"
                 return self._reached(number, len(places), f"reached {number} of {len(places)}; {said}", last)
             last = way.time(here)
         return self._reached(len(places), len(places), f"reached all {len(places)}, the last at {last:.2f} s", last)

@@ -35,6 +35,6 @@ class SteadyError(Criterion):
         error = abs(mean - self.to)
         said = (
             f"{self.of} was {figure(mean, unit)} in the mean, {figure(error, unit)} from {figure(self.to, unit)}; "
-            f"{self.allowed} are allowed"
+            f"{self.allowed} is allowed"
         )
         return self._outcome(error <= self.at_most, said, error, unit)

@@ -16,6 +16,7 @@ from drone_sim.files import writing
 from drone_sim.grading.outputs.by_script import by_script, describe, flight_label, named_outcomes
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
+from drone_sim.message_text import escaped
 
 _NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # XML 1.0, production 2
 
@@ -61,5 +62,5 @@ def _count(element: Element, seconds: float) -> None:
 
 
 def _xml(words: str) -> str:
-    """Return text without the characters that no XML can hold."""
-    return _NOT_IN_XML.sub("\N{REPLACEMENT CHARACTER}", words)
+    """Return text with visible control characters, and without the other characters that no XML can hold."""
+    return _NOT_IN_XML.sub("\N{REPLACEMENT CHARACTER}", escaped(words))

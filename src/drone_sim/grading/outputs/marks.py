@@ -20,6 +20,7 @@ COLUMNS = (
     *("Grade", "Maximum Grade", "Last modified (grade)", "Feedback comments"),
 )
 _NEVER = "-"  # as Moodle writes a time that there is none of
+_LONGEST = 400  # characters of an error
 _FORMULAS = ("=", "+", "-", "@")  # what a spreadsheet takes for one
 
 
@@ -45,10 +46,13 @@ def _row(person: Person, result: ScriptResults) -> tuple[str, ...]:
 
 
 def feedback(result: ScriptResults) -> str:
-    """Return how a script has done, in one line, the same every time.
+    """Return how a script has done, in one line.
 
-    Of errors it says how many: a busy machine may stop an endless script by another limit. The report has them.
+    An error is named only if nothing was flown because of it, such as a syntax error or a submission without a script.
+    Other errors are counted: the report has them, and a busy machine may stop an endless script by another limit.
     """
+    if len(result.errors) == 1 and not any(one.flown for one in result.flights):
+        return f"not flown: {result.errors[0]:.{_LONGEST}}"
     failed = ", ".join(f"{name} in {count}" for name, count in result.failures)
     said = [f"{result.passed} of {len(result.flights)} flights passed", failed and f"failed: {failed}"]
     errors = sum(one.error is not None for one in result.flights)

@@ -15,6 +15,7 @@ import itertools
 import json
 import math
 import re
+import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,6 +32,7 @@ from drone_sim.grading.outputs.html.scene import scene_of
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 from drone_sim.grading.submissions.similarity import given_by, similar
+from drone_sim.message_text import escaped
 from drone_sim.offline import recording
 from drone_sim.offline.recording import COLUMNS
 
@@ -160,12 +162,17 @@ def _alike(plan: Plan, pages: Sequence[ScriptPage], sources: Mapping[str, str]) 
     for number, pair in enumerate(similar(sources, given_by(plan)), start=1):
         both = pair.first, pair.second
         lines = [
-            [(text, line in marked) for line, text in enumerate(sources[name].splitlines(), start=1)]
+            [(text, line in marked) for line, text in enumerate(_lines(sources[name]), start=1)]
             for name, marked in zip(both, pair.lines)
         ]
         first, second = (by_name[name] for name in both)
         found.append(Alike(f"similar/{number}.html", pair.share, (first, second), (lines[0], lines[1])))
     return found
+
+
+def _lines(source: str) -> list[str]:
+    """Return a script's lines, counted as `similar` counts them: a form feed ends none."""
+    return [line.removesuffix("\r") for line in source.removesuffix("\n").split("\n")]
 
 
 class _Drawing:
@@ -177,8 +184,7 @@ class _Drawing:
 
     def page(self, number: int, script: ScriptResults, scripts: Sequence[ScriptResults]) -> ScriptPage:
         """Return a script's page; `number` is from 1 among all `scripts`."""
-        slug = re.sub("[^A-Za-z0-9_-]+", "_", Path(script.label).stem)[:_SLUG]
-        own = f"scripts/{number:02}-{slug}"
+        own = f"scripts/{number:02}-{_slug(script.label)}"
         (self._folder / own / "flights").mkdir(parents=True)
         flights = tuple(self._flight(own, str(place), result) for place, result in enumerate(script.flights))
         rank = 1 + sum(one.points > script.points for one in scripts)
@@ -190,7 +196,7 @@ class _Drawing:
         if not figures.columns:
             return FlightEntry(key, label, result, "", figures.note)
         marks = [
-            {"name": name, "at": one.at}
+            {"name": escaped(name), "at": one.at}
             for name, one in naming.named_outcomes(result)
             if not one.passed and one.at is not None and math.isfinite(one.at)
         ]
@@ -206,6 +212,13 @@ class _Drawing:
         return {"scene": scene_of(self._plan.parameters(result.seed).scene)}
 
 
+def _slug(label: str) -> str:
+    """Return a name as that of a folder, with its letters and digits of any language."""
+    name = re.sub(r"\.(py|lua)$", "", unicodedata.normalize("NFC", Path(label).name))
+    marks = {"_", "-"} | {letter for letter in name if unicodedata.category(letter).startswith("M")}
+    return re.sub("_+", "_", "".join(one if one.isalnum() or one in marks else "_" for one in name))[:_SLUG]
+
+
 def _assignment(name: str, value: Any) -> str:
     return f"report.{name} = {json.dumps(value, separators=(',', ':'), allow_nan=False)};\n"
 
@@ -214,6 +227,7 @@ def _templates() -> jinja2.Environment:
     templates = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_HERE / "templates"),
         autoescape=True,
+        finalize=lambda value: escaped(value) if type(value) is str else value,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
