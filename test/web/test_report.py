@@ -1,11 +1,13 @@
 """The report in a browser: opened from a file, played, scrubbed, and seen to show what the table says."""
 
 import io
+import json
 import shutil
+from urllib.parse import quote, urlsplit
 
 import numpy as np
 import pytest
-from graded import EVIL, SCENE, place, read_plan, result, write_table
+from graded import EVIL, PLAN, SCENE, place, read_plan, result, write_table
 from PIL import Image
 
 from drone_sim.grading.outputs.html import report
@@ -111,6 +113,52 @@ def test_names_and_errors_are_text_and_a_flight_without_a_table_says_so(page, re
     assert not page.locator("#replay").is_visible()
     assert page.locator(".chosen .failed").count() == 1
     assert page.troubles == []
+
+
+ATTACKS = (
+    *('<script>hit("script")</script>', '"><img src=x onerror=hit("img")>', "'><svg onload=hit('svg')>"),
+    *('</script><script>hit("end")</script>', "</title></style></textarea><script>hit('title')</script>"),
+    *("javascript:hit('address')", '" autofocus onfocus="hit(1)" x="', "{{ 7 * 7 }}{% raw %}", "${hit('template')}"),
+    *("--><script>hit('comment')</script>", "\0<script>hit('nul')</script>", "\u2028hit('line')//", "../../../x"),
+)
+
+
+@pytest.fixture(name="attacked", scope="module")
+def _attacked(tmp_path_factory):
+    """A report in which every text that comes from outside is an attack: names, errors, criteria, objects, sources."""
+    folder = tmp_path_factory.mktemp("attacked")
+    title, *objects = map(json.dumps, (ATTACKS[0], *(one for one in ATTACKS if one.isprintable() and len(one) < 64)))
+    boxes = [f"  - {{name: {one}, shape: box, size: [1, 1, 1], position: [0, 0, 1]}}\n" for one in objects]
+    plan = read_plan(folder, PLAN.replace("Hover & <b>more</b>", title), f"objects:\n{''.join(boxes)}")
+    table = write_table(folder / "t.csv")
+    names = {f"{number}.py": one for number, one in enumerate(ATTACKS)}
+    results = [result(script, 0, (False, False), None, {"x": one}, (one, f"{one} 2")) for script, one in names.items()]
+    results += [result(script, 1, (False, False), one, {}, (one, f"{one} 2")) for script, one in names.items()]
+    text = "\n".join(f"x = sim.getObjectPosition(h, -1)[0]{' * x + 1' * number}" for number in range(20))
+    sources = {script: "\n".join([*ATTACKS, text]) for script in list(names)[:3]}
+    tables = lambda one: None if one.error else table  # noqa: E731
+    report.write(plan, results, tables, folder / "out", names, sources)
+    return folder / "out"
+
+
+def test_no_text_from_outside_runs_in_a_report(page, attacked):
+    page.add_init_script("window.hits = []; window.hit = (how) => window.hits.push(how)")
+    files = [*attacked.rglob("*.html")]
+    assert len(files) == 1 + len(ATTACKS) + 3
+    for file in files:
+        for fragment in ("", "#0", "#1", f"#{quote(ATTACKS[1])}"):
+            page.goto(f"{file.as_uri()}{fragment}")
+        if "scripts" in file.parts:
+            page.click("nav a:nth-of-type(1)")
+            page.wait_for_selector("#stage[data-shown='0']")
+            assert page.locator("#marks i").count() == 2
+        assert page.evaluate("window.hits") == [] and page.locator("img, svg[onload], [onfocus]").count() == 0
+        assert {urlsplit(one).scheme for one in page.locator("a").evaluate_all("all => all.map(a => a.href)")} <= {"file"}
+    page.goto((attacked / "index.html").as_uri())
+    shown = page.locator("body").inner_text()
+    assert all(one in shown for one in ATTACKS[:6]) and "49" not in page.locator("td.script").all_inner_texts()
+    page.click("th:has-text('script')")
+    assert page.evaluate("window.hits") == [] and page.troubles == []
 
 
 def test_a_click_on_a_heading_sorts_the_scripts(page, report):
