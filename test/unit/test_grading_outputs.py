@@ -14,6 +14,7 @@ from drone_sim.grading.flight import ungraded
 from drone_sim.grading.outputs import as_json, gradescope, junit, marks, table
 from drone_sim.grading.outputs.by_script import by_script
 from drone_sim.grading.submissions.submission import Person, Submission, names_of
+from drone_sim.message_text import escaped
 
 
 @pytest.fixture(name="plan", scope="module")
@@ -124,7 +125,7 @@ def test_gradescope_gets_the_mean_over_the_flights(plan):
     )
     assert "seed 1: FAILED: it rose in 0.5 s (at 1.50 s)" in contact["output"]
     assert said["output_format"] == said["test_output_format"] == said["test_name_format"] == "text"
-    assert EVIL in said["output"]
+    assert escaped(EVIL) in said["output"]
 
 
 def test_gradescope_grades_one_script(plan, tmp_path):
@@ -169,12 +170,15 @@ def check_keys(said, known):
 
 
 def test_gradescopes_file_is_as_its_specification_says(plan):
-    said = gradescope.content(plan, [result(seed=0), result(seed=1, passed=(False, False), error=EVIL)])
+    flights = [result(seed=0), result(seed=1, passed=(False, False), error=EVIL, names=("forward", EVIL))]
+    said = gradescope.content(plan, flights)
     check_keys(said, OF_ALL)
+    texts = [said["output"], *(one[key] for one in said["tests"] for key in ("name", "output"))]
+    assert [escaped(one) for one in texts] == texts and escaped(EVIL) in texts
     for one in said["tests"]:
         check_keys(one, OF_A_TEST)
         assert 0 <= one["score"] <= one["max_score"]
-    assert "score" in said and len(said["tests"]) == 2
+    assert "score" in said and len(said["tests"]) == 3
 
 
 # Jenkins' schema of JUnit's XML (xunit-plugin, junit-10.xsd): attributes, those that must be there, elements inside.

@@ -166,3 +166,21 @@ def test_it_ends_with_the_process_however_that_ends(ended):
 def test_a_fork_goes_its_own_way(ended):
     """Its signals do not count, and what it holds open does not keep the guardian."""
     assert ended("a fork") == (0, "")
+
+
+def test_the_guardian_has_no_file_of_the_process_open(tmp_path):
+    program = f"file = open({str(tmp_path / 'results')!r}, 'w'){BEGIN}" + """
+(child,) = open(f"/proc/self/task/{os.getpid()}/children").read().split()
+for _ in range(200_000):
+    if len(links := os.listdir(f"/proc/{child}/fd")) == 2: break
+print(sorted(os.readlink(f"/proc/{child}/fd/{one}").partition(":")[0] for one in links))
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "PYTHONPATH": SOURCE},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=HANGS,
+    )
+    assert ended.stdout == "['pipe', 'pipe']\n", ended.stderr

@@ -28,6 +28,7 @@ from drone_sim.scripting import time_limit
 PATIENCE = 2.5  # s, for the orderly end
 _SCRIPTS_PATIENCE = 5.0  # s, for a script to be stopped after its time
 _EARLIER = 0.5  # s, than the guardian, by which a process ends itself, with its status
+_MOST_DESCRIPTORS = 2**16
 _LOOK = 0.5  # s between two looks at scripts
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _NOTICED = 0  # written where the process has seen the signal, and needs time for what is known to end
@@ -51,7 +52,7 @@ class Guardian:
         read, self._write = os.pipe()
         process, scripts = os.getpid(), mmap.mmap(-1, time_limit.WATCHED)
         if os.fork() == 0:
-            _be_the_guardian(read, self._write, process, name, scripts)
+            _be_the_guardian(read, process, name, scripts)
         os.close(read)
         time_limit.watched_by(scripts)
         os.set_blocking(self._write, False)
@@ -134,15 +135,16 @@ def _flush() -> None:
             stream.flush()
 
 
-def _be_the_guardian(read: int, write: int, process: int, name: str, scripts: mmap.mmap) -> None:
+def _be_the_guardian(read: int, process: int, name: str, scripts: mmap.mmap) -> None:
     """Guard in the forked process, and end with the guarded one."""
     try:
         os.setsid()  # the terminal's Ctrl-C is not for the guardian
         for number in _SIGNALS:
             signal.signal(number, signal.SIG_IGN)
-        for unused in (write, 0, 1):
-            with contextlib.suppress(OSError):
-                os.close(unused)
+        # A script of the same user could write through any other descriptor, such as that of a graded result.
+        kept = sorted({2, read})
+        for before, after in zip((-1, *kept), (*kept, _MOST_DESCRIPTORS)):
+            os.closerange(before + 1, after)
         why = _outlasts_its_time(read, _Scripts(scripts, process))
         if why:
             _say(f"{name}: killed: {why}")

@@ -15,8 +15,9 @@ from drone_sim.files import writing
 from drone_sim.grading.outputs.by_script import ScriptResults, by_script, describe, flight_label, named_outcomes, points
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
+from drone_sim.message_text import escaped
 
-_TEXT = "text"  # not html: what a script says is shown, never obeyed
+_TEXT = "text"  # not html: what a script says is shown, never obeyed; without a NUL, which a data base may refuse
 
 
 def write(plan: Plan, results: Sequence[Result], path: str | Path) -> None:
@@ -33,7 +34,7 @@ def content(plan: Plan, results: Sequence[Result]) -> dict[str, Any]:
     names = dict.fromkeys(name for one in script.flights for name, _ in named_outcomes(one))
     return {
         "score": script.points,
-        "output": _overview(plan, script),
+        "output": escaped(_overview(plan, script)),
         "output_format": _TEXT,
         "test_output_format": _TEXT,
         "test_name_format": _TEXT,
@@ -59,12 +60,12 @@ def _test(number: int, name: str, script: ScriptResults) -> dict[str, Any]:
     there = [outcome for _, outcome in outcomes if outcome is not None]
     return {
         "number": str(number),
-        "name": name,
+        "name": escaped(name),
         "score": sum(one.points for one in there) / len(script.flights),
         "max_score": max(one.of for one in there),
         "status": "passed" if all(one.passed for one in there) else "failed",
         "output": "\n".join(
-            f"{flight_label(result)}: {'passed' if one.passed else 'FAILED'}: {describe(one)}"
+            escaped(f"{flight_label(result)}: {'passed' if one.passed else 'FAILED'}: {describe(one)}")
             for result, one in outcomes
             if one is not None
         ),
