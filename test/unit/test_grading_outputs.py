@@ -227,10 +227,14 @@ def test_the_marks_name_an_error_by_which_nothing_was_flown(plan, tmp_path):
     why = "[load] /class/b.py:1: SyntaxError: invalid syntax\x1b[31m"
     broken = [ungraded(plan, "/class/b.py", seed, {}, why) for seed in range(3)]
     later = [result("c.py", seed, (False, True), error="[actuation] c.py:4: boom") for seed in range(3)]
-    submissions = [Submission("/class/b.py", (Person("Bo"),)), Submission("c.py")]
-    marks.write(submissions, by_script([*broken, *later]), tmp_path / "m.csv")
-    bo, che = (row["Feedback comments"] for row in csv.DictReader((tmp_path / "m.csv").read_text().splitlines()))
+    no_script = "'d': holds no child script"
+    none = [ungraded(plan, "/class/d", seed, {}, no_script) for seed in range(3)]
+    bos = Submission("/class/b.py", (Person("Bo"),))
+    submissions = [bos, Submission("c.py"), Submission("/class/d", error=no_script)]
+    marks.write(submissions, by_script([*broken, *later, *none]), tmp_path / "m.csv")
+    bo, che, du = (row["Feedback comments"] for row in csv.DictReader((tmp_path / "m.csv").read_text().splitlines()))
     assert bo.startswith("not flown: [load] b.py:1: SyntaxError: invalid syntax") and "failed" not in bo
+    assert du == "not flown: 'd': holds no child script"
     assert "not flown" not in che and "failed: forward in 3" in che and "ended by an error: 3" in che
 
 

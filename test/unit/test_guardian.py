@@ -168,18 +168,21 @@ def test_a_fork_goes_its_own_way(ended):
     assert ended("a fork") == (0, "")
 
 
-def test_the_guardian_has_no_file_of_the_process_open(tmp_path):
-    program = f"file = open({str(tmp_path / 'results')!r}, 'w'){BEGIN}" + """
+LINKS = """
 (child,) = open(f"/proc/self/task/{os.getpid()}/children").read().split()
 for _ in range(200_000):
     if len(links := os.listdir(f"/proc/{child}/fd")) == 2: break
 print(sorted(os.readlink(f"/proc/{child}/fd/{one}").partition(":")[0] for one in links))
 """
+
+
+def test_the_guardian_has_no_file_of_the_process_open(tmp_path):
+    opened = f"file = open({str(tmp_path / 'results')!r}, 'w')"
+    program = f"{opened}{BEGIN}{LINKS}"
     ended = subprocess.run(
         [sys.executable, "-c", program],
         env={**os.environ, "PYTHONPATH": SOURCE},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        capture_output=True,
         text=True,
         timeout=HANGS,
     )

@@ -139,8 +139,8 @@ def test_what_lies_below_its_folder_is_removed_and_a_link_is_not_followed(tmp_pa
     assert removed == [str(folder / name) for name in ("a", "a/b", "file", "link")]
 
 
-# What removes or renames by itself, and with which names: none of them comes from outside. Whoever adds a place names it
-# here; for a tree, for files in a loop, or for a name from outside, `drone_sim.files.containment` is the way.
+# The modules that remove or rename files themselves, with how many calls. No name comes from outside. Add a new place
+# here; for a tree, for files in a loop, or for a name from outside use `drone_sim.files.containment`.
 KNOWN = {
     "editing/drafts.py": 3,  # its own draft
     "files/containment.py": 2,

@@ -26,9 +26,7 @@ _NAME = st.one_of(
 ).map(lambda name: name[:10_000])
 _KIND = st.sampled_from([0] * 6 + [stat.S_IFREG, stat.S_IFLNK, stat.S_IFDIR, stat.S_IFIFO, stat.S_IFCHR, stat.S_IFSOCK])
 _METHOD = st.sampled_from([zipfile.ZIP_STORED] * 3 + [zipfile.ZIP_DEFLATED] * 3 + [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
-_TEXT = st.sampled_from(
-    [SCRIPT] * 4 + [b"", b"../../canary", b"/etc/passwd", bytes(2**20)]
-)
+_TEXT = st.sampled_from([SCRIPT] * 4 + [b"", b"../../canary", b"/etc/passwd", bytes(2**20)])
 _MEMBER = st.tuples(_NAME, _KIND, _METHOD)
 
 
@@ -50,8 +48,7 @@ _HOSTILE = st.lists(st.tuples(_MEMBER, _CONTENT), min_size=1, max_size=8)
 _ENTRY = (f"{GOOD}/my.py", 0, zipfile.ZIP_DEFLATED), SCRIPT
 _MEMBERS = st.builds(
     lambda hostile, place, around: [
-        ((f"{around}{name}", *more), content)
-        for (name, *more), content in [*hostile[:place], _ENTRY, *hostile[place:]]
+        ((f"{around}{name}", *more), content) for (name, *more), content in [*hostile[:place], _ENTRY, *hostile[place:]]
     ],
     _HOSTILE,
     st.integers(0, 8),

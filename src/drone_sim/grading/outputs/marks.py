@@ -21,6 +21,7 @@ COLUMNS = (
 )
 _NEVER = "-"  # as Moodle writes a time that there is none of
 _LONGEST = 400  # characters of an error
+_NOT_LOADED = "[load] "  # how ScriptError begins for a syntax error, or for a module that is not there
 _FORMULAS = ("=", "+", "-", "@")  # what a spreadsheet takes for one
 
 
@@ -36,23 +37,23 @@ def write(submissions: Iterable[Submission], scripts: Sequence[ScriptResults], p
         for one in submissions:
             if result := results.get(one.script):
                 for person in one.people or (Person(result.label),):
-                    table.writerow(map(_cell, _row(person, result)))
+                    table.writerow(map(_cell, _row(person, result, one.error)))
 
 
-def _row(person: Person, result: ScriptResults) -> tuple[str, ...]:
+def _row(person: Person, result: ScriptResults, error: str) -> tuple[str, ...]:
     identifier = f"Participant {person.participant}" if person.participant else ""
     grades = points(result.points), points(result.of), _NEVER
-    return identifier, person.name, person.id, person.email, *grades, feedback(result)
+    return identifier, person.name, person.id, person.email, *grades, feedback(result, error)
 
 
-def feedback(result: ScriptResults) -> str:
-    """Return how a script has done, in one line.
+def feedback(result: ScriptResults, error: str = "") -> str:
+    """Return how a script has done, in one line, the same every time; `error` is why a submission has no script.
 
-    An error is named only if nothing was flown because of it, such as a syntax error or a submission without a script.
-    Other errors are counted: the report has them, and a busy machine may stop an endless script by another limit.
+    A script that cannot be loaded has its error named, too. Other errors are counted: the report has them, and a busy
+    machine may stop an endless script by another limit.
     """
-    if len(result.errors) == 1 and not any(one.flown for one in result.flights):
-        return f"not flown: {result.errors[0]:.{_LONGEST}}"
+    if error or all((one.error or "").startswith(_NOT_LOADED) for one in result.flights):
+        return f"not flown: {error or result.errors[0]:.{_LONGEST}}"
     failed = ", ".join(f"{name} in {count}" for name, count in result.failures)
     said = [f"{result.passed} of {len(result.flights)} flights passed", failed and f"failed: {failed}"]
     errors = sum(one.error is not None for one in result.flights)

@@ -59,7 +59,8 @@ class FlightListener:
         for one in plan.criteria:
             if one.signals and not isinstance(getattr(one, "equals", 0), (int, float)):
                 _refuse(one.called, one.signals, "of signals numbers alone are heard; let the script publish others")
-            _refuse(one.called, [other for other in one.others if other not in names], "objects have no topic")
+            away = [*(other for other in one.others if other not in names), *one.lines]
+            _refuse(one.called, away, "objects have no topic")
             for other in one.others:
                 self._subscribe(f"/{other}/odom", Odometry, partial(self._on_other, other))
             if one.needs_contacts:
