@@ -177,6 +177,7 @@ HOSTILE = {  # what a student's zip holds, and what is said of it
 }
 
 
+@pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_hostile_zips_cost_their_own_marks_and_leave_nothing_outside(tmp_path, monkeypatch):
     monkeypatch.setattr(archive, "LARGEST", 2**20)
     members = {f"{moodle('Good', 1)}/my.py": SCRIPT}
