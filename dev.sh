@@ -47,7 +47,9 @@ ALL=(requirements.txt requirements-all.txt requirements-dev.txt)
 
 COMPILERS=(build-essential python3-dev)
 WINDOWS=(rviz python3-tk)
-TESTS=(librostest-dev python3-cv-bridge python3-tf2-ros) # the last two: other people's readers of what we publish
+TESTS=(librostest-dev python3-tf2-ros)
+# Programs that README and docs run: image_view, republish, tf2_tools. Alone, ros-image-view aborts.
+DOCS=(ros-image-view libnodeletlib-tools libimage-view-dev image-transport-tools tf2-tools)
 
 # ros-environment is what lets setup.bash set ROS_PACKAGE_PATH; on Debian 12 other packages bring it. The package.xml
 # without which `rosrun dynamic_reconfigure dynparam` does not run is in libdynamic-reconfigure-config-init-mutex-dev.
@@ -56,8 +58,8 @@ packages() {
     catkin ros-environment python3-rospy python3-roslaunch python3-rostest rosbash \
     python3-rosbag python3-rostopic python3-rosnode python3-rosmsg python3-rosservice \
     python3-tf2-msgs python3-diagnostic-msgs python3-dynamic-reconfigure python3-geometry-msgs \
-    python3-nav-msgs python3-sensor-msgs python3-std-msgs python3-std-srvs python3-interactive-markers \
-    python3-visualization-msgs libdynamic-reconfigure-config-init-mutex-dev
+    python3-cv-bridge python3-nav-msgs python3-sensor-msgs python3-std-msgs python3-std-srvs \
+    python3-interactive-markers python3-visualization-msgs libdynamic-reconfigure-config-init-mutex-dev
   if [ -n "$DISPLAY" ]; then echo "${WINDOWS[@]}"; fi
 }
 
@@ -67,6 +69,14 @@ as_root() {
 
 # Debian testing has no rviz, which the cockpit replaces.
 installable() { [[ $(LC_ALL=C apt-cache policy "$1") = *"Candidate: "[!\(]* ]]; }
+
+# In words: how many packages apt would install for these, and how large they are.
+planned() { # planned NAME...
+  LC_ALL=C apt-get install --assume-no --no-install-recommends -o Debug::NoLocking=1 "$@" 2>/dev/null | sed -n '
+    s/.* \([0-9]*\) newly installed.*/\1 packages/p
+    s/^Need to get \(.*\) of archives.*/, \1 to fetch/p
+    s/^After this operation, \(.*\) of additional.*/, \1 on disk/p' | tr -d '\n'
+}
 
 install_packages() { # install_packages NAME...
   local missing=() wanted=() package there
@@ -78,7 +88,6 @@ install_packages() { # install_packages NAME...
   done
   if [ ${#missing[@]} = 0 ] || { [ "${missing[*]}" = rviz ] && ! installable rviz; }; then return; fi
   [ "$(id -u)" = 0 ] || command -v sudo >/dev/null || fail "needs root or sudo to install: ${missing[*]}"
-  say "installing ${#missing[@]} packages (a minute or two, once): ${missing[*]}"
   if [ -z "$updated" ]; then as_root apt-get update -q >&2; fi
   updated=yes
   for package in "${missing[@]}"; do
@@ -88,6 +97,7 @@ install_packages() { # install_packages NAME...
       say "this Debian has no rviz: going on without it; ./dev.sh run web:=true shows the simulation in a browser"
     fi
   done
+  say "installing $(planned "${wanted[@]}"): ${wanted[*]}, and what they need"
   as_root env DEBIAN_FRONTEND=noninteractive apt-get install -qy --no-install-recommends -o DPkg::Lock::Timeout=600 \
     "${wanted[@]}" >&2 || {
     [ -z "$(dpkg --audit)$(find /var/lib/dpkg/updates -type f)" ] ||
@@ -166,14 +176,17 @@ fill_both() {
   wait $!
 }
 
-# There is no wheel of PyBullet for Python 3.12 and later: one that `./dev.sh wheel` has made is taken, or it is compiled
-# once, for all checkouts of this user.
+# PyPI has no wheel of PyBullet for Python 3.12 and later. One in a folder or index that pip's settings name is taken, or
+# one that `./dev.sh wheel` has made. Otherwise it is compiled once, for all checkouts of this user.
 make_pybullet() {
-  local version tag
+  local version tag found
   which_pybullet
-  if have_pybullet || pip install -q --dry-run --no-deps --only-binary :all: "$version" >/dev/null 2>&1 ||
-    take_pybullet; then return; fi
-  locked "$wheels" compile_pybullet
+  if have_pybullet; then return; fi
+  if found=$(pip install --dry-run --no-deps --only-binary :all: "$version" 2>/dev/null); then
+    found=$(grep -om1 '[^ ]*pybullet[^ ]*\.whl' <<<"$found") && say "taking PyBullet from $found, which pip has found"
+    return 0
+  fi
+  take_pybullet || locked "$wheels" compile_pybullet
 }
 
 which_pybullet() {
@@ -384,7 +397,7 @@ case "$command" in
     case "$*" in "" | --all) ;; *) fail "setup $*: takes --all or nothing" ;; esac
     setup
     if [ $# = 1 ]; then
-      install_packages "${TESTS[@]}" "${COMPILERS[@]}" # which a catkin workspace asks for
+      install_packages "${TESTS[@]}" "${DOCS[@]}" "${COMPILERS[@]}" # which a catkin workspace asks for
       make_venv "${ALL[@]}"
     fi
     say "ready: source $root/devel/setup.bash" ;;

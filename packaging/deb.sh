@@ -19,7 +19,7 @@ python=$(/usr/bin/python3 -c 'import sys; print("{}.{}".format(*sys.version_info
 
 # What Debian has, the package depends on; the environment sees it.
 DEPENDS="python3 (>= $python), python3 (<< ${python%.*}.$((${python#*.} + 1))), libegl1, libgl1, libgl1-mesa-dri,
- python3-diagnostic-msgs, python3-dynamic-reconfigure, python3-genpy, python3-geometry-msgs,
+ python3-cv-bridge, python3-diagnostic-msgs, python3-dynamic-reconfigure, python3-genpy, python3-geometry-msgs,
  python3-interactive-markers, python3-nav-msgs, python3-numpy, python3-opencv,
  python3-pil, python3-roslaunch, python3-rospy, python3-rosbag, python3-rosmsg, python3-rosnode, python3-rosservice,
  python3-rostopic, python3-sensor-msgs, python3-std-msgs,

@@ -3,8 +3,9 @@
 # into a wheel in the folder WHEELS. ./dev.sh calls it, one at a time.
 set -eo pipefail
 python=$1 version=$2 wheels=$3
-MINUTES=5 # on one core
+MINUTES=5 # on one idle core
 FILES=267
+ENOUGH=5 # files, to estimate how long the others take
 MEGABYTES=500 # of memory for each compiler
 
 # One compiler for each core, as far as there is memory for them, here and in a container's limit.
@@ -13,7 +14,7 @@ memory=$({ cat /proc/meminfo /sys/fs/cgroup/memory.max 2>/dev/null || true; } |
 jobs=$((memory / MEGABYTES))
 if [ "$jobs" -gt "$(nproc)" ]; then jobs=$(nproc); fi
 if [ "$jobs" -lt 1 ]; then jobs=1; fi
-printf '\033[1m[dev.sh]\033[0m compiling PyBullet, of which there is no wheel for %s: about %d minutes, once\n' \
+printf '\033[1m[dev.sh]\033[0m compiling PyBullet once, since PyPI has no wheel for %s: about %d minutes on an idle machine\n' \
   "$("$python" --version)" $((MINUTES / jobs + 1)) >&2
 
 # 735 MB, which a /tmp in memory may not have. Interrupted, it leaves nothing; killed, nothing after the next one.
@@ -39,8 +40,14 @@ PYTHONPATH=$scratch TMPDIR=$scratch CFLAGS="$flags -Wno-incompatible-pointer-typ
   -w "$scratch" "$version" >"$log" 2>&1 &
 compiling=$!
 set +m
+began=$(date +%s)
 while kill -0 "$compiling" 2>/dev/null; do
-  printf '\r  %d of %d files' "$(find "$scratch" -name '*.o' 2>/dev/null | wc -l)" $FILES >&2
+  files=$(find "$scratch" -name '*.o' 2>/dev/null | wc -l)
+  left=
+  if [ "$files" -ge $ENOUGH ]; then
+    left=", about $(((($(date +%s) - began) * (FILES - files) / files + 59) / 60)) minutes left"
+  fi
+  printf '\r  %d of %d files%s \033[K' "$files" $FILES "$left" >&2
   sleep 2
 done
 printf '\n' >&2

@@ -7,10 +7,13 @@ import pytest
 
 from drone_sim.files.resources import package_path
 
+PLAN = """0 upgraded, 377 newly installed, 0 to remove and 2 not upgraded.
+Need to get 12.3 MB/285 MB of archives.
+After this operation, 1189 MB of additional disk space will be used."""
 FAKES = {
     "dpkg-query": 'for one in "${@:4}"; do grep -qx "$one" "$FOLDER/installed" && echo "installed $one"; done',
     "apt-cache": 'grep -qx "$2" "$FOLDER/known" && printf "%s:\\n  Candidate: 1.2\\n" "$2" || true',
-    "apt-get": 'echo "$1 ${@:6}"',
+    "apt-get": 'case "$LC_ALL $*" in *--assume-no*) [ "$LC_ALL" = C ] && echo "$PLAN" ;; *) echo "$1 ${@:6}" ;; esac',
     "sudo": '"$@"',
 }
 
@@ -22,6 +25,7 @@ def _installed(tmp_path):
         (tmp_path / name).write_text(f"#!/bin/bash\n{does}\n")
         (tmp_path / name).chmod(0o755)
     surroundings = {"PATH": f"{tmp_path}:/usr/bin:/bin", "FOLDER": str(tmp_path), "HOME": os.environ["HOME"]}
+    surroundings["PLAN"] = PLAN
 
     def run(installed, known):
         (tmp_path / "installed").write_text("\n".join(installed))
@@ -43,7 +47,13 @@ def _installed(tmp_path):
 
 def test_what_is_missing_is_installed(installed):
     said = installed([], ["catkin", "rviz"])
-    assert "catkin rviz\nupdate \ninstall catkin rviz\n" in said and "no rviz" not in said
+    assert "install catkin rviz\n" in said and "no rviz" not in said
+
+
+def test_how_much_is_installed_is_what_apt_says(installed):
+    said = installed([], ["catkin", "rviz"])
+    assert "377 packages, 12.3 MB/285 MB to fetch, 1189 MB on disk: catkin rviz" in said
+    assert said.index("update") < said.index("377 packages") < said.index("install catkin rviz")
 
 
 def test_without_an_rviz_to_install_setup_goes_on(installed):

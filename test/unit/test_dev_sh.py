@@ -25,7 +25,7 @@ fi
 case "$*" in
   --version) echo Python 3.11.2 ;;
   -c*) echo cp311 ;;
-  *--dry-run*) [ -z "$NO_WHEEL" ] ;; # whether the index has one
+  *--dry-run*) [ -z "$NO_WHEEL" ] && echo "$WHEEL" ;; # whether the index has one
   *"pip wheel"*) touch "$TMPDIR/pybullet-1-cp311-cp311-linux_$(uname -m).whl" ;;
   "-m venv"*) mkdir -p "${@: -1}/bin"; cp "$0" "${@: -1}/bin/python" ;;
   *--collect-only*) seq -f "test_page.py::test_%g" "$FAILED" ;;
@@ -258,6 +258,13 @@ def test_a_wheel_lies_where_one_says_and_one_of_another_python_is_left_alone(mac
     assert code == 0 and name not in said and machine.asked("pip wheel") == 1
 
 
+def test_a_wheel_that_pip_finds_is_taken_and_named(machine):
+    found = "Looking in links: /lab\nProcessing /lab/pybullet-1-cp313-cp313-linux_x86_64.whl (90 MB)"
+    code, said = machine.run("setup", env={"WHEEL": found})
+    assert code == 0 and machine.asked("pip wheel") == 0
+    assert "PyBullet from /lab/pybullet-1-cp313-cp313-linux_x86_64.whl," in said
+
+
 def compile_pybullet(machine, pip):
     """Start packaging/pybullet.sh with a pip that is a bash script."""
     machine.stub("python", f"#!/bin/bash\ncase $1 in --version) echo Python 3.13.0 ;; *) {pip} ;; esac\n")
@@ -280,6 +287,18 @@ def test_compilers_are_limited_by_memory(machine):
     jobs = int(re.search(r"threads\((\d+)\)", (machine.folder / "sitecustomize.py").read_text(encoding="utf-8"))[1])
     assert 1 <= jobs <= os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 500e6
     assert sorted(path.name for path in (machine.folder / "wheels").iterdir()) == ["pybullet.log", "pybullet.whl"]
+
+
+def test_the_compilation_estimates_what_is_left_from_what_is_done(machine):
+    machine.stub("bin/date", '#!/bin/bash\n[ -e "$STUBS/began" ] && touch "$STUBS/go"; touch "$STUBS/began"; cat "$STUBS/time"\n')
+    (machine.folder / "time").write_text("1000", encoding="utf-8")
+    compiler = """
+    mkdir "$STUBS/objects"; touch "$STUBS/objects/"{1..100}.o; echo 1600 >"$STUBS/time"; mv "$STUBS/objects" "$TMPDIR"
+    for ((i = 0; i < 500; i++)); do [ -e "$STUBS/go" ] && break; sleep 0.02; done
+    touch "$TMPDIR/pybullet.whl" """
+    with compile_pybullet(machine, f"until [ -e $STUBS/began ]; do sleep 0.02; done; {compiler}") as one:
+        said = one.communicate(timeout=60)[1]
+    assert one.returncode == 0 and "100 of 267 files, about 17 minutes left" in said
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

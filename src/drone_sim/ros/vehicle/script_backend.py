@@ -12,8 +12,10 @@ import genpy
 import rospy
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Image as ImageMessage
+from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from drone_sim.ros.core import image_messages
 from drone_sim.ros.core.message_conversion import fill, message_class, service_class
 from drone_sim.scripting.api.backend import Ask, Image
 from drone_sim.scripting.api.service_servers import Unanswered
@@ -136,10 +138,8 @@ class _Sender:
 
 class _ImageSender(_Sender):
     def publish(self, image: Image) -> None:
-        message = self._made(width=image.width, height=image.height, encoding="rgb8", step=3 * image.width)
-        message.header.stamp, message.header.frame_id = self._stamp(), image.frame_id
-        message.data = image.data
-        self._publisher.publish(message)
+        header = Header(stamp=self._stamp(), frame_id=image.frame_id)
+        self._publisher.publish(image_messages.image(image.pixels, "rgb8", header))
 
 
 class _Silence:

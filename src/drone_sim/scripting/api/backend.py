@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+
 
 class Image(NamedTuple):
     """A picture that a script publishes: rgb8, the top row first, as sensor_msgs/Image has it."""
 
-    data: bytes
-    width: int
-    height: int
+    pixels: np.ndarray  # height, width, 3
     frame_id: str
 
 

@@ -82,7 +82,7 @@ class TopicFunctions:
     @simROS()
     def imageTransportPublish(self, handle: Handle, data: Any, width: int, height: int, frame_id: Name) -> None:
         """Publish a vision sensor's image as getVisionSensorCharImage returns it, the bottom row first."""
-        self._bus.publish(handle, Image(_top_row_first(data, width, height), int(width), int(height), frame_id))
+        self._bus.publish(handle, Image(_top_row_first(data, width, height), frame_id))
 
     @simROS()
     def imageTransportShutdownPublisher(self, handle: Handle) -> None:
@@ -261,15 +261,15 @@ for _word, _kind in {"String": str, "Int": int, "Double": float, "Bool": bool}.i
     _add_kind(_word, _kind)
 
 
-def _top_row_first(data: Any, width: int, height: int) -> bytes:
-    """Return an image turned over; raises WrongValue, ValueError for what is none of that size."""
+def _top_row_first(data: Any, width: int, height: int) -> np.ndarray:
+    """Return a flipped view of an image, (height, width, 3). Raises WrongValue or ValueError unless it has that size."""
     if isinstance(data, int):
         raise WrongValue("expected an image")
     refuse_if_too_large(data)
     pixels = data.encode("utf-8") if isinstance(data, str) else bytes(data)
     row, rows = 3 * int(width), int(height)
-    if row < 0 or rows < 0:
+    if row <= 0 or rows <= 0:
         raise ValueError(f"an image cannot have {width} x {height} pixels")
     if len(pixels) != row * rows:
         raise ValueError(f"an image of {width} x {height} must have {row * rows} bytes, not {len(pixels)}")
-    return b"".join(np.frombuffer(pixels, np.uint8).reshape(rows, row)[::-1])
+    return np.frombuffer(pixels, np.uint8).reshape(rows, -1, 3)[::-1]

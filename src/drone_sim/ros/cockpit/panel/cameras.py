@@ -29,7 +29,6 @@ _WIDEST, _WIDEST_DEPTHS = 640, 320  # px; of a larger one, every other pixel, or
 _COLORS = cv2.COLORMAP_TURBO  # near is blue, far is red
 _JPEG = (cv2.IMWRITE_JPEG_QUALITY, 80)
 _MILLIMETRES = "16UC1"  # REP-118
-_OPENCVS = {"8UC1": "mono8", "8UC3": "bgr8", "8UC4": "bgra8"}  # these name no colors: OpenCV's order
 _KINDS = ("views", "dialogs", "consoles")
 _CONNECTING = 3.0  # s, for the simulation to hear of who answers
 _LONGEST = 1 << 21  # characters of a message; the simulation's own have less
@@ -264,7 +263,7 @@ def packed(message: CompressedImage | Image) -> tuple[bytes, str]:
         if image.ndim == 2 and image.dtype != np.uint8:
             depths = image[::step, ::step].astype(np.float32)
             return _depths(depths * (1e-3 if encoding == _MILLIMETRES else 1.0))
-        return _encoded(image_messages.to_bgr(image, _OPENCVS.get(encoding, encoding))[::step, ::step]), ""
+        return _encoded(image_messages.bgr(message)[::step, ::step]), ""
     except ValueError as error:
         raise ValueError(f"encoding '{encoding[:40]}': {error}") from None
 
