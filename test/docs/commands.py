@@ -44,6 +44,8 @@ NOT_RUN = {  # with the reason
     "sudo cp -rT build/deb /srv/drone_sim": INSTALLS,
     'echo "deb [trusted=yes] file:/srv/drone_sim ./" | sudo tee /etc/apt/sources.list.d/drone_sim.list': INSTALLS,
     "sudo apt update && sudo apt install ros-drone-sim": INSTALLS,
+    "python3 -m venv venv": INSTALLS,
+    "venv/bin/pip install path/to/drone_sim": "test/unit/test_packaging.py installs it so",
     "client/bin/pip install coppeliasim-zmqremoteapi-client": INSTALLS,
     "readers/bin/pip install rosbags": INSTALLS,
     "readers/bin/python read_bag.py flight.bag": PACKAGE,

@@ -121,8 +121,35 @@ def test_every_file_of_the_package_is_installed():
     named = {
         path for name, globs in data.items() for one in globs for path in (SOURCE / name.replace(".", "/")).glob(one)
     }
-    there = {path for path in SOURCE.rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc")}
+    there = {path for path in (SOURCE / "drone_sim").rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc")}
     assert there and there == named
+
+
+def test_what_pip_installs_flies_without_ros_and_checkout(tmp_path):
+    pytest.importorskip("setuptools")
+    egg_info, build = ("egg_info", "--egg-base", str(tmp_path)), ("build", "--build-base", str(tmp_path / "build"))
+    command = ["setup.py", *egg_info, *build, "install", "--root", str(tmp_path / "root"), "--prefix", "/usr"]
+    install = f"import runpy, sys; sys.modules['catkin_pkg'] = None; sys.argv = {command}; runpy.run_path('setup.py')"
+    subprocess.run([sys.executable, "-c", install], cwd=ROOT, stdout=subprocess.DEVNULL, check=True, timeout=100)
+    (module,) = (tmp_path / "root").rglob("drone_sim/__init__.py")
+    program = (
+        "import drone_sim\n"
+        "from drone_sim.run import parameters, simulation\n"
+        "flown = simulation.Simulation(parameters.load({'scene_file': 'package://drone_sim/config/scenes/gates.yaml'}))\n"
+        "flown.step()\n"
+        "flown.close()\n"
+        "print(drone_sim.__file__)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(module.parents[1])},
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+        timeout=100,
+    )
+    assert done.stdout.strip() == str(module)
 
 
 def test_every_script_that_the_editor_offers_is_installed(tmp_path):
