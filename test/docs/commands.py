@@ -38,6 +38,7 @@ NOT_RUN = {  # with the reason
     "cd ..": WORKSPACE,
     "catkin_make": WORKSPACE,
     "./dev.sh setup --all": "done: these commands run after it",
+    "./dev.sh test": "takes minutes: .ci/run runs it",
     "./dev.sh wheel": "takes minutes: test/unit/test_dev_sh.py takes such a wheel",
     "./dev.sh deb": "takes minutes: packaging is tried in bare chroots",
     "sudo apt install ./build/deb/ros-drone-sim_*.deb": INSTALLS,

@@ -30,3 +30,10 @@ def test_the_commands_of_a_page_are_found_with_what_it_shows(tmp_path):
     page.write_text("```bash\nx\n```\ntext\n```console\n$ a b \\\n  c  # why\nsaid\n$ d\n```\n```python\n$ e\n```\n")
     found = [(one.line, one.text, one.shown) for one in commands.commands(page)]
     assert found == [(6, "a b \\\n  c", ("said",)), (9, "d", ())]
+
+
+def test_readme_begins_with_a_start_and_the_tests():
+    assert [one.text for one in commands.commands(package_path() / "README.md")][:2] == [
+        "./dev.sh run web:=true",
+        "./dev.sh test",
+    ]
