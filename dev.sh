@@ -48,7 +48,7 @@ ALL=(requirements.txt requirements-all.txt requirements-dev.txt)
 COMPILERS=(build-essential python3-dev)
 WINDOWS=(rviz python3-tk)
 TESTS=(librostest-dev python3-tf2-ros)
-# Programs that README and docs run: image_view, republish, tf2_tools. Alone, ros-image-view aborts.
+# Programs that docs run: image_view (without the other two, it finds no plugin), republish, tf2_tools.
 DOCS=(ros-image-view libnodeletlib-tools libimage-view-dev image-transport-tools tf2-tools)
 
 # ros-environment is what lets setup.bash set ROS_PACKAGE_PATH; on Debian 12 other packages bring it. The package.xml

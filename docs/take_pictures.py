@@ -83,8 +83,7 @@ def published():
     simulation = Simulation(values, script=str(DOCS / "tutorial" / "7_camera.py"), backend=backend)
     fly(simulation, 1)
     simulation.close()
-    picture = backend.picture
-    return np.frombuffer(picture.data, np.uint8).reshape(picture.height, picture.width, 3)
+    return backend.picture.pixels
 
 
 def found():
