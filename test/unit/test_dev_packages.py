@@ -1,6 +1,7 @@
 """`./dev.sh setup` installs what is missing, and goes on where there is no rviz to install."""
 
 import os
+import re
 import subprocess
 
 import pytest
@@ -10,6 +11,13 @@ from drone_sim.files.resources import package_path
 PLAN = """0 upgraded, 377 newly installed, 0 to remove and 2 not upgraded.
 Need to get 12.3 MB/285 MB of archives.
 After this operation, 1189 MB of additional disk space will be used."""
+PROGRAMS = {  # Debian's packages, by the ROS packages whose programs docs run
+    "dynamic_reconfigure": "python3-dynamic-reconfigure",
+    "image_transport": "image-transport-tools",
+    "image_view": "ros-image-view",
+    "tf2_tools": "tf2-tools",
+}
+ELSEWHERE = {"demo_teleop", "drone_sim", "my_package", "stereo_image_proc", "tf"}  # docs say what these need
 FAKES = {
     "dpkg-query": 'for one in "${@:4}"; do grep -qx "$one" "$FOLDER/installed" && echo "installed $one"; done',
     "apt-cache": 'grep -qx "$2" "$FOLDER/known" && printf "%s:\\n  Candidate: 1.2\\n" "$2" || true',
@@ -65,3 +73,12 @@ def test_without_an_rviz_to_install_setup_goes_on(installed):
 def test_once_all_else_is_there_nothing_is_done(installed):
     assert installed(["catkin"], ["catkin"]) == ""
     assert installed(["catkin", "rviz"], []) == ""
+
+
+def test_setup_all_installs_the_programs_that_docs_run():
+    root = package_path()
+    text = "".join(one.read_text(encoding="utf-8") for one in (root / "README.md", *(root / "docs").glob("*.md")))
+    assert set(re.findall(r"rosrun (\w+)", text)) - ELSEWHERE == set(PROGRAMS)
+    program = 'source ./dev.sh help >/dev/null; packages; echo "${TESTS[@]}" "${DOCS[@]}"'
+    listed = subprocess.run(["bash", "-c", program, "./dev.sh"], cwd=root, stdout=subprocess.PIPE, text=True, check=True)
+    assert set(PROGRAMS.values()) - set(listed.stdout.split()) == set()
