@@ -80,5 +80,5 @@ def test_setup_all_installs_the_programs_that_docs_run():
     text = "".join(one.read_text(encoding="utf-8") for one in (root / "README.md", *(root / "docs").glob("*.md")))
     assert set(re.findall(r"rosrun (\w+)", text)) - ELSEWHERE == set(PROGRAMS)
     program = 'source ./dev.sh help >/dev/null; packages; echo "${TESTS[@]}" "${DOCS[@]}"'
-    listed = subprocess.run(["bash", "-c", program, "./dev.sh"], cwd=root, stdout=subprocess.PIPE, text=True, check=True)
-    assert set(PROGRAMS.values()) - set(listed.stdout.split()) == set()
+    listed = subprocess.check_output(["bash", "-c", program, "./dev.sh"], cwd=root, text=True)
+    assert set(PROGRAMS.values()) - set(listed.split()) == set()

@@ -121,7 +121,8 @@ def test_every_file_of_the_package_is_installed():
     named = {
         path for name, globs in data.items() for one in globs for path in (SOURCE / name.replace(".", "/")).glob(one)
     }
-    there = {path for path in (SOURCE / "drone_sim").rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc")}
+    files = [path for path in (SOURCE / "drone_sim").rglob("*") if path.is_file()]
+    there = {path for path in files if path.suffix not in (".py", ".pyc")}
     assert there and there == named
 
 

@@ -262,7 +262,7 @@ for _word, _kind in {"String": str, "Int": int, "Double": float, "Bool": bool}.i
 
 
 def _top_row_first(data: Any, width: int, height: int) -> np.ndarray:
-    """Return a flipped view of an image, (height, width, 3). Raises WrongValue or ValueError unless it has that size."""
+    """Return a flipped view of an image, (height, width, 3). Raises WrongValue or ValueError for another size."""
     if isinstance(data, int):
         raise WrongValue("expected an image")
     refuse_if_too_large(data)
