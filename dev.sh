@@ -88,6 +88,7 @@ install_packages() { # install_packages NAME...
   done
   if [ ${#missing[@]} = 0 ] || { [ "${missing[*]}" = rviz ] && ! installable rviz; }; then return; fi
   [ "$(id -u)" = 0 ] || command -v sudo >/dev/null || fail "needs root or sudo to install: ${missing[*]}"
+  say "missing packages: ${missing[*]}"
   if [ -z "$updated" ]; then as_root apt-get update -q >&2; fi
   updated=yes
   for package in "${missing[@]}"; do
@@ -97,7 +98,7 @@ install_packages() { # install_packages NAME...
       say "this Debian has no rviz: going on without it; ./dev.sh run web:=true shows the simulation in a browser"
     fi
   done
-  say "installing $(planned "${wanted[@]}"): ${wanted[*]}, and what they need"
+  say "installing them with what they need: $(planned "${wanted[@]}")"
   as_root env DEBIAN_FRONTEND=noninteractive apt-get install -qy --no-install-recommends -o DPkg::Lock::Timeout=600 \
     "${wanted[@]}" >&2 || {
     [ -z "$(dpkg --audit)$(find /var/lib/dpkg/updates -type f)" ] ||
