@@ -42,7 +42,7 @@ compiling=$!
 set +m
 began=$(date +%s)
 while kill -0 "$compiling" 2>/dev/null; do
-  files=$(find "$scratch" -name '*.o' 2>/dev/null | wc -l)
+  files=$({ find "$scratch" -name '*.o' 2>/dev/null || true; } | wc -l) # it fails where pip removes a folder meanwhile
   left=
   if [ "$files" -ge $ENOUGH ]; then
     left=", about $(((($(date +%s) - began) * (FILES - files) / files + 59) / 60)) minutes left"
