@@ -237,7 +237,7 @@ def test_it_is_tuned_in_flight_and_fails():
 @pytest.mark.parametrize(
     ("front", "said"),
     [
-        ({"noise": {"read": 3}}, "cameras/front/noise/read = 3: needs full_well"),
+        ({"noise": {"read": 3}}, "cameras/front/noise/read = 3: needs `full_well`"),
         ({"exposure": {"automatic": True}}, "exposure/automatic = true: needs time"),
         (
             {"kind": "depth", "shutter": {"readout": 0.01}},

@@ -189,7 +189,7 @@ def test_a_model_of_v_reps_comes_with_its_scripts(build, tmp_path):
         assert told(simulation)[0] == f"{name}:init"
     with pytest.raises(ValueError, match=r"drone\.ttm: is a quadricopter: add it with the parameter `vehicles`"):
         operations.load_model("drone.ttm")
-    with pytest.raises(ValueError, match=r"torn\.ttm: is cut"):
+    with pytest.raises(ValueError, match=r"torn\.ttm: is truncated"):
         operations.load_model("torn.ttm")
 
 

@@ -278,7 +278,7 @@ REFUSED = {
         "object A: Par: 1073741824 script parameters",
     ),
     "deep compounds": (_nested(100), "deeper than 16"),
-    "a deep tree": (_chain(300), "more than 200 ancestors"),
+    "a deep tree": (_chain(300), "deeper than 200 levels"),
 }
 
 

@@ -109,7 +109,7 @@ class VrepJoint:
 class VrepDummy:
     """A dummy. `linked`: handle of the dummy that it is linked to, -1 for none; `path`: points of a 4.x path.
 
-    Each point is x, y, z (m) and a quaternion x, y, z, w.
+    Each point is x, y, z (m) and a quaternion x, y, z, w. `holds`: the dynamics keeps both linked dummies at one place.
     """
 
     size: float

@@ -31,6 +31,7 @@ _OTHERS = {
 }  # fmt: skip
 _USED = {"pyramid": (0, 1, 2, 3), "cylinder": (0, 1, 6), "disc": (0, 1, 6, 8), "cone": (0, 1, 6, 8), "ray": (0, 1)}
 _DYNAMIC_MODE = 5
+_LOOP_CLOSURE = 0  # type of a link between dummies: sim_dummy_linktype_dynamics_loop_closure
 _CYCLIC, _MOTOR, _POSITION_CONTROL = 0x01, 0x10, 0x20  # bits of a joint's `Va9`
 SCRIPT = "SCT"
 
@@ -110,7 +111,8 @@ def _mode(joint: Level) -> str:
 
 def _dummy(dummy: Level) -> Kind:
     size = dummy.numbers("_y2", "Dy2", 1) or (0.01,)
-    return VrepDummy(size[0], dummy.integer("Lli", default=-1))
+    linked = dummy.integer("Lli", default=-1)
+    return VrepDummy(size[0], linked, linked >= 0 and dummy.integer("Dl2") == _LOOP_CLOSURE)
 
 
 def _vision_sensor(sensor: Level) -> Kind:
