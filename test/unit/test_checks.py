@@ -27,8 +27,8 @@ def test_a_good_twist_passes_unchanged():
     "position, orientation, message",
     [
         ((math.nan, 0, 1), (0, 0, 0, 1), "position.x = nan"),
-        ((0, 1e9, 1), (0, 0, 0, 1), "position.y = 1000000000.0: must lie within -1000.0 and 1000.0 m"),
-        ((0, 0, -1), (0, 0, 0, 1), "position.z = -1: must lie within 0.0 and 1000.0 m"),
+        ((0, 1e9, 1), (0, 0, 0, 1), "position.y = 1000000000.0: must lie between -1000.0 and 1000.0 m"),
+        ((0, 0, -1), (0, 0, 0, 1), "position.z = -1: must lie between 0.0 and 1000.0 m"),
         ((0, 0, 1), (0, 0, 0, 0), "must be a unit quaternion, its length is 0"),
         ((0, 0, 1), (0, 0, math.nan, 1), "must be a unit quaternion, its length is nan"),
     ],

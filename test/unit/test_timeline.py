@@ -125,7 +125,7 @@ def test_end_counts_the_longest_push():
         ("[{at: 1, twist: {angular: [0, 0, 11]}}]", "entry 1: twist.angular.z = 11.0: must lie within +-10.0 rad/s"),
         (
             "[{at: 1, pose: {position: [0, 0, -1]}}]",
-            "entry 1: pose.position.z = -1.0: must lie within 0.0 and 1000.0 m",
+            "entry 1: pose.position.z = -1.0: must lie between 0.0 and 1000.0 m",
         ),
         ("[{at: 1, push: {force: [1, 0, 0]}}]", "entry 1: push.duration: missing"),
         (
@@ -163,7 +163,7 @@ def test_every_wrong_key_is_named_with_its_line(tmp_path):
         "2: entry 1: twist.liner: unknown key; known are linear, angular",
         "3: entry 2: at = 'soon': input should be a valid number",
         "4: entry 2: push.duration: missing; it is a number of seconds",
-        "8: entry 4: pose.position.z = -1.0: must lie within 0.0 and 1000.0 m",
+        "8: entry 4: pose.position.z = -1.0: must lie between 0.0 and 1000.0 m",
         f"9: entry 5: pusch: unknown key; known are at, vehicle, {KINDS}",
     ]
 

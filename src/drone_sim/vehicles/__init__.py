@@ -1,1 +1,1 @@
-"""What flies: a vehicle, its objects under V-REP's names, its script."""
+"""Vehicles: body, propulsion, sensors, faults, commands and scene objects under V-REP's names."""

@@ -1,4 +1,4 @@
-"""A vehicle's body in the world: where it is, how it moves, what pushes it, what it meets."""
+"""A vehicle's rigid body: pose and velocity, applied forces, rays and contacts."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from drone_sim.mechanics.wrench import Wrench
 from drone_sim.sensors.sensor import Contact, Hit
 from drone_sim.world.pictures import Place
 
-_NONE: Vector = (0.0, 0.0, 0.0)
+_ZERO: Vector = (0.0, 0.0, 0.0)
 
 
 class Pushed(NamedTuple):
-    """A force (N, world) at a point (m, inertial frame) and a torque (N m, world), on the shape of a name."""
+    """A script's force (N, world) at a point (m, inertial frame) and torque (N m, world) on the named shape."""
 
     shape: str
     force: Vector
@@ -28,59 +28,59 @@ class Pushed(NamedTuple):
     point: Vector
 
     def without(self, forces: bool, torques: bool) -> Pushed:
-        """Return what is left without its force, its torque, or both."""
-        return self._replace(force=_NONE if forces else self.force, torque=_NONE if torques else self.torque)
+        """Return a copy with the force, the torque or both set to zero."""
+        return self._replace(force=_ZERO if forces else self.force, torque=_ZERO if torques else self.torque)
 
 
 class Body:
-    """One rigid body; its frame is the URDF's root link. It carries the sensors (sensors.sensor.Carrier)."""
+    """One rigid body, in the frame of the URDF's root link. Sensors are mounted on it (sensors.sensor.Carrier)."""
 
-    state: State  # after the last sub-step that was looked at, or move
+    state: State  # as of the last refresh() or move()
     matrix: Matrix  # world from root link
-    _read: State | None = None  # that `matrix` was computed from
-    propellers: Propellers  # that drive it, as long as the run lasts
+    _last_read: State | None = None  # the state from which `matrix` was computed
+    propellers: Propellers  # of the current run
 
     def __init__(self, rigid: RigidBody, start: Pose, context: SimulationContext):
-        """Put it into the world, at rest."""
+        """Add the body to the world at `start`, at rest."""
         self.rigid = rigid
         self.mass, self.gravity = rigid.mass, context.gravity
         self.datum, self.magnetic_field = context.datum, context.magnetic_field
-        self.jumps = 0  # how often it was put somewhere else
-        self.pushes = 0  # how often a script has pushed it
-        self.is_held = False  # in somebody's hand: no part of what snapshots remember, nor of a run
+        self.jumps = 0  # number of teleports
+        self.pushes = 0  # number of forces that scripts added
+        self.is_held = False  # dragged by a user; not saved in snapshots
         self._context = context
         self._world = context.world
         self.number = self._world.add_rigid_body(rigid, start)
         self.inertial_from_root: Matrix = frames.invert(self._world.inertial_frame(self.number))
-        # Of each link of the URDF but the root: the one above, `base_link` for the root, and where it sits on it.
-        self.links = {name: (self._named(above), matrix) for name, (above, matrix) in rigid.parents.items()}
-        # Of each visual: the link that it belongs to, and where it sits on that.
-        self.visual_places = [(self._named(name), matrix) for name, matrix in rigid.visuals]
-        self.start = start  # where it begins
+        # URDF link, except the root -> its parent link (`base_link` for the root) and its pose in the parent's frame
+        self.links = {name: (self._link_name(parent), matrix) for name, (parent, matrix) in rigid.parents.items()}
+        # for each visual: its link, and its pose in that link's frame
+        self.visual_places = [(self._link_name(name), matrix) for name, matrix in rigid.visuals]
+        self.start = start
         self.reset()
 
-    def _named(self, link: str) -> str:
+    def _link_name(self, link: str) -> str:
         return link if link in self.rigid.parents else "base_link"
 
-    # ---- where it is
+    # ---- pose
 
     def reset(self) -> None:
-        """Return to the start, at rest, with nothing that pushes and nobody who holds it."""
+        """Return to the start pose at rest; drop the scripts' forces and end a drag."""
         self.let_go()
         self._world.set_pose(self.number, self.start)
-        self._pushed: list[Pushed] = []  # in the next step
+        self._pending: list[Pushed] = []  # by scripts; acts in the next step
         self.refresh()
 
     def begin_on_floor(self) -> None:
-        """Have its start on what is below, the floor's height where nothing is, and be there."""
-        (x, y, z), turn = self.start
+        """Move the start pose onto the surface below, or to z = 0 if there is none, and reset to it."""
+        (x, y, z), orientation = self.start
         below = self._world.queries.ray((x, y, z), (x, y, 0.0), ignoring=self.number)
         ground = z - below.distance if below else 0.0
-        self.start = Pose((x, y, z - self._world.queries.lowest(self.number) + ground), turn)
+        self.start = Pose((x, y, z - self._world.queries.lowest(self.number) + ground), orientation)
         self.reset()
 
     def begin_again(self) -> None:
-        """Return to the start in the middle of a run, as if it had touched nothing by then."""
+        """Return to the start pose during a run, and forget the body's contacts."""
         self.jumps += 1
         self._world.part(self.number)
         self.reset()
@@ -88,44 +88,44 @@ class Body:
     def refresh(self) -> None:
         """Read the state back from the world."""
         state = self._world.state(self.number)
-        if state is not self._read:
-            self._read = self.state = state
+        if state is not self._last_read:
+            self._last_read = self.state = state
             self.matrix = state.matrix
 
     def move(self, pose: Pose) -> None:
-        """Put it somewhere else, at rest."""
+        """Teleport the body to a pose, at rest."""
         self.jumps += 1
         self._world.set_pose(self.number, pose)
         self.refresh()
 
     def hold(self) -> None:
-        """Let it stand still, whatever pulls at it, until it is let go."""
+        """Freeze the body, whatever forces act on it, until let_go()."""
         if not self.is_held:
             self.is_held = True
             self._world.collision_filter.freeze(self.number, still=True)
             self.refresh()
 
     def let_go(self) -> None:
-        """Let it fly on, from rest."""
+        """End hold(): the body moves again, from rest."""
         if self.is_held:
             self.is_held = False
             self._world.collision_filter.freeze(self.number, still=False)
 
     def restored(self) -> None:
-        """Follow the world, which was put back to what it had been."""
+        """Read the state after the world was restored from a snapshot."""
         self.jumps += 1
-        self._pushed = []
+        self._pending = []
         self.refresh()
 
     def place_visuals(self, places: Mapping[int, Place]) -> None:
-        """Move some of its visuals, by index, to other places: looks only."""
+        """Move some of the visuals, by index; this does not affect the dynamics."""
         self._world.pictures.place(self.number, places)
 
-    # ---- what pushes it
+    # ---- forces
 
     @property
     def wind(self) -> Vector:
-        """Velocity of the air where it is (m/s, world)."""
+        """Wind velocity at the body's position (m/s, world)."""
         return self._context.weather.at(self.state.position)
 
     @property
@@ -134,23 +134,23 @@ class Body:
         return self.propellers.thrusts
 
     def add_force(self, push: Pushed) -> None:
-        """Let a force and a torque act in the next step."""
+        """Add a force and a torque that act during the next step."""
         self.pushes += 1
-        self._pushed.append(push)
+        self._pending.append(push)
 
     def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
-        """Forget the forces on a shape, or the torques, or both, that were added since the last step."""
-        self._pushed = [one.without(forces, torques) if one.shape == shape else one for one in self._pushed]
+        """Drop the forces, the torques or both that were added to a shape since the last step."""
+        self._pending = [push.without(forces, torques) if push.shape == shape else push for push in self._pending]
 
     def take_pushes(self) -> Wrench:
-        """Return what scripts push it with in the step that begins, and forget it."""
-        wrench, pushed, self._pushed = Wrench(), self._pushed, []
+        """Return the wrench of the scripts' forces for the step that begins, and clear them."""
+        wrench, pushed, self._pending = Wrench(), self._pending, []
         for _, force, torque, point in pushed:
             wrench.add(force, torque, point)
         return wrench
 
     def apply(self, force: Force) -> None:
-        """Let a force act in the sub-step that comes, as it is at this moment; none moves what somebody holds."""
+        """Apply a force, evaluated at the present state, in the next sub-step; ignored while the body is held."""
         if self.is_held:
             return
         self.refresh()
@@ -158,15 +158,15 @@ class Body:
         force.add_to(wrench, self)
         self._world.apply(self.number, wrench)
 
-    # ---- what it meets
+    # ---- rays and contacts
 
     def ray(self, start: Vector, end: Vector) -> Hit | None:
-        """Return what a ray (m, world) meets first that is not the body itself; None for nothing."""
+        """Return the first hit of a ray (m, world), ignoring the body itself; None if there is none."""
         hit = self._world.queries.ray(start, end, ignoring=self.number)
         return None if hit is None else Hit(hit.distance, self._context.name_of(hit.body), hit.normal)
 
     def contacts(self) -> list[Contact]:
-        """Return what it touched in the last sub-step."""
+        """Return the body's contacts in the last sub-step."""
         names = self._context.names
-        touched = self._world.queries.contacts(self.number)
-        return [Contact(names.get(one.body, NOBODY)[0], one.point, one.normal, one.force) for one in touched]
+        contacts = self._world.queries.contacts(self.number)
+        return [Contact(names.get(hit.body, NOBODY)[0], hit.point, hit.normal, hit.force) for hit in contacts]

@@ -1,4 +1,4 @@
-"""What a vehicle is told and asked, in the fields of the messages that do so, and what its script says of its state."""
+"""Velocity commands and requests to a vehicle, their message types, and the flight state its script reports."""
 
 from __future__ import annotations
 
@@ -15,69 +15,69 @@ from drone_sim.vehicles.radio_link import RadioLink
 
 
 class Commands:
-    """The command of one vehicle, which its scripts hear."""
+    """The current velocity command of one vehicle, posted to its scripts as `cmd_vel`."""
 
     def __init__(self, bus: MessageBus, timeout: float, clock: Clock):
-        """Take the bus of its script, cmd_vel_timeout (s; 0 for ever) and the simulation's clock."""
+        """Create it for the child script's bus; `timeout` is cmd_vel_timeout (s; 0: none)."""
         self._bus = bus
         self.timeout = timeout
         self._clock = clock
-        self.listening: list[MessageBus] = []  # of scripts on its parts
-        self.link: RadioLink[Twist] | None = None  # over which commands come; None for at once
+        self.listening: list[MessageBus] = []  # of scripts on the vehicle's parts
+        self.link: RadioLink[Twist] | None = None  # that delays commands; None: no delay
         self.begin()
 
     def begin(self) -> None:
-        """Have no command, as at the start of a run."""
+        """Reset to no command, as at the start of a run."""
         self.now = Twist()
         self.age = 0.0  # s
 
     @property
     def buses(self) -> tuple[MessageBus, ...]:
-        """Those of its script, and of scripts on its parts."""
+        """The buses of the child script and of scripts on the vehicle's parts."""
         return self._bus, *self.listening
 
     def receive(self, twist: Twist) -> None:
-        """Take a command for the next step, or for when it comes over the link."""
+        """Post a command to the scripts for the next step, or send it over the radio link if there is one."""
         if self.link is None:
-            self._obey(twist)
+            self._post(twist)
         else:
             self.link.send(self._clock.time, twist)
 
     def take(self) -> None:
-        """Obey what has come over the link."""
-        came = self.link and self.link.receive(self._clock.time)
-        if came:
-            self._obey(came[1])
+        """Post the newest command that has arrived over the radio link, if there is one."""
+        arrived = self.link and self.link.receive(self._clock.time)
+        if arrived:
+            self._post(arrived[1])
 
     def advance(self) -> None:
-        """Make the command a step older; one that is too old is replaced by a zero command."""
-        if self._is_over:
-            self._obey(Twist())
+        """Age the command by one step; replace it by a zero command after the timeout."""
+        if self._is_timed_out:
+            self._post(Twist())
         self.age += self._clock.time_step
 
     @property
-    def _is_over(self) -> bool:
+    def _is_timed_out(self) -> bool:
         too_old = self.timeout and self.age > self.timeout - self._clock.time_step / 2
         return bool(too_old and self.now != Twist())
 
     @property
     def is_quiet(self) -> bool:
-        """Whether no script will get the command at the beginning of the next step, unless a new one is received."""
-        return self.link is None and not self._is_over
+        """Whether no command will be posted in the next step unless a new one is received."""
+        return self.link is None and not self._is_timed_out
 
-    def _obey(self, twist: Twist) -> None:
+    def _post(self, twist: Twist) -> None:
         self.now, self.age = twist, 0.0
         for bus in self.buses:
             bus.post("cmd_vel", twist)
 
     def save_state(self) -> Restore:
-        """Return a function that brings back the command; what is under way is brought back by the faults."""
+        """Return a function that restores the command; Faults restores the commands on the radio link."""
         return saved(self, "now", "age", "timeout")
 
 
 EMPTY, POSE = "std_msgs/Empty", "geometry_msgs/PoseStamped"
 RESET = "reset"
-REQUESTS = {RESET: EMPTY, "takeoff": EMPTY, "land": EMPTY, "home": EMPTY, "goto": POSE}  # topics, and their types
+REQUESTS = {RESET: EMPTY, "takeoff": EMPTY, "land": EMPTY, "home": EMPTY, "goto": POSE}  # topic -> message type
 
 
 class Empty(NamedTuple):
@@ -94,7 +94,7 @@ class Quaternion(NamedTuple):
 
 
 class PoseFields(NamedTuple):
-    """geometry_msgs/Pose: m, and a unit quaternion."""
+    """geometry_msgs/Pose: position in m, orientation as a unit quaternion."""
 
     position: Vector3
     orientation: Quaternion
@@ -107,7 +107,7 @@ class PoseStamped(NamedTuple):
 
 
 def request(pose: Pose | None = None) -> Any:
-    """Return the message that a script gets: of a pose (world), or an empty one."""
+    """Return the request message for a script: a PoseStamped of `pose` (world), or Empty."""
     if pose is None:
         return Empty()
     return PoseStamped(PoseFields(Vector3(*pose.position), Quaternion(*pose.orientation)))
@@ -116,57 +116,57 @@ def request(pose: Pose | None = None) -> Any:
 _LOG = logging.getLogger(__name__)
 
 UNKNOWN = "unknown"
-LANDED, CRASHED = "landed", "crashed"  # in which no command moves it
+LANDED, CRASHED = "landed", "crashed"  # states in which commands have no effect
 _TOPIC = "state"
 
 
 class FlightState:
-    """Hands requests to the scripts of a vehicle that offer to answer them."""
+    """Forwards requests to the scripts of a vehicle that subscribe to them, and reads the state they publish."""
 
     def __init__(self, commands: Commands):
-        """Take what knows the buses of its scripts."""
+        """Create it; `commands` lists the buses of the vehicle's scripts."""
         self._commands = commands
         self.begin()
 
     def begin(self) -> None:
-        """Forget which requests no script answered: another script may be there."""
-        self.is_flown = False  # by a child script, which is loaded
-        # For each script of the vehicle that may have failed: returns its error, or None while it is called.
+        """Forget the scripts of the last run, and which requests had no effect."""
+        self.is_flown = False  # whether a child script is loaded
+        # one function for each script that may fail: returns its error, or None while it runs
         self.script_errors: list[Callable[[], ScriptError | None]] = []
         self._missing = ""
-        self._told: set[str] = set()  # topics that had no effect
+        self._warned: set[str] = set()  # topics that had no effect
 
     @property
     def script_error(self) -> ScriptError | None:
-        """The error of a script of the vehicle that has failed and is not called any more; None if there is none."""
-        return next((error for one in self.script_errors if (error := one()) is not None), None)
+        """The error of the first script of the vehicle that failed and is no longer called; None if there is none."""
+        return next((error for get_error in self.script_errors if (error := get_error()) is not None), None)
 
     def __str__(self) -> str:
-        """Return the state, as a script says it; `unknown` where none does."""
+        """Return the state that a script publishes, or `unknown`."""
         for bus in self._commands.buses:
-            said = bus.said and bus.said.get(bus.resolve(_TOPIC))
-            if said:
-                return str(said.get("data", said) if isinstance(said, dict) else said)
+            message = bus.said and bus.said.get(bus.resolve(_TOPIC))
+            if message:
+                return str(message.get("data", message) if isinstance(message, dict) else message)
         return self._missing or UNKNOWN
 
-    def ask(self, topic: str, message: Any, before: Callable[[], None] = lambda: None) -> None:
-        """Call `before`, and leave the message for the next step; where no script listens, say so instead.
+    def ask(self, topic: str, message: Any, prepare: Callable[[], None] = lambda: None) -> None:
+        """Call `before` and post the message for the next step.
 
-        So it is while the simulation is stopped, and has no script. It is said once for each topic and script.
+        If no script subscribes to the topic or the simulation is stopped, only log a warning, once per topic and run.
         """
         if not self.is_flown:
-            self._tell(topic, "the simulation is stopped; `start` it first")
+            self._warn_once(topic, "the simulation is stopped; `start` it first")
             return
-        hearing = [bus for bus in self._commands.buses if bus.hears(topic)]
-        if hearing:
-            before()
+        subscribed = [bus for bus in self._commands.buses if bus.hears(topic)]
+        if subscribed:
+            prepare()
         else:
             self._missing = self._missing or f"{UNKNOWN}: the script does not subscribe to {topic}"
-            self._tell(topic, "the child script does not subscribe to this topic; `pilot` does")
-        for bus in hearing:
+            self._warn_once(topic, "the child script does not subscribe to this topic; `pilot` does")
+        for bus in subscribed:
             bus.post(topic, message)
 
-    def _tell(self, topic: str, why: str) -> None:
-        if topic not in self._told:
-            self._told.add(topic)
+    def _warn_once(self, topic: str, why: str) -> None:
+        if topic not in self._warned:
+            self._warned.add(topic)
             _LOG.warning("%s: no effect: %s", topic, why)

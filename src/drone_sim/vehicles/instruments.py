@@ -1,4 +1,4 @@
-"""The sensors of one vehicle that measure numbers."""
+"""The sensors of one vehicle, except its cameras."""
 
 from __future__ import annotations
 
@@ -13,66 +13,66 @@ from drone_sim.vehicles.body import Body
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.quadricopter_objects import DRONE
 
-_NOWHERE = 1e9  # m, m/s and rad/s, summed: there is nothing to measure, and the step ends the flight
+_DIVERGED = 1e9  # sum of m, m/s and rad/s beyond which nothing is measured; the end of the step reports it
 
 
 class Instruments:
-    """The instruments of a vehicle: made once, reset with every run."""
+    """The instruments of a vehicle: created once, reset at the start of every run."""
 
     def __init__(self, vehicle: VehicleParameters, suffix: str, body: Body, context: SimulationContext):
-        """Make them for a body; they hang on objects whose names have the suffix."""
+        """Create the instruments of a body; `suffix` is appended to the names of their objects."""
         self.by_name: dict[str, Instrument] = {}
-        self.by_object: dict[str, Instrument] = {}  # by the name that scripts find
-        self.fixed_frames: dict[str, Matrix] = {}  # root from those that the URDF has not, on the root
-        self.moving_frames: dict[str, Callable[[], Matrix]] = {}  # world from those that hang on something else
-        for name, one in vehicle.sensors.items():
-            seen_as = f"{one.object or name}{suffix}"
-            pose = partial(_pose, context, one, seen_as)
-            made = one.make(Fitting(f"{vehicle.name}/{name}", body, pose, context.sub_step))
-            self.by_name[name] = self.by_object[seen_as] = made
-            parent, matrix = one.placed(body.rigid.links)
+        self.by_object: dict[str, Instrument] = {}  # by the object name that scripts use
+        self.fixed_frames: dict[str, Matrix] = {}  # root from frame, for sensors on the root that are no URDF link
+        self.moving_frames: dict[str, Callable[[], Matrix]] = {}  # world from sensor frame, for other sensors
+        for name, sensor in vehicle.sensors.items():
+            object_name = f"{sensor.object or name}{suffix}"
+            pose = partial(_pose, context, sensor, object_name)
+            instrument = sensor.make(Fitting(f"{vehicle.name}/{name}", body, pose, context.sub_step))
+            self.by_name[name] = self.by_object[object_name] = instrument
+            parent, matrix = sensor.placed(body.rigid.links)
             if parent not in ("", DRONE):
-                self.moving_frames[one.frame] = pose
-            elif one.frame not in body.rigid.links:
-                self.fixed_frames[one.frame] = matrix
+                self.moving_frames[sensor.frame] = pose
+            elif sensor.frame not in body.rigid.links:
+                self.fixed_frames[sensor.frame] = matrix
         self._body = body
         self._all = tuple(self.by_name.values())
-        self._looking: tuple[Instrument | Failing, ...] = self._all
+        self._working: tuple[Instrument | Failing, ...] = self._all
 
     def __bool__(self) -> bool:
         """Whether there are any."""
         return bool(self._all)
 
     def reset(self) -> None:
-        """Begin anew, with the vehicle at its starting place and its objects in the tree."""
-        for one in self._all:
-            one.reset()
+        """Reset all instruments; the vehicle must be at its start pose and its objects in the tree."""
+        for instrument in self._all:
+            instrument.reset()
 
     def clear(self) -> None:
         """Forget the readings of the last step."""
-        for one in self._all:
-            one.readings.clear()
+        for instrument in self._all:
+            instrument.readings.clear()
 
     def look(self, count: int) -> None:
-        """Let them take part in a sub-step, `count` of which there have been since the start of the run."""
-        place, _, linear, angular = self._body.state
-        if not -_NOWHERE < sum(place) + sum(linear) + sum(angular) < _NOWHERE:  # nor a NaN, with which nothing is known
+        """Update the working instruments after sub-step number `count` of the run."""
+        position, _, linear, angular = self._body.state
+        if not -_DIVERGED < sum(position) + sum(linear) + sum(angular) < _DIVERGED:  # a NaN also makes this true
             return
-        for one in self._looking:
-            one.look(count)
+        for instrument in self._working:
+            instrument.look(count)
 
     def fail(self, failures: Mapping[str, Failure]) -> None:
-        """Let those fail that are named, and no others."""
-        sound: Failure = "ok"
-        named = [(one, failures.get(name, sound)) for name, one in self.by_name.items()]
-        self._looking = tuple(one if how == sound else Failing(one, how) for one, how in named)
+        """Apply the failures by instrument name; all other instruments work."""
+        working: Failure = "ok"
+        modes = [(instrument, failures.get(name, working)) for name, instrument in self.by_name.items()]
+        self._working = tuple(item if mode == working else Failing(item, mode) for item, mode in modes)
 
     def save_state(self) -> Restore:
-        """Return a function that brings them back, once the body is where it was."""
-        return in_turn(*(one.save_state() for one in self._all))
+        """Return a function that restores the instruments; restore the body before."""
+        return in_turn(*(instrument.save_state() for instrument in self._all))
 
 
 def _pose(context: SimulationContext, parameters: SensorParameters, name: str) -> Matrix:
-    """Return the world from a sensor's frame: a script may have moved the object."""
+    """Return world from a sensor's frame, by its object, which a script may have moved."""
     objects = context.objects
     return parameters.sensor_at(objects.matrix(objects.handle(name)))

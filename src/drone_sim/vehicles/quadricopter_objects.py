@@ -1,4 +1,4 @@
-"""A vehicle as a child script finds it: V-REP's quadricopter, under its 3.x names and in its 4.x paths.
+"""The scene objects of a vehicle: V-REP's quadricopter, under its 3.x names and 4.x paths.
 
     Drone                                        /Quadcopter             carried by the dynamics
       Quadricopter_base                          /Quadcopter/base        the pose that scripts read
@@ -8,12 +8,12 @@
         Quadricopter_propeller_respondable<i>    .../respondable
           Quadricopter_propeller_body<i>         .../respondable/body
             Quadricopter_propeller_joint<i>      .../respondable/body/joint
-      FrontVision, TrackCam, one for every camera  /FrontVision
-      one for every sensor                       /range and so on
+      FrontVision, TrackCam: one per camera      /FrontVision
+      one per sensor                             /range and so on
       Quadricopter_floorCamera, _frontCamera     /floorCamera, /frontCamera
       Drone_script                               /Quadcopter/Script      its child script, as an object of 4.9
 
-Each name that begins with Quadricopter_ stands there with Quadcopter_, too, as in CoppeliaSim 4.0.
+Each name that begins with Quadricopter_ also exists with Quadcopter_, as in CoppeliaSim 4.0.
 The names of the second vehicle end in #0, those of the third in #1, and so on, as those of V-REP's copies do.
 Cameras and vision sensors look along their z axis, with y up and x to the left, as V-REP's do.
 """
@@ -34,9 +34,9 @@ from drone_sim.sensors.sensor import SensorParameters
 
 
 class ObjectPlace(Checked):
-    """Another name, to which no suffix is added, alias, parent ('' is the world), and place (m, rad) in its frame.
+    """Changes to a vehicle's object: an additional name without suffix, alias, parent and pose.
 
-    `size_factor` is what sim.getObjectSizeFactor returns.
+    `parent` '' is the world; the pose (m, rad) is in the parent's frame; sim.getObjectSizeFactor returns `size_factor`.
     """
 
     name: Label = ""
@@ -47,7 +47,7 @@ class ObjectPlace(Checked):
     size_factor: Annotated[Finite, Within(1e-6, 1e6)] = 1.0
 
     def local(self, default: Matrix) -> Matrix:
-        """Return the parent's frame from its own: as given, or the default."""
+        """Return the parent's frame from the object's frame, or the default if no pose is given."""
         if self.position is None and self.rpy is None:
             return default
         return from_rpy(self.position or (0.0, 0.0, 0.0), self.rpy or (0.0, 0.0, 0.0))
@@ -67,32 +67,32 @@ OPTICAL_FROM_SENSOR = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # o
 
 
 def respondable(number: int) -> str:
-    """Return the name of a propeller's body, counted from 1: forces act on it, its script takes particleVelocity."""
+    """Return the name of propeller `number`'s body (from 1): forces act on it, its script reads particleVelocity."""
     return f"Quadricopter_propeller_respondable{number}"
 
 
 def seen(number: int) -> str:
-    """Return the name of the visible part of a propeller, counted from 1, without its blades."""
+    """Return the name of the visible part of propeller `number` (from 1), without its blades."""
     return f"Quadricopter_propeller_body{number}"
 
 
 def joint(number: int) -> str:
-    """Return the name of the joint that turns the blades of a propeller, counted from 1."""
+    """Return the name of the joint that turns the blades of propeller `number` (from 1)."""
     return f"Quadricopter_propeller_joint{number}"
 
 
 def own_names(propellers: int) -> tuple[str, ...]:
-    """Return the names of the objects of a vehicle with this number of propellers, without cameras and sensors."""
+    """Return the object names of a vehicle with this number of propellers, without cameras and sensors."""
     names = ("Quadricopter_propeller{}".format, respondable, seen, joint)
     of_propellers = [name(number) for number in range(1, propellers + 1) for name in names]
     return DRONE, "Quadricopter_base", TRACK_BASE, TARGET, FLOOR_CAMERA, FRONT_CAMERA, SCRIPT, *of_propellers
 
 
-REMOVABLE = (FLOOR_CAMERA, FRONT_CAMERA, TRACK_BASE)  # without which a vehicle flies
+REMOVABLE = (FLOOR_CAMERA, FRONT_CAMERA, TRACK_BASE)  # a vehicle also flies without these
 
 
 class QuadricopterObjects:
-    """Puts the objects of one vehicle into the tree, all under names with its suffix."""
+    """Adds the objects of one vehicle to the tree, under names with its suffix."""
 
     def __init__(
         self,
@@ -101,10 +101,9 @@ class QuadricopterObjects:
         handles: list[int],
         places: Mapping[str, ObjectPlace | None] | None = None,
     ):
-        """Take the tree, '' or '#0' and so on, and the list to which every object's handle is added.
+        """Create it; `suffix` is '', '#0' and so on; the handle of every object is appended to `handles`.
 
-        `places` says of some objects, by their names here, how else they are called and where they are, or None of
-        those that are not there.
+        `places` changes the names and places of objects, by their default names; None leaves an object out.
         """
         self._objects = objects
         self._suffix = suffix
@@ -119,9 +118,9 @@ class QuadricopterObjects:
         cameras: Mapping[str, CameraParameters],
         sensors: Mapping[str, SensorParameters],
     ) -> None:
-        """Add all; `links` and `propellers` are poses in the root link's frame.
+        """Add all objects; `links` and `propellers` are poses in the root link's frame.
 
-        Raises ParameterError for a camera or sensor that cannot be where it is said to be.
+        Raises ParameterError for a camera or sensor whose parent, frame or name is not valid.
         """
         self._add(DRONE, body=body, alias="Quadcopter", also=("Quadricopter", "Quadcopter"))
         self._add("Quadricopter_base", DRONE, BASE, alias="base")
@@ -157,29 +156,29 @@ class QuadricopterObjects:
         place = self._places.get(name, NOWHERE_ELSE)
         if place is None:
             return
-        own = None if parent is None else f"{parent}{self._suffix}"
-        above = own if own is None or own in self._objects else parent  # one of the scene, such as Floor
+        parent_name = None if parent is None else f"{parent}{self._suffix}"
+        parent_name = parent_name if parent_name is None or parent_name in self._objects else parent  # such as Floor
         if place.parent is not None:
-            above = place.parent or None
-            if above is not None and above not in self._objects:
-                raise ParameterError(f"no object is named '{above}', the parent of '{name}'")
-        called = [one for given in (name, *also) for one in (given, given.replace("Quadricopter_", "Quadcopter_"))]
-        names = [f"{one}{self._suffix}" for one in dict.fromkeys(called)]  # V-REP 3.x's, and CoppeliaSim 4.0 to 4.2's
+            parent_name = place.parent or None
+            if parent_name is not None and parent_name not in self._objects:
+                raise ParameterError(f"no object is named '{parent_name}', the parent of '{name}'")
+        # names of V-REP 3.x, and of CoppeliaSim 4.0 to 4.2
+        bases = [base for old in (name, *also) for base in (old, old.replace("Quadricopter_", "Quadcopter_"))]
+        names = [f"{base}{self._suffix}" for base in dict.fromkeys(bases)]
         if place.name and place.name not in names:
             names.append(place.name)
         alias = place.alias or alias or name
         try:
             handle = self._objects.add(
-                names[0], above, place.local(local), body, alias=alias, also=names[1:], kind=kind
+                names[0], parent_name, place.local(local), body, alias=alias, also=names[1:], kind=kind
             )
-        except ValueError as error:  # one of the scene has that name
+        except ValueError as error:  # an object of the scene has that name
             raise ParameterError(str(error)) from None
         self._objects[handle].is_model = name == DRONE
         self._objects[handle].size_factor = place.size_factor
         self._handles.append(handle)
 
     def _add_sensor(self, links: Mapping[str, Matrix], name: str, sensor: SensorParameters) -> None:
-        """Add the object of a sensor. Raises ParameterError for one that cannot be where it is said to be."""
         if sensor.mount is not None and sensor.frame in links:
             raise ParameterError(
                 f"sensor {name}: the URDF already has a link {sensor.frame}; `mount` needs another frame"
@@ -190,18 +189,18 @@ class QuadricopterObjects:
         self._mount(f"sensor {name}", sensor.object or name, parent or DRONE, local, kind)
 
     def _add_camera(self, links: Mapping[str, Matrix], camera: CameraParameters) -> None:
-        said = f"camera frame {camera.frame}"
+        label = f"camera frame {camera.frame}"
         if camera.mount is None:
             if camera.frame not in links:
-                raise ParameterError(f"{said}: must be a link of the URDF, or have a `mount`")
+                raise ParameterError(f"{label}: must be a link of the URDF, or have a `mount`")
             parent, optical = DRONE, links[camera.frame]
         else:
             parent, optical = camera.mount.parent or DRONE, camera.mount.optical
-        self._mount(said, camera.object, parent, frames.multiply(optical, OPTICAL_FROM_SENSOR), "vision_sensor")
+        self._mount(label, camera.object, parent, frames.multiply(optical, OPTICAL_FROM_SENSOR), "vision_sensor")
 
-    def _mount(self, said: str, name: str, parent: str, local: Matrix, kind: str) -> None:
+    def _mount(self, label: str, name: str, parent: str, local: Matrix, kind: str) -> None:
         if f"{parent}{self._suffix}" not in self._objects and parent not in self._objects:
-            raise ParameterError(f"{said}: no object is named {parent}")
+            raise ParameterError(f"{label}: no object is named {parent}")
         if f"{name}{self._suffix}" in self._objects:
-            raise ParameterError(f"{said}: an object named '{name}' already exists")
+            raise ParameterError(f"{label}: an object named '{name}' already exists")
         self._add(name, parent, local, kind=kind)

@@ -1,6 +1,6 @@
-"""What a vehicle does, in words: what its script says of it, unless its body says otherwise.
+"""State of a vehicle in words: the state its script publishes, corrected by contacts and tilt.
 
-A script knows what it means to do; whether the drone lies on the ground or hangs on a wall, contacts and tilt tell.
+The script knows what it intends; contacts and tilt show whether the drone lies on the ground or touches a wall.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from drone_sim.vehicles.commands import UNKNOWN
 from drone_sim.vehicles.vehicle import Vehicle
 
 FLYING, HELD, UPSIDE_DOWN, SCRIPT_FAILED = "flying", "held", "upside down", "script failed"
-_CARRIES = 0.7  # upward part of a unit normal: steeper than 45 degrees nothing stands
-_SLIDES = 0.05  # m/s
+_MIN_SUPPORT = 0.7  # upward part of a unit normal; on a surface steeper than 45 degrees the drone does not stand
+_MIN_SLIDING_SPEED = 0.05  # m/s
 _FLOOR = "Floor"
 
 
@@ -26,42 +26,42 @@ def tilt(body: Body) -> float:
 
 
 def situation(body: Body) -> str:
-    """Return what its body does: flying, held, upside down, on the ground, sliding on it, or touching something."""
+    """Return the state of a body: flying, held, upside down, on the ground, sliding on it, or touching something."""
     if body.is_held:
         return HELD
-    touched = body.contacts()
+    contacts = body.contacts()
     if tilt(body) > math.pi / 2:
         return UPSIDE_DOWN
-    if not touched:
+    if not contacts:
         return FLYING
-    below = [one for one in touched if one.normal[2] > _CARRIES]
+    below = [contact for contact in contacts if contact.normal[2] > _MIN_SUPPORT]
     if not below:
-        return f"touches {_hardest(touched)}"
-    return f"{_motion(body.state.linear_velocity)}on {_hardest(below)}"
+        return f"touches {_strongest_contact(contacts)}"
+    return f"{_motion(body.state.linear_velocity)}on {_strongest_contact(below)}"
 
 
 def _motion(velocity: Vector) -> str:
-    return "slides " if math.hypot(*velocity) > _SLIDES else ""
+    return "slides " if math.hypot(*velocity) > _MIN_SLIDING_SPEED else ""
 
 
-def _hardest(touched: Sequence[Contact]) -> str:
-    """Return the name of what is touched with the greatest force."""
-    name = max(touched, key=lambda one: math.hypot(*one.force)).what
+def _strongest_contact(contacts: Sequence[Contact]) -> str:
+    """Return the name of the object with the largest contact force."""
+    name = max(contacts, key=lambda contact: math.hypot(*contact.force)).what
     return "the ground" if name in ("", _FLOOR) else name
 
 
 def doing(vehicle: Vehicle) -> str:
-    """Return what a vehicle does, in words.
+    """Return the state of a vehicle in words.
 
-    This is `script failed`, if a script of the vehicle has failed; else the state that the script publishes; else, or
-    if that is `flying`, the state of its body.
+    This is `script failed` if a script of the vehicle has failed; otherwise the state that the script publishes. If
+    there is none, or it is `flying`, it is the state of the body.
     """
     if vehicle.flight_state.script_error is not None:
         return SCRIPT_FAILED
-    said = str(vehicle.flight_state)
-    return situation(vehicle.body) if said == FLYING or said.startswith(UNKNOWN) else said
+    state = str(vehicle.flight_state)
+    return situation(vehicle.body) if state == FLYING or state.startswith(UNKNOWN) else state
 
 
 def hears_commands(vehicle: Vehicle) -> bool:
-    """Tell whether a script of the vehicle is subscribed to cmd_vel."""
+    """Return whether a script of the vehicle is subscribed to cmd_vel."""
     return any(bus.hears("cmd_vel") for bus in vehicle.commands.buses)
