@@ -1,1 +1,1 @@
-"""What stands in the world besides the vehicles: from a scene file into the world, and back."""
+"""The scene around the vehicles: scene files, their bodies and objects, and operations on these."""

@@ -1,4 +1,4 @@
-"""What a scene file may say of the scripts that are attached to its objects."""
+"""Parameters of the scripts that a scene file attaches to objects."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from pydantic import Field
 from drone_sim.config.types import Checked, FileName, Label, ParameterError, ScriptValue, Switch
 
 MAX_SCRIPTS = 256
-MAX_PARAMETERS = 256  # of one script
+MAX_PARAMETERS = 256  # per script
 
 
 class AttachedScriptParameters(Checked):
-    """A child script on an object of the scene or of a vehicle, which has the name `object` there.
+    """A child script on the object named `object`, of the scene or of a vehicle.
 
-    `embedded`: `..` in its paths is the parent of that object, as up to CoppeliaSim 4.8, and not the object itself.
+    `embedded`: `..` in its paths is that object's parent, as up to CoppeliaSim 4.8, and not the object itself.
     """
 
     object: Label
@@ -29,26 +29,26 @@ AttachedScripts = Annotated[list[AttachedScriptParameters], Field(max_length=MAX
 
 
 class RunningScripts(Protocol):
-    """What runs the scripts of the scene's objects, and is told what becomes of these."""
+    """Interface to the scripts of the scene's objects, called when objects are added, renamed or removed."""
 
     def attach(self, objects: Collection[str]) -> object:
-        """Attach the scripts of objects that have come; they begin before they are called for the first time."""
+        """Attach the scripts of added objects; each is initialised before its first call."""
 
     def rename(self, name: str, new: str) -> None:
-        """Know the script of an object, if it has one, by the object's new name."""
+        """Move the script of a renamed object, if it has one, to the object's new name."""
 
     def end(self, objects: Collection[str]) -> None:
-        """Call the cleanup of scripts whose objects are about to go, and let go of them; one that runs ends later."""
+        """Call cleanup and detach the scripts of objects to be removed; a script that is running ends later."""
 
 
 def check(scripts: Sequence[AttachedScriptParameters]) -> None:
-    """Raise ParameterError where an object has two scripts, or a script no file."""
+    """Raise ParameterError for an object with two scripts or a script without a file."""
     names: set[str] = set()
-    for index, one in enumerate(scripts):
+    for index, script in enumerate(scripts):
         for key, mistake in (
-            ("object", one.object in names and "is used twice"),
-            ("script", not one.script and "no file"),
+            ("object", script.object in names and "is used twice"),
+            ("script", not script.script and "no file"),
         ):
             if mistake:
-                raise ParameterError(mistake, ("scripts", index, key), f"'{getattr(one, key)}'")
-        names.add(one.object)
+                raise ParameterError(mistake, ("scripts", index, key), f"'{getattr(script, key)}'")
+        names.add(script.object)

@@ -1,4 +1,4 @@
-"""Shapes of the scene as the object tree sees them: what stands, what is carried, what the dynamics moves."""
+"""Scene shapes in the object tree, and their bodies in the world: static, kinematic or dynamic."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from drone_sim.world import World
 
 
 class ShapeInWorld(NamedTuple):
-    """What a shape is in the world: a link (-1: the root) of a body, how heavy (kg), and whether it stands still.
+    """A shape in the world: a link (-1: the root) of a body, its mass (kg), and whether it is static.
 
-    local: the shape's frame in its parent's; of what is held, in that of its joint, as it has moved.
+    local: the shape's pose in its parent's frame; if a joint holds it, in the moved frame of the joint.
     """
 
     number: int
@@ -28,10 +28,10 @@ class ShapeInWorld(NamedTuple):
 
 
 class SceneBody:
-    """One object of the scene that the dynamics moves, as the object tree sees it."""
+    """A free dynamic body of the scene, for the object tree."""
 
     def __init__(self, world: World, number: int):
-        """Take the world and the number of the body in it."""
+        """Create it for body `number` of the world."""
         self._world = world
         self.number = number
 
@@ -46,15 +46,15 @@ class SceneBody:
         return self.state.matrix
 
     def move(self, pose: Pose) -> None:
-        """Put it there, at rest."""
+        """Teleport the body, at rest."""
         self._world.set_pose(self.number, pose)
 
 
 class LinkBody:
-    """A shape that a joint or a force sensor holds."""
+    """The body of a shape that a joint or a force sensor holds, for the object tree."""
 
     def __init__(self, world: World, number: int, link: int, local: Matrix):
-        """Take the world, the number of the body in it, of its link, and that link's frame from the shape's."""
+        """Create it for a link of body `number`; `local` is link from shape."""
         self._world = world
         self.number = number
         self.link = link
@@ -77,45 +77,45 @@ class LinkBody:
         return frames.multiply(self._world.joints.link_state(self.number, self.link).matrix, self._local)
 
     def inertia(self) -> Inertia:
-        """Return how its mass lies in its frame."""
-        found = self._world.inertia(self.number, self.link)
-        return found._replace(frame=frames.multiply(frames.invert(self._local), found.frame))
+        """Return mass and inertia in the shape's frame."""
+        inertia = self._world.inertia(self.number, self.link)
+        return inertia._replace(frame=frames.multiply(frames.invert(self._local), inertia.frame))
 
     def move(self, pose: Pose) -> None:
-        """Refuse: its joint says where it is. Raises ValueError."""
+        """Raise ValueError: the joint determines the pose."""
         raise ValueError("a joint holds this shape, so it cannot be moved")
 
 
 class CarriedBody:
-    """A body without mass that follows the frame that carries it."""
+    """A kinematic body without mass that follows a frame."""
 
     def __init__(self, world: World, number: int, frame: Callable[[], Matrix]):
-        """Take the world, the number of the body in it, and what returns world from its frame."""
+        """Create it for body `number` of the world; `frame` returns world from body."""
         self._world = world
         self._number = number
         self._frame = frame
-        self._at: Matrix | None = None
+        self._last_matrix: Matrix | None = None
 
     def follow(self) -> None:
-        """Put it where its frame is, unless it is there."""
+        """Move the body to its frame if the frame has moved."""
         matrix = self._frame()
-        if matrix != self._at:
-            self._at = matrix
+        if matrix != self._last_matrix:
+            self._last_matrix = matrix
             self._world.set_pose(self._number, Pose(frames.position(matrix), frames.to_quaternion(matrix)))
 
     def renew(self) -> None:
-        """Put it where its frame is, if it was ever put anywhere: the world's state may have been restored."""
-        if self._at is not None:
-            self._at = None
+        """Move the body to its frame after the world's state was restored, if it was ever moved."""
+        if self._last_matrix is not None:
+            self._last_matrix = None
             self.follow()
 
 
 class ShapeObject(SceneObject):
-    """A shape: free where it has a mass, held where it hangs on a joint, else it stands still in its parent's frame."""
+    """A shape: free if it has mass, held if its parent is a joint, otherwise fixed in its parent's frame."""
 
-    number: int  # its body in the world
-    link: int  # its link there, -1 for the root
-    mass: float  # kg, 0 for what never moves
+    number: int  # of its body in the world
+    link: int  # of that body, -1 for the root
+    mass: float  # kg; 0: always static
 
     def __init__(
         self,
@@ -125,9 +125,9 @@ class ShapeObject(SceneObject):
         follow: Callable[[], None],
         solid: ShapeInWorld,
     ):
-        """Take where it is in the tree, and as what in the world.
+        """Create it at a place in the tree, with the body `solid` in the world.
 
-        `changed` is told whenever it hangs on something else, or has become static or dynamic; `follow` when it is put.
+        `changed` is called after its parent, its body or its being static has changed; `follow` after put().
         """
         self._world = world
         self._parent = place.parent
@@ -137,9 +137,9 @@ class ShapeObject(SceneObject):
         self.pass_carriers()
 
     def embody(self, solid: ShapeInWorld) -> None:
-        """Use this body in the world from now on; `pass_carriers` has to be called next."""
+        """Use another body in the world; call `pass_carriers` next."""
         self.number, self.link, local, self.mass, static = solid
-        self._passing: set[int] = set()
+        self._not_colliding: set[int] = set()
         self.carried = CarriedBody(self._world, self.number, self.matrix)
         if self.is_held:
             self.local = IDENTITY
@@ -153,38 +153,38 @@ class ShapeObject(SceneObject):
 
     @property
     def is_held(self) -> bool:
-        """Whether a joint or a force sensor holds it: nobody puts it anywhere else."""
+        """Whether a joint or a force sensor holds it; it can then not be moved on its own."""
         return self.link != -1
 
     @property
     def is_loose(self) -> bool:
-        """Whether it follows its parent only when a script moves that parent."""
+        """Whether it is a free child: it follows its parent only when a script moves that parent."""
         return not self.is_held and super().is_loose
 
     @property
     def parent(self) -> SceneObject | None:  # type: ignore[override]
-        """What carries it, where it has no mass."""
+        """The parent in the tree; a static shape follows it."""
         return self._parent
 
     @parent.setter
     def parent(self, parent: SceneObject | None) -> None:
         if parent is not self._parent:
             self._parent = parent
-            self._renew()
+            self._update()
 
     def inertia(self) -> Inertia | None:
-        """Return how its mass lies in it, None where the dynamics leaves it alone."""
+        """Return mass and inertia in its frame; None if it is static."""
         if isinstance(self.body, LinkBody):
             return self.body.inertia() if self.mass else None
         return None if self.is_static else self._world.inertia(self.number)
 
     @property
     def is_static(self) -> bool:
-        """Whether the dynamics leaves it alone."""
+        """Whether the dynamics does not move it."""
         return self.body is None
 
     def set_static(self, static: bool) -> None:
-        """Let the dynamics leave it alone, or move it again. Raises ValueError for what has never had a mass."""
+        """Make it static or dynamic. Raises ValueError if it has no mass in the scene file."""
         if static == self.is_static or self.is_held:
             return
         if not self.mass:
@@ -192,73 +192,73 @@ class ShapeObject(SceneObject):
         matrix = self.matrix()
         self.body = None if static else SceneBody(self._world, self.number)
         self._world.collision_filter.freeze(self.number, static)
-        self._renew()
+        self._update()
         self.put(matrix)
 
     def put(self, matrix: Matrix) -> None:
-        """Put it there, and its body. Raises ValueError for what is held."""
+        """Move it and its body to `matrix` (world). Raises ValueError if it is held."""
         if self.is_held:
-            above = self.parent.name if self.parent is not None else ""
-            raise ValueError(f"'{self.name}' is held by '{above}': set that joint, or move the joint's parent")
+            holder = self.parent.name if self.parent is not None else ""
+            raise ValueError(f"'{self.name}' is held by '{holder}': set that joint, or move the joint's parent")
         super().put(matrix)
         if self.is_static:
             self.carried.follow()
             self._follow()
 
     def push(self, force: Vector, torque: Vector) -> None:
-        """Let a force (N) at its centre of mass and a torque (N m) act in the next step, both in the world frame.
+        """Apply a force (N) at its centre of mass and a torque (N m) in the next step, both in the world frame.
 
-        What the dynamics leaves alone feels nothing.
+        A static shape ignores them.
         """
         if not self.is_static:
             self._world.shape_forces.add(self.number, self.link, force, torque)
 
     def drop_pushes(self, forces: bool, torques: bool) -> None:
-        """Forget the forces, or the torques, or both, that have pushed it since the last step."""
+        """Drop the forces, the torques or both that were added since the last step."""
         self._world.shape_forces.drop(self.number, self.link, forces, torques)
 
     def release(self) -> None:
-        """Move by the dynamics again, and without a carrier, before another object takes its place."""
+        """Make it dynamic again, if it has mass, and remove its parent, before another object takes its place."""
         if self.mass:
             self.set_static(False)
         self.parent = None
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that puts it back where it is now, as static as it is."""
-        put_back, static = super().save_state(), self.is_static
+        """Return a function that restores its place in the tree and whether it is static."""
+        restore_place, static = super().save_state(), self.is_static
 
         def restore() -> None:
             self.set_static(static)
-            put_back()
+            restore_place()
 
         return restore
 
     def forget_body(self, number: int) -> None:
-        """Forget a removed body with which it did not collide."""
-        self._passing.discard(number)
+        """Forget a removed body from the set of those with which it does not collide."""
+        self._not_colliding.discard(number)
 
-    def _renew(self) -> None:
+    def _update(self) -> None:
         self.pass_carriers()
         self._changed(self)
 
     def pass_carriers(self) -> None:
-        """Do not collide with what carries it."""
-        above = bodies_above(self) if self.is_static else set()
-        for number in self._passing - above:
+        """Disable collisions with the bodies that carry it."""
+        carriers = bodies_above(self) if self.is_static else set()
+        for number in self._not_colliding - carriers:
             self._world.collision_filter.let_pass(self.number, number, passes=False)
-        for number in above - self._passing:
+        for number in carriers - self._not_colliding:
             self._world.collision_filter.let_pass(self.number, number)
-        self._passing = above
+        self._not_colliding = carriers
 
 
-def bodies_above(one: SceneObject) -> set[int]:
-    """Return the bodies in the world of what carries an object."""
-    found = set()
-    above = one.parent
-    while above is not None:
-        carrier = above if isinstance(above, ShapeObject) else above.body
-        number = getattr(carrier, "number", None)
+def bodies_above(child: SceneObject) -> set[int]:
+    """Return the numbers of the bodies of an object's ancestors."""
+    numbers = set()
+    ancestor = child.parent
+    while ancestor is not None:
+        body = ancestor if isinstance(ancestor, ShapeObject) else ancestor.body
+        number = getattr(body, "number", None)
         if number is not None:
-            found.add(number)
-        above = above.parent
-    return found
+            numbers.add(number)
+        ancestor = ancestor.parent
+    return numbers

@@ -1,4 +1,4 @@
-"""The bodies of a scene's shapes, one each, but for those that joints hold together; and where entries stand."""
+"""Builds the bodies of a scene's shapes (one per shape or articulation), and orders and transforms of entries."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from drone_sim.world.assemblies import Hinge, Link
 
 
 class Built(NamedTuple):
-    """A body in the world: its chain, its number, and its link (-1: the root) for each entry of a shape."""
+    """A body in the world: its chain, its number, and the link (-1: the root) of each shape, by entry."""
 
     chain: Chain
     body: int
@@ -29,59 +29,59 @@ class Built(NamedTuple):
 
 
 def alone(entries: Mapping[int, EntryParameters], chains: Iterable[Chain]) -> list[Chain]:
-    """Return a chain of its own for each shape that is in none of these."""
+    """Return a chain of a single shape for each shape that is in none of `chains`."""
     held = {index for chain in chains for index in chain.shapes()}
-    shapes = (index for index, one in entries.items() if isinstance(one, ObjectParameters))
+    shapes = (index for index, entry in entries.items() if isinstance(entry, ObjectParameters))
     return [Chain(index, []) for index in shapes if index not in held]
 
 
 def build(
     world: World, entries: Mapping[int, EntryParameters], chains: Iterable[Chain], matrices: Mapping[int, Matrix]
 ) -> list[Built]:
-    """Put the shapes of chains into the world, or none. `matrices` has for each entry the world from its frame.
+    """Add the shapes of chains to the world; on an error, none of them. `matrices` are world from entry.
 
-    Raises ValueError, in one line, for a file that cannot be read.
+    Raises ValueError with a message of one line for a file that cannot be read.
     """
-    made: list[Built] = []
+    built: list[Built] = []
     try:
         for chain in chains:
             if chain.hung or chain.root is None:
-                body, links = _together(world, entries, chain, matrices)
+                body, links = _articulated(world, entries, chain, matrices)
             else:
-                body, links = _alone(world, entries[chain.root], matrices[chain.root]), [-1]
+                body, links = _single(world, entries[chain.root], matrices[chain.root]), [-1]
             places = {index: link for index, link in zip(chain.shapes(), links) if index is not None}
-            made.append(Built(chain, body, places))
+            built.append(Built(chain, body, places))
     except ValueError:
-        for one in made:
-            world.remove(one.body)
+        for item in built:
+            world.remove(item.body)
         raise
-    for one in made:
-        for index, link in one.links.items():
-            _make_seem(world, entries[index], one.body, link)
-    return made
+    for item in built:
+        for index, link in item.links.items():
+            _set_properties(world, entries[index], item.body, link)
+    return built
 
 
-def _make_seem(world: World, one: EntryParameters, body: int, link: int) -> None:
-    if isinstance(one, ObjectParameters) and (one.friction, one.restitution) != (1.0, 0.0):
-        world.set_material(body, link, one.friction, one.restitution)
-    if isinstance(one, ObjectParameters) and not one.respondable:
+def _set_properties(world: World, entry: EntryParameters, body: int, link: int) -> None:
+    if isinstance(entry, ObjectParameters) and (entry.friction, entry.restitution) != (1.0, 0.0):
+        world.set_material(body, link, entry.friction, entry.restitution)
+    if isinstance(entry, ObjectParameters) and not entry.respondable:
         world.collision_filter.let_everything_pass(body, link)
-    if isinstance(one, ObjectParameters) and not one.visible:
+    if isinstance(entry, ObjectParameters) and not entry.visible:
         world.pictures.hide(body, link)
-    if isinstance(one, ObjectParameters) and one.static and one.mass:
+    if isinstance(entry, ObjectParameters) and entry.static and entry.mass:
         world.collision_filter.freeze(body, still=True)
 
 
-def _alone(world: World, one: EntryParameters, matrix: Matrix) -> int:
-    assert isinstance(one, ObjectParameters), "a body consists of shapes"
-    shape = one.to_shape()
+def _single(world: World, entry: EntryParameters, matrix: Matrix) -> int:
+    assert isinstance(entry, ObjectParameters), "a body consists of shapes"
+    shape = entry.to_shape()
     pose = _pose(matrix)
-    if isinstance(shape, Compound) or one.inertia is not None:
-        return world.add_assembly([_link(one, IDENTITY)], pose, [one.texture])[0]
-    return world.add_object(shape, pose, mass=one.mass, color=one.color, texture=one.texture)
+    if isinstance(shape, Compound) or entry.inertia is not None:
+        return world.add_assembly([_link(entry, IDENTITY)], pose, [entry.texture])[0]
+    return world.add_object(shape, pose, mass=entry.mass, color=entry.color, texture=entry.texture)
 
 
-def _together(
+def _articulated(
     world: World, entries: Mapping[int, EntryParameters], chain: Chain, matrices: Mapping[int, Matrix]
 ) -> tuple[int, list[int]]:
     root = entries[chain.root] if chain.root is not None else None
@@ -96,7 +96,7 @@ def _together(
 
 
 def _frame(entries: Mapping[int, EntryParameters], chain: Chain, matrices: Mapping[int, Matrix]) -> Matrix:
-    """Return the world from the frame of a chain's root: the shape's, or that of the parent of its only first joint."""
+    """Return world from a chain's root: the shape, or else the parent of the chain's first joint."""
     if chain.root is not None:
         return matrices[chain.root]
     joint = chain.hung[0].joint
@@ -111,39 +111,39 @@ def _hinge(entries: Mapping[int, EntryParameters], hung: Hung) -> Hinge:
     return Hinge(hung.above, hung.local, joint.type, joint.limits, joint.value)
 
 
-def _link(one: ObjectParameters, local: Matrix) -> Link:
-    parts = parts_of(one.to_shape(), one.color)
-    if not one.mass:
+def _link(entry: ObjectParameters, local: Matrix) -> Link:
+    parts = parts_of(entry.to_shape(), entry.color)
+    if not entry.mass:
         return Link(parts, local)
-    inertia = one.inertia.inertia if one.inertia is not None else inertia_of(parts, one.mass)
-    return Link(parts, local, one.mass, inertia)
+    inertia = entry.inertia.inertia if entry.inertia is not None else inertia_of(parts, entry.mass)
+    return Link(parts, local, entry.mass, inertia)
 
 
 def _pose(matrix: Matrix) -> Pose:
     return Pose(frames.position(matrix), frames.to_quaternion(matrix))
 
 
-# ---- where they stand
+# ---- order and transforms
 
 
 def parents_first(entries: Mapping[int, EntryParameters]) -> list[int]:
-    """Return the indices of entries, no parent after its children, else as they come. There is no circle among them."""
-    index_of = {one.name: index for index, one in entries.items()}
+    """Return the indices of entries in their order, but each parent before its children; there must be no cycle."""
+    index_of = {entry.name: index for index, entry in entries.items()}
     ordered: dict[int, None] = {}
     for index in entries:
         waiting: list[int] = []
-        above: int | None = index
-        while above is not None and above not in ordered:
-            waiting.append(above)
-            above = index_of.get(entries[above].parent)
-        ordered.update((one, None) for one in reversed(waiting))
+        parent: int | None = index
+        while parent is not None and parent not in ordered:
+            waiting.append(parent)
+            parent = index_of.get(entries[parent].parent)
+        ordered.update((ancestor, None) for ancestor in reversed(waiting))
     return list(ordered)
 
 
-def motion(one: EntryParameters) -> Matrix:
-    """Return the transform between an entry's frame and what hangs on it: that which a joint makes."""
-    if not isinstance(one, JointParameters):
+def motion(entry: EntryParameters) -> Matrix:
+    """Return entry from child frame: the joint's present motion, or the identity if the entry is not a joint."""
+    if not isinstance(entry, JointParameters):
         return IDENTITY
-    if one.type == PRISMATIC:
-        return from_rpy((0.0, 0.0, one.value), (0.0, 0.0, 0.0))
-    return from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, one.value))
+    if entry.type == PRISMATIC:
+        return from_rpy((0.0, 0.0, entry.value), (0.0, 0.0, 0.0))
+    return from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, entry.value))

@@ -1,9 +1,9 @@
-"""Which joints of a scene the dynamics moves, and what hangs together by them and by force sensors.
+"""Finds the joints that the dynamics moves, and the articulations ("chains") of joints, force sensors and shapes.
 
-A joint that is not kinematic, is revolute or prismatic, and has just one shape with a mass right below it, holds that
-shape to what is above: to the next such shape or joint upwards, else to its parent, which stands still or carries it. A
-force sensor with such a shape holds it rigidly. Shapes with a mass that neither of these connects move independently:
-parent and child in the tree are not rigidly joined.
+A revolute or prismatic joint that is not kinematic and has exactly one child shape with mass connects that shape to its
+nearest ancestor that is such a shape or joint, or else to the joint's parent, which is static or kinematic. A force
+sensor with such a child shape holds it rigidly. Shapes with mass that no joint or force sensor connects move
+independently: parent and child in the tree are not rigidly joined.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from drone_sim.scene.kinds.force_sensor import ForceSensorParameters
 from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.object_parameters import ObjectParameters
 
-MOST_HELD = 127  # of one body: PyBullet counts 128 links, and knows no state of a larger one
-_Holding = JointParameters | ForceSensorParameters
+MOST_HELD = 127  # per body; PyBullet has at most 128 links and returns no state for larger bodies
+_Holder = JointParameters | ForceSensorParameters
 
 
 class Hung(NamedTuple):
-    """A shape on a joint, or on a force sensor, both as indices among the entries.
+    """A shape attached by a joint or force sensor, both as indices of entries.
 
-    above: index in the chain of what it is held to; local: that one's frame from the joint's, where the frame of a
-    root is the shape's (or the joint's parent's) and that of what is held is its joint's, as it has moved.
+    above: index in the chain of the link that it is attached to; local: that link's frame from the joint's. The frame
+    of a root is that of the shape (or of the joint's parent); the frame of a held link is the moved frame of its joint.
     """
 
     joint: int
@@ -36,59 +36,58 @@ class Hung(NamedTuple):
 
 
 class Chain(NamedTuple):
-    """A root and what hangs on it, first what is nearest. `root` is the entry of a shape with a mass, or None."""
+    """An articulation: a root and the shapes attached to it, nearest first. `root` is a shape with mass, or None."""
 
     root: int | None
     hung: list[Hung]
 
     def shapes(self) -> Iterator[int | None]:
-        """Yield the entries of its shapes, first the root."""
+        """Yield the entries of the shapes, the root first."""
         yield self.root
-        yield from (one.shape for one in self.hung)
+        yield from (hung.shape for hung in self.hung)
 
     def members(self) -> Iterator[int]:
-        """Yield the entries of all that it is made of."""
-        yield from (one for one in self.shapes() if one is not None)
-        yield from (one.joint for one in self.hung)
+        """Yield the entries of all shapes, joints and force sensors."""
+        yield from (shape for shape in self.shapes() if shape is not None)
+        yield from (hung.joint for hung in self.hung)
 
 
 class Chains(NamedTuple):
-    """All chains; and why other joints are moved by scripts alone, by their entry."""
+    """All chains, and for each other joint that should be dynamic why it is not, by entry."""
 
     chains: list[Chain]
     reasons: dict[int, str]
 
 
 def found(entries: Mapping[int, EntryParameters]) -> Chains:
-    """Return the chains among the entries of a scene, whose parents come in any order, but not in a circle.
+    """Return the chains of a scene's entries, which may be in any order, but without a cycle of parents.
 
-    Raises ParameterError for one of more than MOST_HELD joints.
+    Raises ParameterError for a chain of more than MOST_HELD joints.
     """
     return _Search(entries).run()
 
 
-def _holds(one: _Holding) -> bool:
-    """Tell whether something may hold a shape in the dynamics."""
-    return isinstance(one, ForceSensorParameters) or one.mode != "kinematic"
+def _is_dynamic(entry: _Holder) -> bool:
+    return isinstance(entry, ForceSensorParameters) or entry.mode != "kinematic"
 
 
 class _Search:
     def __init__(self, entries: Mapping[int, EntryParameters]):
         self._entries = entries
-        self._index = {one.name: index for index, one in entries.items()}
-        self._held: dict[int, int] = {}  # shape by joint
-        self._place: dict[int, tuple[Chain, int]] = {}  # of a shape or a joint: the chain, and the index in it
+        self._index = {entry.name: index for index, entry in entries.items()}
+        self._held: dict[int, int] = {}  # joint -> shape
+        self._place: dict[int, tuple[Chain, int]] = {}  # shape or joint -> chain, and index in it
 
     def run(self) -> Chains:
         reasons = {}
-        joints = {index: one for index, one in self._entries.items() if isinstance(one, _Holding)}
-        below = self._shapes_below(joints)
-        for index, one in joints.items():
-            reason = self._reason(one, below[index])
+        joints = {index: entry for index, entry in self._entries.items() if isinstance(entry, _Holder)}
+        shapes_below = self._shapes_below(joints)
+        for index, entry in joints.items():
+            reason = self._reason(entry, shapes_below[index])
             if reason:
                 reasons[index] = reason
-            elif _holds(one) and below[index]:
-                self._held[index] = below[index][0]
+            elif _is_dynamic(entry) and shapes_below[index]:
+                self._held[index] = shapes_below[index][0]
         chains: list[Chain] = []
         for joint in self._held:
             self._put(joint, chains)
@@ -103,51 +102,51 @@ class _Search:
                 f"{len(chain.hung)} joints and force sensors in a chain from '{name}': at most {MOST_HELD} are allowed"
             )
 
-    def _shapes_below(self, joints: Mapping[int, _Holding]) -> dict[int, list[int]]:
-        """Return the shapes with a mass right below each joint."""
+    def _shapes_below(self, joints: Mapping[int, _Holder]) -> dict[int, list[int]]:
+        """Return the child shapes with mass of each joint."""
         below: dict[int, list[int]] = {index: [] for index in joints}
-        for index, one in self._entries.items():
-            if one.parent and isinstance(one, ObjectParameters) and one.moves:
-                above = self._index.get(one.parent, -1)
-                if above in below:
-                    below[above].append(index)
+        for index, entry in self._entries.items():
+            if entry.parent and isinstance(entry, ObjectParameters) and entry.moves:
+                parent = self._index.get(entry.parent, -1)
+                if parent in below:
+                    below[parent].append(index)
         return below
 
-    def _reason(self, joint: _Holding, below: Sequence[int]) -> str:
-        """Return why the dynamics does not move a joint that should be; '' where it does, or should not."""
-        if not _holds(joint) or (isinstance(joint, ForceSensorParameters) and not below):
+    def _reason(self, joint: _Holder, shapes: Sequence[int]) -> str:
+        """Return why the dynamics cannot move a joint that is not kinematic; '' otherwise."""
+        if not _is_dynamic(joint) or (isinstance(joint, ForceSensorParameters) and not shapes):
             return ""
         if isinstance(joint, JointParameters) and joint.type == "spherical":
             return "spherical joints are not part of the dynamics"
-        if not below:
+        if not shapes:
             return "they have no child shape with a mass"
-        if len(below) > 1:
-            return f"they have {len(below)} child shapes with a mass, not one"
-        if any(self._is_urdf(index) for index in (below[0], self._holder(joint)[0])):
+        if len(shapes) > 1:
+            return f"they have {len(shapes)} child shapes with a mass, not one"
+        if any(self._is_urdf(index) for index in (shapes[0], self._holder(joint)[0])):
             return "joints cannot hold a urdf"
         return ""
 
     def _is_urdf(self, index: int | None) -> bool:
-        one = self._entries[index] if index is not None else None
-        return isinstance(one, ObjectParameters) and one.shape == "urdf"
+        entry = self._entries[index] if index is not None else None
+        return isinstance(entry, ObjectParameters) and entry.shape == "urdf"
 
     def _holder(self, joint: EntryParameters) -> tuple[int | None, Matrix]:
-        """Return the shape or joint that holds a joint, and its frame from the joint's.
+        """Return the entry of the shape or joint that holds a joint, and its frame from the joint's.
 
-        None is the joint's parent, or the world.
+        None stands for the joint's parent or the world.
         """
-        local, above = joint.local, self._index.get(joint.parent)
-        while above is not None:
-            one = self._entries[above]
-            if above in self._held or (isinstance(one, ObjectParameters) and one.moves):
-                return above, local
-            if isinstance(one, JointParameters):
-                break  # scripts move it: what hangs on it is carried
-            local, above = multiply(one.local, local), self._index.get(one.parent)
+        local, ancestor = joint.local, self._index.get(joint.parent)
+        while ancestor is not None:
+            entry = self._entries[ancestor]
+            if ancestor in self._held or (isinstance(entry, ObjectParameters) and entry.moves):
+                return ancestor, local
+            if isinstance(entry, JointParameters):
+                break  # scripts move this joint: its children are kinematic
+            local, ancestor = multiply(entry.local, local), self._index.get(entry.parent)
         return None, joint.local
 
     def _put(self, joint: int, chains: list[Chain]) -> tuple[Chain, int]:
-        """Put a joint and its shape into a chain, unless they are in one; return the chain and their index there."""
+        """Add a joint and its shape to a chain, unless they are in one; return the chain and their index."""
         if joint in self._place:
             return self._place[joint]
         shape = self._held[joint]
@@ -158,7 +157,7 @@ class _Search:
         return self._place[joint]
 
     def _link_of(self, holder: int | None, chains: list[Chain]) -> tuple[Chain, int, Matrix]:
-        """Return chain and index of the link that holds something, and that link's frame from the holder's."""
+        """Return chain and index of the link of `holder`, and that link's frame from the holder's."""
         if holder is None:
             chains.append(Chain(None, []))
             return chains[-1], 0, IDENTITY

@@ -1,4 +1,4 @@
-"""What all entries of `objects` have in common: a name, a parent, a place in the parent's frame, also as it is now."""
+"""The common part of all entries of `objects`: name, parent and pose in the parent's frame; present values of these."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from drone_sim.mechanics.joint import FORCE, POSITION, SPHERICAL, VELOCITY, Join
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose
 
-_STANDS = 1e-7  # m, by which what has not been moved may seem to be elsewhere
+_TOLERANCE = 1e-7  # m and rotation matrix element; rounding error of the pose of an object that was not moved
 
 
 class Place(NamedTuple):
-    """Where an object belongs in the tree."""
+    """Names, parent and pose of an object in the tree."""
 
     names: tuple[str, ...]
     alias: str
@@ -26,12 +26,12 @@ class Place(NamedTuple):
 
 
 class EntryParameters(Checked):
-    """An entry; `position` (m) and `rpy` (rad) are in the frame of the object named `parent`, '' the world.
+    """An entry; `position` (m) and `rpy` (rad) are in the frame of the object named `parent` ('': the world).
 
-    No other object has its `name` (V-REP 3.x); siblings may share the `alias` (4.x), which is the name where none is
-    given. `model`: it is the base of a model, from which paths with a colon begin (`:/`). `category`: of its pixels and
-    boxes in a camera's truth, the name without its number where none is given. `size_factor` is what
-    sim.getObjectSizeFactor returns; it scales nothing.
+    `name` (V-REP 3.x) is unique; siblings may share an `alias` (4.x), which defaults to the name. `model`: the object
+    is the base of a model, at which paths with a colon (`:/`) begin. `category`: label of its pixels and boxes in a
+    camera's ground truth; the default is the name without its number. sim.getObjectSizeFactor returns `size_factor`; it
+    does not scale anything.
     """
 
     name: Label = ""
@@ -44,57 +44,57 @@ class EntryParameters(Checked):
     size_factor: Annotated[Finite, Within(1e-6, 1e6)] = 1.0
 
     def model_post_init(self, _context: Any) -> None:
-        """Refuse what scripts could not find under a name."""
+        """Raise ParameterError for an entry without a name that needs one."""
         if (self.parent or self.alias) and not self.name:
             key, value = ("parent", self.parent) if self.parent else ("alias", self.alias)
             raise ParameterError("an entry with a parent or alias needs a `name`", (key,), f"'{value}'")
 
     @property
     def pose(self) -> Pose:
-        """Where it stands in its parent's frame."""
+        """Its pose in the parent's frame."""
         x, y, z = self.position
         return Pose((x, y, z), to_quaternion(from_rpy((0, 0, 0), self.rpy)))
 
     @property
     def local(self) -> Matrix:
-        """Its parent's frame from its own."""
+        """Parent from object frame."""
         return from_rpy(self.position, self.rpy)
 
     @property
     def shown(self) -> str:
-        """What 4.x paths call it."""
+        """The name that 4.x paths use: the alias, or else the name."""
         return self.alias or self.name
 
 
-# ---- as it is now
+# ---- present values
 
 
-def place_of(one: SceneObject) -> dict[str, Any]:
-    """Return the keys of an entry that say where an object is now, what it hangs on, and how a joint stands."""
-    above = one.parent
-    matrix = one.matrix() if above is None else frames.relative(above.below(), one.matrix())
-    values = place_at(matrix, "" if above is None else above.name)
-    return {**values, **_joint(one)} if isinstance(one, Joint) else values
+def place_of(item: SceneObject) -> dict[str, Any]:
+    """Return the present values of an entry's keys for pose, parent and the state of a joint."""
+    parent = item.parent
+    matrix = item.matrix() if parent is None else frames.relative(parent.below(), item.matrix())
+    values = place_at(matrix, "" if parent is None else parent.name)
+    return {**values, **_joint(item)} if isinstance(item, Joint) else values
 
 
 def place_at(matrix: Matrix, parent: str) -> dict[str, Any]:
-    """Return the keys of an entry that say where it is in the frame of its parent, to 1e-9 m and rad."""
-    position, turn = (
-        [round(one, 9) + 0.0 for one in three] for three in (frames.position(matrix), frames.to_rpy(matrix))
+    """Return the keys of an entry for a pose in the frame of its parent, rounded to 1e-9 m and rad."""
+    position, rpy = (  # adding 0.0 turns -0.0 into 0.0
+        [round(value, 9) + 0.0 for value in values] for values in (frames.position(matrix), frames.to_rpy(matrix))
     )
-    return {"position": position, "rpy": turn, "parent": parent}  # without a -0.0
+    return {"position": position, "rpy": rpy, "parent": parent}
 
 
 def stands_at(entry: EntryParameters, place: Mapping[str, Any]) -> bool:
-    """Tell whether an entry says already, to 1e-7 m and 1e-7 of a turn's matrix, what `place_of` says."""
+    """Return whether an entry has this place already, to 1e-7 m and 1e-7 of the rotation matrix."""
     if entry.parent != place["parent"]:
         return False
-    now = from_rpy(place["position"], place["rpy"])
-    return all(abs(one - other) < _STANDS for one, other in zip(entry.local, now))
+    matrix = from_rpy(place["position"], place["rpy"])
+    return all(abs(value - other) < _TOLERANCE for value, other in zip(entry.local, matrix))
 
 
 def placed(entry: EntryParameters, parent: str, matrix: Matrix) -> EntryParameters:
-    """Return an entry in another place, in the frame of its parent."""
+    """Return the entry with another parent and pose in the parent's frame."""
     place = place_at(matrix, parent)
     return entry.model_copy(update={"parent": parent, **{key: tuple(place[key]) for key in ("position", "rpy")}})
 

@@ -1,4 +1,4 @@
-"""What a scene file may say of collections of objects, which scripts find by their names."""
+"""Parameters of the object collections of a scene file, which scripts access by name."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from drone_sim.context import SimulationContext
 from drone_sim.mechanics.object_collections import Item
 
 _LOG = logging.getLogger(__name__)
-_MOST, _MOST_ITEMS = 256, 10_000
+_MAX_COLLECTIONS, _MAX_ITEMS = 256, 10_000
 
 
 class ItemParameters(Checked):
-    """What belongs to a collection: an object, what hangs on it (tree), what it hangs on (chain), or all there are.
+    """Members of a collection: an object, its descendants (tree), its ancestors (chain), or all objects.
 
-    `removes`: from what the items before it say; `without`: a tree or chain leaves out the object itself.
+    `removes`: remove them from the members of the preceding items; `without`: tree or chain without the object itself.
     """
 
     what: Literal["single", "tree", "chain", "all"]
@@ -28,7 +28,7 @@ class ItemParameters(Checked):
     without: Switch = False
 
     def model_post_init(self, _context: Any) -> None:
-        """Refuse an item without an object that needs one."""
+        """Raise ParameterError for an item without the object that it needs."""
         if not self.object and self.what != "all":
             raise ParameterError(f"a {self.what} needs the name of an object", ("object",), "''")
 
@@ -37,29 +37,29 @@ class CollectionParameters(Checked):
     """A collection."""
 
     name: Annotated[Label, Field(min_length=1)]
-    items: Annotated[list[ItemParameters], Field(max_length=_MOST_ITEMS)]
+    items: Annotated[list[ItemParameters], Field(max_length=_MAX_ITEMS)]
 
 
-CollectionList = Annotated[list[CollectionParameters], Field(max_length=_MOST)]
+CollectionList = Annotated[list[CollectionParameters], Field(max_length=_MAX_COLLECTIONS)]
 
 
 def check(collections: Sequence[CollectionParameters]) -> None:
-    """Raise ParameterError where two have one name."""
+    """Raise ParameterError if two collections have the same name."""
     names: set[str] = set()
-    for index, one in enumerate(collections):
-        if one.name in names:
-            raise ParameterError("is used twice", ("collections", index, "name"), f"'{one.name}'")
-        names.add(one.name)
+    for index, collection in enumerate(collections):
+        if collection.name in names:
+            raise ParameterError("is used twice", ("collections", index, "name"), f"'{collection.name}'")
+        names.add(collection.name)
 
 
 def begin(collections: Sequence[CollectionParameters], context: SimulationContext) -> None:
-    """Let scripts find collections of the objects that are there by now; others are left out, which the log says."""
-    for one in collections:
-        handle = context.collections.add(one.name)
-        for item in one.items:
+    """Create the collections of the objects that exist; log a warning for each missing object."""
+    for collection in collections:
+        handle = context.collections.add(collection.name)
+        for item in collection.items:
             try:
                 of = -1 if item.what == "all" else context.objects.handle(item.object)
             except ValueError as error:
-                _LOG.warning("collection %s: %s", one.name, error)
+                _LOG.warning("collection %s: %s", collection.name, error)
                 continue
             context.collections.extend(handle, Item(item.what, of, item.removes, item.without))

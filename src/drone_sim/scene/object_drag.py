@@ -1,4 +1,4 @@
-"""Objects that a user drags: moved while the simulation goes on, and held still until they are released."""
+"""Objects that a user drags: moved while the simulation runs, and frozen until they are released."""
 
 from __future__ import annotations
 
@@ -14,48 +14,48 @@ from drone_sim.scene.bodies import ShapeObject
 
 
 class ObjectDrag:
-    """The objects of one scene that are being dragged. They are not part of snapshots: restoring one releases them."""
+    """The objects of one scene that are being dragged. Restoring a snapshot releases them."""
 
     def __init__(self, context: SimulationContext, things: Callable[[], Mapping[str, SceneObject]], floor: float):
-        """Take the context, what returns all objects that can be dragged, by name, and the floor's side (m)."""
-        self.held: dict[str, int] = {}  # the body that stands still, by what is held of it
+        """Create it; `things` returns the objects that can be dragged, by name; `floor` is the floor's side (m)."""
+        self.held: dict[str, int] = {}  # object name -> frozen body
         self._world, self._objects = context.world, context.objects
         self._things = things
         self.floor = floor
 
     def hold(self, name: str) -> None:
-        """Let an object stand still, whatever pulls at it. Raises ValueError for one that is not there."""
-        whole = _whole(self._find(name))
+        """Freeze an object's body, whatever forces act on it. Raises ValueError for an unknown name."""
+        whole = _movable_root(self._find(name))
         number = whole.number if isinstance(whole, ShapeObject) else getattr(whole.body, "number", None)
         if name not in self.held and number is not None and whole.body is not None:
             self._world.collision_filter.freeze(number, still=True)
             self.held[name] = number
 
     def let_go(self, name: str) -> None:
-        """Let an object fall, or go on, at rest where it is."""
+        """Release an object: its body moves again, from rest."""
         number = self.held.pop(name, None)
         if number is None or number in self.held.values() or self._is_static(number):
             return
         self._world.collision_filter.freeze(number, still=False)
 
     def forget(self, number: int) -> None:
-        """Release what belongs to a body that was removed."""
-        self.held = {name: one for name, one in self.held.items() if one != number}
+        """Release the objects of a body that was removed."""
+        self.held = {name: body for name, body in self.held.items() if body != number}
 
     def let_go_of_all(self) -> None:
-        """Hold nothing."""
+        """Release all objects."""
         for name in tuple(self.held):
             self.let_go(name)
 
     def put(self, name: str, matrix: Matrix) -> None:
-        """Put an object at a transform in the world, with all that is fixed to it or hangs on it.
+        """Move an object to a transform in the world, with everything fixed to it and its children.
 
-        Raises ValueError where there is no such object, or it could not be there.
+        Raises ValueError for an unknown name or a position off the floor.
         """
-        one = self._find(name)
-        self._check(frames.position(one.matrix()), frames.position(matrix))
-        whole = _whole(one)
-        matrix = frames.multiply(matrix, frames.relative(one.matrix(), whole.matrix()))
+        item = self._find(name)
+        self._check(frames.position(item.matrix()), frames.position(matrix))
+        whole = _movable_root(item)
+        matrix = frames.multiply(matrix, frames.relative(item.matrix(), whole.matrix()))
         self._objects.set_matrix(self._objects.handle(whole.name), WORLD, matrix)
 
     def _find(self, name: str) -> SceneObject:
@@ -65,25 +65,26 @@ class ObjectDrag:
         return things[name]
 
     def _is_static(self, number: int) -> bool:
-        """Tell whether a script has made it so."""
+        """Return whether a script has made the shape of this body static."""
         return any(
-            isinstance(one, ShapeObject) and one.number == number and one.is_static for one in self._things().values()
+            isinstance(item, ShapeObject) and item.number == number and item.is_static
+            for item in self._things().values()
         )
 
     def _check(self, now: Vector, wanted: Vector) -> None:
-        """Refuse places off the floor, but for what is farther away already."""
+        """Raise ValueError for a position off the floor that is farther out than the present one."""
         half = self.floor / 2
         for axis, before, value, low, high in zip("xyz", now, wanted, (-half, -half, 0.0), (half, half, self.floor)):
             if not min(low, before) <= value <= max(high, before):
                 raise ValueError(f"position.{axis} = {value:g}: must be from {low:g} to {high:g} m on this floor")
 
 
-def _whole(one: SceneObject) -> SceneObject:
-    """Return what moves with an object: itself, or the shape to which joints hold it. Raises ValueError for none."""
-    whole: SceneObject | None = one
-    if isinstance(one, ShapeObject) and one.is_held:
-        while whole is not None and (not isinstance(whole, ShapeObject) or whole.is_held):
-            whole = whole.parent
-    if whole is None:
-        raise ValueError(f"'{one.name}' cannot be dragged: joints hold it, and no free shape holds these joints")
-    return whole
+def _movable_root(item: SceneObject) -> SceneObject:
+    """Return the object to move: itself, or the root shape if joints hold it. Raises ValueError if there is none."""
+    root: SceneObject | None = item
+    if isinstance(item, ShapeObject) and item.is_held:
+        while root is not None and (not isinstance(root, ShapeObject) or root.is_held):
+            root = root.parent
+    if root is None:
+        raise ValueError(f"'{item.name}' cannot be dragged: joints hold it, and no free shape holds these joints")
+    return root

@@ -1,4 +1,4 @@
-"""What a scene file may say of a shape that stands in the scene."""
+"""Parameters of the shapes of a scene file."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from drone_sim.shapes.mass import PrincipalInertia
 from drone_sim.shapes.shape import SceneShape
 
 _Moment = Annotated[Finite, Within(1e-12, 1e12)]  # kg m²
-_NO_PARTS = ("urdf",)  # shapes that are no part of a compound
+_NO_PARTS = ("urdf",)  # shapes that a compound cannot contain
 
 
 class InertiaParameters(Checked):
-    """How the mass lies: principal moments, and where centre of mass and axes are in the shape's frame."""
+    """Principal moments of inertia, and the pose of the centre of mass and principal axes in the shape's frame."""
 
     moments: Annotated[tuple[_Moment, _Moment, _Moment], Field(description="3 numbers, principal moments in kg m²")]
     position: Point = (0.0, 0.0, 0.0)
@@ -40,15 +40,15 @@ class InertiaParameters(Checked):
 
     @property
     def inertia(self) -> PrincipalInertia:
-        """The same for the dynamics."""
+        """The inertia for the dynamics."""
         return PrincipalInertia(self.moments, from_rpy(self.position, self.rpy))
 
 
 class ObjectParameters(EntryParameters):
-    """A shape in the scene: what all have in common; each brings its own keys.
+    """A shape in the scene: the keys that all shapes have in common.
 
-    A mass of 0 stands still, and what is `static`, until a script lets it move. Of two that touch, friction and
-    restitution are multiplied; the floor has 1 and 1.
+    A shape with mass 0 is static; a `static` one is until a script makes it dynamic. Friction and restitution of two
+    shapes in contact are multiplied; the floor has 1 and 1.
     """
 
     mass: Mass = 0.0
@@ -63,10 +63,10 @@ class ObjectParameters(EntryParameters):
     shape: str
 
     def model_post_init(self, context: Any) -> None:
-        """Refuse an inertia where the URDF says it."""
+        """Raise ParameterError for the inertia of a URDF."""
         super().model_post_init(context)
         if self.inertia is not None and self.shape == "urdf":
-            raise ParameterError("a urdf has its own", ("inertia",))
+            raise ParameterError("is not allowed for a urdf, which has its own", ("inertia",))
 
     @property
     def moves(self) -> bool:
@@ -74,12 +74,12 @@ class ObjectParameters(EntryParameters):
         return bool(self.mass) and not self.static
 
     def to_shape(self) -> SceneShape | Compound:
-        """Return its shape, of the keys that this brings."""
+        """Return the shape that its keys describe."""
         return _shape_of(self)
 
 
 class PartParameters(Checked):
-    """A part of a compound, in its frame."""
+    """A part of a compound, with its pose in the compound's frame."""
 
     position: Point = (0.0, 0.0, 0.0)
     rpy: Angles = (0.0, 0.0, 0.0)
@@ -88,17 +88,17 @@ class PartParameters(Checked):
 
     @property
     def part(self) -> Part:
-        """The part itself."""
+        """The part for a Compound."""
         return Part(_shape_of(self), from_rpy(self.position, self.rpy), self.color)
 
 
-def _shape_of(said: ObjectParameters | PartParameters) -> SceneShape:
-    shape = SCENE_SHAPES[said.shape]
-    return shape(**{field.name: getattr(said, field.name) for field in fields(shape)})
+def _shape_of(parameters: ObjectParameters | PartParameters) -> SceneShape:
+    shape = SCENE_SHAPES[parameters.shape]
+    return shape(**{field.name: getattr(parameters, field.name) for field in fields(shape)})
 
 
 def _with_keys_of(shape: type[SceneShape], base: type[Checked]) -> type[Checked]:
-    """Return what a scene file may say of a shape, beside what `base` has."""
+    """Return a subclass of `base` with the keys of a shape."""
     keys: dict[str, Any] = {"color": (Color, shape.default_color), "shape": (Literal[shape.word], ...)}
     types = get_type_hints(shape, include_extras=True)
     for field in fields(shape):
@@ -114,15 +114,15 @@ else:
 
 
 class CompoundParameters(ObjectParameters):
-    """Several shapes in one rigid body."""
+    """Several shapes as one rigid body."""
 
     shape: Literal["compound"]
-    color: Color = (1.0, 1.0, 1.0, 1.0)  # each part has its own
+    color: Color = (1.0, 1.0, 1.0, 1.0)  # unused: each part has its own color
     parts: Annotated[list[_Part], Field(min_length=1, max_length=MAX_PARTS)]
 
     def to_shape(self) -> Compound:
-        """Return its parts."""
-        return Compound(tuple(one.part for one in self.parts))
+        """Return the compound."""
+        return Compound(tuple(part.part for part in self.parts))
 
 
 SHAPES = (*(_with_keys_of(shape, ObjectParameters) for shape in SCENE_SHAPES.values()), CompoundParameters)

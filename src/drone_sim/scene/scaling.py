@@ -1,4 +1,4 @@
-"""An entry of another size: all its lengths so many times as large, and its mass with its volume."""
+"""Scaling of entries: lengths by the factors, mass with the volume."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drone_sim.scene.kinds.curved_path import CurvedPathParameters
 from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.object_parameters import CompoundParameters, ObjectParameters, PartParameters
 
-_LENGTHS = {  # of what is no shape
+_LENGTHS = {  # of kinds that are not shapes
     "dummy": ("size",),
     "proximity_sensor": ("range", "offset", "radius"),
     "vision_sensor": ("near", "far", "size"),
@@ -22,80 +22,81 @@ _ROUND = ("cylinder", "capsule", "sphere")
 
 
 def scaled(entry: EntryParameters, factors: Vector) -> EntryParameters:
-    """Return an entry so many times as large along x, y and z. Raises ValueError for what cannot be."""
-    if not all(math.isfinite(one) and one > 0 for one in factors):
+    """Return an entry scaled by factors along x, y and z. Raises ValueError if it cannot be scaled so."""
+    if not all(math.isfinite(factor) and factor > 0 for factor in factors):
         raise ValueError(
-            f"'{entry.name}' is scaled by {', '.join(f'{one:g}' for one in factors)}: must be greater than 0"
+            f"'{entry.name}' is scaled by {', '.join(f'{factor:g}' for factor in factors)}: must be greater than 0"
         )
-    values = _shape(entry, factors) if isinstance(entry, ObjectParameters) else _kind(entry, factors)
+    values = _scaled_shape(entry, factors) if isinstance(entry, ObjectParameters) else _scaled_kind(entry, factors)
     checked = changed(entry, values)
     return entry.model_copy(update={key: getattr(checked, key) for key in values})
 
 
-def _shape(entry: ObjectParameters, factors: Vector) -> dict[str, Any]:
+def _scaled_shape(entry: ObjectParameters, factors: Vector) -> dict[str, Any]:
     x, y, z = factors
     values: dict[str, Any] = {"mass": entry.mass * x * y * z} if entry.mass else {}
     if entry.inertia is not None:
-        factor = _same(entry, factors, "with an `inertia`")
-        moments = [factor**5 * one for one in entry.inertia.moments]
+        factor = _uniform(entry, factors, "with an `inertia`")
+        moments = [factor**5 * moment for moment in entry.inertia.moments]
         values["inertia"] = {
             **entry.inertia.model_dump(),
             "moments": moments,
-            "position": [factor * one for one in entry.inertia.position],
+            "position": [factor * value for value in entry.inertia.position],
         }
     if isinstance(entry, CompoundParameters):
-        factor = _same(entry, factors, "a compound")
-        values["parts"] = [_part(part, factor) for part in entry.parts]
+        factor = _uniform(entry, factors, "a compound")
+        values["parts"] = [_scaled_part(part, factor) for part in entry.parts]
     else:
-        values["size"] = _size(entry, factors)
+        values["size"] = _scaled_size(entry, factors)
     return values
 
 
-def _part(part: PartParameters, factor: float) -> dict[str, Any]:
-    place = [factor * one for one in part.position]
-    return {**part.model_dump(), "position": place, "size": _size(part, (factor, factor, factor))}
+def _scaled_part(part: PartParameters, factor: float) -> dict[str, Any]:
+    position = [factor * value for value in part.position]
+    return {**part.model_dump(), "position": position, "size": _scaled_size(part, (factor, factor, factor))}
 
 
-def _size(said: ObjectParameters | PartParameters, factors: Vector) -> list[float]:
+def _scaled_size(shape: ObjectParameters | PartParameters, factors: Vector) -> list[float]:
     x, y, z = factors
-    size: tuple[float, ...] = getattr(said, "size", ())
-    if said.shape not in _ROUND:
-        if said.shape == "urdf":
-            raise ValueError(f"'{getattr(said, 'name', '')}' is a urdf: change its size in the URDF file")
-        return [factor * one for factor, one in zip(factors, size)]
-    if x != y or (said.shape == "sphere" and x != z):
+    size: tuple[float, ...] = getattr(shape, "size", ())
+    if shape.shape not in _ROUND:
+        if shape.shape == "urdf":
+            raise ValueError(f"'{getattr(shape, 'name', '')}' is a urdf: change its size in the URDF file")
+        return [factor * length for factor, length in zip(factors, size)]
+    if x != y or (shape.shape == "sphere" and x != z):
         raise ValueError(
-            f"'{getattr(said, 'name', '')}' is a {said.shape}: it must stay round, not scaled by {x:g}, {y:g}, {z:g}"
+            f"'{getattr(shape, 'name', '')}' is a {shape.shape}: it must stay round, not scaled by {x:g}, {y:g}, {z:g}"
         )
-    return [x * size[0], *(z * one for one in size[1:])]
+    return [x * size[0], *(z * length for length in size[1:])]
 
 
-def _kind(entry: EntryParameters, factors: Vector) -> dict[str, Any]:
+def _scaled_kind(entry: EntryParameters, factors: Vector) -> dict[str, Any]:
     kind = getattr(entry, "kind", "")
     if kind == "path":
-        return {"points": [[a * b for a, b in zip(factors, one)] for one in getattr(entry, "points", ())]}
+        return {"points": [[a * b for a, b in zip(factors, point)] for point in getattr(entry, "points", ())]}
     if isinstance(entry, CurvedPathParameters):
-        return _curved_path(entry, factors)
+        return _scaled_curved_path(entry, factors)
     if isinstance(entry, JointParameters):
         if entry.type != PRISMATIC:
             return {}
-        ends = entry.limits and [factors[2] * one for one in entry.limits]
-        return {"limits": ends, "value": factors[2] * entry.value}
+        limits = entry.limits and [factors[2] * limit for limit in entry.limits]
+        return {"limits": limits, "value": factors[2] * entry.value}
     known = [key for key in _LENGTHS.get(kind, ()) if getattr(entry, key)]
-    factor = _same(entry, factors, f"a {kind}") if known else 1.0
+    factor = _uniform(entry, factors, f"a {kind}") if known else 1.0
     return {key: factor * getattr(entry, key) for key in known}
 
 
-def _curved_path(entry: CurvedPathParameters, factors: Vector) -> dict[str, Any]:
-    mean = math.prod(factors) ** (1 / 3)  # as V-REP has it
+def _scaled_curved_path(entry: CurvedPathParameters, factors: Vector) -> dict[str, Any]:
+    mean = math.prod(factors) ** (1 / 3)  # as in V-REP
     points = [
-        {**one.model_dump(), "position": [a * b for a, b in zip(factors, one.position)]} for one in entry.control_points
+        {**item.model_dump(), "position": [a * b for a, b in zip(factors, item.position)]}
+        for item in entry.control_points
     ]
     lengths = ("metres_per_radian", "metres_per_pause", "along")
     return {"control_points": points, **{key: mean * getattr(entry, key) for key in lengths}}
 
 
-def _same(entry: EntryParameters, factors: Vector, what: str) -> float:
+def _uniform(entry: EntryParameters, factors: Vector, what: str) -> float:
     if len({*factors}) > 1:
         x, y, z = factors
         raise ValueError(

@@ -1,4 +1,4 @@
-"""What may stand in a scene beside shapes. A kind that is added is added here."""
+"""The kinds of scene objects other than shapes. Add a new kind to KINDS."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A dummy: a frame, and nothing else."""
+"""A dummy: a frame without any other properties."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from drone_sim.scene.kinds.kind import KindParameters, Place
 
 
 class DummyParameters(KindParameters):
-    """A dummy; `size` (m) is that of the ball by which rviz shows it."""
+    """A dummy; `size` (m) is the diameter of its ball in rviz."""
 
     kind: Literal["dummy"]
     size: Length = 0.01
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
-        """Return the frame."""
+        """Return the dummy."""
         return Dummy(place, self.size)
 
 
 class Dummy(SceneObject):
-    """A frame, and how large it is shown."""
+    """A frame with a display size."""
 
     def __init__(self, place: Place, size: float):
-        """Take where it is, and its size (m)."""
+        """Create the dummy; `size` in m."""
         super().__init__(*place, kind="dummy")
         self.size = size

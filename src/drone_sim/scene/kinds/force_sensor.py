@@ -1,4 +1,4 @@
-"""A force sensor: a rigid link between the shape on it and what it hangs on, which measures what goes through."""
+"""A force sensor: a rigid link between its child shape and its parent that measures the transmitted wrench."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.scene.kinds.kind import KindParameters, Place
 from drone_sim.world import World
 
-_NOTHING = (0.0, 0.0, 0.0)
+_ZERO = (0.0, 0.0, 0.0)
 
 
 class ForceSensorParameters(KindParameters):
-    """A force sensor; what the dynamics makes of it is in chains.py."""
+    """A force sensor; chains.py describes its part in the dynamics."""
 
     kind: Literal["force_sensor"]
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
-        """Return the sensor, which holds nothing yet."""
+        """Return the sensor, not attached to a link yet."""
         return ForceSensor(*place, kind="force_sensor")
 
 
 class ForceSensor(SceneObject):
-    """Tells what goes through it."""
+    """Measures the force and torque transmitted to its child shape."""
 
-    _held: tuple[World, int, int] | None = None
+    _held_link: tuple[World, int, int] | None = None
 
     def hold(self, world: World, body: int, link: int) -> None:
-        """Hold a link of a body in the world."""
-        self._held = world, body, link
+        """Attach the sensor to the link of a body that it holds."""
+        self._held_link = world, body, link
         world.joints.measure(body, link)
 
     @property
     def is_held(self) -> bool:
-        """Whether something hangs on it in the dynamics."""
-        return self._held is not None
+        """Whether it holds a shape in the dynamics."""
+        return self._held_link is not None
 
     def release(self) -> None:
-        """Hold nothing any more."""
-        self._held = None
+        """Detach the sensor from its link."""
+        self._held_link = None
 
     def read(self) -> tuple[Vector, Vector]:
-        """Return force (N) and torque (N m), as of the last sub-step, by which what hangs on it acts; its own frame."""
-        if self._held is None:
-            return _NOTHING, _NOTHING
-        world, body, link = self._held
+        """Return the force (N) and torque (N m) that the child exerts, of the last sub-step, in the sensor's frame."""
+        if self._held_link is None:
+            return _ZERO, _ZERO
+        world, body, link = self._held_link
         return world.joints.load(body, link)

@@ -1,4 +1,4 @@
-"""A joint of the scene; what the dynamics makes of it is in chains.py."""
+"""A joint of the scene; chains.py describes its part in the dynamics."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ _Force = Annotated[Finite, Within(0, 1e9)]  # N m or N
 _DEFAULT_FORCE = 100.0
 
 
-def _in_order(pair: tuple[float, float] | None) -> tuple[float, float] | None:
+def _check_order(pair: tuple[float, float] | None) -> tuple[float, float] | None:
     if pair is not None and not pair[0] < pair[1]:
         raise ValueError("must be [lowest, highest] with lowest < highest")
     return pair
 
 
-_Ends = Annotated[
+_Limits = Annotated[
     tuple[Coordinate, Coordinate] | None,
-    AfterValidator(_in_order),
+    AfterValidator(_check_order),
     Field(description="2 numbers, [lowest, highest] in rad or m"),
 ]
 
 
 class JointParameters(KindParameters):
-    """A joint about, or along, its z axis; rad or m. Without `limits` it has no end."""
+    """A joint that rotates about or moves along its z axis (rad or m); `limits` None: no limits."""
 
     kind: Literal["joint"]
     type: Literal["revolute", "prismatic", "spherical"]
-    limits: _Ends = None
+    limits: _Limits = None
     value: _Value = 0.0
     mode: Literal["kinematic", "passive", "position", "velocity", "force"] = "kinematic"
     target: Annotated[Finite, Within(-1e9, 1e9)] = 0.0
     max_force: _Force = _DEFAULT_FORCE
 
     def model_post_init(self, context: Any) -> None:
-        """Refuse an initial value outside of the limits, and a value or limits of a spherical joint."""
+        """Raise ParameterError for a value outside the limits, and for a value or limits of a spherical joint."""
         super().model_post_init(context)
         low, high = self.limits or (-math.inf, math.inf)
         if not low <= self.value <= high:
@@ -55,7 +55,7 @@ class JointParameters(KindParameters):
 
     @property
     def control(self) -> JointControl:
-        """What moves it at the beginning."""
+        """Its initial control mode and targets."""
         return JointControl(
             self.mode,
             position=self.target if self.mode == POSITION else self.value,

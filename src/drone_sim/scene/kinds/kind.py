@@ -1,4 +1,4 @@
-"""What an entry of `objects` is that is no shape: its keys, and the object that scripts find."""
+"""Base class of the entries of `objects` that are not shapes: their keys, and how their object is made."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["KindParameters", "Place"]
 
 
 class KindParameters(EntryParameters):
-    """What all kinds have in common that are no shapes."""
+    """The keys that all kinds have in common."""
 
     name: Annotated[Label, Field(min_length=1)]
     position: Point = (0.0, 0.0, 0.0)

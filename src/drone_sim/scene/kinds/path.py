@@ -1,4 +1,4 @@
-"""A path: points that scripts follow."""
+"""A path of straight segments that scripts follow."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ Turn = tuple[Finite, Finite, Finite, Finite]
 
 
 class PathParameters(KindParameters):
-    """A path of straight pieces; `points` in its own frame; `closed`: from the last one back to the first.
+    """A path of straight segments; `points` in its own frame; `closed`: the last is joined to the first.
 
-    `turns` are quaternions x, y, z, w of the points, for scripts that read them; without any they look along the path.
+    `turns` are the points' quaternions x, y, z, w, for scripts that read them; by default they look along the path.
     """
 
     kind: Literal["path"]
@@ -29,15 +29,15 @@ class PathParameters(KindParameters):
     turns: Annotated[tuple[Turn, ...], Field(max_length=MAX_POINTS)] = ()
 
     def model_post_init(self, context: Any) -> None:
-        """Refuse quaternions that are no rotations, or not one for each point."""
+        """Raise ParameterError for quaternions that are not unit, or not one for each point."""
         super().model_post_init(context)
         if self.turns and len(self.turns) != len(self.points):
             raise ParameterError(
                 f"{len(self.turns)} quaternions for {len(self.points)} points: must be one for each point", ("turns",)
             )
-        if any(abs(math.hypot(*one) - 1.0) > 1e-3 for one in self.turns):
+        if any(abs(math.hypot(*quaternion) - 1.0) > 1e-3 for quaternion in self.turns):
             raise ParameterError("each must be a unit quaternion x, y, z, w", ("turns",))
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
-        """Return the path."""
+        """Return the path object."""
         return Path(*place, self.points, self.closed, self.turns)

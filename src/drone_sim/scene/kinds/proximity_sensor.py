@@ -1,8 +1,8 @@
-"""A proximity sensor: the nearest point of what is in its volume.
+"""A proximity sensor: it detects the nearest point in its volume.
 
-The point is exact to 1 mm for a ray. In the other volumes it is the nearest of a fan of some 450 rays, looked at more
-closely around the best one, or the point of a body that is nearest to the sensor, where that lies inside: what is
-thinner than the gaps between the rays, a 24th of the cross section, and has its nearest point outside may be missed.
+For a ray the point is exact to 1 mm. In the other volumes it is the nearest hit of a fan of about 450 rays, refined
+around the best ray, or the point of a body that is nearest to the sensor, if that is inside the volume. An object that
+is thinner than the gap between rays (1/24 of the cross section) and has its nearest point outside may be missed.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from drone_sim.scripting.api.sensors import EVERYTHING
 from drone_sim.world import World
 from drone_sim.world.queries import Met
 
-_CLOSER = 5  # times that the best ray's surroundings are looked at
-_SHRINKS = 3.0  # by which the part that is looked at is smaller each time
-_NEEDS = {"cone": "angle", "disc": "angle", "pyramid": "angle", "cylinder": "radius"}
-_WIDEST = {"cone": math.tau, "disc": math.tau, "pyramid": 3.1}  # rad
+_REFINEMENTS = 5  # number of refinements around the best ray
+_REFINEMENT_FACTOR = 3.0  # factor by which each refinement reduces the spacing of the rays
+_REQUIRED_KEY = {"cone": "angle", "disc": "angle", "pyramid": "angle", "cylinder": "radius"}
+_MAX_ANGLE = {"cone": math.tau, "disc": math.tau, "pyramid": 3.1}  # rad
 
 
 class ProximitySensorParameters(KindParameters):
-    """A proximity sensor; `range` and `offset` in m; full `angle` in rad, or `radius` in m, as its type needs."""
+    """A proximity sensor: `range`, `offset` (m), and the full `angle` (rad) or `radius` (m) that its type needs."""
 
     kind: Literal["proximity_sensor"]
     type: Literal["ray", "cone", "disc", "cylinder", "pyramid"]
@@ -41,14 +41,14 @@ class ProximitySensorParameters(KindParameters):
     radius: Annotated[Finite, Within(0, 1e4)] = 0.0
 
     def model_post_init(self, context: Any) -> None:
-        """Refuse a volume without extent."""
+        """Raise ParameterError for a missing angle or radius, or too large an angle."""
         super().model_post_init(context)
-        needed = _NEEDS.get(self.type)
-        if needed is not None and not getattr(self, needed):
-            raise ParameterError(f"must be greater than 0 for a {self.type}", (needed,), "0")
-        widest = _WIDEST.get(self.type, math.inf)
-        if self.angle > widest:
-            raise ParameterError(f"must be at most {widest:.4g} rad", ("angle",), f"{self.angle:g}")
+        required = _REQUIRED_KEY.get(self.type)
+        if required is not None and not getattr(self, required):
+            raise ParameterError(f"must be greater than 0 for a {self.type}", (required,), "0")
+        maximum = _MAX_ANGLE.get(self.type, math.inf)
+        if self.angle > maximum:
+            raise ParameterError(f"must be at most {maximum:.4g} rad", ("angle",), f"{self.angle:g}")
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
         """Return the sensor."""
@@ -56,7 +56,7 @@ class ProximitySensorParameters(KindParameters):
 
 
 class Detection(NamedTuple):
-    """What a sensor has found, in its own frame: how far (m), where, the object's name or '', the unit normal there."""
+    """A detected point: distance (m), point (m) and unit normal in the sensor's frame; the object's name or ''."""
 
     distance: float
     point: Vector
@@ -65,41 +65,41 @@ class Detection(NamedTuple):
 
 
 class ProximitySensor(SceneObject):
-    """Looks when it is asked; it does not see the bodies that carry it."""
+    """Detects objects on request, except the bodies of its ancestors."""
 
     def __init__(self, place: Place, volume: Volume, context: SimulationContext):
-        """Take where it is, what it looks through, and what the simulation shares."""
+        """Create the sensor with its detection volume."""
         super().__init__(*place, kind="proximity_sensor")
         self.volume = volume
         self.entity = EVERYTHING
         self._context = context
 
     def save_state(self) -> Restore:
-        """Return a function that puts it back where it is now, looking for what it looks for now."""
+        """Return a function that restores its place and the entity that it detects."""
         return in_turn(super().save_state(), saved(self, "entity"))
 
     def detect(self, wanted: Callable[[str], bool] = lambda _: True) -> Detection | None:
-        """Return the nearest point of an object whose name is wanted; None where there is none."""
+        """Return the nearest point of an object whose name is `wanted`, or None."""
         context = self._context
         context.carried.follow()
-        own = bodies_above(self)
-        return self._nearest(lambda body, link: body not in own and wanted(context.name_of(body, link)))
+        carriers = bodies_above(self)
+        return self._nearest(lambda body, link: body not in carriers and wanted(context.name_of(body, link)))
 
     def _nearest(self, counts: Callable[[int, int], bool]) -> Detection | None:
         matrix, volume, step = self.matrix(), self.volume, self.volume.step
-        seek = _Seek(self._context.world, matrix, volume, counts)
-        best = min([*seek.along(volume.spots()), *seek.inside()], default=None)
+        search = _Search(self._context.world, matrix, volume, counts)
+        best = min([*search.along(volume.spots()), *search.inside()], default=None)
         if best is None:
             return None
-        for _ in range(_CLOSER if step else 0):
-            best = min([best, *seek.along(volume.spots_around(volume.spot(best.point), step))])
-            step /= _SHRINKS
+        for _ in range(_REFINEMENTS if step else 0):
+            best = min([best, *search.along(volume.spots_around(volume.spot(best.point), step))])
+            step /= _REFINEMENT_FACTOR
         name = self._context.name_of(best.body, best.link)
         return Detection(best.distance, best.point, name, frames.rotate_back(matrix, best.normal))
 
 
-class _Found(NamedTuple):
-    """A point in the sensor's frame, the nearest first; the normal in the world's."""
+class _Hit(NamedTuple):
+    """A hit, ordered by distance; the point is in the sensor's frame, the normal in the world's."""
 
     distance: float
     point: Vector
@@ -108,26 +108,26 @@ class _Found(NamedTuple):
     link: int
 
 
-class _Seek(NamedTuple):
+class _Search(NamedTuple):
     world: World
     matrix: Matrix
     volume: Volume
     counts: Callable[[int, int], bool]
 
-    def along(self, spots: Sequence[Spot]) -> list[_Found]:
-        """Return what rays meet."""
+    def along(self, spots: Sequence[Spot]) -> list[_Hit]:
+        """Return the hits of the rays through these spots."""
         rays = [self.volume.ray(spot) for spot in spots]
         ends = [(frames.transform(self.matrix, start), frames.transform(self.matrix, end)) for start, end in rays]
-        return [self._found(met) for met in self.world.queries.rays(ends, self.counts)]
+        return [self._hit(hit) for hit in self.world.queries.rays(ends, self.counts)]
 
-    def inside(self) -> list[_Found]:
-        """Return the points of bodies that are nearest to the sensor and lie inside."""
+    def inside(self) -> list[_Hit]:
+        """Return the nearest point of each body, if it is inside the volume."""
         if self.volume.type in ("ray", "disc"):
             return []
         origin, reach = frames.position(self.matrix), self.volume.reach
-        found = [self._found(met) for met in self.world.queries.nearest_points(origin, reach, self.counts)]
-        return [one for one in found if self.volume.holds(one.point)]
+        hits = [self._hit(met) for met in self.world.queries.nearest_points(origin, reach, self.counts)]
+        return [hit for hit in hits if self.volume.holds(hit.point)]
 
-    def _found(self, met: Met) -> _Found:
-        point = frames.transform(frames.invert(self.matrix), met.point)
-        return _Found(math.hypot(*point), point, met.normal, met.body, met.link)
+    def _hit(self, hit: Met) -> _Hit:
+        point = frames.transform(frames.invert(self.matrix), hit.point)
+        return _Hit(math.hypot(*point), point, hit.normal, hit.body, hit.link)

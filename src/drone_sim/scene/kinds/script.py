@@ -1,4 +1,4 @@
-"""A script of CoppeliaSim 4.9 and later as an object: a frame below what it is on, by which paths find it."""
+"""A script object of CoppeliaSim 4.9 and later: a child frame of the scripted object, for paths to the script."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drone_sim.scene.kinds.kind import KindParameters, Place
 
 
 class ScriptParameters(KindParameters):
-    """A script object; the script itself is an entry of `scripts`, on the object that this one hangs on."""
+    """A script object; the script itself is an entry of `scripts`, attached to this object's parent."""
 
     kind: Literal["script"]
 

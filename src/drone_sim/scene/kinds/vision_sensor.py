@@ -1,4 +1,4 @@
-"""A vision sensor of the scene: a camera that looks when a script asks."""
+"""A vision sensor of the scene: a camera that renders when a script requests an image."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from drone_sim.scripting.api.sensors import EVERYTHING
 from drone_sim.scripting.api.vision import Detected
 
 MAX_SIDE = 2048  # px
-_OPTICAL = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # from V-REP's axes: y down, x right
+_OPTICAL = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # sensor from optical frame (y down, x right)
 
 
 class VisionSensorParameters(KindParameters):
-    """A camera, by its picture (px) and the angle of its larger side (rad); V-REP's axes: z ahead, y up, x left.
+    """A camera with image size (px) and field of view of the larger side (rad); V-REP axes: z ahead, y up, x left.
 
-    One with a `size` (m, of the larger side) is orthographic.
+    With a `size` (m, of the larger side) it is orthographic.
     """
 
     kind: Literal["vision_sensor"]
@@ -37,7 +37,7 @@ class VisionSensorParameters(KindParameters):
     far: Annotated[Finite, Within(1e-3, 1e5)] = 100.0
 
     def model_post_init(self, context: Any) -> None:
-        """Refuse planes between which there is nothing."""
+        """Raise ParameterError unless near < far."""
         super().model_post_init(context)
         if not self.near < self.far:
             raise ParameterError(f"must be less than far = {self.far:g}", ("near",), f"{self.near:g}")
@@ -48,26 +48,26 @@ class VisionSensorParameters(KindParameters):
 
 
 class VisionSensor(SceneObject):
-    """Takes pictures when it is asked."""
+    """Renders images on request."""
 
     def __init__(self, place: Place, parameters: VisionSensorParameters, context: SimulationContext):
-        """Take where it is, what it is like, and what the simulation shares."""
+        """Create the sensor from its parameters."""
         super().__init__(*place, kind="vision_sensor")
         self.width, self.height = parameters.width, parameters.height
         self.near, self.far = parameters.near, parameters.far
         self.angle = parameters.fov  # rad, of the larger side
-        self.orthographic_size = parameters.size  # m, of the larger side; None where it is perspective
+        self.orthographic_size = parameters.size  # m, of the larger side; None: perspective
         self.detected = Detected()
         self.entity = EVERYTHING
         self.color_coded = False
         self._context = context
 
     def save_state(self) -> Restore:
-        """Return a function that brings back where it is, and what its script has found."""
+        """Return a function that restores its place, settings and its script's detection result."""
         return in_turn(super().save_state(), saved(self, "detected", "entity", "color_coded"))
 
     def picture(self, kind: str = "color", only: Collection[str] | None = None) -> np.ndarray:
-        """Return what it sees, of `only` these objects or of all: "color", "depth" or "handles". Raises ValueError."""
+        """Return an image ("color", "depth" or "handles") of `only` these objects or of all. Raises ValueError."""
         self._context.carried.follow()
         pose = np.reshape((*frames.multiply(self.matrix(), _OPTICAL), 0, 0, 0, 1), (4, 4))
         return self._context.picture(kind, self._lens(), pose, only)
@@ -75,8 +75,8 @@ class VisionSensor(SceneObject):
     def _lens(self) -> Lens:
         larger = max(self.width, self.height)
         if self.orthographic_size is not None:
-            wide = self.orthographic_size * self.width / larger
-            return Orthographic(self.width, self.height, wide, self.near, self.far)
+            width = self.orthographic_size * self.width / larger
+            return Orthographic(self.width, self.height, width, self.near, self.far)
         angle = self.angle
         if self.height > self.width:
             angle = 2 * math.atan(math.tan(self.angle / 2) * self.width / self.height)
