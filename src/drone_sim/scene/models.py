@@ -1,4 +1,4 @@
-"""Several objects as one: rigid compounds of shapes; models, which are a part of the tree in a file; meshes' files."""
+"""Rigid compounds of shapes, model files (a subtree of objects), and generated mesh files."""
 
 from __future__ import annotations
 
@@ -27,57 +27,57 @@ from drone_sim.shapes.compound import parts_of
 from drone_sim.shapes.shape import DrawnShape
 
 _HEAD = "# A model, written by saveModel: metres, radians.\n"
-_FILES = ("file", "texture", "script")
-_FIRST, _PLACE = ("name", "alias", "shape", "kind", "type"), ("model", "parent", "position", "rpy")
-_MOST_MESHES, _MOST_BYTES = 1000, 256 * MEBIBYTE  # of made meshes that are kept
+_FILE_KEYS = ("file", "texture", "script")
+_FIRST_KEYS, _PLACE_KEYS = ("name", "alias", "shape", "kind", "type"), ("model", "parent", "position", "rpy")
+_MAX_MESHES, _MAX_MESH_BYTES = 1000, 256 * MEBIBYTE  # of the cache of generated meshes
 
 
 # ---- compounds
 
 
 def grouped(entries: Sequence[EntryParameters], frames_of: Sequence[Matrix]) -> dict[str, Any]:
-    """Return what a scene file says of one shape of several, in the frame of the first. Raises ValueError."""
+    """Return the entry of a compound of several shapes, in the frame of the first. Raises ValueError."""
     parts, mass = [], 0.0
-    for one, matrix in zip(entries, frames_of):
-        if not isinstance(one, ObjectParameters) or one.shape == "urdf":
-            raise ValueError(f"'{one.name}' is not a shape that can be grouped")
+    for entry, matrix in zip(entries, frames_of):
+        if not isinstance(entry, ObjectParameters) or entry.shape == "urdf":
+            raise ValueError(f"'{entry.name}' is not a shape that can be grouped")
         local = frames.relative(frames_of[0], matrix)
-        members = one.parts if isinstance(one, CompoundParameters) else [one]
+        members = entry.parts if isinstance(entry, CompoundParameters) else [entry]
         for member in members:
-            own = local if member is one else frames.multiply(local, frames.from_rpy(member.position, member.rpy))
-            parts.append({**_look(member), **_place(own)})
-        mass += one.mass
+            pose = local if member is entry else frames.multiply(local, frames.from_rpy(member.position, member.rpy))
+            parts.append({**_shape_keys(member), **_pose_keys(pose)})
+        mass += entry.mass
     first = entries[0]
     assert isinstance(first, ObjectParameters), "checked above"
-    kept = {
+    common = {
         key: getattr(first, key) for key in ("parent", "position", "rpy", "alias", "static", "respondable", "visible")
     }
-    return {**kept, "shape": "compound", "mass": mass, "parts": parts}
+    return {**common, "shape": "compound", "mass": mass, "parts": parts}
 
 
 def parted(entry: EntryParameters, matrix: Matrix) -> list[dict[str, Any]]:
-    """Return what a scene file says of the parts of a shape, each alone in the world. Raises ValueError."""
+    """Return the entries of the parts of a compound, each without a parent. Raises ValueError."""
     if not isinstance(entry, CompoundParameters):
         raise ValueError(f"'{entry.name}' is not a compound")
-    volumes = [_volume(one) for one in entry.parts]
-    kept = {key: getattr(entry, key) for key in ("static", "respondable", "visible")}
+    volumes = [_volume(part) for part in entry.parts]
+    common = {key: getattr(entry, key) for key in ("static", "respondable", "visible")}
     return [
         {
-            **kept,
-            **_look(one),
-            **_place(frames.multiply(matrix, frames.from_rpy(one.position, one.rpy))),
+            **common,
+            **_shape_keys(part),
+            **_pose_keys(frames.multiply(matrix, frames.from_rpy(part.position, part.rpy))),
             "mass": entry.mass * volume / sum(volumes),
         }
-        for one, volume in zip(entry.parts, volumes)
+        for part, volume in zip(entry.parts, volumes)
     ]
 
 
-def _look(said: ObjectParameters | PartParameters) -> dict[str, Any]:
-    keys = [field.name for field in fields(SCENE_SHAPES[said.shape])]
-    return {"shape": said.shape, "color": said.color, **{key: getattr(said, key) for key in keys}}
+def _shape_keys(parameters: ObjectParameters | PartParameters) -> dict[str, Any]:
+    keys = [field.name for field in fields(SCENE_SHAPES[parameters.shape])]
+    return {"shape": parameters.shape, "color": parameters.color, **{key: getattr(parameters, key) for key in keys}}
 
 
-def _place(matrix: Matrix) -> dict[str, Any]:
+def _pose_keys(matrix: Matrix) -> dict[str, Any]:
     return {key: value for key, value in place_at(matrix, "").items() if key != "parent"}
 
 
@@ -87,15 +87,15 @@ def _volume(part: PartParameters) -> float:
 
 
 def bounds(entry: EntryParameters) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest and the highest corner (m) of a shape in its own frame. Raises ValueError for what is none."""
+    """Return the minimum and maximum corner (m) of a shape in its own frame. Raises ValueError if it is not a shape."""
     if not isinstance(entry, ObjectParameters) or entry.shape == "urdf":
         raise ValueError(f"'{entry.name}' has no bounding box of its own")
     corners = []
     for shape, local, _ in parts_of(entry.to_shape(), entry.color):
-        assert isinstance(shape, DrawnShape), "what is no urdf is drawn"
-        turn = np.reshape(local, (3, 4))
+        assert isinstance(shape, DrawnShape), "every shape except a urdf is drawn"
+        transform = np.reshape(local, (3, 4))
         for part in shape.triangles():
-            corners.append(part.corners.reshape(-1, 3) @ turn[:, :3].T + turn[:, 3])
+            corners.append(part.corners.reshape(-1, 3) @ transform[:, :3].T + transform[:, 3])
     points = np.concatenate(corners)
     return points.min(axis=0), points.max(axis=0)
 
@@ -104,16 +104,16 @@ def bounds(entry: EntryParameters) -> tuple[np.ndarray, np.ndarray]:
 
 
 def mesh_file(vertices: Sequence[float], indices: Sequence[int], used: Collection[str]) -> str:
-    """Return a file with triangles: their corners' coordinates (m), and the corners of each, from 0.
+    """Return an STL file of triangles, given by vertices (m) and the indices (from 0) of each triangle's corners.
 
-    It is named by its content. The least recently used files that are not among `used` are deleted to make room for it.
+    The file is named by its content. To make room, the least recently used files that are not in `used` are deleted.
     """
     points = np.reshape(np.asarray(vertices, float), (-1, 3))
     corners = np.reshape(np.asarray(indices, int), (-1, 3))
     if corners.min() < 0 or corners.max() >= len(points):
         raise ValueError(f"indices: each must be from 0 to {len(points) - 1}, the vertices")
     content = mesh_files.stl(points[corners])
-    path = _made_meshes() / f"{hashlib.sha256(content).hexdigest()[:16]}.stl"
+    path = _mesh_folder() / f"{hashlib.sha256(content).hexdigest()[:16]}.stl"
     try:
         if path.is_file():
             path.touch()
@@ -127,65 +127,65 @@ def mesh_file(vertices: Sequence[float], indices: Sequence[int], used: Collectio
     return str(path)
 
 
-def _made_meshes() -> Path:
-    """Return the folder of meshes that were made, any of which may be deleted when no simulation runs."""
+def _mesh_folder() -> Path:
+    """Return the folder of generated meshes, all of which may be deleted when no simulation runs."""
     return cache_path() / "meshes"
 
 
 def _make_room(files: Iterable[Path], used: Collection[str]) -> None:
-    found = []
-    for one in files:
-        with contextlib.suppress(FileNotFoundError):  # another process makes room, too
-            found.append((one.stat(), one))
+    entries = []
+    for file in files:
+        with contextlib.suppress(FileNotFoundError):  # another process may delete files, too
+            entries.append((file.stat(), file))
     size = 0
-    for count, (stat, one) in enumerate(sorted(found, key=lambda pair: -pair[0].st_mtime_ns)):
+    for count, (stat, file) in enumerate(sorted(entries, key=lambda entry: -entry[0].st_mtime_ns)):
         size += stat.st_size
-        if (count >= _MOST_MESHES or size > _MOST_BYTES) and str(one) not in used:
-            remove(one, within=_made_meshes())
+        if (count >= _MAX_MESHES or size > _MAX_MESH_BYTES) and str(file) not in used:
+            remove(file, within=_made_meshes())
 
 
 def plain(values: Checked, folder: Path | None) -> dict[str, Any]:
-    """Return values as YAML has them, without defaults; their files named as a scene file in `folder` can name them.
+    """Return values as in YAML, without defaults, with file names for a scene file in `folder` (None: any folder).
 
-    None is any folder. Meshes that were made are copied beside the file. Raises OSError.
+    Generated meshes are copied to the folder `meshes` beside the scene file. Raises OSError.
     """
-    said = values.model_dump(mode="json", exclude_defaults=True)
-    for key in _FILES:
-        if said.get(key):
-            said[key] = file_name(getattr(values, key), folder)
-    if "parts" in said:  # of a compound
-        said["parts"] = [plain(one, folder) for one in getattr(values, "parts")]  # noqa: B009
-    return said
+    content = values.model_dump(mode="json", exclude_defaults=True)
+    for key in _FILE_KEYS:
+        if content.get(key):
+            content[key] = file_name(getattr(values, key), folder)
+    if "parts" in content:  # a compound
+        content["parts"] = [plain(part, folder) for part in getattr(values, "parts")]  # noqa: B009
+    return content
 
 
-def in_order(said: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what YAML says of an object in the order in which a person writes it: what it is, where, and the rest."""
-    own = [key for key in ("size", "file", "width", "height", "fov") if key in said]
-    keys = dict.fromkeys([*_FIRST, *own, *_PLACE, *said])
-    parts = {"parts": [in_order(one) for one in said["parts"]]} if "parts" in said else {}
-    return {**{key: said[key] for key in keys if key in said}, **parts}
+def in_order(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the YAML keys of an object in the usual order: names and type, dimensions, pose, and the others."""
+    dimensions = [key for key in ("size", "file", "width", "height", "fov") if key in content]
+    keys = dict.fromkeys([*_FIRST_KEYS, *dimensions, *_PLACE_KEYS, *content])
+    parts = {"parts": [in_order(part) for part in content["parts"]]} if "parts" in content else {}
+    return {**{key: content[key] for key in keys if key in content}, **parts}
 
 
 def file_name(value: Any, folder: Path | None) -> Any:
-    """Return a file's name as a scene file in `folder` can name it; what is none, as it is. Raises OSError."""
-    if folder is not None and isinstance(value, FoundFile) and Path(value).parent == _made_meshes():
-        kept = folder / "meshes" / Path(value).name
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(value, kept)
-        return f"meshes/{kept.name}"
+    """Return a file's name for a scene file in `folder`; any other value unchanged. Raises OSError."""
+    if folder is not None and isinstance(value, FoundFile) and Path(value).parent == _mesh_folder():
+        copy = folder / "meshes" / Path(value).name
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(value, copy)
+        return f"meshes/{copy.name}"
     return value.seen_from(folder) if isinstance(value, FoundFile) else value
 
 
 def write(path: Path, entries: Sequence[EntryParameters], scripts: Sequence[AttachedScriptParameters]) -> None:
-    """Write entries and the scripts on them as a file; only a model that was saved here may be overwritten.
+    """Write entries and their scripts to a model file; of existing files, only a saved model may be overwritten.
 
-    Raises ValueError, in one line, where it cannot be.
+    Raises ParameterError with a message of one line if it cannot be written.
     """
     if path.exists() and not (path.is_file() and path.read_bytes().startswith(_HEAD.encode())):
         raise ParameterError(f"{path}: is not overwritten, because it is not a model that drone_sim saved")
-    listed = {"objects": entries, "scripts": scripts}
+    sections = {"objects": entries, "scripts": scripts}
     try:
-        content = {key: [plain(one, path.parent) for one in several] for key, several in listed.items() if several}
+        content = {key: [plain(item, path.parent) for item in items] for key, items in sections.items() if items}
         text = _HEAD + yaml_files.dump(content, default_flow_style=None, width=120)
         writing.write(path, text)
     except OSError as error:
@@ -193,25 +193,25 @@ def write(path: Path, entries: Sequence[EntryParameters], scripts: Sequence[Atta
 
 
 class Model(NamedTuple):
-    """What a file says, its own files relative to it: objects, of which there is one at least, and scripts on them."""
+    """Content of a file, with file names relative to it: objects (at least one) and their scripts."""
 
     objects: list[dict[str, Any]]
     scripts: list[dict[str, Any]]
 
 
 def read(path: Path, imported: Callable[[Path], Path]) -> Model:
-    """Return what a scene file or a model says; `imported` makes a scene file of one of V-REP's. Raises ValueError."""
-    is_own = path.suffix == ".yaml"
+    """Return the content of a scene file or model; `imported` converts a V-REP file. Raises ValueError."""
+    is_yaml = path.suffix == ".yaml"
     try:
-        file = path if is_own else imported(path)
+        file = path if is_yaml else imported(path)
     except OSError as error:
         raise ParameterError(f"{path}: {error.strerror or error}") from None
-    said = scene_parameters.from_content(read_yaml(file), file.parent)
-    if not is_own and said.get("vehicles"):
-        raise ParameterError(f"{path}: is a quadricopter: add it with the parameter `vehicles`")
-    objects, scripts = said["scene"].get("objects"), said["scene"].get("scripts", [])
-    for name, several in (("objects", objects), ("scripts", scripts)):
-        if not isinstance(several, list) or not all(isinstance(one, dict) for one in several):
+    content = scene_parameters.from_content(read_yaml(file), file.parent)
+    if not is_yaml and content.get("vehicles"):
+        raise ParameterError(f"{path}: contains a quadricopter: add it with the parameter `vehicles`")
+    objects, scripts = content["scene"].get("objects"), content["scene"].get("scripts", [])
+    for name, items in (("objects", objects), ("scripts", scripts)):
+        if not isinstance(items, list) or not all(isinstance(item, dict) for item in items):
             raise ParameterError(f"{path}: must have a list of `{name}`")
     if not objects:
         raise ParameterError(f"{path}: its list of `objects` is empty")
@@ -219,13 +219,13 @@ def read(path: Path, imported: Callable[[Path], Path]) -> Model:
 
 
 def inside(folder: Path | None, name: str, *suffixes: str) -> Path:
-    """Return a file in a folder, with .yaml or another suffix. Raises ValueError for what is none."""
+    """Return the path of a .yaml file, or one with another allowed suffix, in `folder`. Raises ValueError otherwise."""
     if folder is None:
         raise ValueError(
             f"'{name[:80]}': a model must be in the folder of the scene file, but the simulation has no scene file"
         )
     path = (folder / name).resolve()
     if path.suffix not in (".yaml", *suffixes) or not path.is_relative_to(folder.resolve()):
-        known = " or ".join((".yaml", *suffixes))
-        raise ValueError(f"'{name[:80]}': must be the name of a {known} file in the folder of the scene file")
+        allowed = " or ".join((".yaml", *suffixes))
+        raise ValueError(f"'{name[:80]}': must be the name of a {allowed} file in the folder of the scene file")
     return path

@@ -1,4 +1,4 @@
-"""The scene around the vehicles: floor and objects in the world, and in the tree of objects."""
+"""The scene around the vehicles: floor and objects, in the world and in the object tree."""
 
 from __future__ import annotations
 
@@ -31,43 +31,43 @@ from drone_sim.shapes.visual import Visual
 from drone_sim.world.joints import JointDrive
 
 _LOG = logging.getLogger(__name__)
-_Key = tuple[Any, ...]  # of what a body is made of
+_Key = tuple[Any, ...]  # identifies the content of a body
 _AT_REST = (0.0, 0.0, 0.0)
 
 
 class Scene:
-    """What stands in the world besides the vehicles: entries as in a scene file, their bodies, their objects.
+    """The world without vehicles: entries as in a scene file, their bodies and their objects.
 
-    Entries may come, go and change at any time (operations.py): `renew` builds what they describe and is not there yet,
-    and removes what they do not describe any more; everything else goes on unchanged.
+    Entries may be added, removed and changed at any time (operations.py): `renew` then builds missing bodies and
+    objects and removes those without an entry; everything else continues unchanged.
     """
 
     def __init__(self, parameters: SceneParameters, context: SimulationContext):
-        """Put floor and objects into the empty world of `context`, and the bodies' names into its names.
+        """Add floor and objects to the empty world of `context`, and the bodies' names to its names.
 
         Raises ParameterError for a file that cannot be used.
         """
-        self.parameters = parameters  # as it began
-        self.entries: dict[int, EntryParameters] = dict(enumerate(parameters.objects))  # by a number that stays theirs
-        self.scripts: dict[str, AttachedScriptParameters] = {one.object: one for one in parameters.scripts}  # by object
+        self.parameters = parameters  # initial ones
+        self.entries: dict[int, EntryParameters] = dict(enumerate(parameters.objects))  # by permanent index
+        self.scripts: dict[str, AttachedScriptParameters] = {item.object: item for item in parameters.scripts}
         check_files(parameters.floor, parameters.objects)
         self._context, self.tree = context, context.objects
         self._world = context.world
         self._add_floor(parameters.floor)
         self.drag = ObjectDrag(context, self.things, parameters.floor.size)
         self.next_index = len(self.entries)
-        self.is_changed = False  # whether anything has been done to it (operations.py) since it was made
-        self.rebuilt = 0  # bodies that have come or gone by now
-        self.changed: Counter[int] = Counter()  # how often an entry has become other than its body is
-        self.factors: dict[int, Vector] = {}  # by which entries were scaled
+        self.is_changed = False  # whether any operation (operations.py) changed it
+        self.rebuilt = 0  # number of bodies added or removed so far
+        self.changed: Counter[int] = Counter()  # versions of entries; incremented to rebuild the body
+        self.factors: dict[int, Vector] = {}  # total scale of entries
         self._built: dict[_Key, Built] = {}
         self._places: dict[int, tuple[int, int]] = {}  # body and link of each shape
-        self._began: dict[int, Matrix] = {}  # where the objects were at the beginning, by entry; empty before
+        self._initial_poses: dict[int, Matrix] = {}  # of the objects, by entry; empty until known
         self._forget_objects()
         _warn(self.entries, self._build()[1])
 
     def lay_floor(self, floor: FloorParameters) -> None:
-        """Let another floor take the last one's place. Raises ParameterError for a file that cannot be used."""
+        """Replace the floor. Raises ParameterError for a file that cannot be used."""
         check_files(floor, self.entries.values())
         self._world.remove(self.floor)
         del self._context.names[self.floor]
@@ -82,59 +82,59 @@ class Scene:
     # ---- bodies
 
     def _build(self) -> tuple[list[Built], dict[int, str]]:
-        """Let there be the bodies that the entries ask for, and no others.
+        """Create missing bodies and remove those without an entry.
 
-        Returns the new ones, and why joints are not moved, by entry. Raises ParameterError, where all is as it was, for
-        a file that cannot be read.
+        Return the new bodies, and for each joint that the dynamics cannot move the reason, by entry. Raises
+        ParameterError for a file that cannot be read; then nothing has changed.
         """
-        found = chains.found(self.entries)
-        wanted = {self._key(one): one for one in (*building.alone(self.entries, found.chains), *found.chains)}
-        new = {key: one for key, one in wanted.items() if key not in self._built}
-        matrices = {index: self._matrix(index) for one in new.values() for index in one.members()}
+        result = chains.found(self.entries)
+        required = {self._key(chain): chain for chain in (*building.alone(self.entries, result.chains), *result.chains)}
+        new = {key: chain for key, chain in required.items() if key not in self._built}
+        matrices = {index: self._matrix(index) for chain in new.values() for index in chain.members()}
         speeds = {index: self._speed(index) for index in matrices}
         try:
-            made = building.build(self._world, self.entries, new.values(), matrices)
+            built = building.build(self._world, self.entries, new.values(), matrices)
         except ValueError as error:
             raise ParameterError(str(error)) from None
-        gone = self._built.keys() - wanted.keys()
-        for key in gone:
+        obsolete = self._built.keys() - required.keys()
+        for key in obsolete:
             self._remove(self._built.pop(key))
-        self.rebuilt += len(gone) + len(new)
-        self._built.update(zip(new, made))
-        self._places = {index: (one.body, link) for one in self._built.values() for index, link in one.links.items()}
+        self.rebuilt += len(obsolete) + len(new)
+        self._built.update(zip(new, built))
+        self._places = {index: (item.body, link) for item in self._built.values() for index, link in item.links.items()}
         self._add_names()
-        for one in made:
-            self._set_moving(one, speeds)
-        return made, found.reasons
+        for item in built:
+            self._restore_velocities(item, speeds)
+        return built, result.reasons
 
     def _key(self, chain: Chain) -> _Key:
         versions = tuple(self.changed[index] for index in chain.members())
-        return chain.root, tuple(one[:3] for one in chain.hung), versions
+        return chain.root, tuple(hung[:3] for hung in chain.hung), versions
 
     def _matrix(self, index: int) -> Matrix:
-        """Return the world from the frame of an entry, of what is not there yet, too."""
+        """Return world from an entry's frame, also for an entry without an object."""
         if index in self.objects:
             return self.objects[index].matrix()
         entry = self.entries[index]
         if entry.parent in self.tree:
             return multiply(self.tree[self.tree.handle(entry.parent)].below(), entry.local)
-        above = next((other for other, one in self.entries.items() if entry.parent and one.name == entry.parent), None)
-        if above is None:  # it hangs on a vehicle, which comes after the scene
+        parent = next((key for key, item in self.entries.items() if entry.parent and item.name == entry.parent), None)
+        if parent is None:  # the parent is a vehicle, which is added after the scene
             return entry.local
-        return multiply(multiply(self._matrix(above), building.motion(self.entries[above])), entry.local)
+        return multiply(multiply(self._matrix(parent), building.motion(self.entries[parent])), entry.local)
 
     def _speed(self, index: int) -> tuple[Vector, Vector, float]:
-        """Return how fast an entry is that is about to have another body: m/s, rad/s, and along a joint."""
-        one = self.objects.get(index)
-        if isinstance(one, Joint):
-            return _AT_REST, _AT_REST, one.velocity_along
-        body = one.body if one is not None else None
+        """Return the velocities of an entry whose body is replaced: linear (m/s), angular (rad/s), along a joint."""
+        item = self.objects.get(index)
+        if isinstance(item, Joint):
+            return _AT_REST, _AT_REST, item.velocity_along
+        body = item.body if item is not None else None
         if body is None:
             return _AT_REST, _AT_REST, 0.0
         _, _, linear, angular = body.state
         return linear, angular, 0.0
 
-    def _set_moving(self, built: Built, speeds: Mapping[int, tuple[Vector, Vector, float]]) -> None:
+    def _restore_velocities(self, built: Built, speeds: Mapping[int, tuple[Vector, Vector, float]]) -> None:
         root = built.chain.root
         if root is not None and getattr(self.entries[root], "moves", False) and any(map(any, speeds[root][:2])):
             self._world.set_velocity(built.body, *speeds[root][:2])
@@ -143,21 +143,21 @@ class Scene:
             if speed and isinstance(joint, JointParameters):
                 self._world.joints.put(built.body, built.links[hung.shape], joint.value, speed)
 
-    def _remove(self, gone: Built) -> None:
-        for hung in gone.chain.hung:
-            one = self.objects.get(hung.joint)
-            if isinstance(one, (Joint, ForceSensor)):
-                one.release()
-        self._world.remove(gone.body)
-        self._context.names.pop(gone.body, None)
-        for link in gone.links.values():
-            self._context.link_names.pop((gone.body, link), None)
+    def _remove(self, built: Built) -> None:
+        for hung in built.chain.hung:
+            item = self.objects.get(hung.joint)
+            if isinstance(item, (Joint, ForceSensor)):
+                item.release()
+        self._world.remove(built.body)
+        self._context.names.pop(built.body, None)
+        for link in built.links.values():
+            self._context.link_names.pop((built.body, link), None)
         for carried in (self._context.carried.shapes, self._context.carried.bases, self._carried_bases):
-            carried.pop(gone.body, None)
-        self.drag.forget(gone.body)
-        for one in self.objects.values():
-            if isinstance(one, ShapeObject):
-                one.forget_body(gone.body)
+            carried.pop(built.body, None)
+        self.drag.forget(built.body)
+        for item in self.objects.values():
+            if isinstance(item, ShapeObject):
+                item.forget_body(built.body)
 
     def _add_names(self) -> None:
         names, link_names = self._context.names, self._context.link_names
@@ -169,41 +169,41 @@ class Scene:
     # ---- the tree
 
     def name_objects(self) -> None:
-        """Let scripts find the objects, as they were at the beginning, in a tree without them.
+        """Add all objects to a tree without them, in their initial state.
 
-        Raises ParameterError, with its place, for a name that is taken, or a parent that is not there.
+        Raises ParameterError, with its location, for a name that is used or a parent that does not exist.
         """
         self._forget_objects()
         self._add_objects(self._built.values())
-        if not self._began:
-            self._place_loose_ones(self.objects)
-            self._began = {index: one.matrix() for index, one in self.objects.items()}
+        if not self._initial_poses:
+            self._place_free_children(self.objects)
+            self._initial_poses = {index: item.matrix() for index, item in self.objects.items()}
         self._follow()
 
     def renew(self, change_tree: Callable[[], None] = lambda: None, bodies: bool = True) -> None:
-        """Let world and tree be what the entries say by now; `change_tree` is called when there are the new bodies.
+        """Update world and tree from the entries; `change_tree` is called once the new bodies exist.
 
-        `bodies`: bodies may have to be rebuilt, too. Raises ParameterError, where world and tree are as they were.
+        `bodies`: also rebuild bodies. Raises ParameterError; then world and tree have not changed.
         """
-        made = self._build()[0] if bodies else []
-        for index in (index for one in made for index in one.links):
-            one = self.objects.get(index)
-            if isinstance(one, ShapeObject):
-                one.embody(self._solid(index, self.entries[index].local))
+        new_bodies = self._build()[0] if bodies else []
+        for index in (index for body in new_bodies for index in body.links):
+            item = self.objects.get(index)
+            if isinstance(item, ShapeObject):
+                item.embody(self._solid(index, self.entries[index].local))
         for index in self.objects.keys() - self.entries.keys():
             del self.objects[index], self.changed[index]
             self.factors.pop(index, None)
         change_tree()
-        for one in self.objects.values():
-            if isinstance(one, ShapeObject):
-                one.pass_carriers()
-        there = set(self.objects)
-        self._add_objects(made)
-        self._place_loose_ones(self.objects.keys() - there)
+        for item in self.objects.values():
+            if isinstance(item, ShapeObject):
+                item.pass_carriers()
+        present = set(self.objects)
+        self._add_objects(new_bodies)
+        self._place_free_children(self.objects.keys() - present)
         self._follow()
 
     def exchange(self, index: int, handle: int, entry: KindParameters, place: Place) -> None:
-        """Make an object anew of an entry, in the place of the one that is there."""
+        """Replace an object by one built from `entry`."""
         made = entry.make(place, self._context)
         made.is_model, made.size_factor = entry.model, entry.size_factor
         before, self.objects[index] = self.objects[index], made
@@ -212,39 +212,39 @@ class Scene:
         self.tree.exchange(handle, made)
 
     def paint(self, index: int, rgba: Sequence[float]) -> None:
-        """Show a shape in another color."""
+        """Set the displayed color of a shape."""
         body, link = self._places[index]
         self._world.set_color(body, rgba, link)
 
     def _forget_objects(self) -> None:
         self.drag.let_go_of_all()
-        for one in getattr(self, "objects", {}).values():
-            if isinstance(one, ShapeObject):
-                one.release()
-        self.objects: dict[int, SceneObject] = {}  # by entry
-        self._carried_bases: dict[int, CarriedBody] = {}  # those of chains whose first joint has a parent, by body
+        for item in getattr(self, "objects", {}).values():
+            if isinstance(item, ShapeObject):
+                item.release()
+        self.objects: dict[int, SceneObject] = {}  # by index of the entry
+        self._carried_bases: dict[int, CarriedBody] = {}  # static roots of chains with a parent, by body
         self._context.carried.shapes.clear()
         self._context.carried.bases.clear()
 
-    def _add_objects(self, made: Iterable[Built]) -> None:
-        """Let the tree have the objects that it has not, and the dynamics move the joints of new bodies."""
-        new = {index: one for index, one in self.entries.items() if index not in self.objects}
+    def _add_objects(self, new_bodies: Iterable[Built]) -> None:
+        """Add the missing objects to the tree, and connect the joints and force sensors of new bodies."""
+        new = {index: entry for index, entry in self.entries.items() if index not in self.objects}
         for index in building.parents_first(new):
             self.objects[index] = self._add(index)
-        for built in made:
-            self._hold(built)
+        for built in new_bodies:
+            self._connect(built)
 
     def _add(self, index: int) -> SceneObject:
-        one = self.entries[index]
+        entry = self.entries[index]
         parent = self._parent(index)
-        gone = bool(one.parent) and parent is None  # a vehicle: it stays where it began
-        place = Place((one.name,), one.shown, parent, self._began[index] if gone else one.local)
-        if isinstance(one, KindParameters):
-            added = one.make(place, self._context)
+        is_orphan = bool(entry.parent) and parent is None  # a removed vehicle: the object keeps its initial pose
+        place = Place((entry.name,), entry.shown, parent, self._initial_poses[index] if is_orphan else entry.local)
+        if isinstance(entry, KindParameters):
+            added = entry.make(place, self._context)
         else:
             follow = self._context.carried.follow
-            added = ShapeObject(place, self._world, self._changed, follow, self._solid(index, place.local))
-        added.is_model, added.size_factor = one.model, one.size_factor
+            added = ShapeObject(place, self._world, self._update_carried, follow, self._solid(index, place.local))
+        added.is_model, added.size_factor = entry.model, entry.size_factor
         try:
             self.tree.insert(added)
         except ValueError as error:
@@ -252,10 +252,10 @@ class Scene:
         return added
 
     def _solid(self, index: int, local: Matrix) -> ShapeInWorld:
-        one = self.entries[index]
-        assert isinstance(one, ObjectParameters), "only shapes have bodies"
+        entry = self.entries[index]
+        assert isinstance(entry, ObjectParameters), "only shapes have bodies"
         number, link = self._places[index]
-        return ShapeInWorld(number, link, one.local if link != -1 else local, one.mass, one.static)
+        return ShapeInWorld(number, link, entry.local if link != -1 else local, entry.mass, entry.static)
 
     def _parent(self, index: int) -> SceneObject | None:
         name = self.entries[index].parent
@@ -263,7 +263,7 @@ class Scene:
             return None
         if name in self.tree:
             return self.tree[self.tree.handle(name)]
-        if self._began:  # a vehicle that has gone
+        if self._initial_poses:  # a vehicle that was removed
             return None
         raise ParameterError(
             f"no object is named '{name}', the parent of '{self.entries[index].name}'; "
@@ -271,8 +271,8 @@ class Scene:
             ("objects", index, "parent"),
         )
 
-    def _changed(self, shape: ShapeObject) -> None:
-        """Follow what carries a shape from now on, or follow it no longer."""
+    def _update_carried(self, shape: ShapeObject) -> None:
+        """Update the kinematic bodies after a shape's parent or its being static has changed."""
         if shape.name in self.tree:
             self.tree.look_for_loose_ones()
         if shape.parent is None or not shape.is_static:
@@ -280,25 +280,25 @@ class Scene:
         else:
             self._context.carried.shapes[shape.number] = shape.carried
 
-    def _hold(self, built: Built) -> None:
-        """Let the dynamics move the joints of a chain, and force sensors measure."""
+    def _connect(self, built: Built) -> None:
+        """Connect the joints and force sensors of a chain to its body's links."""
         for hung in built.chain.hung:
-            one, link = self.objects[hung.joint], built.links[hung.shape]
-            if isinstance(one, ForceSensor):
-                one.hold(self._world, built.body, link)
-            elif isinstance(one, Joint):
-                one.drive = JointDrive(self._world.joints, built.body, link)
-                one.drive.limit(one.limits)
-                one.drive.command(one.control)
+            holder, link = self.objects[hung.joint], built.links[hung.shape]
+            if isinstance(holder, ForceSensor):
+                holder.hold(self._world, built.body, link)
+            elif isinstance(holder, Joint):
+                holder.drive = JointDrive(self._world.joints, built.body, link)
+                holder.drive.limit(holder.limits)
+                holder.drive.command(holder.control)
         if built.chain.root is None:
             first = self.objects[built.chain.hung[0].joint]
             if first.parent is not None:
                 self._carried_bases[built.body] = CarriedBody(self._world, built.body, first.parent.below)
-                for above in bodies_above(first):
-                    self._world.collision_filter.let_pass(built.body, above)
+                for carrier in bodies_above(first):
+                    self._world.collision_filter.let_pass(built.body, carrier)
 
     def _follow(self) -> None:
-        """Put what is carried where it is carried to, a chain that hangs on another one's link after that."""
+        """Move the kinematic bodies to their frames; a chain that hangs on another chain's link follows that chain."""
 
         def depth(body: int) -> int:
             return len(bodies_above(self.objects[first[body]]))
@@ -308,83 +308,83 @@ class Scene:
         self._context.carried.bases = {body: bases[body] for body in sorted(bases, key=depth)}
         self._context.carried.follow()
 
-    def _place_loose_ones(self, added: Iterable[int]) -> None:
-        """Put what hangs on vehicles where they are, now that they are there."""
+    def _place_free_children(self, added: Iterable[int]) -> None:
+        """Move added free children to their entries' poses relative to the parent, now that it exists."""
         for index in added:
-            one = self.objects[index]
-            if one.is_loose and one.parent is not None:
-                one.put(multiply(one.parent.below(), self.entries[index].local))
+            item = self.objects[index]
+            if item.is_loose and item.parent is not None:
+                item.put(multiply(item.parent.below(), self.entries[index].local))
 
-    # ---- as it is now
+    # ---- present values
 
     def now(self, index: int) -> dict[str, Any]:
-        """Return the keys of an entry that say where it is, what it hangs on, how a joint stands, what is static."""
-        one, entry = self.objects[index], self.entries[index]
-        values = place_of(one)
-        if stands_at(entry, values):  # its numbers are its author's
+        """Return the present values of an entry's keys for pose, parent, joint and `static`."""
+        item, entry = self.objects[index], self.entries[index]
+        values = place_of(item)
+        if stands_at(entry, values):  # keep the author's numbers
             values.update(position=list(entry.position), rpy=list(entry.rpy))
-        if isinstance(one, ShapeObject) and one.mass and not one.is_held:
-            is_other = isinstance(entry, ObjectParameters) and one.is_static != entry.static
-            values.update({"static": one.is_static} if is_other else {})
+        if isinstance(item, ShapeObject) and item.mass and not item.is_held:
+            is_other = isinstance(entry, ObjectParameters) and item.is_static != entry.static
+            values.update({"static": item.is_static} if is_other else {})
         return values
 
     def entry_now(self, index: int) -> EntryParameters:
-        """Return an entry as it is now: itself, where it says that already."""
+        """Return an entry with its present values; the same entry if nothing differs."""
         entry, now = self.entries[index], self.now(index).items()
         values = {key: tuple(value) if isinstance(value, list) else value for key, value in now}
         values = {key: value for key, value in values.items() if getattr(entry, key) != value}
         return entry.model_copy(update=values) if values else entry
 
     def write_down(self, indices: Iterable[int]) -> None:
-        """Let entries say where they are now."""
+        """Update entries to the present values of their objects."""
         for index in indices:
             self.entries[index] = self.entry_now(index)
 
     def write_down_joints(self) -> None:
-        """Update the entries to where objects are now, if there are joints that may be about to hold other objects."""
-        if any(isinstance(one, (JointParameters, ForceSensorParameters)) for one in self.entries.values()):
+        """Update all entries to the present values if there are joints or force sensors, whose links may change."""
+        if any(isinstance(entry, (JointParameters, ForceSensorParameters)) for entry in self.entries.values()):
             self.write_down(self.entries)
 
     def put_in_order(self) -> None:
-        """Let entries stand in the order of their objects' handles, as they came first."""
-        handles = {index: self.tree.handle(one.name) for index, one in self.entries.items()}
+        """Sort the entries by their objects' handles, the order in which they were first added."""
+        handles = {index: self.tree.handle(entry.name) for index, entry in self.entries.items()}
         self.entries = dict(sorted(self.entries.items(), key=lambda pair: handles[pair[0]]))
 
     def parameters_now(self) -> SceneParameters:
-        """Return what a file would say of the scene as it is now."""
+        """Return the parameters of the scene with their present values."""
         self.write_down(self.entries)
         now = {"objects": list(self.entries.values()), "scripts": list(self.scripts.values())}
         return self.parameters.model_copy(update=now)
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that puts bodies without mass back where the tree has them."""
-        kept = dict(self.entries)
+        """Return a function that restores entries and moves kinematic bodies to their frames."""
+        entries = dict(self.entries)
 
         def restore() -> None:
-            self.entries.update({index: one for index, one in kept.items() if index in self.entries})
-            statics = [one.carried for one in self.objects.values() if isinstance(one, ShapeObject) and not one.is_held]
-            for one in (*self._carried_bases.values(), *statics):
-                one.renew()
+            self.entries.update({index: entry for index, entry in entries.items() if index in self.entries})
+            shapes = [it.carried for it in self.objects.values() if isinstance(it, ShapeObject) and not it.is_held]
+            for body in (*self._carried_bases.values(), *shapes):
+                body.renew()
 
         return restore
 
-    # ---- what it looks like
+    # ---- appearance
 
     def things(self) -> dict[str, SceneObject]:
-        """Return what one can see and move, by name."""
-        return {one.name: one for one in self.objects.values() if one.kind in ("shape", "dummy", "path")}
+        """Return the objects that a user can see and move, by name."""
+        return {item.name: item for item in self.objects.values() if item.kind in ("shape", "dummy", "path")}
 
     def visuals(self) -> tuple[list[Visual], np.ndarray]:
-        """Return how the objects look, the floor aside, and the poses world from visual, (N, 4, 4)."""
+        """Return the visuals of the objects, without the floor, and their poses world from visual, (N, 4, 4)."""
         numbers = self._numbers()
         return self._world.pictures.visuals(numbers), self._world.pictures.visual_poses(numbers)
 
     def categories(self) -> dict[str, str]:
-        """Return the categories of the objects that are given one, by name."""
-        return {one.name: one.category for one in self.entries.values() if one.category}
+        """Return the categories of the objects that have one, by name."""
+        return {entry.name: entry.category for entry in self.entries.values() if entry.category}
 
     def visual_names(self) -> list[str]:
-        """Return for each of the visuals the name of its object, as in `things`."""
+        """Return the object's name for each of the visuals, as in `things`."""
         names = {place: self.entries[index].name for index, place in self._places.items()}
         return [names.get(place, "") for place in self._world.pictures.places(self._numbers())]
 
@@ -393,9 +393,9 @@ class Scene:
 
 
 def _warn(entries: Mapping[int, object], reasons: Mapping[int, str]) -> None:
-    """Say in one line for each reason which joints the dynamics does not move."""
+    """Log one warning for each reason, with the joints that the dynamics does not move."""
     for reason in sorted({*reasons.values()}):
-        names = [getattr(entries[index], "name", "") for index, one in reasons.items() if one == reason]
+        names = [getattr(entries[index], "name", "") for index, other in reasons.items() if other == reason]
         _LOG.warning(
             "only scripts move these joints, because %s: %s",
             reason,

@@ -1,4 +1,4 @@
-"""What a scene file may say: floor, objects, where the drone stands, and the weather."""
+"""Parameters of a scene file: floor, objects, scripts, collections; checks of its entries and files."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ from drone_sim.scene.object_collections import CollectionList
 from drone_sim.scene.object_parameters import SHAPES, ObjectParameters
 
 MAX_OBJECTS = 2000
-# What a scene file may say of these comes before the parameters.
+# These keys of a scene file take precedence over the parameters.
 WORLD_KEYS = ("time_step", "sub_step", "gravity", "physics")
-BESIDE = ("drone", "vehicles", "weather", *WORLD_KEYS)  # what a scene file holds besides the scene
-MAX_TRIANGLES = 500_000  # of all meshes of a scene, each counted as often as it stands there
-MAX_PIXELS = 4 * images.MAX_SIDE**2  # of all its textures
-MAX_REACH = 1e5  # m, of a mesh from its own origin
+BESIDE = ("drone", "vehicles", "weather", *WORLD_KEYS)  # keys of a scene file that are not of the scene
+MAX_TRIANGLES = 500_000  # of all meshes of a scene; a mesh counts once per use
+MAX_PIXELS = 4 * images.MAX_SIDE**2  # of all textures of a scene
+MAX_REACH = 1e5  # m, distance of a mesh's vertices from its origin
 
 
 class FloorParameters(Checked):
-    """A square floor at z = 0, centred on the origin; around it is ground, or nothing where `edge` is true."""
+    """A square floor at z = 0, centred on the origin, surrounded by ground or, if `edge`, by nothing."""
 
     size: Annotated[Finite, Within(0.01, 1e4)]
     texture: File
@@ -61,31 +61,31 @@ else:
 
 
 _Value = TypeVar("_Value")
-_VREPS_WORDS = {"box": "Cuboid", "mesh": "Shape", "compound": "Shape", "urdf": "Shape"}
-# Made when an entry is first read by itself, which few simulations need.
+_VREP_NAMES = {"box": "Cuboid", "mesh": "Shape", "compound": "Shape", "urdf": "Shape"}
+# Built when a single entry is first read, which few simulations do.
 _ENTRY: TypeAdapter[EntryParameters] = TypeAdapter(EntryChoice, config=ConfigDict(defer_build=True))
 _SCRIPT = TypeAdapter(AttachedScriptParameters)
 
 
-def entry_from(said: Mapping[str, Any]) -> EntryParameters:
-    """Return what an entry says, checked; without a `position` it is at its parent's. Raises ParameterError."""
-    return _checked(_ENTRY, EntryChoice, {"position": [0.0, 0.0, 0.0], **said})
+def entry_from(values: Mapping[str, Any]) -> EntryParameters:
+    """Return a checked entry; the default `position` is the parent's origin. Raises ParameterError."""
+    return _checked(_ENTRY, EntryChoice, {"position": [0.0, 0.0, 0.0], **values})
 
 
-def script_from(said: Mapping[str, Any]) -> AttachedScriptParameters:
-    """Return what an entry of `scripts` says, checked. Raises ParameterError."""
-    return _checked(_SCRIPT, AttachedScriptParameters, said)
+def script_from(values: Mapping[str, Any]) -> AttachedScriptParameters:
+    """Return a checked entry of `scripts`. Raises ParameterError."""
+    return _checked(_SCRIPT, AttachedScriptParameters, values)
 
 
-def _checked(adapter: TypeAdapter[_Value], kind: Any, said: Mapping[str, Any]) -> _Value:
+def _checked(adapter: TypeAdapter[_Value], kind: Any, values: Mapping[str, Any]) -> _Value:
     try:
-        return adapter.validate_python(said)
+        return adapter.validate_python(values)
     except ValidationError as error:
-        raise ParameterError(one_line([(None, one.text) for one in problems(error, kind)])) from None
+        raise ParameterError(one_line([(None, problem.text) for problem in problems(error, kind)])) from None
 
 
 class SceneParameters(Checked):
-    """The world without the drone."""
+    """The world without vehicles."""
 
     datum: DatumParameters
     magnetic_field: MagneticField
@@ -95,59 +95,59 @@ class SceneParameters(Checked):
     collections: CollectionList
 
     def model_post_init(self, _context: Any) -> None:
-        """Give a name to objects without one; check what concerns several objects at once."""
+        """Name the shapes that have no name; check names, parents, scripts and collections."""
         name_shapes(self.objects)
         names: set[str] = set()
-        for index, one in enumerate(self.objects):
-            if one.name in names:
-                raise _refused(index, "name", one.name, "is used twice")
-            names.add(one.name)
+        for index, entry in enumerate(self.objects):
+            if entry.name in names:
+                raise _problem(index, "name", entry.name, "is used twice")
+            names.add(entry.name)
         check_parents(self.objects)
         attached_scripts.check(self.scripts)
         object_collections.check(self.collections)
 
 
 def name_shapes(objects: list[EntryChoice]) -> None:
-    """Let shapes without a name be called as V-REP calls new ones: Cuboid, Cuboid0, Cuboid1, ..."""
-    taken = {one.name for one in objects}
+    """Name the shapes that have no name as V-REP names new ones: Cuboid, Cuboid0, Cuboid1, ..."""
+    taken = {entry.name for entry in objects}
     free: dict[str, Iterator[str]] = {}
-    for index, one in enumerate(objects):
-        if not one.name and isinstance(one, ObjectParameters):
-            word = _VREPS_WORDS.get(one.shape, one.shape.capitalize())
-            names = free.setdefault(word, (other for other in numbered(word) if other not in taken))
+    for index, entry in enumerate(objects):
+        if not entry.name and isinstance(entry, ObjectParameters):
+            word = _VREP_NAMES.get(entry.shape, entry.shape.capitalize())
+            names = free.setdefault(word, (candidate for candidate in numbered(word) if candidate not in taken))
             name = next(names)
-            objects[index] = one.model_copy(update={"name": name, "alias": word if name != word else ""})
+            objects[index] = entry.model_copy(update={"name": name, "alias": word if name != word else ""})
 
 
-def _refused(index: int, key: str, value: str, why: str) -> ParameterError:
+def _problem(index: int, key: str, value: str, why: str) -> ParameterError:
     return ParameterError(why, ("objects", index, key), f"'{value}'")
 
 
 def check_parents(objects: Iterable[EntryParameters]) -> None:
-    """Raise ParameterError for one of some entries that hangs on itself, or too deep below the others."""
-    entries = {one.name: one for one in objects}
-    for index, one in enumerate(entries.values()):
-        above = _above(one, entries)
-        if one.name in above:
-            raise _refused(index, "parent", one.parent, f"'{one.name}' would be its own ancestor")
-        if len(above) > DEEPEST:
-            raise _refused(index, "parent", one.parent, f"'{one.name}' has more than {DEEPEST} ancestors")
+    """Raise ParameterError for an entry that is its own ancestor or has too many ancestors."""
+    entries = {entry.name: entry for entry in objects}
+    for index, entry in enumerate(entries.values()):
+        ancestors = _ancestors(entry, entries)
+        if entry.name in ancestors:
+            raise _problem(index, "parent", entry.parent, f"'{entry.name}' would be its own ancestor")
+        if len(ancestors) > DEEPEST:
+            raise _problem(index, "parent", entry.parent, f"'{entry.name}' has more than {DEEPEST} ancestors")
 
 
-def _above(one: EntryParameters, entries: Mapping[str, EntryParameters]) -> dict[str, None]:
-    """Return the names of the entries that one hangs on, by way of others, too; its own where it does."""
-    above: dict[str, None] = {}
-    name = one.parent
-    while name and name in entries and name not in above:
-        above[name] = None
+def _ancestors(entry: EntryParameters, entries: Mapping[str, EntryParameters]) -> dict[str, None]:
+    """Return the names of an entry's ancestors among `entries`, including its own name in a cycle."""
+    ancestors: dict[str, None] = {}
+    name = entry.parent
+    while name and name in entries and name not in ancestors:
+        ancestors[name] = None
         name = entries[name].parent
-    return above
+    return ancestors
 
 
 def read(file: str) -> dict[str, Any]:
-    """Return a scene file's floor, objects, drone and weather as they stand among the parameters.
+    """Return the content of a scene file in the layout of the parameters: `scene`, `drone`, `weather` and so on.
 
-    Its own files (mesh, urdf, texture) are relative to it. Raises ParameterError.
+    File names in it (mesh, urdf, texture) are relative to the scene file. Raises ParameterError.
     """
     try:
         path = resolve(file)
@@ -157,26 +157,26 @@ def read(file: str) -> dict[str, Any]:
 
 
 def from_content(content: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Return what `read` does, of a scene file's content."""
-    scene = {key: value for key, value in content.items() if key not in BESIDE}  # the unknown are refused with the rest
-    found = {"scene": scene, **{key: content[key] for key in BESIDE if key in content}}
-    find_files_beside(folder, found)
-    return found
+    """Return the same as `read`, given a scene file's content."""
+    scene = {key: value for key, value in content.items() if key not in BESIDE}  # unknown keys are reported later
+    result = {"scene": scene, **{key: content[key] for key in BESIDE if key in content}}
+    find_files_beside(folder, result)
+    return result
 
 
 def find_files_beside(folder: Path, values: Mapping[str, Any]) -> None:
-    """Let the file names among `scene` and `drone` lead to files in a folder."""
+    """Resolve the file names in `scene`, `drone` and `vehicles` relative to a folder, in place."""
     scene = values.get("scene")
-    inside = scene if isinstance(scene, dict) else {}
-    places = [inside.get("floor"), *_listed(inside.get("objects")), *_listed(inside.get("scripts"))]
+    inner = scene if isinstance(scene, dict) else {}
+    places = [inner.get("floor"), *_listed(inner.get("objects")), *_listed(inner.get("scripts"))]
     vehicles = values.get("vehicles")
     entries = vehicles.values() if isinstance(vehicles, dict) else ()
     for place in (values.get("drone"), *places, *entries):
-        _find_beside(folder, place)
+        _resolve_files(folder, place)
 
 
 def problem_in_file(problem: ParameterProblem) -> ParameterProblem | None:
-    """Return a problem as the scene file has it, where they stand beside the drone; None for any other."""
+    """Return a problem with its location in the scene file; None if it is not of the scene file."""
     if problem.location[:1] in [(key,) for key in BESIDE]:
         return problem
     if problem.location[:1] != ("scene",):
@@ -189,28 +189,28 @@ def problem_in_file(problem: ParameterProblem) -> ParameterProblem | None:
 
 
 def _listed(objects: Any) -> list[Any]:
-    return objects if isinstance(objects, list) else []  # what is no list is refused with the other values
+    return objects if isinstance(objects, list) else []  # other types are reported with the other problems
 
 
-def _find_beside(folder: Path, place: Any) -> None:
-    for part in _listed(place.get("parts")) if isinstance(place, dict) else []:
-        _find_beside(folder, part)
+def _resolve_files(folder: Path, values: Any) -> None:
+    for part in _listed(values.get("parts")) if isinstance(values, dict) else []:
+        _resolve_files(folder, part)
     for key in ("file", "texture", "urdf", "script"):
-        name = place.get(key) if isinstance(place, dict) else None
-        if key == "script" and not Path(str(name)).suffix:  # tutorial and target have none
+        name = values.get(key) if isinstance(values, dict) else None
+        if key == "script" and not Path(str(name)).suffix:  # built-in scripts such as tutorial and target have none
             continue
-        if isinstance(name, str) and name and not hasattr(name, "given"):  # an alias is the same mapping once more
-            place[key] = named_in(folder, name)
+        if isinstance(name, str) and name and not hasattr(name, "given"):  # a YAML alias repeats the same mapping
+            values[key] = named_in(folder, name)
 
 
-# ---- meshes, textures and URDFs, looked through and counted before anything is made of them
+# ---- checks of meshes, textures and URDFs before anything is built
 
 
 def check_files(floor: FloorParameters, objects: Iterable[EntryParameters]) -> None:
-    """Raise ParameterError, in one line, for the first file of the scene that cannot be used."""
+    """Raise ParameterError with a message of one line for the first file of the scene that cannot be used."""
     try:
-        shapes = [one for one in objects if isinstance(one, ObjectParameters)]
-        _check_textures({floor.texture, *(one.texture for one in shapes if one.texture)})
+        shapes = [entry for entry in objects if isinstance(entry, ObjectParameters)]
+        _check_textures({floor.texture, *(shape.texture for shape in shapes if shape.texture)})
         _check_meshes(shapes)
     except ValueError as error:
         raise ParameterError(" ".join(str(error).split())) from None
@@ -227,7 +227,7 @@ def _check_textures(paths: set[str]) -> None:
 
 def _check_meshes(shapes: list[ObjectParameters]) -> None:
     count = 0
-    for path, scale in (mesh for one in shapes for mesh in one.to_shape().meshes()):
+    for path, scale in (mesh for shape in shapes for mesh in shape.to_shape().meshes()):
         count += mesh_files.triangles(path)
         if count > MAX_TRIANGLES:
             raise ValueError(f"mesh {path}: the meshes of the scene have more than {MAX_TRIANGLES} triangles together")
