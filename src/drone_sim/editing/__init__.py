@@ -1,1 +1,1 @@
-"""Edits of the scene as records, with undo and redo: what the windows of the simulation are made of."""
+"""The scene editor: edit requests as records, undo and redo, files; used by the simulation's windows and scripts."""

@@ -1,4 +1,4 @@
-"""What an edit has changed of a scene, to be taken back, and to be done again."""
+"""Changes of a scene by an edit, which can be undone and redone."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters
 
 _Value = TypeVar("_Value")
-_Pair = tuple[_Value | None, _Value | None]  # before, and after; None where it is not there
-_DESCRIPTION = ("alias", "category", "model")
-_PLACE = ("parent", "position", "rpy")
+_Pair = tuple[_Value | None, _Value | None]  # before and after; None if absent
+_DESCRIPTION_KEYS = ("alias", "category", "model")
+_POSE_KEYS = ("parent", "position", "rpy")
 
 
 class SceneChange(NamedTuple):
-    """What differs after an edit: objects by handle, scripts by the name of their object, settings."""
+    """The differences made by an edit: objects by handle, scripts by the name of their object, and settings."""
 
     entries: dict[int, _Pair[EntryParameters]]
     scripts: dict[str, _Pair[AttachedScriptParameters]]
@@ -32,20 +32,20 @@ class SceneChange(NamedTuple):
 
     @property
     def reversed(self) -> SceneChange:
-        """What takes it back."""
-        return SceneChange(_turned(self.entries), _turned(self.scripts), (self.settings[1], self.settings[0]))
+        """The change that undoes this one."""
+        return SceneChange(_swapped(self.entries), _swapped(self.scripts), (self.settings[1], self.settings[0]))
 
     def followed_by(self, other: SceneChange) -> SceneChange:
-        """Return both as one."""
+        """Return this change and the following one combined."""
         return SceneChange(
-            _joined(self.entries, other.entries),
-            _joined(self.scripts, other.scripts),
+            _combined(self.entries, other.entries),
+            _combined(self.scripts, other.scripts),
             (self.settings[0], other.settings[1]),
         )
 
 
 def change_between(before: SceneContent, after: SceneContent) -> SceneChange:
-    """Return what has changed."""
+    """Return the differences between two contents."""
     return SceneChange(
         _differences(before.entries, after.entries),
         _differences(before.scripts, after.scripts),
@@ -61,11 +61,11 @@ def _differences(before: Mapping[_Key, _Value], after: Mapping[_Key, _Value]) ->
     return {key: pair for key, pair in pairs if pair[0] is not pair[1] and pair[0] != pair[1]}
 
 
-def _turned(pairs: Mapping[_Key, _Pair[_Value]]) -> dict[_Key, _Pair[_Value]]:
+def _swapped(pairs: Mapping[_Key, _Pair[_Value]]) -> dict[_Key, _Pair[_Value]]:
     return {key: (after, before) for key, (before, after) in pairs.items()}
 
 
-def _joined(first: Mapping[_Key, _Pair[_Value]], second: Mapping[_Key, _Pair[_Value]]) -> dict[_Key, _Pair[_Value]]:
+def _combined(first: Mapping[_Key, _Pair[_Value]], second: Mapping[_Key, _Pair[_Value]]) -> dict[_Key, _Pair[_Value]]:
     pairs = {
         key: (first.get(key, second.get(key, (None, None)))[0], second.get(key, first.get(key, (None, None)))[1])
         for key in {**first, **second}
@@ -74,48 +74,48 @@ def _joined(first: Mapping[_Key, _Pair[_Value]], second: Mapping[_Key, _Pair[_Va
 
 
 def carry_out(simulation: Simulation, change: SceneChange, arrange: Callable[[Settings], None]) -> None:
-    """Apply a change to a scene that is in the state before it; `arrange` applies other settings.
+    """Apply a change to a scene that is in the state before it; `arrange` applies changed settings.
 
-    Raises ValueError, perhaps when a part of the change is done already.
+    Raises ValueError; a part of the change may then be applied already.
     """
-    _Changing(simulation, change).carry_out(arrange)
+    _ChangeApplier(simulation, change).carry_out(arrange)
 
 
-class _Changing:
+class _ChangeApplier:
     def __init__(self, simulation: Simulation, change: SceneChange):
         self._simulation = simulation
         self._change = change
         pairs = change.entries.items()
-        self._gone = [handle for handle, (_, after) in pairs if after is None]
-        self._new = {handle: after for handle, (before, after) in pairs if before is None and after is not None}
-        self._other = {handle: (one, two) for handle, (one, two) in pairs if one is not None and two is not None}
+        self._removed = [handle for handle, (_, after) in pairs if after is None]
+        self._added = {handle: after for handle, (before, after) in pairs if before is None and after is not None}
+        self._changed = {handle: (old, new) for handle, (old, new) in pairs if old is not None and new is not None}
 
     def carry_out(self, arrange: Callable[[Settings], None]) -> None:
-        self._take_away()
+        self._remove()
         before, after = self._change.settings
         if before != after:
             arrange(after)
-        self._rename({handle: two.name for handle, (one, two) in self._other.items() if one.name != two.name})
-        if self._new:
-            self._simulation.context.objects.reserve({one.name: handle for handle, one in self._new.items()})
-            self._simulation.operations.add([*self._new.values()])
+        self._rename({handle: new.name for handle, (old, new) in self._changed.items() if old.name != new.name})
+        if self._added:
+            self._simulation.context.objects.reserve({new.name: handle for handle, new in self._added.items()})
+            self._simulation.operations.add([*self._added.values()])
             self._simulation.scene.put_in_order()
-        self._be()
-        self._place()
+        self._replace_entries()
+        self._set_places()
         for name, (_, script) in self._change.scripts.items():
             if script is not None and self._simulation.scene.scripts.get(name) != script:
                 self._simulation.operations.attach_script(script)
 
-    def _take_away(self) -> None:
+    def _remove(self) -> None:
         operations = self._simulation.operations
         for name, (_, script) in self._change.scripts.items():
             if script is None:
                 operations.detach_script(name)
-        if self._gone:
-            operations.remove(self._gone)
+        if self._removed:
+            operations.remove(self._removed)
 
     def _rename(self, names: dict[int, str]) -> None:
-        """Give names, also where some exchange theirs."""
+        """Rename objects, even if some exchange their names."""
         tree, operations = self._simulation.context.objects, self._simulation.operations
         while names:
             free = [handle for handle, name in names.items() if name not in tree]
@@ -125,21 +125,21 @@ class _Changing:
             for handle in free:
                 operations.rename(handle, names.pop(handle))
 
-    def _be(self) -> None:
-        """Give entries their new content, all at once, so that the world is rebuilt only once."""
+    def _replace_entries(self) -> None:
+        """Set the new entries, all at once, so that the world is rebuilt only once."""
         operations, entries = self._simulation.operations, {}
-        for handle, (one, two) in self._other.items():
-            if type(one) is not type(two):
-                self._replace(handle, two)
-        for handle, (one, two) in self._other.items():
-            if type(one) is type(two) and _others(one, two) - {"name", *_DESCRIPTION, *_PLACE}:
+        for handle, (old, new) in self._changed.items():
+            if type(old) is not type(new):
+                self._replace(handle, new)
+        for handle, (old, new) in self._changed.items():
+            if type(old) is type(new) and _different_keys(old, new) - {"name", *_DESCRIPTION_KEYS, *_POSE_KEYS}:
                 now = operations.entry(handle)
-                entries[handle] = two.model_copy(update={"name": now.name, "parent": now.parent})
+                entries[handle] = new.model_copy(update={"name": now.name, "parent": now.parent})
         if entries:
             operations.exchange(entries)
-        for handle, (one, two) in self._other.items():
-            described = {key: getattr(two, key) for key in _DESCRIPTION if key in _others(one, two)}
-            if described and type(one) is type(two):
+        for handle, (old, new) in self._changed.items():
+            described = {key: getattr(new, key) for key in _DESCRIPTION_KEYS if key in _different_keys(old, new)}
+            if described and type(old) is type(new):
                 operations.describe(handle, **described)
 
     def _replace(self, handle: int, entry: EntryParameters) -> None:
@@ -153,23 +153,22 @@ class _Changing:
         for child in children:
             operations.set_parent(child, handle, keep_in_place=True)
 
-    def _place(self) -> None:
+    def _set_places(self) -> None:
         tree, operations = self._simulation.context.objects, self._simulation.operations
-        hung = {handle: two for handle, (one, two) in self._other.items() if one.parent != two.parent}
-        for handle in hung:  # on nothing first: two may change places
+        reparented = {handle: new for handle, (old, new) in self._changed.items() if old.parent != new.parent}
+        for handle in reparented:  # to the world first: two objects may exchange their places
             operations.set_parent(handle, WORLD, keep_in_place=True)
-        for handle, two in hung.items():
-            if two.parent:
-                operations.set_parent(handle, tree.handle(two.parent), keep_in_place=True)
+        for handle, new in reparented.items():
+            if new.parent:
+                operations.set_parent(handle, tree.handle(new.parent), keep_in_place=True)
         moved = [
-            (handle, two)
-            for handle, (one, two) in self._other.items()
-            if any(getattr(one, key) != getattr(two, key) for key in _PLACE)
+            (handle, new)
+            for handle, (old, new) in self._changed.items()
+            if any(getattr(old, key) != getattr(new, key) for key in _POSE_KEYS)
         ]
-        for handle, two in sorted(moved, key=lambda one: levels(tree[one[0]])):
-            operations.put(handle, two.local)
+        for handle, new in sorted(moved, key=lambda item: levels(tree[item[0]])):
+            operations.put(handle, new.local)
 
 
-def _others(one: EntryParameters, two: EntryParameters) -> set[str]:
-    """Return the keys in whose values two entries of one type differ."""
-    return {key for key in type(two).model_fields if getattr(one, key, None) != getattr(two, key)}
+def _different_keys(old: EntryParameters, new: EntryParameters) -> set[str]:
+    return {key for key in type(new).model_fields if getattr(old, key, None) != getattr(new, key)}

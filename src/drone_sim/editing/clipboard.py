@@ -1,4 +1,4 @@
-"""Objects as a text that is copied and pasted: YAML as in a scene file, whoever has written it."""
+"""Text of copied objects: YAML as in a scene file, also pasted from other programs."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters
 
 _KEYS = {"objects": list, "scripts": list, "vehicles": dict}
-_LIKE = "must be objects as in a scene file, such as - {shape: box, size: [1, 1, 1], position: [0, 0, 0.5]}"
-_DEEPEST = 40  # spaces before the lines of a part of a file
+_EXPECTED = "must be objects as in a scene file, such as - {shape: box, size: [1, 1, 1], position: [0, 0, 0.5]}"
+_MAX_INDENT = 40  # spaces
 _Content = dict[str, Any]
 
 
@@ -28,68 +28,68 @@ def written(
     vehicles: Mapping[str, Any],
     folder: Path,
 ) -> str:
-    """Return the text; the files in it have names by which a scene in any folder finds them.
+    """Return the text of objects; its file names are valid for a scene in any folder.
 
-    Vehicles are as they are said in a scene file in `folder`.
+    `vehicles` are entries as in a scene file in `folder`.
     """
     plain: _Content = {
-        "objects": [models.in_order(models.plain(one, None)) for one in entries],
-        "scripts": [models.plain(one, None) for one in scripts],
+        "objects": [models.in_order(models.plain(entry, None)) for entry in entries],
+        "scripts": [models.plain(script, None) for script in scripts],
         "vehicles": copy.deepcopy(dict(vehicles)),
     }
     scene_parameters.find_files_beside(folder, {"vehicles": plain["vehicles"]})
     content = _with_files(plain, lambda file: file.seen_from(None))
-    return dumped({key: several for key, several in content.items() if several})
+    return dumped({key: section for key, section in content.items() if section})
 
 
 def read(text: str, folder: Path) -> _Content:
-    """Return `objects`, `scripts` and `vehicles` of a text, those of its files that are in `folder` named from there.
+    """Return `objects`, `scripts` and `vehicles` of a text; names of files in `folder` become relative to it.
 
-    It has these keys, or is a list of objects, or one object. Raises ValueError, in one line, for what is none.
+    The text has these keys or is a list of objects or one object. Otherwise raises ParameterError, in one line.
     """
-    said = _parsed(text)
-    if isinstance(said, dict) and not {"shape", "kind"}.isdisjoint(said):
-        said = [said]
-    content = {"objects": said} if isinstance(said, list) else said
+    value = _parsed(text)
+    if isinstance(value, dict) and not {"shape", "kind"}.isdisjoint(value):
+        value = [value]
+    content = {"objects": value} if isinstance(value, list) else value
     if not isinstance(content, dict) or not (content.keys() - {"scripts"}):
-        raise ParameterError(f"the pasted text {shown(text)}: {_LIKE}")
-    for key, several in content.items():
+        raise ParameterError(f"the pasted text {shown(text)}: {_EXPECTED}")
+    for key, part in content.items():
         if key not in _KEYS:
             raise ParameterError(f"the pasted text: unknown key {shown(key)}; {near_names(str(key), _KEYS)}")
-        if not isinstance(several, _KEYS[key]) or not all(isinstance(one, dict) for one in _entries(several)):
-            raise ParameterError(f"the pasted text: {key} = {shown(several)}: {_LIKE}")
+        if not isinstance(part, _KEYS[key]) or not all(isinstance(entry, dict) for entry in _entries(part)):
+            raise ParameterError(f"the pasted text: {key} = {shown(part)}: {_EXPECTED}")
     scene_parameters.find_files_beside(folder, {"scene": content, "vehicles": content.get("vehicles")})
-    return {**{key: kind() for key, kind in _KEYS.items()}, **_with_files(content, lambda file: _nearer(file, folder))}
+    return {**{key: kind() for key, kind in _KEYS.items()}, **_with_files(content, lambda it: _relative(it, folder))}
 
 
-def _entries(several: Any) -> list[Any]:
-    return [*several.values()] if isinstance(several, dict) else several
+def _entries(section: Any) -> list[Any]:
+    return [*section.values()] if isinstance(section, dict) else section
 
 
 def _parsed(text: str) -> Any:
-    """Return what a text says, also where it is a part of a file, its lines indented, the first one perhaps cut."""
+    """Parse a text; it may be an indented part of a file whose first line has lost its indentation."""
     first, _, rest = text.lstrip().partition("\n")
-    most = min((len(line) - len(line.lstrip()) for line in rest.splitlines() if line.strip()), default=0)
-    most = min(most, _DEEPEST)
-    cut = [f"{' ' * indent}{first}\n{rest}" for indent in range(most, 0, -1)]
-    troubles = []
-    for one in (text, textwrap.dedent(text), *cut):
+    indentation = min((len(line) - len(line.lstrip()) for line in rest.splitlines() if line.strip()), default=0)
+    indentation = min(indentation, _MAX_INDENT)
+    candidates = [f"{' ' * indent}{first}\n{rest}" for indent in range(indentation, 0, -1)]
+    errors = []
+    for candidate in (text, textwrap.dedent(text), *candidates):
         try:
-            return yaml_files.parse(one)
+            return yaml_files.parse(candidate)
         except yaml_files.YamlError as error:
-            troubles.append(error)
-    raise ParameterError(f"the pasted text {shown(text)} is not YAML ({troubles[0]}): it {_LIKE}")
+            errors.append(error)
+    raise ParameterError(f"the pasted text {shown(text)} is not YAML ({errors[0]}): it {_EXPECTED}")
 
 
 def _with_files(value: Any, name: Callable[[FoundFile], str]) -> Any:
-    """Return values whose files have other names."""
+    """Return `value` with all file names replaced by `name`(file)."""
     if isinstance(value, Mapping):
-        return {key: _with_files(one, name) for key, one in value.items()}
+        return {key: _with_files(item, name) for key, item in value.items()}
     if isinstance(value, list):
-        return [_with_files(one, name) for one in value]
+        return [_with_files(item, name) for item in value]
     return name(value) if isinstance(value, FoundFile) else value
 
 
-def _nearer(file: FoundFile, folder: Path) -> str:
+def _relative(file: FoundFile, folder: Path) -> str:
     path = Path(file)
     return str(path.relative_to(folder)) if path.is_relative_to(folder) else file.given

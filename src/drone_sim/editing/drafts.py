@@ -1,4 +1,4 @@
-"""Unsaved changes of a scene, kept on the disk: the next node offers them."""
+"""Drafts: unsaved changes of a scene, kept on the disk and offered by the next node."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NO_FILE = "a new scene"
 
 
 class Draft(NamedTuple):
-    """The file of the scene, '' where it has none, when the draft was written (s since 1970), and the scene's text."""
+    """A draft: the scene's file ('' if none), the time of writing (s since 1970), and the scene's text."""
 
     file: str
     saved: float
@@ -26,30 +26,30 @@ class Draft(NamedTuple):
 
 
 class Drafts:
-    """One draft of this node, and that which an earlier one has left."""
+    """The draft of this node, and the draft that an earlier node left."""
 
     def __init__(self, folder: Path | None):
-        """Keep them in a folder, or, for None, nowhere."""
+        """Keep drafts in a folder; None: do not keep them."""
         self._file = folder / "draft.yaml" if folder else None
-        self._left = folder / "draft.left.yaml" if folder else None
+        self._left_file = folder / "draft.left.yaml" if folder else None
         self._lock = threading.Lock()
         self._writing: threading.Thread | None = None
-        self._number = 0  # of the last text that was to be written
+        self._number = 0  # of the last text requested to be written
         self._has_failed = False
         self.offered: Draft | None = None
         self.offer()
 
     def offer(self) -> None:
-        """Offer the present draft: the scene that it is of is not open any more."""
+        """Offer the present draft, whose scene is no longer open."""
         with self._lock, contextlib.suppress(OSError):
-            if self._file and self._left:
-                self._file.replace(self._left)
-        self.offered = _read(self._left) if self._left else None
+            if self._file and self._left_file:
+                self._file.replace(self._left_file)
+        self.offered = _read(self._left_file) if self._left_file else None
 
     def keep(self, file: str, text: str) -> None:
-        """Write a draft, in a thread. If that fails, log a warning, unless the draft before failed, too.
+        """Write a draft, in a thread. If that fails, log a warning, unless the preceding draft failed, too.
 
-        The cockpit shows a warning with the words "no effect" as a notice.
+        The cockpit shows a warning that contains "no effect" as a notice.
         """
         path = self._file
         if path is None:
@@ -74,25 +74,25 @@ class Drafts:
         self._writing.start()
 
     def wait(self) -> None:
-        """Wait until what was to be kept is on the disk."""
+        """Wait until the last draft is written."""
         if self._writing is not None:
             self._writing.join()
 
     def clear(self) -> None:
-        """Have no draft: all is saved."""
+        """Delete the draft: everything is saved."""
         self._number += 1
         with self._lock, contextlib.suppress(OSError):
             if self._file:
                 self._file.unlink(missing_ok=True)
 
     def take(self) -> Draft:
-        """Return the offered draft, and offer it no longer. Raises ValueError where there is none."""
-        if self.offered is None or self._left is None:
+        """Return the offered draft and stop offering it. Raises ValueError if there is none."""
+        if self.offered is None or self._left_file is None:
             raise ValueError("there is no draft of a scene")
-        taken, self.offered = self.offered, None
+        draft, self.offered = self.offered, None
         with contextlib.suppress(OSError):
-            self._left.unlink(missing_ok=True)
-        return taken
+            self._left_file.unlink(missing_ok=True)
+        return draft
 
 
 def _read(path: Path) -> Draft | None:

@@ -1,4 +1,4 @@
-"""The scene's editor: requests as records, carried out on the living scene; undo, redo, revisions."""
+"""The scene editor: executes requests on the simulated scene; undo, redo, revisions, drafts."""
 
 from __future__ import annotations
 
@@ -27,37 +27,37 @@ _DRAFT_PERIOD = 1.0  # s of real time
 
 
 class SceneEditor:
-    """The editor of one simulation, called by its thread alone: all requests of windows and scripts go through it."""
+    """The editor of one simulation for all requests of windows and scripts; call it only in the simulation's thread."""
 
     def __init__(self, player: Player, drafts: Path | None = None):
-        """Edit the scene of the simulation that `player` plays; what is not saved is kept in the folder `drafts`."""
+        """Edit the scene of `player`'s simulation; unsaved changes are kept as drafts in the folder `drafts`."""
         self._player = player
         self.simulation = player.simulation
         self.scene = SceneAccess(self.simulation)
         self.files = SceneFiles(self.scene)
         self.history = History()
-        self._drafts, self._drafted = Drafts(drafts), (0, False)
-        self._seldom = Throttle(_DRAFT_PERIOD)
-        self.revision = 0  # another number after every edit
-        self._saved = 0  # the revision that is in the file
-        self._started = 0, False  # the revision with which it runs, and whether that is not in the file
-        self._run = -1  # whose edits stop takes back, -1 while it is stopped
+        self._drafts, self._last_draft = Drafts(drafts), (0, False)
+        self._draft_throttle = Throttle(_DRAFT_PERIOD)
+        self.revision = 0  # changes with every edit
+        self._saved = 0  # the revision in the file
+        self._started = 0, False  # revision at the start of the run, and whether it was modified
+        self._run = -1  # number of the run, -1 while stopped
         self._operations = EditOperations(self.scene)
-        self._read, self._is_opening = -1, False
+        self._scenes_read, self._is_opening = -1, False
         self.follow()
 
     @property
     def is_modified(self) -> bool:
-        """Whether the scene differs from what its file says."""
+        """Whether the scene differs from its file."""
         return self.revision != self._saved
 
     @property
     def scene_file(self) -> str:
-        """The file of the scene, '' where it has none."""
+        """The file of the scene, '' if it has none."""
         return str(self.scene.document.file or "")
 
     def described(self) -> dict[str, Any]:
-        """Return what a window shows of the scene as a whole."""
+        """Return the state of the editor for windows."""
         offered = self._drafts.offered
         return {
             "revision": self.revision,
@@ -71,13 +71,13 @@ class SceneEditor:
         }
 
     def follow(self) -> None:
-        """Take note of what start, stop, or the loading of another scene have changed meanwhile."""
+        """Update the state after a start, a stop, or the loading of another scene."""
         simulation = self.simulation
-        if simulation.scenes_read != self._read:
-            self._read = simulation.scenes_read
-            if self.is_modified and not self._is_opening:  # another has loaded a scene over what was not saved
+        if simulation.scenes_read != self._scenes_read:
+            self._scenes_read = simulation.scenes_read
+            if self.is_modified and not self._is_opening:  # loaded over unsaved changes, not by the editor
                 self._drafts.offer()
-            self._begin_anew()
+            self._reset()
         run = simulation.run if simulation.running else -1
         if run == -1 and not self.is_modified and self.scene.document.is_changed_on_disk:
             simulation.read_at_start()
@@ -89,38 +89,38 @@ class SceneEditor:
                 self._started = self.revision, self.is_modified
             self._run = run
 
-    def _begin_anew(self) -> None:
+    def _reset(self) -> None:
         self.history.clear()
         self.revision += 1
-        self._saved, self._run = self.revision, -1  # a stop takes back nothing of what another scene was
+        self._saved, self._run = self.revision, -1  # stop does not revert edits of another scene
 
     def _stop(self) -> None:
-        """What was edited since the start has been undone."""
+        """Update history and revision: stop has reverted the edits made since the start."""
         before, was_modified = self._started
         self.history.stop()
         if self.revision != before:
             self.revision += 1
             self._saved = self._saved if was_modified else self.revision
 
-    def answer(self, said: Any) -> dict[str, Any]:
-        """Do what a message asks for; return the answer. Raises ValueError and OSError, where nothing has changed."""
+    def answer(self, message: Any) -> dict[str, Any]:
+        """Execute a request and return the answer. Raises ValueError and OSError; then nothing has changed."""
         self.follow()
-        kind = records.request_of(said)
-        request: Any = checked(kind, said)
-        does: Mapping[type[Checked], Callable[[Any], dict[str, Any]]] = {
+        kind = records.request_of(message)
+        request: Any = checked(kind, message)
+        handlers: Mapping[type[Checked], Callable[[Any], dict[str, Any]]] = {
             records.Edit: self._edit,
             records.Undo: self._undo,
-            records.Redo: lambda _: self._go(self.history.redone, self.history.undone, "redone"),
+            records.Redo: lambda _: self._step(self.history.redone, self.history.undone, "redone"),
             records.Text: lambda _: self._text(),
-            records.TextOf: lambda one: self._answer("text of objects", text=self._operations.text_of(one)),
+            records.TextOf: lambda it: self._answer("text of objects", text=self._operations.text_of(it)),
             records.Write: self._write,
             records.New: lambda _: self._open(None),
-            records.Open: lambda one: self._open(one.open),
+            records.Open: lambda it: self._open(it.open),
             records.Save: self._save,
             records.SaveModel: self._save_model,
-            records.Draft: lambda one: self._draft(one.draft),
+            records.Draft: lambda it: self._draft(it.draft),
         }
-        return does[kind](request)
+        return handlers[kind](request)
 
     # ---- edits
 
@@ -129,53 +129,53 @@ class SceneEditor:
         return self._change(name, lambda: self._operations.do(request.edit), request.merge)
 
     def _change(self, name: str, change: Callable[[], list[int]], merge: str = "") -> dict[str, Any]:
-        """Carry something out as a whole, or, where it fails, not at all."""
+        """Call `change` atomically and add it to the history; if it fails, the scene is restored."""
         before = self.scene.content()
         try:
             handles = change()
-        except Exception:  # of whatever kind: nothing of it stays
-            self._carry_out(change_between(self.scene.content(), before))
+        except Exception:  # any exception: restore the scene
+            self._apply(change_between(self.scene.content(), before))
             raise
         done = change_between(before, self.scene.content())
         if not done.is_empty:
             self.history.add(Step(name, merge, done))
             self.revision += 1
-        return self._answer(name, handles=[one for one in handles if self.scene.tree.get(one) is not None])
+        return self._answer(name, handles=[key for key in handles if self.scene.tree.get(key) is not None])
 
-    def _carry_out(self, change: SceneChange) -> None:
+    def _apply(self, change: SceneChange) -> None:
         if not change.is_empty:
             carry_out(self.simulation, change, self.scene.arrange)
 
-    def _answer(self, said: str, **more: Any) -> dict[str, Any]:
-        return {"revision": self.revision, "said": said, "until_stop": self.simulation.running, **more}
+    def _answer(self, message: str, **more: Any) -> dict[str, Any]:
+        return {"revision": self.revision, "said": message, "until_stop": self.simulation.running, **more}
 
     def _undo(self, request: records.Undo) -> dict[str, Any]:
-        """Undo the last step or, given a `merge`, the edits that belong to it; what others did since stays."""
+        """Undo the last step or, for a `merge` key, the step with this key; later edits of others are kept."""
         if not request.merge or self.history.is_last(request.merge):
-            return self._go(self.history.undone, self.history.redone, "undone")
+            return self._step(self.history.undone, self.history.redone, "undone")
         step = self.history.of(request.merge)
         change, now = step.change.reversed, self.scene.settings
         settings = now, as_between(now, *change.settings)
-        return self._change(f"Take back: {step.name}", lambda: self._take_back(change._replace(settings=settings)))
+        return self._change(f"Revert: {step.name}", lambda: self._revert(change._replace(settings=settings)))
 
-    def _take_back(self, change: SceneChange) -> list[int]:
-        self._carry_out(change)
+    def _revert(self, change: SceneChange) -> list[int]:
+        self._apply(change)
         return [*change.entries]
 
-    def _go(self, step: Callable[[], Step], back: Callable[[], Step], word: str) -> dict[str, Any]:
-        """Undo or redo; `back` restores the history where that fails."""
-        there = step()
-        change = there.change.reversed if word == "undone" else there.change
+    def _step(self, step: Callable[[], Step], back: Callable[[], Step], word: str) -> dict[str, Any]:
+        """Undo or redo a step; `back` restores the history if that fails."""
+        entry = step()
+        change = entry.change.reversed if word == "undone" else entry.change
         before = self.scene.content()
         try:
-            self._carry_out(change)
+            self._apply(change)
         except (ValueError, OSError, ScriptError) as error:
-            self._carry_out(change_between(self.scene.content(), before))
+            self._apply(change_between(self.scene.content(), before))
             back()
-            raise ValueError(f"'{there.name}' cannot be {word}: {error}") from None
+            raise ValueError(f"'{entry.name}' cannot be {word}: {error}") from None
         self.revision += 1
-        handles = [one for one in change.entries if self.scene.tree.get(one) is not None]
-        return self._answer(f"{word}: {there.name}", handles=handles)
+        handles = [handle for handle in change.entries if self.scene.tree.get(handle) is not None]
+        return self._answer(f"{word}: {entry.name}", handles=handles)
 
     # ---- texts and files
 
@@ -191,10 +191,10 @@ class SceneEditor:
 
     def _take_text(self, written: str) -> dict[str, Any]:
         text = YamlText(written)
-        wanted = self.files.content_of(text)
+        new_content = self.files.content_of(text)
 
         def change() -> list[int]:
-            self._carry_out(change_between(self.scene.content(), wanted))
+            self._apply(change_between(self.scene.content(), new_content))
             return []
 
         answer = self._change("Edit text", change)
@@ -204,13 +204,13 @@ class SceneEditor:
     def _open(self, file: str | None) -> dict[str, Any]:
         try:
             self._player.stop()
-        except ScriptError as error:  # in a cleanup, which must not hinder it
+        except ScriptError as error:  # in a script's cleanup; open the file nevertheless
             _LOG.error("%s", error)
         self._is_opening = True
         try:
             self.files.open(file)
             if file is None:
-                self._begin_anew()
+                self._reset()
             self.follow()
         finally:
             self._is_opening = False
@@ -219,12 +219,12 @@ class SceneEditor:
     def _save(self, request: records.Save) -> dict[str, Any]:
         path = self.files.save(None if request.save is True else str(request.save))
         if self.simulation.running:
-            copied = (
+            note = (
                 ""
                 if path == self.scene.document.file
                 else ". This is a copy: to save the scene itself, stop the simulation first"
             )
-            return self._answer(f"saved the scene as it is in flight to {path}{copied}", file=str(path))
+            return self._answer(f"saved the scene as it is in flight to {path}{note}", file=str(path))
         self._saved = self.revision
         return self._answer(f"saved {path}", file=str(path))
 
@@ -235,11 +235,11 @@ class SceneEditor:
     # ---- drafts
 
     def keep_draft(self) -> None:
-        """Keep what is not saved, now and then; what stop undoes is not kept."""
-        now = self.revision, self.is_modified
-        if now == self._drafted or self.simulation.running or not self._seldom.passes():
+        """Write a draft of unsaved changes, rate-limited; not during a run, since stop reverts its edits."""
+        state = self.revision, self.is_modified
+        if state == self._last_draft or self.simulation.running or not self._draft_throttle.passes():
             return
-        self._drafted = now
+        self._last_draft = state
         if self.is_modified:
             self._drafts.keep(self.scene_file, self.files.text())
         else:
@@ -256,8 +256,8 @@ class SceneEditor:
 
 def _name(operations: list[Any]) -> str:
     first = operations[0]
-    word = str(first.do).replace("_", " ").capitalize()
+    label = str(first.do).replace("_", " ").capitalize()
     objects = getattr(first, "objects", None)
     if len(operations) > 1 or (isinstance(objects, list) and len(objects) > 1):
-        return f"{word} {max(len(operations), len(objects or []))} objects"
-    return word
+        return f"{label} {max(len(operations), len(objects or []))} objects"
+    return label

@@ -1,4 +1,4 @@
-"""Models to add: those of the package by their names, and files."""
+"""Models that can be added: the package's models by name, and files."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ KINDS = (".yaml", ".ttm", ".urdf", *_MESHES)
 
 def package_models() -> dict[str, Path]:
     """Return the files of the models that come with the package, by name."""
-    return {one.stem: one for one in sorted((package_path() / MODELS).glob("*.yaml"))}
+    return {file.stem: file for file in sorted((package_path() / MODELS).glob("*.yaml"))}
 
 
 def _in_package(file: FoundFile) -> FoundFile:
-    """Return a file of a model as any scene, on any machine, can name it."""
+    """Return a model's file under a name that is valid for any scene on any machine."""
     return named_in(Path(), f"package://drone_sim/{MODELS}/{file.given}")
 
 
 def model_said(name: str, folder: Path, imported: Callable[[Path], Path]) -> Model:
-    """Return what a scene file would say of a model: one of the package's by name, or a file, seen from `folder`.
+    """Return the content of a model: a model of the package by name, or a file relative to `folder`.
 
-    `imported` makes a scene file of one of V-REP's. Raises ValueError, and OSError.
+    `imported` converts a V-REP file to a scene file. Raises ValueError and OSError.
     """
     suffix = Path(name).suffix.lower()
     if not suffix:
-        known = package_models()
-        if name not in known:
-            raise ValueError(f"no model named '{name}'; {near_names(name, known)}")
-        model = read(known[name], imported)
-        for one in model.objects:
-            one.update({key: _in_package(one[key]) for key in ("file", "texture") if key in one})
+        available = package_models()
+        if name not in available:
+            raise ValueError(f"no model named '{name}'; {near_names(name, available)}")
+        model = read(available[name], imported)
+        for entry in model.objects:
+            entry.update({key: _in_package(entry[key]) for key in ("file", "texture") if key in entry})
         return model
     if suffix not in KINDS:
         raise ValueError(f"{name[:80]}: a model is a {', '.join(KINDS[:-1])} or {KINDS[-1]} file")
     file = named_in(folder, name)
     if suffix in (".yaml", ".ttm"):
         return read(locate(file), imported)
-    said = {"shape": "mesh" if suffix in _MESHES else "urdf", "file": file, "name": Path(name).stem[:60]}
-    return Model([said], [])
+    entry_values = {"shape": "mesh" if suffix in _MESHES else "urdf", "file": file, "name": Path(name).stem[:60]}
+    return Model([entry_values], [])

@@ -22,92 +22,95 @@ from drone_sim.scene.entry import EntryParameters, placed
 from drone_sim.scene.object_parameters import ObjectParameters
 from drone_sim.scene.scene_parameters import entry_from, name_shapes, script_from
 
-_DESCRIPTION = ("alias", "category", "model")
-_OTHERWISE = {"name": "rename", "parent": "reparent", "position": "move", "rpy": "move"}
+_DESCRIPTION_KEYS = ("alias", "category", "model")
+_OPERATION_FOR = {"name": "rename", "parent": "reparent", "position": "move", "rpy": "move"}
 
 
 class ObjectEdits:
-    """Each operation returns the handles of what it has made, or touched. All raise ValueError."""
+    """Operations on scene objects; each returns the handles of created or changed objects. All raise ValueError."""
 
     def __init__(self, scene: SceneAccess):
-        """Take the scene."""
+        """Edit this scene."""
         self._scene = scene
 
-    # ---- come and go
+    # ---- adding and removing
 
-    def add(self, said: records.Add) -> list[int]:
-        """Add entries under free names."""
-        content = {"scene": {"objects": copy.deepcopy(said.objects), "scripts": copy.deepcopy(said.scripts)}}
+    def add(self, op: records.Add) -> list[int]:
+        """Add entries under unused names."""
+        content = {"scene": {"objects": copy.deepcopy(op.objects), "scripts": copy.deepcopy(op.scripts)}}
         scene_parameters.find_files_beside(self._scene.folder, content)
-        entries = [entry_from(one) for one in content["scene"]["objects"]]
+        entries = [entry_from(entry) for entry in content["scene"]["objects"]]
         name_shapes(entries)
-        if said.position is not None:
-            entries[0] = _landed(entries[0], said.position, said.yaw)
-        return self._add_as_free(entries, [script_from(one) for one in content["scene"]["scripts"]])
+        if op.position is not None:
+            entries[0] = _set_down(entries[0], op.position, op.yaw)
+        return self._add_renamed(entries, [script_from(script) for script in content["scene"]["scripts"]])
 
-    def _add_as_free(
+    def _add_renamed(
         self, entries: Sequence[EntryParameters], scripts: Sequence[AttachedScriptParameters]
     ) -> list[int]:
         tree = self._scene.tree
-        new: dict[str, str] = {}
-        for one in entries:
-            new[one.name] = next(name for name in numbered(one.name) if name not in tree and name not in new.values())
-        made = [
-            one.model_copy(update={"name": new[one.name], "parent": new.get(one.parent, one.parent)}) for one in entries
+        renames: dict[str, str] = {}
+        for entry in entries:
+            renames[entry.name] = next(
+                name for name in numbered(entry.name) if name not in tree and name not in renames.values()
+            )
+        renamed = [
+            entry.model_copy(update={"name": renames[entry.name], "parent": renames.get(entry.parent, entry.parent)})
+            for entry in entries
         ]
-        on = [one.model_copy(update={"object": new.get(one.object, one.object)}) for one in scripts]
-        return self._scene.operations.add(made, on)
+        moved = [it.model_copy(update={"object": renames.get(it.object, it.object)}) for it in scripts]
+        return self._scene.operations.add(renamed, moved)
 
-    def add_model(self, said: records.AddModel) -> list[int]:
-        """Add what a file has, its origin at a place."""
-        model = model_said(said.model, self._scene.folder, self._scene.operations.imported)
-        entries = [entry_from(one) for one in model.objects]
+    def add_model(self, op: records.AddModel) -> list[int]:
+        """Add the objects of a model, with its origin at `position`."""
+        model = model_said(op.model, self._scene.folder, self._scene.operations.imported)
+        entries = [entry_from(entry) for entry in model.objects]
         name_shapes(entries)
-        at = frames.from_rpy(said.position, (0.0, 0.0, said.yaw))
-        placed_ones = [one if one.parent else placed(one, "", frames.multiply(at, one.local)) for one in entries]
-        if len(entries) == 1 and not said.model.endswith(".yaml") and isinstance(entries[0], ObjectParameters):
-            placed_ones = [_landed(entries[0], said.position, said.yaw)]
-        return self._scene.operations.add_named_anew(placed_ones, [script_from(one) for one in model.scripts])
+        at = frames.from_rpy(op.position, (0.0, 0.0, op.yaw))
+        moved = [entry if entry.parent else placed(entry, "", frames.multiply(at, entry.local)) for entry in entries]
+        if len(entries) == 1 and not op.model.endswith(".yaml") and isinstance(entries[0], ObjectParameters):
+            moved = [_set_down(entries[0], op.position, op.yaw)]
+        return self._scene.operations.add_named_anew(moved, [script_from(script) for script in model.scripts])
 
     def remove(self, handles: Sequence[int], below: bool) -> list[int]:
-        """Remove objects; a model with all that hangs on it."""
+        """Remove objects; a model, or with `below` every object, is removed with its descendants except vehicles."""
         tree, operations = self._scene.tree, self._scene.operations
-        going: dict[int, None] = {}
-        for one in handles:
-            whole = operations.model(one) if below or tree[one].is_model else [one]
-            going.update(dict.fromkeys(part for part in whole if part == one or self._scene.vehicle_of(part) is None))
-        operations.remove([*going])
+        removed: dict[int, None] = {}
+        for top in handles:
+            group = operations.model(top) if below or tree[top].is_model else [top]
+            removed.update(dict.fromkeys(part for part in group if part == top or self._scene.vehicle_of(part) is None))
+        operations.remove([*removed])
         return []
 
     def copy(self, handles: Sequence[int], places: Sequence[Vector]) -> list[int]:
-        """Copy objects with what hangs on them, each so far (m, world) from the original."""
+        """Copy objects with their descendants, once for each of `places`: offsets (m, world) from the originals."""
         operations = self._scene.operations
-        whole = [*dict.fromkeys(part for one in handles for part in operations.model(one))]
-        if len(places) * len(whole) > scene_parameters.MAX_OBJECTS:
+        originals = [*dict.fromkeys(part for handle in handles for part in operations.model(handle))]
+        if len(places) * len(originals) > scene_parameters.MAX_OBJECTS:
             raise ValueError(
-                f"{len(places) * len(whole)} copies: a scene has at most {scene_parameters.MAX_OBJECTS} objects"
+                f"{len(places) * len(originals)} copies: a scene has at most {scene_parameters.MAX_OBJECTS} objects"
             )
-        made = []
+        copies = []
         for place in places:
-            new = dict(zip(whole, operations.copy(whole)))
-            for one in self._scene.tops(handles):
-                self._shift(new[one], one, place)
-            made += [new[one] for one in handles]
-        return made
+            new = dict(zip(originals, operations.copy(originals)))
+            for handle in self._scene.tops(handles):
+                self._shift(new[handle], handle, place)
+            copies += [new[handle] for handle in handles]
+        return copies
 
     def described(self, handles: Sequence[int]) -> tuple[list[EntryParameters], list[AttachedScriptParameters]]:
-        """Return objects and what hangs on them as a scene file would say them, the first ones in the world."""
+        """Return the entries and scripts of objects and their descendants; the topmost are in the world frame."""
         tree, operations, scripts = self._scene.tree, self._scene.operations, self._scene.simulation.scene.scripts
         tops = self._scene.tops(handles)
         entries = []
-        for one in dict.fromkeys(part for top in tops for part in operations.model(top)):
-            if self._scene.vehicle_of(one) is None:
-                entry = operations.entry(one)
-                entries.append(placed(entry, "", tree.matrix(one)) if one in tops else entry)
-        return entries, [scripts[one.name] for one in entries if one.name in scripts]
+        for handle in dict.fromkeys(part for top in tops for part in operations.model(top)):
+            if self._scene.vehicle_of(handle) is None:
+                entry = operations.entry(handle)
+                entries.append(placed(entry, "", tree.matrix(handle)) if handle in tops else entry)
+        return entries, [scripts[entry.name] for entry in entries if entry.name in scripts]
 
     def _shift(self, copied: int, original: int, by: Sequence[float]) -> None:
-        """Hang a copy where the original hangs, so far from it (m, world)."""
+        """Give a copy the original's parent and place it at an offset (m, world) from the original."""
         tree, operations = self._scene.tree, self._scene.operations
         operations.set_parent(copied, tree.handle_of(tree[original].parent), keep_in_place=True)
         matrix = list(tree.matrix(original))
@@ -118,44 +121,44 @@ class ObjectEdits:
     # ---- names, parents, places
 
     def rename(self, handle: int, name: str) -> list[int]:
-        """Give an object another name, and alias."""
+        """Rename an object and reset its alias to the name."""
         self._scene.operations.rename(handle, name)
         if self._scene.operations.entry(handle).alias:
             self._scene.operations.describe(handle, alias="")
         return [handle]
 
     def reparent(self, handle: int, parent: int, keep: str) -> None:
-        """Hang an object on another."""
+        """Set an object's parent; `keep`: the pose in the world, or the one relative to the parent."""
         local = self._scene.tree.matrix(handle, PARENT)
         self._scene.operations.set_parent(handle, parent, keep_in_place=True)
         if keep == "relative":
             self._scene.operations.put(handle, local)
 
     def put(self, handle: int, relative_to: int, matrix: Matrix) -> None:
-        """Put an object at a transform relative to another."""
+        """Set an object's pose relative to its parent, the world, or another object."""
         tree = self._scene.tree
-        above = tree[handle].parent
+        parent = tree[handle].parent
         if relative_to not in (PARENT, WORLD):
             matrix = frames.multiply(tree[relative_to].below(), matrix)
-        if relative_to != PARENT and above is not None:
-            matrix = frames.relative(above.below(), matrix)
+        if relative_to != PARENT and parent is not None:
+            matrix = frames.relative(parent.below(), matrix)
         self._scene.operations.put(handle, matrix)
 
-    # ---- what they are like
+    # ---- properties
 
-    def set(self, said: Mapping[int, Mapping[str, Any]]) -> None:
-        """Give entries, by handle, other values, all at once, so that the world is rebuilt only once."""
+    def set(self, values_by_handle: Mapping[int, Mapping[str, Any]]) -> None:
+        """Set keys of entries, by handle, all at once, so that the world is rebuilt only once."""
         operations = self._scene.operations
-        rest = {handle: self._look_otherwise(handle, values) for handle, values in said.items()}
+        rest = {handle: self._set_simple(handle, values) for handle, values in values_by_handle.items()}
         entries = {handle: operations.entry_with(handle, values) for handle, values in rest.items() if values}
         if entries:
             operations.exchange(entries)
 
-    def _look_otherwise(self, handle: int, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Set the values that need no new body in the world; return the values that are left."""
-        for key, word in _OTHERWISE.items():
+    def _set_simple(self, handle: int, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Set the keys that do not need a new body in the world; return the others."""
+        for key, operation in _OPERATION_FOR.items():
             if key in values:
-                raise ParameterError(f"{key}: cannot be set here; use the operation `{word}`")
+                raise ParameterError(f"{key}: cannot be set here; use the operation `{operation}`")
         operations, values = self._scene.operations, dict(values)
         parameters = values.pop("script_parameters", None)
         if parameters is not None:
@@ -163,7 +166,7 @@ class ObjectEdits:
         entry = operations.entry(handle)
         values = {key: _default(entry, key) if value is None else value for key, value in values.items()}
         self._find_files(values)
-        described = {key: values.pop(key) for key in _DESCRIPTION if key in values}
+        described = {key: values.pop(key) for key in _DESCRIPTION_KEYS if key in values}
         if described:
             operations.describe(handle, **described)
         if "color" in values and isinstance(entry, ObjectParameters):
@@ -174,31 +177,31 @@ class ObjectEdits:
         scene_parameters.find_files_beside(self._scene.folder, {"scene": {"objects": [values]}})
 
     def scale(self, handles: Sequence[int], factors: tuple[float, float, float]) -> None:
-        """Let objects be so many times as large."""
+        """Scale objects by factors along their own axes."""
         self._scene.operations.scale(handles, factors)
 
     def group(self, handles: Sequence[int], name: str, as_: str) -> list[int]:
-        """Make one of several."""
+        """Group objects into a compound shape, or into a model below a new dummy."""
         operations = self._scene.operations
         if as_ == "shape":
-            made = operations.group(handles)
-            return self.rename(made, operations.free_name(name)) if name else [made]
+            compound = operations.group(handles)
+            return self.rename(compound, operations.free_name(name)) if name else [compound]
         handles = self._scene.tops(handles)
-        places = [self._scene.tree.matrix(one) for one in handles]
-        middle = [sum(one[axis] for one in places) / len(places) for axis in (3, 7)]
-        said = {
+        matrices = [self._scene.tree.matrix(handle) for handle in handles]
+        middle = [sum(matrix[axis] for matrix in matrices) / len(matrices) for axis in (3, 7)]
+        entry = {
             "name": operations.free_name(name or "Model"),
             "kind": "dummy",
             "model": True,
             "position": [*middle, 0.0],
         }
-        (base,) = operations.add([said])
-        for one in handles:
-            operations.set_parent(one, base, keep_in_place=True)
+        (base,) = operations.add([entry])
+        for handle in handles:
+            operations.set_parent(handle, base, keep_in_place=True)
         return [base]
 
     def ungroup(self, handle: int) -> list[int]:
-        """Make several of one."""
+        """Split a compound into its parts, or a model into independent objects."""
         operations, tree = self._scene.operations, self._scene.tree
         if not tree[handle].is_model:
             return operations.ungroup(handle)
@@ -217,13 +220,13 @@ def _default(entry: EntryParameters, key: str) -> Any:
     return field.get_default(call_default_factory=True)
 
 
-def _landed(entry: EntryParameters, position: Sequence[float], yaw: float) -> EntryParameters:
-    """Return an entry whose lowest point is at the height of a place in the world."""
+def _set_down(entry: EntryParameters, position: Sequence[float], yaw: float) -> EntryParameters:
+    """Return the entry at a position in the world such that its lowest point is at the position's height."""
     x, y, z = position
     lowest = 0.0
     if isinstance(entry, ObjectParameters) and entry.shape != "urdf":
         low, high = models.bounds(entry)
-        turn = frames.from_rpy((0.0, 0.0, 0.0), entry.rpy)
-        lowest = min(frames.transform(turn, corner)[2] for corner in itertools.product(*zip(low, high)))
-    at = frames.from_rpy((x, y, z - float(lowest)), (0.0, 0.0, yaw))
-    return placed(entry, "", frames.multiply(at, frames.from_rpy((0.0, 0.0, 0.0), entry.rpy)))
+        rotation = frames.from_rpy((0.0, 0.0, 0.0), entry.rpy)
+        lowest = min(frames.transform(rotation, corner)[2] for corner in itertools.product(*zip(low, high)))
+    pose = frames.from_rpy((x, y, z - float(lowest)), (0.0, 0.0, yaw))
+    return placed(entry, "", frames.multiply(pose, frames.from_rpy((0.0, 0.0, 0.0), entry.rpy)))

@@ -1,4 +1,4 @@
-"""What can be done to a scene in one edit: records, as they come from outside, checked."""
+"""Records of edit requests and operations, checked on input."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ MAX_OPERATIONS = 2000
 MAX_COPIES = 1000
 
 
-def _named(value: Any) -> Any:
+def _check_object(value: Any) -> Any:
     if isinstance(value, bool) or not isinstance(value, (int, str)):
         raise ValueError("must be an object's handle or name")
     return value
 
 
-Object = Annotated[StrictInt | StrictStr, BeforeValidator(_named)]
+Object = Annotated[StrictInt | StrictStr, BeforeValidator(_check_object)]
 _Objects = Annotated[list[Object], Field(min_length=1, max_length=MAX_OPERATIONS)]
 _Quaternion = Annotated[
     tuple[Finite, Finite, Finite, Finite], Field(description="4 numbers, a quaternion [x, y, z, w]")
@@ -31,7 +31,7 @@ _Count = Annotated[int, Within(1, MAX_COPIES)]
 
 
 class Add(Checked):
-    """Entries as in a scene file, under free names; `position` is where the lowest point of the first lands."""
+    """Add entries as in a scene file, under unused names; the first entry's lowest point is put at `position`."""
 
     do: Literal["add"]
     objects: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_OPERATIONS)]
@@ -41,7 +41,7 @@ class Add(Checked):
 
 
 class AddModel(Checked):
-    """A model of the package's by its name, or a file; its origin lands at `position`, in the world."""
+    """Add a model of the package by name, or a file, with its origin at `position` in the world."""
 
     do: Literal["add_model"]
     model: str
@@ -50,7 +50,7 @@ class AddModel(Checked):
 
 
 class AddSign(Checked):
-    """A board with a text, whose picture is written beside the scene; its foot is at `position`."""
+    """Add a sign with a text, standing at `position`; its image is written beside the scene file."""
 
     do: Literal["add_sign"]
     text: Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[ -~]+$")]
@@ -59,7 +59,7 @@ class AddSign(Checked):
 
 
 class AddVehicle(Checked):
-    """A vehicle with all that it carries, so high above a place."""
+    """Add a vehicle with its equipment at `position`, raised by `height` (m)."""
 
     do: Literal["add_vehicle"]
     type: str = "quadricopter"
@@ -71,7 +71,7 @@ class AddVehicle(Checked):
 
 
 class Remove(Checked):
-    """What hangs on the objects stays, except on models; with `below` it is removed from all of them."""
+    """Remove objects; their children stay, except those of models. With `below`, all descendants are removed."""
 
     do: Literal["remove"]
     objects: _Objects
@@ -79,7 +79,7 @@ class Remove(Checked):
 
 
 class Move(Checked):
-    """To a place relative to the world, to the parent, or to another object; what is left out stays."""
+    """Move an object relative to the world, its parent or another object; omitted values stay the same."""
 
     do: Literal["move"]
     object: Object
@@ -90,7 +90,7 @@ class Move(Checked):
 
 
 class Rename(Checked):
-    """Another name, and alias."""
+    """Rename an object and reset its alias."""
 
     do: Literal["rename"]
     object: Object
@@ -98,7 +98,7 @@ class Rename(Checked):
 
 
 class Reparent(Checked):
-    """Another parent, -1 for the world; the pose in the world stays, or that relative to the parent."""
+    """Set the parent (-1: the world); `keep`: the pose in the world, or relative to the parent."""
 
     do: Literal["reparent"]
     objects: _Objects
@@ -107,7 +107,7 @@ class Reparent(Checked):
 
 
 class Set(Checked):
-    """Keys of its entry in the scene file; null is the default again."""
+    """Set keys of the object's entry in the scene file; null restores the default."""
 
     do: Literal["set"]
     object: Object
@@ -115,7 +115,7 @@ class Set(Checked):
 
 
 class Scale(Checked):
-    """So many times as large along their own axes."""
+    """Scale objects along their own axes."""
 
     do: Literal["scale"]
     objects: _Objects
@@ -123,7 +123,7 @@ class Scale(Checked):
 
 
 class Copy(Checked):
-    """With what hangs on them: in a row, a grid, or in place; the originals count."""
+    """Copy objects with their descendants in a row, in a grid or in place; `counts` includes the originals."""
 
     do: Literal["copy"]
     objects: _Objects
@@ -132,14 +132,14 @@ class Copy(Checked):
 
 
 class Paste(Checked):
-    """Objects and vehicles of a text, as `text_of` gives it, under free names; beside what stands where they would."""
+    """Add the objects and vehicles of a text as from `text_of`, under unused names, moved off occupied positions."""
 
     do: Literal["paste"]
     text: str
 
 
 class Group(Checked):
-    """One model of several, below a dummy, or one rigid shape."""
+    """Group objects into a model below a new dummy, or into one rigid shape."""
 
     do: Literal["group"]
     objects: _Objects
@@ -148,14 +148,14 @@ class Group(Checked):
 
 
 class Ungroup(Checked):
-    """A rigid shape into its parts; a model into objects that do not belong together."""
+    """Split a rigid shape into its parts, or a model into independent objects."""
 
     do: Literal["ungroup"]
     object: Object
 
 
 class AttachScript(Checked):
-    """A script on it; without a file, a new one in V-REP's form."""
+    """Attach a script to an object; without a file, create one from V-REP's template."""
 
     do: Literal["attach_script"]
     object: Object
@@ -165,7 +165,7 @@ class AttachScript(Checked):
 
 
 class DetachScript(Checked):
-    """No script on it; the file stays."""
+    """Detach the script of an object; its file stays."""
 
     do: Literal["detach_script"]
     object: Object
@@ -197,7 +197,7 @@ else:
 
 
 class Edit(Checked):
-    """Several operations that are done as a whole; those of the same `merge`, in a row, are one step of undo."""
+    """Execute operations atomically; consecutive edits with the same `merge` key are one step of undo."""
 
     edit: Annotated[list[Operation], Field(min_length=1, max_length=MAX_OPERATIONS)]
     name: Label = ""
@@ -205,75 +205,75 @@ class Edit(Checked):
 
 
 class Undo(Checked):
-    """Undo the last edit, or that of this `merge`, whatever others have done since."""
+    """Undo the last step, or the one with this `merge` key even if others have edited since."""
 
     undo: Literal[True]
     merge: Label = ""
 
 
 class Redo(Checked):
-    """The edit that was undone last is done again."""
+    """Redo the step that was undone last."""
 
     redo: Literal[True]
 
 
 class Text(Checked):
-    """The scene as its file would say it."""
+    """Get the scene as text of a scene file."""
 
     text: Literal[True]
 
 
 class TextOf(Checked):
-    """Objects with what hangs on them, and vehicles, as a scene file would say them."""
+    """Get objects with their descendants, and vehicles, as text of a scene file."""
 
     text_of: _Objects
 
 
 class Write(Checked):
-    """The scene becomes what a text says, which was made from the text of a `revision`."""
+    """Replace the scene by that of a text; refused if the scene has changed since `revision`."""
 
     write: str
     revision: int | None = None
 
 
 class New(Checked):
-    """A floor, and nobody flies."""
+    """Open a new scene: a floor without vehicles."""
 
     new: Literal[True]
 
 
 class Open(Checked):
-    """The scene of a file."""
+    """Open the scene of a file."""
 
     open: str
 
 
 class Save(Checked):
-    """Write its file, or another one, which is its file then."""
+    """Write the scene to its file, or to another one, which becomes its file."""
 
     save: Literal[True] | str
 
 
 class SaveModel(Checked):
-    """Write an object, and all that hangs on it, into a file of its own."""
+    """Write an object and its descendants to a model file."""
 
     save_model: Object
     file: str
 
 
 class Draft(Checked):
-    """What an earlier node left unsaved: take it, or drop it."""
+    """Open (`take`) or discard (`drop`) the unsaved changes of an earlier node."""
 
     draft: Literal["take", "drop"]
 
 
 _REQUESTS = (Edit, Undo, Redo, Text, TextOf, Write, New, Open, Save, SaveModel, Draft)
-REQUESTS: dict[str, type[Checked]] = {next(iter(one.model_fields)): one for one in _REQUESTS}
+REQUESTS: dict[str, type[Checked]] = {next(iter(kind.model_fields)): kind for kind in _REQUESTS}
 
 
-def request_of(said: Any) -> type[Checked]:
-    """Return what a message asks for. Raises ParameterError."""
+def request_of(message: Any) -> type[Checked]:
+    """Return the request class of a message. Raises ParameterError."""
     for word, kind in REQUESTS.items():
-        if isinstance(said, Mapping) and word in said:
+        if isinstance(message, Mapping) and word in message:
             return kind
-    raise ParameterError(f"{shown(said)}: must be a mapping with one of {', '.join(REQUESTS)}")
+    raise ParameterError(f"{shown(message)}: must be a mapping with one of {', '.join(REQUESTS)}")

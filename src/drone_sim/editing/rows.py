@@ -1,4 +1,4 @@
-"""The tree of objects as rows, and which of them differ from those that were told last."""
+"""The object tree as rows for windows, and the rows that changed since the last call."""
 
 from __future__ import annotations
 
@@ -17,83 +17,83 @@ from drone_sim.scene.entry import EntryParameters, place_of
 from drone_sim.vehicles.vehicle import Vehicle
 
 Row = dict[str, Any]
-_ASIDE = ("name", "alias", "model", "parent", "position", "rpy", "shape", "kind")  # which stand in the row itself
+_ROW_KEYS = ("name", "alias", "model", "parent", "position", "rpy", "shape", "kind")  # with own fields in a row
 
 
 class SceneRows:
-    """One row for each object, made anew where anything of it is otherwise."""
+    """One row for each object, rebuilt when its content changes."""
 
     def __init__(self, scene: SceneAccess):
-        """Take the scene; no row is made yet."""
+        """Show the objects of this scene; the first follow() makes the rows."""
         self._scene = scene
-        self._known: dict[int, tuple[Any, ...]] = {}  # what each row was made of
+        self._known: dict[int, tuple[Any, ...]] = {}  # content from which each row was made
         self.rows: dict[int, Row] = {}
 
     def follow(self) -> tuple[list[Row], list[int]]:
-        """Return the rows that differ from what they were at the last call, and the handles that are gone."""
+        """Return the rows that changed since the last call, and the handles of removed objects."""
         scene, changed = self._scene, []
         tree = scene.tree
-        entries = {one.name: (index, one) for index, one in scene.simulation.scene.entries.items()}
-        whose = {handle: one for one in scene.simulation.vehicles.values() for handle in one.handles}
-        said = vehicles_in(scene.settings, scene.simulation.parameters) if whose else {}
-        said = {name: {key: value for key, value in one.items() if key not in PLACE} for name, one in said.items()}
+        entries = {entry.name: (index, entry) for index, entry in scene.simulation.scene.entries.items()}
+        owners = {handle: item for item in scene.simulation.vehicles.values() for handle in item.handles}
+        written = vehicles_in(scene.settings, scene.simulation.parameters) if owners else {}
+        written = {name: {key: value for key, value in it.items() if key not in PLACE} for name, it in written.items()}
         scripts = scene.simulation.scene.scripts
         handles = {id(tree[handle]): handle for handle in tree}
         for handle in tree:
-            one = tree[handle]
-            index, entry = entries.get(one.name, (-1, None))
-            vehicle = whose.get(handle)
-            parent = -1 if one.parent is None else handles[id(one.parent)]
-            script = scripts.get(one.name)
-            own = self._beside(one, vehicle, said) if entry is None else entry
-            made_of = (
-                one.name, one.alias, one.is_model, parent, one.matrix(), own, script,
-                vehicle.name if vehicle else "", getattr(one, "value", 0.0),
+            item = tree[handle]
+            index, entry = entries.get(item.name, (-1, None))
+            vehicle = owners.get(handle)
+            parent = -1 if item.parent is None else handles[id(item.parent)]
+            script = scripts.get(item.name)
+            content = self._other_content(item, vehicle, written) if entry is None else entry
+            state = (
+                item.name, item.alias, item.is_model, parent, item.matrix(), content, script,
+                vehicle.name if vehicle else "", getattr(item, "value", 0.0),
             )  # fmt: skip
-            if self._known.get(handle) != made_of:
-                self._known[handle] = made_of
+            if self._known.get(handle) != state:
+                self._known[handle] = state
                 if entry is not None:
-                    own = scene.simulation.scene.entry_now(index)
-                self.rows[handle] = row = _row(handle, one, parent, own, script)
+                    content = scene.simulation.scene.entry_now(index)
+                self.rows[handle] = row = _row(handle, item, parent, content, script)
                 row["vehicle"] = vehicle.name if vehicle else ""
                 row["of"] = "vehicle" if vehicle else "scene" if entry is not None else "floor"
-                if vehicle is not None and one is vehicle.object:
+                if vehicle is not None and item is vehicle.object:
                     row.update(root=True, type="vehicle", script=vehicle.parameters.script)
                 changed.append(row)
-        gone = [handle for handle in self._known if tree.get(handle) is None]
-        for handle in gone:
+        removed = [handle for handle in self._known if tree.get(handle) is None]
+        for handle in removed:
             del self._known[handle], self.rows[handle]
-        return changed, gone
+        return changed, removed
 
-    def _beside(self, one: SceneObject, vehicle: Vehicle | None, said: Mapping[str, Any]) -> Any:
-        """Return the content of an object that is no entry of the scene; `said` has what is said of the vehicles."""
+    def _other_content(self, item: SceneObject, vehicle: Vehicle | None, vehicle_entries: Mapping[str, Any]) -> Any:
+        """Return the content of the floor, a vehicle or its part; `vehicle_entries` are as in the scene file."""
         if vehicle is None:
             return _simple(self._scene.simulation.parameters.scene.floor)
-        if one is not vehicle.object:
-            return part_named(vehicle.parameters, one.name)
-        return {**_simple(vehicle.parameters), **said.get(vehicle.name, {})}
+        if item is not vehicle.object:
+            return part_named(vehicle.parameters, item.name)
+        return {**_simple(vehicle.parameters), **vehicle_entries.get(vehicle.name, {})}
 
 
-def _row(handle: int, one: SceneObject, parent: int, own: Any, script: AttachedScriptParameters | None) -> Row:
-    place = place_of(one)
-    values: Mapping[str, Any] = own if isinstance(own, Mapping) else {}
-    if isinstance(own, EntryParameters):
-        said = own.model_dump(mode="json", exclude_defaults=True)
-        values = {key: value for key, value in said.items() if key not in _ASIDE}
-        place = {key: list(getattr(own, key)) for key in ("position", "rpy")}
-    if isinstance(own, Part):
-        values = own.values
+def _row(handle: int, item: SceneObject, parent: int, content: Any, script: AttachedScriptParameters | None) -> Row:
+    place = place_of(item)
+    values: Mapping[str, Any] = content if isinstance(content, Mapping) else {}
+    if isinstance(content, EntryParameters):
+        keys = content.model_dump(mode="json", exclude_defaults=True)
+        values = {key: value for key, value in keys.items() if key not in _ROW_KEYS}
+        place = {key: list(getattr(content, key)) for key in ("position", "rpy")}
+    if isinstance(content, Part):
+        values = content.values
     if script is not None and script.parameters:
         values = {**values, "script_parameters": dict(script.parameters)}
-    matrix = one.matrix()
+    matrix = item.matrix()
     return {
         "handle": handle,
-        "name": one.name,
-        "alias": one.alias,
-        "kind": one.kind,
-        "type": _type_of(own) or ("floor" if one.name == FLOOR else one.kind),
+        "name": item.name,
+        "alias": item.alias,
+        "kind": item.kind,
+        "type": _type_of(content) or ("floor" if item.name == FLOOR else item.kind),
         "parent": parent,
-        "model": one.is_model,
+        "model": item.is_model,
         "script": script.script if script else "",
         "pose": [round(value, 6) for value in (*frames.position(matrix), *frames.to_quaternion(matrix))],
         "position": place["position"],
@@ -103,10 +103,10 @@ def _row(handle: int, one: SceneObject, parent: int, own: Any, script: AttachedS
 
 
 def _simple(parameters: Checked) -> dict[str, Any]:
-    """Return what is a number, a text or a switch, as somebody would write it."""
+    """Return the numbers, texts and switches of some parameters, file names as written by the author."""
     values = {key: getattr(parameters, key) for key in type(parameters).model_fields}
-    return {key: getattr(one, "given", one) for key, one in values.items() if isinstance(one, (bool, int, float, str))}
+    return {key: getattr(it, "given", it) for key, it in values.items() if isinstance(it, (bool, int, float, str))}
 
 
-def _type_of(own: Any) -> str:
-    return own.word if isinstance(own, Part) else getattr(own, "shape", "") or getattr(own, "kind", "")
+def _type_of(content: Any) -> str:
+    return content.word if isinstance(content, Part) else getattr(content, "shape", "") or getattr(content, "kind", "")

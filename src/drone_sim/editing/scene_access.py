@@ -1,4 +1,4 @@
-"""The scene that is edited, as operations reach it: its objects, and what its file says beside them."""
+"""Access of edit operations to the scene: its objects, and the settings of its file."""
 
 from __future__ import annotations
 
@@ -17,78 +17,78 @@ from drone_sim.scene.scene_parameters import WORLD_KEYS
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
-_FIXED = ("datum", "magnetic_field", "collections", *WORLD_KEYS)
+_FIXED_IN_FLIGHT = ("datum", "magnetic_field", "collections", *WORLD_KEYS)
 
 
 class SceneAccess:
-    """A simulation, as whoever edits its scene sees it."""
+    """A simulation, as the edit operations see it."""
 
     def __init__(self, simulation: Simulation):
-        """Take the simulation."""
+        """Give access to this simulation."""
         self.simulation = simulation
 
     @property
     def document(self) -> SceneDocument:
-        """Its text, file and settings."""
+        """The scene's text, file and settings."""
         return self.simulation.document
 
     @property
     def settings(self) -> Settings:
-        """What is said beside objects and scripts."""
+        """The scene file's content except objects and scripts."""
         return self.document.settings
 
     @property
     def folder(self) -> Path:
-        """The folder to which file names are relative."""
+        """The folder to which file names in the scene are relative."""
         return self.document.folder
 
     @property
     def operations(self) -> SceneOperations:
-        """What is done to objects."""
+        """The operations on objects."""
         return self.simulation.operations
 
     @property
     def tree(self) -> ObjectTree:
-        """The objects."""
+        """The object tree."""
         return self.simulation.context.objects
 
     def content(self) -> SceneContent:
-        """Return what the scene is now."""
+        """Return the present content of the scene."""
         return self.simulation.content()
 
-    def handle(self, named: Any) -> int:
+    def handle(self, reference: Any) -> int:
         """Return the handle of an object, given its handle or its name. Raises ValueError."""
-        if isinstance(named, str):
-            return self.tree.handle(named)
-        self.tree[named]  # which there must be
-        return int(named)
+        if isinstance(reference, str):
+            return self.tree.handle(reference)
+        self.tree[reference]  # raises ValueError for an unknown handle
+        return int(reference)
 
     def vehicle_of(self, handle: int) -> Vehicle | None:
-        """Return the vehicle whose object it is."""
-        return next((one for one in self.simulation.vehicles.values() if handle in one.handles), None)
+        """Return the vehicle that an object belongs to, or None."""
+        return next((vehicle for vehicle in self.simulation.vehicles.values() if handle in vehicle.handles), None)
 
     def is_root(self, handle: int) -> bool:
-        """Tell whether an object is the root of a vehicle."""
+        """Return whether an object is the root of a vehicle."""
         vehicle = self.vehicle_of(handle)
         return vehicle is not None and self.tree[handle] is vehicle.object
 
     def tops(self, handles: Sequence[int]) -> list[int]:
-        """Return those of some objects that hang on none of the others."""
+        """Return the handles of the objects that are not descendants of any other."""
         tree = self.tree
-        return [one for one in handles if not any(tree[one].hangs_on(tree[other]) for other in handles)]
+        return [handle for handle in handles if not any(tree[handle].hangs_on(tree[other]) for other in handles)]
 
     # ---- settings
 
     def checked(self, settings: Settings) -> Parameters:
-        """Return the parameters of the same objects with other settings. Raises ParameterError."""
+        """Return the parameters of the present objects with other settings. Raises ParameterError."""
         simulation = self.simulation
-        found = simulation.parameters.with_content({**settings, "objects": []}, self.folder)
-        now = simulation.scene.parameters_now()
-        scene = found.scene.model_copy(update={"objects": now.objects, "scripts": now.scripts})
-        return found.varied(found.weather, scene, found.fleet)
+        result = simulation.parameters.with_content({**settings, "objects": []}, self.folder)
+        present = simulation.scene.parameters_now()
+        scene = result.scene.model_copy(update={"objects": present.objects, "scripts": present.scripts})
+        return result.varied(result.weather, scene, result.fleet)
 
     def arrange(self, settings: Settings) -> None:
-        """Let the scene have other settings. Raises ParameterError and UrdfError, where all is as it was."""
+        """Apply other settings to the scene. Raises ParameterError and UrdfError; then nothing has changed."""
         if settings == self.settings:
             return
         simulation = self.simulation
@@ -98,8 +98,8 @@ class SceneAccess:
         if simulation.running:
             simulation.rearrange(parameters)
         elif self._only_moves(settings, parameters):
-            for one in parameters.fleet:
-                put(simulation.vehicles[one.name], one.matrix)
+            for vehicle in parameters.fleet:
+                put(simulation.vehicles[vehicle.name], vehicle.matrix)
             simulation.arrange(parameters, rebuild=False)
             simulation.scene.is_changed = True
         else:
@@ -107,24 +107,24 @@ class SceneAccess:
         self.document.settings = settings
 
     def _check_flight(self, settings: Settings) -> None:
-        """Refuse what no flight can go on with."""
-        for key in _FIXED:
+        """Raise ValueError for settings that cannot change during a run."""
+        for key in _FIXED_IN_FLIGHT:
             if settings.get(key) != self.settings.get(key):
                 raise ValueError(f"{key}: can only be changed while the simulation is stopped: stop it first")
 
     def _only_moves(self, settings: Settings, parameters: Parameters) -> bool:
-        """Tell whether only the places of vehicles differ."""
-        if _others(settings) != _others(self.settings):
+        """Return whether only the poses of vehicles differ."""
+        if _without_vehicles(settings) != _without_vehicles(self.settings):
             return False
         fleet = self.simulation.parameters.fleet
         return len(fleet) == len(parameters.fleet) and all(
-            one.is_alone == two.is_alone and _placed_as(one, two) == two for one, two in zip(fleet, parameters.fleet)
+            old.is_alone == new.is_alone and _placed_as(old, new) == new for old, new in zip(fleet, parameters.fleet)
         )
 
 
-def _others(settings: Settings) -> Mapping[str, Any]:
+def _without_vehicles(settings: Settings) -> Mapping[str, Any]:
     return {key: value for key, value in settings.items() if key not in ("drone", "vehicles")}
 
 
-def _placed_as(one: VehicleParameters, two: VehicleParameters) -> VehicleParameters:
-    return one.model_copy(update={key: getattr(two, key) for key in PLACE})
+def _placed_as(old: VehicleParameters, new: VehicleParameters) -> VehicleParameters:
+    return old.model_copy(update={key: getattr(new, key) for key in PLACE})

@@ -1,4 +1,4 @@
-"""Where a window opens and saves scenes and models, and the scene as a text beside it."""
+"""Opening and saving of scene files and models, and the scene as text."""
 
 from __future__ import annotations
 
@@ -18,47 +18,47 @@ _NEW = "# Metres, radians, kilograms.\nfloor: {size: 5}\nvehicles: {}\nobjects: 
 
 
 class SceneFiles:
-    """Names a window's files; what is in them is written as by any program."""
+    """Opens and saves the scene's files for windows."""
 
     def __init__(self, scene: SceneAccess):
-        """Take the scene."""
+        """Open and save this scene."""
         self._scene = scene
 
     @property
     def is_read_only(self) -> bool:
-        """Whether saving makes a copy of the file."""
+        """Whether the file cannot be written, so that saving makes a copy."""
         file = self._scene.document.file
-        return file is None or _is_kept(file)
+        return file is None or _is_read_only(file)
 
-    # ---- as a text
+    # ---- text
 
     def text(self) -> str:
-        """Return what the file would say of the scene as it is now."""
+        """Return the present scene as text of a scene file."""
         return self._scene.document.text(self._scene.content())
 
     def content_of(self, text: YamlText) -> SceneContent:
-        """Return the scene that a text says. Raises ParameterError, with the line."""
-        said = text.values
+        """Return the content of a text. Raises ParameterError, with the line."""
+        values = text.values
         if not text.is_mapping:
             raise ParameterError("line 1: must hold `key: value` lines such as `objects: []`")
         scene = self._scene
         parameters = scene.simulation.parameters
         try:
-            found = parameters.with_content(said, scene.folder).scene
-        except ParameterError:  # once more, with the lines, which take their time
-            found = parameters.with_content(said, scene.folder, yaml_files.YamlLines(text.text)).scene
+            scene_parameters = parameters.with_content(values, scene.folder).scene
+        except ParameterError:  # again with line numbers, which are slow to find
+            scene_parameters = parameters.with_content(values, scene.folder, yaml_files.YamlLines(text.text)).scene
         tree, entries = scene.tree, {}
-        own = {tree.handle(one.name) for one in scene.simulation.scene.entries.values()}
-        for number, one in enumerate(found.objects):
-            handle = tree.handle(one.name) if one.name in tree else -1
-            entries[handle if handle in own else -2 - number] = one
-        scripts = {one.object: one for one in found.scripts}
-        return SceneContent(entries, scripts, settings_of(said))
+        scene_handles = {tree.handle(entry.name) for entry in scene.simulation.scene.entries.values()}
+        for number, entry in enumerate(scene_parameters.objects):
+            handle = tree.handle(entry.name) if entry.name in tree else -1
+            entries[handle if handle in scene_handles else -2 - number] = entry
+        scripts = {script.object: script for script in scene_parameters.scripts}
+        return SceneContent(entries, scripts, settings_of(values))
 
     # ---- files
 
     def open(self, file: str | None) -> None:
-        """Let a file take the scene's place, or, for None, a floor where nobody flies. Raises ParameterError."""
+        """Open a scene file or, for None, a new scene: a floor without vehicles. Raises ParameterError."""
         simulation = self._scene.simulation
         if file is not None:
             simulation.load_scene(file)
@@ -68,9 +68,10 @@ class SceneFiles:
         simulation.document.belong_to(None, home(), _NEW, simulation.object_handles)
 
     def save(self, name: str | None) -> Path:
-        """Write the scene's file, or another, which is its file then; return it. Raises ValueError and OSError.
+        """Write the scene to its file, or to another one, which becomes its file; return it.
 
-        One that nobody may write to is copied. What flies is written as it stands; the scene's file stays the same.
+        A read-only file is copied. During a run the present state is written, and the scene keeps its file. Raises
+        ValueError and OSError.
         """
         path, simulation = self._path(name), self._scene.simulation
         text = simulation.save_scene(path)
@@ -81,16 +82,16 @@ class SceneFiles:
         return path
 
     def save_model(self, handle: int, name: str) -> Path:
-        """Write an object and all that hangs on it as a model. Raises ValueError and OSError."""
+        """Write an object and its descendants as a model. Raises ValueError and OSError."""
         operations, tree = self._scene.operations, self._scene.tree
         path = self._path(name)
         scripts = self._scene.simulation.scene.scripts
-        entries = [operations.entry(one) for one in operations.model(handle) if self._scene.vehicle_of(one) is None]
+        entries = [operations.entry(key) for key in operations.model(handle) if self._scene.vehicle_of(key) is None]
         if not entries:
-            raise ValueError(f"'{tree[handle].name}' is part of a vehicle, which is no model of the scene")
+            raise ValueError(f"'{tree[handle].name}' is part of a vehicle, which cannot be saved as a model")
         base = placed(entries[0], "", tree.matrix(handle))
         path.parent.mkdir(parents=True, exist_ok=True)
-        models.write(path, [base, *entries[1:]], [scripts[one.name] for one in entries if one.name in scripts])
+        models.write(path, [base, *entries[1:]], [scripts[entry.name] for entry in entries if entry.name in scripts])
         return path
 
     def _path(self, name: str | None) -> Path:
@@ -100,21 +101,21 @@ class SceneFiles:
                 raise ParameterError(f"{name[:80]}: the name of a scene must end in .yaml")
             if not path.is_absolute():
                 path = self._scene.folder / path
-            if _is_kept(path):
+            if _is_read_only(path):
                 raise ParameterError(f"{name[:80]}: files of the package cannot be overwritten: give another name")
             return path.resolve()
         file = self._scene.document.file
-        if file is not None and not _is_kept(file):
+        if file is not None and not _is_read_only(file):
             return file
         return home() / (file.name if file else "scene.yaml")
 
 
-def _is_kept(path: Path) -> bool:
-    """Tell whether a file is one of the package's, or must not be written to."""
-    return package_path() in path.resolve().parents or (path.exists() and not _may_write(path))
+def _is_read_only(path: Path) -> bool:
+    """Return whether a file belongs to the package or cannot be written."""
+    return package_path() in path.resolve().parents or (path.exists() and not _is_writable(path))
 
 
-def _may_write(path: Path) -> bool:
+def _is_writable(path: Path) -> bool:
     try:
         writing.check(path)
     except OSError:

@@ -1,4 +1,4 @@
-"""Scripts on objects: attached, made anew, taken away."""
+"""Scripts of objects: attach, create, change and detach."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drone_sim.scene.scene_parameters import script_from
 from drone_sim.scripting.load import script_path
 
 _SUFFIX = {"lua": ".lua", "python": ".py"}
-_LUA = """\
+_LUA_TEMPLATE = """\
 function sysCall_init()
     object = sim.getObject('.')
 end
@@ -28,7 +28,7 @@ end
 function sysCall_cleanup()
 end
 """
-_PYTHON = """\
+_PYTHON_TEMPLATE = """\
 def sysCall_init():
     self.object = sim.getObject('.')
 
@@ -44,42 +44,42 @@ def sysCall_sensing():
 def sysCall_cleanup():
     pass
 """
-_TEXTS = {"lua": _LUA, "python": _PYTHON}
+_TEMPLATES = {"lua": _LUA_TEMPLATE, "python": _PYTHON_TEMPLATE}
 
 
 def attach(scene: SceneAccess, handle: int, file: str, language: str, parameters: Mapping[str, Any]) -> None:
-    """Attach a script to an object; without a file, a new one beside the scene. Raises ValueError and OSError."""
+    """Attach a script to an object; without `file`, create one beside the scene. Raises ValueError and OSError."""
     name = scene.tree[handle].name
-    found = named_in(scene.folder, file) if file else named_in(scene.folder, _new(scene.folder, name, language))
-    script_path(str(found))
-    script = script_from({"object": name, "script": found, "parameters": dict(parameters)})
+    path = named_in(scene.folder, file) if file else named_in(scene.folder, _create(scene.folder, name, language))
+    script_path(str(path))
+    script = script_from({"object": name, "script": path, "parameters": dict(parameters)})
     scene.operations.attach_script(script)
 
 
-def _new(folder: Path, name: str, language: str) -> str:
-    """Write a script in V-REP's form, with a name that no file has; return that."""
+def _create(folder: Path, name: str, language: str) -> str:
+    """Write a new script from V-REP's template under an unused file name; return the name."""
     stem = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower() or "script"
     folder.mkdir(parents=True, exist_ok=True)
     for number in range(1000):
         path = folder / f"{stem}{number or ''}{_SUFFIX[language]}"
         if not path.exists():
-            writing.write_new(path, _TEXTS[language])
+            writing.write_new(path, _TEMPLATES[language])
             return path.name
     raise ValueError(f"{folder}: already has a thousand scripts named {stem}")
 
 
 def set_parameters(scene: SceneAccess, handle: int, parameters: Any) -> None:
-    """Let the script of an object have other parameters. Raises ValueError."""
+    """Set the parameters of an object's script. Raises ValueError if it has none."""
     name = scene.tree[handle].name
     script = scene.simulation.scene.scripts.get(name)
     if script is None:
         raise ValueError(f"'{name}' has no script of the scene")
-    said = {**script.model_dump(), "script": script.script, "parameters": parameters}
-    scene.operations.attach_script(script_from(said))
+    values = {**script.model_dump(), "script": script.script, "parameters": parameters}
+    scene.operations.attach_script(script_from(values))
 
 
 def detach(scene: SceneAccess, handle: int) -> None:
-    """Let an object have no script. Raises ValueError."""
+    """Detach the script of an object. Raises ValueError if it has none."""
     name = scene.tree[handle].name
     if name not in scene.simulation.scene.scripts:
         raise ValueError(f"'{name}' has no script of the scene")

@@ -1,4 +1,4 @@
-"""The cameras and sensors of vehicles: which object is which of them, and what the scene file says of it."""
+"""The cameras and sensors of vehicles: their objects, and their values in the scene file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drone_sim.vehicles.parameters import VehicleParameters
 
 
 class Part(NamedTuple):
-    """A camera or a sensor: whether it is among `cameras` or `sensors`, its key there, and what it is like."""
+    """A camera or sensor: the section (`cameras` or `sensors`), its key there, and its parameters."""
 
     among: str
     key: str
@@ -22,50 +22,50 @@ class Part(NamedTuple):
 
     @property
     def word(self) -> str:
-        """Its type, as windows know it."""
+        """Its type, as in properties()."""
         return word_of_part(type(self.parameters))
 
     @property
     def values(self) -> dict[str, Any]:
-        """All that it is like, inner keys with dots, such as `noise.read`."""
-        said = self.parameters.model_dump(mode="json")
-        mount = said.pop("mount")
-        return {**dict(flattened(said)), "mount": mount}
+        """All values; nested keys have dots, such as `noise.read`."""
+        content = self.parameters.model_dump(mode="json")
+        mount = content.pop("mount")
+        return {**dict(flattened(content)), "mount": mount}
 
 
 def parts_of(vehicle: VehicleParameters) -> dict[str, Part]:
     """Return the cameras and sensors by the names of their objects, without the vehicle's suffix."""
-    several = {"cameras": vehicle.cameras, "sensors": vehicle.sensors}
-    parts = [Part(among, key, one) for among, ones in several.items() for key, one in ones.items()]
-    return {one.parameters.object or one.key: one for one in parts}
+    sections = {"cameras": vehicle.cameras, "sensors": vehicle.sensors}
+    parts = [Part(among, key, item) for among, items in sections.items() for key, item in items.items()]
+    return {part.parameters.object or part.key: part for part in parts}
 
 
 def part_named(vehicle: VehicleParameters, name: str) -> Part | None:
-    """Return the camera or sensor whose object has a name; None where it is another part."""
+    """Return the camera or sensor with the object `name`, or None."""
     return parts_of(vehicle).get(plain(name))
 
 
-def with_part(said: Mapping[str, Any], part: Part, base: Part | None, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is said of a vehicle with other values of a part, inner keys with dots or in mappings.
+def with_part(entry: Mapping[str, Any], part: Part, base: Part | None, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a vehicle's entry with other values of a part; nested keys have dots or are in mappings.
 
-    Values that are None, or the same as in `base`, the part as it is by default, are left out.
+    Values that are None or equal to those of `base`, the part with its default values, are left out.
     """
-    own = dict(flattened((said.get(part.among) or {}).get(part.key) or {}))
-    usual = base.values if base else {}
+    changed = dict(flattened((entry.get(part.among) or {}).get(part.key) or {}))
+    defaults = base.values if base else {}
     for key, value in flattened(values):
-        if value is None or (key in usual and usual[key] == value):
-            own = {one: other for one, other in own.items() if one not in _gone_with(part, key)}
+        if value is None or (key in defaults and defaults[key] == value):
+            changed = {name: other for name, other in changed.items() if name not in _with_dependents(part, key)}
         else:
-            own[key] = value
-    several = {**(said.get(part.among) or {}), part.key: nested(own.items())}
-    several = {one: other for one, other in several.items() if one != part.key or other}
-    made = {**said, part.among: several}
-    return made if several else {key: value for key, value in made.items() if key != part.among}
+            changed[key] = value
+    section = {**(entry.get(part.among) or {}), part.key: nested(changed.items())}
+    section = {name: other for name, other in section.items() if name != part.key or other}
+    result = {**entry, part.among: section}
+    return result if section else {key: value for key, value in result.items() if key != part.among}
 
 
-def _gone_with(part: Part, key: str) -> list[str]:
-    """Return a key, and those that have no meaning without it, such as a lens' coefficients without its model."""
+def _with_dependents(part: Part, key: str) -> list[str]:
+    """Return a key and those that depend on it, such as a lens' coefficients on its model."""
     fields = dict(inner_fields(type(part.parameters)))
-    above, dot, _ = key.rpartition(".")
+    prefix, dot, _ = key.rpartition(".")
     is_needed = dot and key in fields and fields[key].is_required()
-    return [one for one in fields if one.startswith(f"{above}.")] if is_needed else [key]
+    return [name for name in fields if name.startswith(f"{prefix}.")] if is_needed else [key]
