@@ -1,4 +1,4 @@
-"""A vehicle: its body, what pushes it, what it sees with, what it is told, and its objects under V-REP's names."""
+"""A vehicle: body, forces, cameras, sensors, commands, faults, and its objects under V-REP's names."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ from drone_sim.vehicles.types import TYPES
 
 
 class Vehicle:
-    """A vehicle of any type in a world. What it shares with others is in its context, and nothing else is."""
+    """A vehicle of any type. Everything that it shares with other vehicles is in its context."""
 
-    object: SceneObject  # that its child script is attached to, the root of all of its own
+    object: SceneObject  # the root of its objects, to which its child script is attached
     target: SceneObject  # DronePosition, the green sphere
-    pushes: Pushes  # of the run
+    pushes: Pushes  # of the present run
 
     def __init__(self, parameters: VehicleParameters, suffix: str, context: SimulationContext):
-        """Put it at its starting place, at rest; its objects' names get the suffix.
+        """Create the vehicle at its start pose, at rest. `suffix` is appended to the names of its objects.
 
         Raises UrdfError and ParameterError.
         """
@@ -51,15 +51,15 @@ class Vehicle:
         self.flight_state = FlightState(self.commands)
         rigid = urdf.read(parameters.urdf)
         rotors = Rotors(rigid, parameters.urdf, TYPES[parameters.type])
-        turned = frames.from_rpy((0, 0, 0), (*parameters.tilt, parameters.yaw))
-        self.body = Body(rigid, Pose(parameters.position, frames.to_quaternion(turned)), context)
+        rotation = frames.from_rpy((0, 0, 0), (*parameters.tilt, parameters.yaw))
+        self.body = Body(rigid, Pose(parameters.position, frames.to_quaternion(rotation)), context)
         if parameters.start == LANDED:
             self.body.begin_on_floor()
         self.propulsion = Propulsion(rotors, self.body, suffix)
         self.handles: list[int] = []  # of its objects
-        self._cleared = -1  # how often the tree had been, when they were added
+        self._cleared = -1  # the tree's count of clearings when the objects were added
         self.cameras = {
-            name: Camera(one, self._fitting(name, one), context.vision) for name, one in parameters.cameras.items()
+            name: Camera(item, self._fitting(name, item), context.vision) for name, item in parameters.cameras.items()
         }
         context.blades.append(self.propulsion.blades)
         context.names[self.body.number] = (parameters.name, self.object_name)
@@ -72,20 +72,20 @@ class Vehicle:
             raise
 
     def reset(self) -> None:
-        """Return to the starting place, at rest, and its objects anew in the shared tree."""
+        """Reset to the start pose, at rest; replace its objects in the tree; reset forces, sensors and faults."""
         self.body.reset()
         self._begin_forces()
         self.flight_state.begin()
         self._leave_tree()
-        tree, own, rigid = self.context.objects, self.parameters, self.body.rigid
+        tree, parameters, rigid = self.context.objects, self.parameters, self.body.rigid
         self._cleared = tree.cleared
-        objects = QuadricopterObjects(tree, self.suffix, self.handles, own.objects)
-        objects.add(self.body, rigid.links, self.propulsion.rotors.links, own.cameras, own.sensors)
-        self.object, self.target = (tree[tree.handle(one + self.suffix)] for one in (DRONE, TARGET))
+        objects = QuadricopterObjects(tree, self.suffix, self.handles, parameters.objects)
+        objects.add(self.body, rigid.links, self.propulsion.rotors.links, parameters.cameras, parameters.sensors)
+        self.object, self.target = (tree[tree.handle(name + self.suffix)] for name in (DRONE, TARGET))
         for handle in self.handles:
             if tree[handle].body is not None:
                 self.context.velocities.follow(handle)
-        self.propulsion.attach(own.propellers)
+        self.propulsion.attach(parameters.propellers)
         self.commands.listening = []
         for camera in self.cameras.values():
             camera.reset()
@@ -94,7 +94,7 @@ class Vehicle:
 
     @property
     def track(self) -> SceneObject:
-        """Track_base: at the drone, level, turned by its yaw; the scene's own, or the drone, where it brings none."""
+        """Track_base: at the drone, level, rotated by its yaw; else a scene object of this name, else the drone."""
         tree, name = self.context.objects, TRACK_BASE + self.suffix
         return tree[tree.handle(name)] if name in tree else self.object
 
@@ -102,38 +102,38 @@ class Vehicle:
         time_step = self.context.clock.time_step
         self.propulsion.begin(self.parameters.propellers, time_step)
         self.pushes = Pushes(time_step)
-        others = [one.make() for one in self.parameters.forces.values()]
-        self._forces: list[Force] = [self.propulsion.law, *(one for one in others if not one.every_sub_step)]
-        self.sub_step_forces = [one for one in others if one.every_sub_step]
-        self._has_drag = any(one.feels_wind for one in others)
+        others = [parameters.make() for parameters in self.parameters.forces.values()]
+        self._forces: list[Force] = [self.propulsion.law, *(force for force in others if not force.every_sub_step)]
+        self.sub_step_forces = [force for force in others if force.every_sub_step]
+        self._has_drag = any(force.feels_wind for force in others)
         self.feel_weather()
         self.commands.begin()
 
     def feel_weather(self) -> None:
-        """Have drag, once there is weather; if `forces` gives none, with the default coefficients of DragParameters."""
+        """Add a drag force with DragParameters' defaults if there is wind and `forces` defines none."""
         if self.context.weather.is_felt and not self._has_drag:
             self._has_drag = True
             self.sub_step_forces = [*self.sub_step_forces, DragParameters(kind="drag").make()]
 
     def _begin_faults(self) -> None:
         self.faults.begin(self.propulsion.law)
-        self._prepare()
+        self._update_step_calls()
 
-    def _prepare(self) -> None:
-        """List what comes before the script in every step; a sound vehicle without sensors has nothing."""
-        self._before_script = [self.instruments.clear] if self.instruments else []
+    def _update_step_calls(self) -> None:
+        """Update the calls that precede the scripts in every step; none without sensors and command link."""
+        self._step_calls = [self.instruments.clear] if self.instruments else []
         self.commands.link = self.faults.commands
         if self.commands.link is not None:
-            self._before_script.append(self.commands.take)
+            self._step_calls.append(self.commands.take)
 
     def _leave_tree(self) -> None:
-        """Take its objects out of the tree, unless they have gone with all others."""
+        """Remove its objects from the tree, unless the tree was already cleared."""
         if self._cleared == self.context.objects.cleared:
             self.context.objects.remove(self.handles)
         self.handles = []
 
     def leave(self) -> None:
-        """Remove it from the world."""
+        """Remove the vehicle from the world and from the tree."""
         self._leave_tree()
         self.context.blades.remove(self.propulsion.blades)
         self.context.names.pop(self.body.number, None)
@@ -150,46 +150,46 @@ class Vehicle:
         return CameraFitting(f"{self.name}/{name}", pose, velocity, self.context.clock)
 
     def _velocity(self, camera: CameraParameters) -> tuple[Vector, Vector]:
-        """Velocity of a camera and of its turn: now, or over the last step, where a script moves it."""
+        """Linear and angular velocity of a camera: present ones, or over the last step if scripts move it."""
         objects, meter = self.context.objects, self.context.velocities
         handle = objects.handle(camera.object + self.suffix)
         if objects[handle].carrier is not None:
             return objects[handle].velocity()
         return meter.velocity(handle)[0], meter.rotation(handle)
 
-    # ---- from outside
+    # ---- requests and faults
 
     def ask(self, topic: str, pose: Pose | None = None) -> None:
-        """Let the script do what a topic of `requests` asks for, if it offers that; `reset` puts it back before.
+        """Send a request on a topic of REQUESTS to the scripts; `reset` also resets the vehicle before.
 
-        While the simulation is stopped, and has no script, nothing happens but a line in the log.
+        If no script subscribes to it or the simulation is stopped, only log a warning.
         """
         before = self._begin_again if topic == RESET else lambda: None
         self.flight_state.ask(topic, request(pose), before)
 
     def _begin_again(self) -> None:
-        """Be where it began, at rest and sound, while time and sensors go on."""
+        """Reset pose, velocity, forces and faults to their initial state; simulation time and sensors continue."""
         self.body.begin_again()
         self._begin_forces()
         self._begin_faults()
         self.context.tunings += 1
 
     def change_faults(self, changes: Mapping[str, Any]) -> None:
-        """Change its faults: keys of `faults`, as in YAML. Raises ParameterError."""
+        """Change some keys of `faults`, as in YAML. Raises ParameterError."""
         self.faults.change(changes)
-        self._prepare()
+        self._update_step_calls()
         self.context.tunings += 1
 
     # ---- phases
 
     def begin_step(self) -> None:
-        """Forget the readings of the last step, and let scripts hear the command of this one."""
-        for prepare in self._before_script:
-            prepare()
+        """Clear the readings of the last step, and post the command to the scripts."""
+        for call in self._step_calls:
+            call()
         self.commands.advance()
 
     def wrench(self) -> Wrench:
-        """Return what pushes the body through this step, the forces of single sub-steps aside; nothing while held."""
+        """Return the wrench for this step without the sub-step forces; zero while the body is held."""
         body = self.body
         wrench = body.take_pushes()
         for force in self._forces:
@@ -199,39 +199,39 @@ class Vehicle:
         return Wrench() if body.is_held else wrench
 
     def before_sub_step(self) -> None:
-        """Let the forces act that follow the body through the sub-steps."""
+        """Apply the forces that are evaluated in every sub-step."""
         for force in self.sub_step_forces:
             self.body.apply(force)
 
     def after_sub_step(self, count: int) -> None:
-        """Let the instruments look, after so many sub-steps of the run."""
+        """Update the instruments after sub-step number `count` of the run."""
         self.body.refresh()
         self.instruments.look(count)
 
     def take_pictures(self, steps: int, now: bool = False) -> None:
-        """Let the cameras that are watched take a picture: those that are due after so many steps, or all `now`.
+        """Render every subscribed camera that is due at step `steps`, or all of them if `now`.
 
-        Those with automatic exposure measure the light whenever they are due.
+        Cameras with automatic exposure measure the light whenever they are due.
         """
         for name, camera in self.cameras.items():
             if not now:
                 camera.meter(steps)
             is_watched = camera.watched()
             if is_watched or camera.image is not None:
-                looks = is_watched and (now or camera.is_due(steps)) and camera.failure != "silent"
-                camera.show(steps, *self.faults.transmit(name, camera.look() if looks else None))
+                is_rendered = is_watched and (now or camera.is_due(steps)) and camera.failure != "silent"
+                camera.show(steps, *self.faults.transmit(name, camera.look() if is_rendered else None))
 
     # ---- snapshots
 
     def save_state(self) -> Restore:
-        """Return a function that brings back what the body is not: forces, commands, cameras, sensors, faults."""
+        """Return a function that restores everything but the body: forces, commands, cameras, sensors, faults."""
         forces = (*self._forces, self.pushes, *self.sub_step_forces)
         parts = (*forces, self.propulsion.blades, self.commands, *self.cameras.values())
         return in_turn(
-            *(one.save_state() for one in parts),
+            *(part.save_state() for part in parts),
             self.body.restored,
-            self.instruments.save_state(),  # which ask the body how often it was put somewhere
+            self.instruments.save_state(),  # after the body: they read its number of teleports
             self.faults.save_state(),
-            self._prepare,
+            self._update_step_calls,
             saved(self, "sub_step_forces", "_has_drag"),
         )

@@ -1,4 +1,4 @@
-"""Six of V-REP's propellers around a body."""
+"""A hexacopter with V-REP's propellers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from drone_sim.vehicles.types.vehicle_type import VehicleType
 
 
 class Hexacopter(VehicleType):
-    """Propellers 1 to 6, from the front left once around; child_scripts/hexacopter.py flies it."""
+    """Propellers 1 to 6, counter-clockwise from the front left; child_scripts/hexacopter.py flies it."""
 
     name = "hexacopter"
     rotors = (

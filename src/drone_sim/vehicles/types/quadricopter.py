@@ -6,7 +6,7 @@ from drone_sim.vehicles.types.vehicle_type import VehicleType
 
 
 class Quadricopter(VehicleType):
-    """V-REP's propellers 1 to 4."""
+    """Propellers 1 to 4, as in V-REP."""
 
     name = "quadricopter"
     rotors = (("front_left", -1), ("back_left", +1), ("back_right", -1), ("front_right", +1))

@@ -1,4 +1,4 @@
-"""What a type of vehicle is: where its propellers sit, and the law by which they push."""
+"""Base class of the vehicle types: places of the propellers, and their thrust model."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from drone_sim.mechanics.frames import Vector
 
 
 class VehicleType:
-    """A type of vehicle, by the name that the key `type` has.
+    """A type of vehicle; `name` is the value of the key `type`.
 
-    `rotors` are propellers 1, 2, and so on: where each sits, by the links propeller_<place> and, below, blades_<place>
-    of the URDF, and the sense (+-1) of its reaction torque.
+    `rotors` are propellers 1, 2, and so on: the place, which names the URDF links propeller_<place> and its child
+    blades_<place>, and the sense (+-1) of the reaction torque.
     """
 
     name: ClassVar[str]
@@ -28,8 +28,8 @@ class VehicleType:
         time_step: float,
         commanded: Callable[[], Sequence[float]],
     ) -> Propellers:
-        """Return what pushes along `axes` (unit, root link's frame) at `points` (m, inertial frame): V-REP's particles.
+        """Return V-REP's particle model, with thrust along `axes` (unit, root link) at `points` (m, inertial frame).
 
-        `commanded` returns the velocities (m/s) that scripts ask for.
+        `commanded` returns the particle velocities (m/s) that scripts command.
         """
         return Propellers(law, axes, points, [sense for _, sense in cls.rotors], time_step, commanded)
