@@ -38,7 +38,7 @@ def written(
         "vehicles": copy.deepcopy(dict(vehicles)),
     }
     scene_parameters.find_files_beside(folder, {"vehicles": plain["vehicles"]})
-    content = _with_files(plain, lambda file: file.seen_from(None))
+    content = _rename_files(plain, lambda file: file.seen_from(None))
     return dumped({key: section for key, section in content.items() if section})
 
 
@@ -59,7 +59,7 @@ def read(text: str, folder: Path) -> _Content:
         if not isinstance(part, _KEYS[key]) or not all(isinstance(entry, dict) for entry in _entries(part)):
             raise ParameterError(f"the pasted text: {key} = {shown(part)}: {_EXPECTED}")
     scene_parameters.find_files_beside(folder, {"scene": content, "vehicles": content.get("vehicles")})
-    return {**{key: kind() for key, kind in _KEYS.items()}, **_with_files(content, lambda it: _relative(it, folder))}
+    return {**{key: kind() for key, kind in _KEYS.items()}, **_rename_files(content, lambda it: _relative(it, folder))}
 
 
 def _entries(section: Any) -> list[Any]:
@@ -81,12 +81,11 @@ def _parsed(text: str) -> Any:
     raise ParameterError(f"the pasted text {shown(text)} is not YAML ({errors[0]}): it {_EXPECTED}")
 
 
-def _with_files(value: Any, name: Callable[[FoundFile], str]) -> Any:
-    """Return `value` with all file names replaced by `name`(file)."""
+def _rename_files(value: Any, name: Callable[[FoundFile], str]) -> Any:
     if isinstance(value, Mapping):
-        return {key: _with_files(item, name) for key, item in value.items()}
+        return {key: _rename_files(item, name) for key, item in value.items()}
     if isinstance(value, list):
-        return [_with_files(item, name) for item in value]
+        return [_rename_files(item, name) for item in value]
     return name(value) if isinstance(value, FoundFile) else value
 
 

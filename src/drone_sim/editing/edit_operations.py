@@ -145,7 +145,6 @@ class EditOperations:
             edits.reparent(handle, parent, op.keep)
 
     def _set(self, operations: Sequence[records.Set]) -> list[int]:
-        """Execute several `set` operations as one."""
         values_by_handle: dict[int, dict[str, Any]] = {}
         for op in operations:
             values_by_handle.setdefault(self._scene.handle(op.object), {}).update(op.values)

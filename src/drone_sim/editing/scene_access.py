@@ -107,7 +107,6 @@ class SceneAccess:
         self.document.settings = settings
 
     def _check_flight(self, settings: Settings) -> None:
-        """Raise ValueError for settings that cannot change during a run."""
         for key in _FIXED_IN_FLIGHT:
             if settings.get(key) != self.settings.get(key):
                 raise ValueError(f"{key}: can only be changed while the simulation is stopped: stop it first")

@@ -81,7 +81,7 @@ class _Search:
     def run(self) -> Chains:
         reasons = {}
         joints = {index: entry for index, entry in self._entries.items() if isinstance(entry, _Holder)}
-        shapes_below = self._shapes_below(joints)
+        shapes_below = self._moving_children(joints)
         for index, entry in joints.items():
             reason = self._reason(entry, shapes_below[index])
             if reason:
@@ -102,8 +102,7 @@ class _Search:
                 f"{len(chain.hung)} joints and force sensors in a chain from '{name}': at most {MOST_HELD} are allowed"
             )
 
-    def _shapes_below(self, joints: Mapping[int, _Holder]) -> dict[int, list[int]]:
-        """Return the child shapes with mass of each joint."""
+    def _moving_children(self, joints: Mapping[int, _Holder]) -> dict[int, list[int]]:
         below: dict[int, list[int]] = {index: [] for index in joints}
         for index, entry in self._entries.items():
             if entry.parent and isinstance(entry, ObjectParameters) and entry.moves:

@@ -98,7 +98,6 @@ def _shape_of(parameters: ObjectParameters | PartParameters) -> SceneShape:
 
 
 def _with_keys_of(shape: type[SceneShape], base: type[Checked]) -> type[Checked]:
-    """Return a subclass of `base` with the keys of a shape."""
     keys: dict[str, Any] = {"color": (Color, shape.default_color), "shape": (Literal[shape.word], ...)}
     types = get_type_hints(shape, include_extras=True)
     for field in fields(shape):

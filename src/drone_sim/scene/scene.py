@@ -232,7 +232,7 @@ class Scene:
         for index in building.parents_first(new):
             self.objects[index] = self._add(index)
         for built in new_bodies:
-            self._connect(built)
+            self._connect_joints(built)
 
     def _add(self, index: int) -> SceneObject:
         entry = self.entries[index]
@@ -280,8 +280,7 @@ class Scene:
         else:
             self._context.carried.shapes[shape.number] = shape.carried
 
-    def _connect(self, built: Built) -> None:
-        """Connect the joints and force sensors of a chain to its body's links."""
+    def _connect_joints(self, built: Built) -> None:
         for hung in built.chain.hung:
             holder, link = self.objects[hung.joint], built.links[hung.shape]
             if isinstance(holder, ForceSensor):

@@ -45,7 +45,6 @@ def _motion(velocity: Vector) -> str:
 
 
 def _strongest_contact(contacts: Sequence[Contact]) -> str:
-    """Return the name of the object with the largest contact force."""
     name = max(contacts, key=lambda contact: math.hypot(*contact.force)).what
     return "the ground" if name in ("", _FLOOR) else name
 
