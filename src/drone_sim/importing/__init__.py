@@ -1,1 +1,1 @@
-"""V-REP's files made into ours: scene file, meshes, URDFs and scripts in a folder, and a list of what is missing."""
+"""Import of V-REP files: writes scene file, meshes, URDFs, scripts and a list of differences into a folder."""

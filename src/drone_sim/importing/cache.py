@@ -1,7 +1,7 @@
-"""What `scene:=FILE.ttt` flies in: the file, imported into a folder of its own below ~/.cache.
+"""Cache of imported .ttt files: `scene:=FILE.ttt` flies in a copy imported into its own folder below ~/.cache.
 
-The folder's name has a hash of the file's content: a file that was written anew is imported anew. All of it may be
-deleted at any time. XDG_CACHE_HOME names another place than ~/.cache.
+The folder's name contains a hash of the file's content, so a changed file is imported again. The whole cache may be
+deleted at any time. XDG_CACHE_HOME replaces ~/.cache.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from drone_sim.vrep_files.model import VrepFileError
 
 _LOG = logging.getLogger(__name__)
 _LOG.setLevel(logging.INFO)
-_FORM = b"8"  # of what is written: another one, and files are imported anew
+_FORMAT_VERSION = b"8"  # of the written files; after a change, every file is imported again
 
 
 def imported_scene(path: Path) -> Path:
-    """Return the scene file that a file of V-REP's was made into, now or before. Raises VrepFileError and OSError."""
-    from drone_sim.importing.scene_folder import LIST, SCENE  # which reads and makes all kinds of things
+    """Return the scene file imported from a V-REP file, now or earlier. Raises VrepFileError and OSError."""
+    from drone_sim.importing.scene_folder import LIST, SCENE  # slow import: loads readers and writers
     from drone_sim.importing.scripts import renew
 
     folder = _folder(path)
@@ -41,7 +41,7 @@ def imported_scene(path: Path) -> Path:
 
 
 def cache_folder() -> Path:
-    """Return the folder below which imported scenes lie."""
+    """Return the folder that contains the imported scenes."""
     return cache_path() / "scenes"
 
 
@@ -50,12 +50,12 @@ def _folder(path: Path) -> Path:
         content = read_bytes(path, MAX_SIZE)
     except (OSError, ValueError) as error:
         raise VrepFileError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
-    digest = hashlib.sha256(_FORM + content).hexdigest()[:16]
+    digest = hashlib.sha256(_FORMAT_VERSION + content).hexdigest()[:16]
     return cache_folder() / f"{word(path.stem, 'scene')}-{digest}"
 
 
 def _import_into(path: Path, folder: Path) -> None:
-    """Import beside the folder, and give it its name when all is there: another process may be at it, too."""
+    """Import into a temporary folder and rename it when complete: another process may import the same file."""
     from drone_sim.importing.scene_folder import SCENE, import_file
 
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -64,7 +64,7 @@ def _import_into(path: Path, folder: Path) -> None:
         import_file(path, unfinished)
         unfinished.rename(folder)
     except OSError:
-        if not (folder / SCENE).is_file():  # nor has another process made it
+        if not (folder / SCENE).is_file():  # no other process has imported it either
             raise
     finally:
         with contextlib.suppress(OSError):

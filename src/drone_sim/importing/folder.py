@@ -1,4 +1,4 @@
-"""The folder that an import writes: files, names and numbers as a scene has them, and what is not as it was."""
+"""Output folder of an import: file names, rounded numbers, and the report of differences from the V-REP file."""
 
 from __future__ import annotations
 
@@ -12,53 +12,53 @@ from drone_sim.files.resources import read_bytes, resolve
 from drone_sim.mechanics import frames
 from drone_sim.message_text import MAX_NAME
 
-_DIGITS = 6  # after the point: micrometres and microradians
-_NOTHING = [0.0, 0.0, 0.0]
+_DECIMALS = 6  # micrometres and microradians
+_ZEROS = [0.0, 0.0, 0.0]
 
 
-def number(value: float, digits: int = _DIGITS) -> float:
-    """Return a number without the noise of its last digits, and without a -0."""
+def number(value: float, digits: int = _DECIMALS) -> float:
+    """Return `value` rounded to `digits` decimals, and 0 instead of -0."""
     return round(float(value), digits) + 0.0
 
 
 def numbers(values: Iterable[float]) -> list[float]:
-    """Return a list of such numbers."""
+    """Return the values rounded by `number`."""
     return [number(value) for value in values]
 
 
 def shade(color: Iterable[float]) -> list[float]:
-    """Return a colour; an opaque one without the opacity."""
+    """Return a rounded RGBA colour as a list, without the opacity if it is 1."""
     red, green, blue, opacity = (number(value, 3) for value in color)
     return [red, green, blue] if opacity == 1 else [red, green, blue, opacity]
 
 
 def pose_keys(matrix: Sequence[float]) -> dict[str, Any]:
-    """Return `position` and `rpy` of a transform, what is zero left out."""
+    """Return the keys `position` (m) and `rpy` (rad) of a transform; a key with only zeros is omitted."""
     keys = {"position": numbers(frames.position(matrix)), "rpy": numbers(frames.to_rpy(matrix))}
-    return {key: value for key, value in keys.items() if value != _NOTHING}
+    return {key: value for key, value in keys.items() if value != _ZEROS}
 
 
 def label(text: str) -> str:
-    """Return a text as a scene file may have it as a name: printable and not too long."""
+    """Return `text` as a valid name in a scene file: printable and at most MAX_NAME characters."""
     return "".join(letter if letter.isprintable() else "_" for letter in text)[:MAX_NAME]
 
 
 def word(name: str, otherwise: str) -> str:
-    """Return a name of letters, digits and _ alone, a letter first: for files, topics and vehicles."""
+    """Return `name` as letters, digits and _ only, with `otherwise` in front unless it begins with a letter."""
     plain = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_")[:48]
     return plain if re.match(r"[A-Za-z]", plain) else f"{otherwise}_{plain}".rstrip("_")
 
 
 class Folder:
-    """Writes files below one folder, which it makes."""
+    """Writes files below a folder, which is created with the first file."""
 
     def __init__(self, path: Path):
-        """Take its path. Nothing is made before the first file is written."""
+        """Write below `path`."""
         self.path = path
         self._taken: set[str] = set()
 
     def free_name(self, wanted: str, suffix: str, below: str = "") -> str:
-        """Return a file name like the one wanted that no other file of this folder has, relative to it."""
+        """Return an unused file name, relative to this folder, similar to `wanted`, and reserve it."""
         plain = f"{below}{word(wanted, 'object')}"
         name, number = f"{plain}{suffix}", 2
         while name.lower() in self._taken:
@@ -67,11 +67,11 @@ class Folder:
         return name
 
     def keep_free(self, names: Iterable[str]) -> None:
-        """Give no file one of these names."""
+        """Reserve these names, so that `free_name` returns none of them."""
         self._taken.update(name.lower() for name in names)
 
     def write(self, name: str, content: str | bytes) -> None:
-        """Write a file, text in UTF-8. Raises OSError."""
+        """Write a file; text is encoded as UTF-8. Raises OSError."""
         path = self.path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         with writing.replacing(path, binary=isinstance(content, bytes)) as file:
@@ -79,41 +79,41 @@ class Folder:
 
 
 LIST = "IMPORT.txt"
-_HOLE = "WILL NOT WORK: "
-_LONGEST_LIST = 1 << 20  # bytes
+_HOLE_PREFIX = "WILL NOT WORK: "
+_MAX_LIST_SIZE = 1 << 20  # bytes
 
 
 def holes(scene_file: str) -> list[str]:
-    """Return what the import of a scene file says that will not work; nothing for a scene that is no import."""
+    """Return what will not work in an imported scene, from its import report; [] if the scene was not imported."""
     try:
-        text = read_bytes(resolve(scene_file).with_name(LIST), _LONGEST_LIST).decode("utf-8", "replace")
+        text = read_bytes(resolve(scene_file).with_name(LIST), _MAX_LIST_SIZE).decode("utf-8", "replace")
     except (OSError, ValueError):
         return []
-    return [line.removeprefix(_HOLE) for line in text.splitlines() if line.startswith(_HOLE)]
+    return [line.removeprefix(_HOLE_PREFIX) for line in text.splitlines() if line.startswith(_HOLE_PREFIX)]
 
 
 class Report:
-    """Lines for the end of an import, by what they say; objects of which the same is said share one."""
+    """The differences from the V-REP file, one line for each; objects with the same difference share a line."""
 
     def __init__(self) -> None:
-        """Begin with nothing to say."""
-        self.notes: list[str] = []  # what is the same by other means
-        self.holes: list[str] = []  # what will not work
-        self._said: dict[str, list[str]] = {}
+        """Create an empty report."""
+        self.notes: list[str] = []  # what works the same in another way
+        self.holes: list[str] = []  # what will not work in the scene
+        self._names: dict[str, list[str]] = {}
 
     def add(self, name: str, what: str) -> None:
-        """Say something of an object; '' is the whole file."""
-        names = self._said.setdefault(what, [])
+        """Add the line `what` for an object; '' stands for the whole file."""
+        names = self._names.setdefault(what, [])
         if name not in names:
             names.append(name)
 
     def __len__(self) -> int:
-        """How much there is to say."""
-        return len(self._said) + len(self.holes)
+        """Return the number of lines, without notes."""
+        return len(self._names) + len(self.holes)
 
     def lines(self, most: int | None = None) -> Iterator[str]:
-        """Yield one line for everything that is said, with all of its objects, or the first so many; holes first."""
-        yield from (f"{_HOLE}{one}" for one in self.holes)
-        for what, names in self._said.items():
+        """Yield the lines, holes first, each with its object names, at most `most` of them."""
+        yield from (f"{_HOLE_PREFIX}{hole}" for hole in self.holes)
+        for what, names in self._names.items():
             more = f" and {len(names) - most} more" if most is not None and len(names) > most else ""
             yield f"{', '.join(names[:most])}{more}: {what}" if names != [""] else what

@@ -1,4 +1,4 @@
-"""`rosrun drone_sim import_scene FILE.ttt|.ttm [OUT]`: a file of V-REP's as a scene that flies here."""
+"""`rosrun drone_sim import_scene FILE.ttt|.ttm [OUT]`: convert a V-REP file into a scene."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _NAME = "import_scene"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Import; return 0, or 1 after a line on stderr for a file that cannot be read or written."""
+    """Import a file; return 0, or 1 after an error line on stderr if a file cannot be read or written."""
     options = _parser().parse_args(arguments)
-    return status_of(_NAME, lambda: _say(_import(Path(options.file), options.out, options.force)))
+    return status_of(_NAME, lambda: _print_summary(_import(Path(options.file), options.out, options.force)))
 
 
 def _import(path: Path, out: str | None, force: bool) -> Imported:
@@ -31,10 +31,10 @@ def _import(path: Path, out: str | None, force: bool) -> Imported:
     return import_file(path, folder)
 
 
-def _say(imported: Imported) -> None:
+def _print_summary(imported: Imported) -> None:
     counts = {"object": imported.objects, "vehicle": imported.vehicles, "script": imported.scripts}
-    said = ", ".join(f"{count} {word}" if count == 1 else f"{count} {word}s" for word, count in counts.items())
-    print(f"{imported.scene}: {said}")
+    summary = ", ".join(f"{count} {word}" if count == 1 else f"{count} {word}s" for word, count in counts.items())
+    print(f"{imported.scene}: {summary}")
     for note in imported.report.notes:
         print(note)
     if imported.report:

@@ -1,4 +1,4 @@
-"""The collections of a file as those of a scene file."""
+"""Import of V-REP collections as entries of `collections:`."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from drone_sim.vrep_files.model import VrepCollection
 def entries(
     collections: Sequence[VrepCollection], names: Mapping[int, str], report: Report
 ) -> Iterator[dict[str, Any]]:
-    """Yield the entries of `collections:`; `names` are those of the objects that are brought, by handle."""
-    given: set[str] = set()
-    for one in collections:
-        name = label(one.name)
-        if not name or name in given:  # the editor's own, which nobody finds by a name
+    """Yield the entries of `collections:`; `names` maps handles of imported objects to their names."""
+    used: set[str] = set()
+    for collection in collections:
+        name = label(collection.name)
+        if not name or name in used:  # created by V-REP's editor; no script finds it by name
             continue
-        given.add(name)
+        used.add(name)
         items: list[dict[str, Any]] = []
-        for item in one.items:
+        for item in collection.items:
             if item.what != "all" and item.object not in names:
-                report.add(one.name, "a collection: some of its objects are not imported")
+                report.add(collection.name, "a collection: some of its objects are not imported")
                 continue
-            said = {"what": item.what, "object": names.get(item.object, "")}
-            switches = {"removes": item.removes, "without": item.without}
-            items.append({key: value for key, value in {**said, **switches}.items() if value})
+            target = {"what": item.what, "object": names.get(item.object, "")}
+            flags = {"removes": item.removes, "without": item.without}
+            items.append({key: value for key, value in {**target, **flags}.items() if value})
         yield {"name": name, "items": items}

@@ -1,4 +1,4 @@
-"""Paths of V-REP 3.x as entries of a scene file."""
+"""Import of V-REP 3.x paths as scene entries."""
 
 from __future__ import annotations
 
@@ -6,38 +6,38 @@ from typing import Any
 
 from drone_sim.importing.folder import Report, number, numbers
 from drone_sim.mechanics.controlled_path import AUTOMATIC, COUNTS, METRES_PER_RADIAN, OWN, X_UP
-from drone_sim.scene.kinds.curved_path import COUNTS as LEAST_AND_MOST
+from drone_sim.scene.kinds.curved_path import COUNTS as COUNT_LIMITS
 from drone_sim.scene.kinds.curved_path import FACTORS, LONGEST, MAX_LINE
 from drone_sim.vrep_files import paths
 from drone_sim.vrep_files.model import VrepControlPoint, VrepPath
 
-_USUAL = {"factors": [0.5, 0.5], "count": 15, "pause": 0.0, "flags": 0, "channels": [0.0] * 4, "turn": [0, 0, 0, 1]}
-_USUAL_COUNTS = "dl_if_nonzero"
-_FARTHEST = 1e5  # m
-_LEAST, _MOST = 1e-4, 1e3  # m, of what a turn or a pause counts for
+_DEFAULTS = {"factors": [0.5, 0.5], "count": 15, "pause": 0.0, "flags": 0, "channels": [0.0] * 4, "turn": [0, 0, 0, 1]}
+_DEFAULT_COUNTS = "dl_if_nonzero"
+_MAX_COORDINATE = 1e5  # m
+_MIN_EQUIVALENT, _MAX_EQUIVALENT = 1e-4, 1e3  # m, path length that a rotation or pause counts as
 
 
 def curved_path(name: str, path: VrepPath, report: Report) -> dict[str, Any]:
-    """Return the keys of a path's entry, without its place; say what is not as it was."""
-    there = [one for one in path.points if max(map(abs, one.pose.position)) < _FARTHEST]
-    share = min(1.0, MAX_LINE / max(1, sum(one.count for one in there)))
-    keys: dict[str, Any] = {"kind": "curved_path", "control_points": [_control_point(one, share) for one in there]}
+    """Return the keys of a path's entry, without its pose; add differences to `report`."""
+    points = [point for point in path.points if max(map(abs, point.pose.position)) < _MAX_COORDINATE]
+    share = min(1.0, MAX_LINE / max(1, sum(point.count for point in points)))
+    keys: dict[str, Any] = {"kind": "curved_path", "control_points": [_control_point(point, share) for point in points]}
     if path.switches & paths.CLOSED:
         keys["closed"] = True
     if path.switches & paths.FLAT:
         keys["flat"] = True
-    usual = {"orientation": AUTOMATIC, "counts": _USUAL_COUNTS, "metres_per_radian": number(METRES_PER_RADIAN)}
-    said = {
+    defaults = {"orientation": AUTOMATIC, "counts": _DEFAULT_COUNTS, "metres_per_radian": number(METRES_PER_RADIAN)}
+    values = {
         "orientation": _orientation(path.switches),
-        "counts": [*COUNTS][path.counts] if path.counts in range(len(COUNTS)) else _USUAL_COUNTS,
-        "metres_per_radian": _within(number(path.metres_per_radian), _LEAST, _MOST),
-        "metres_per_pause": _within(number(path.metres_per_pause), _LEAST, _MOST),
-        "along": _within(number(path.along), 0.0, LONGEST),
+        "counts": [*COUNTS][path.counts] if path.counts in range(len(COUNTS)) else _DEFAULT_COUNTS,
+        "metres_per_radian": _clamped(number(path.metres_per_radian), _MIN_EQUIVALENT, _MAX_EQUIVALENT),
+        "metres_per_pause": _clamped(number(path.metres_per_pause), _MIN_EQUIVALENT, _MAX_EQUIVALENT),
+        "along": _clamped(number(path.along), 0.0, LONGEST),
     }
-    keys.update(_unusual(said, {**usual, "metres_per_pause": 1.0, "along": 0.0}))
-    if path.switches & paths.VELOCITY_PROFILE or any(one.speed != 1 for one in path.points):
+    keys.update(_without_defaults(values, {**defaults, "metres_per_pause": 1.0, "along": 0.0}))
+    if path.switches & paths.VELOCITY_PROFILE or any(point.speed != 1 for point in path.points):
         report.add(name, "a path: its velocity profile is not imported")
-    broken = path.broken + len(path.points) - len(there)
+    broken = path.broken + len(path.points) - len(points)
     if broken:
         report.add(name, f"a path: {broken} of its control points are not finite: left out")
     if share < 1:
@@ -53,21 +53,21 @@ def _orientation(switches: int) -> str:
     return X_UP if switches & paths.X_UP else AUTOMATIC
 
 
-def _control_point(one: VrepControlPoint, share: float) -> dict[str, Any]:
-    said = {
-        "turn": numbers(one.pose.orientation),
-        "factors": [_within(number(factor), *FACTORS) for factor in (one.before, one.after)],
-        "count": int(_within(one.count * share, *LEAST_AND_MOST)),
-        "pause": _within(number(one.pause), 0.0, _MOST),
-        "flags": one.flags,
-        "channels": numbers(one.channels),
+def _control_point(point: VrepControlPoint, share: float) -> dict[str, Any]:
+    values = {
+        "turn": numbers(point.pose.orientation),
+        "factors": [_clamped(number(factor), *FACTORS) for factor in (point.before, point.after)],
+        "count": int(_clamped(point.count * share, *COUNT_LIMITS)),
+        "pause": _clamped(number(point.pause), 0.0, _MAX_EQUIVALENT),
+        "flags": point.flags,
+        "channels": numbers(point.channels),
     }
-    return {"position": numbers(one.pose.position), **_unusual(said, _USUAL)}
+    return {"position": numbers(point.pose.position), **_without_defaults(values, _DEFAULTS)}
 
 
-def _unusual(said: dict[str, Any], usual: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in said.items() if value != usual[key]}
+def _without_defaults(values: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if value != defaults[key]}
 
 
-def _within(value: float, low: float, high: float) -> float:
+def _clamped(value: float, low: float, high: float) -> float:
     return min(max(value, low), high)

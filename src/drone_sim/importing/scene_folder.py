@@ -1,4 +1,4 @@
-"""A file of V-REP's as a folder of ours: the scene file, its meshes, URDFs and scripts, and what stayed behind."""
+"""Conversion of a V-REP file into a folder: scene file, meshes, URDFs, scripts, and a report of differences."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _FLOOR = ("Floor", "ResizableFloor_5_25")
 
 
 def reserved_names(suffixes: Sequence[int]) -> set[str]:
-    """Return the names of our floor, and of the objects and cameras of vehicles with these suffixes (none: our own)."""
+    """Return the names of drone_sim's floor and of the objects and cameras of vehicles (none: one without suffix)."""
     names = set(_FLOOR)
     for suffix in suffixes or (-1,):
         tree = ObjectTree()
@@ -42,33 +42,33 @@ def reserved_names(suffixes: Sequence[int]) -> set[str]:
 
 
 class UniqueNames:
-    """Gives every object a name of its own."""
+    """Gives objects unique names."""
 
     def __init__(self, taken: Iterable[str] = ()):
-        """Take the names that are not free."""
+        """Treat the names `taken` as used."""
         self._taken = set(taken)
 
     def give(self, objects: Iterable[Placed], report: Report) -> None:
-        """Name every object as in the file, where that can be."""
-        for one in objects:
-            one.name = self.free(one.wanted_name)
-            if one.name != one.wanted_name:
-                report.add(one.wanted_name, f"is called {one.name} here")
+        """Give each object its name in the file, or a similar one if that is taken."""
+        for node in objects:
+            node.name = self.free(node.wanted_name)
+            if node.name != node.wanted_name:
+                report.add(node.wanted_name, f"is called {node.name} here")
 
     def give_in_trees(self, objects: Iterable[Placed], report: Report) -> None:
-        """Name the objects of each tree as in the file, or, where one of these names is taken, all as a copy's."""
+        """Name each tree's objects as in the file; if one name is taken, give all a copy's suffix."""
         trees: dict[int, list[Placed]] = defaultdict(list)
-        for placed_one in objects:
-            trees[id(placed_one.top)].append(placed_one)
+        for node in objects:
+            trees[id(node.top)].append(node)
         for tree in trees.values():
-            wanted = [label(one.wanted_name) or "object" for one in tree]
-            for one, name in zip(tree, shifted(wanted, self._taken)):
-                one.name = self.free(name)
-                if one.name != one.wanted_name:
-                    report.add(one.wanted_name, f"is called {one.name} here")
+            wanted = [label(node.wanted_name) or "object" for node in tree]
+            for node, name in zip(tree, shifted(wanted, self._taken)):
+                node.name = self.free(name)
+                if node.name != node.wanted_name:
+                    report.add(node.wanted_name, f"is called {node.name} here")
 
     def free(self, wanted: str) -> str:
-        """Return a name like the one wanted, and take it."""
+        """Return an unused name similar to `wanted`, and reserve it."""
         plain = label(wanted) or "object"
         name, number = plain, 2
         while name in self._taken:
@@ -79,24 +79,24 @@ class UniqueNames:
 
 
 SCENE = "scene.yaml"
-_STEP, _SUB_STEP, _GRAVITY = 0.05, 0.005, -9.81  # which a scene file need not say
-_FARTHEST = 1e5  # m
-_ONLY_LOOKED_THROUGH = ("light", "graph")
+_TIME_STEP, _SUB_STEP, _GRAVITY = 0.05, 0.005, -9.81  # s, s, m/s²: defaults of a scene file
+_MAX_COORDINATE = 1e5  # m
+_IDLE_KINDS = ("light", "graph")
 
 
-# In a customization script, which also has phases in which no simulation runs.
-_ACTS = re.compile(
+# A customization script also has callbacks that run while no simulation runs; these are the ones that run in it.
+_SIMULATION_CALLBACK = re.compile(
     r"\bsysCall_(?:actuation|sensing|thread|threadmain)\b|\bcustomizationscriptcall_simulation(?:actuation|sensing)\b"
 )
-_LINKS = re.compile(r"\bsim(?:\.s|S)etLinkDummy\b")
+_LINKS_DUMMIES = re.compile(r"\bsim(?:\.s|S)etLinkDummy\b")
 
 
-def _is_on_a_body(dummy: Placed) -> bool:
+def _has_dynamic_parent(dummy: Placed) -> bool:
     return dummy.above is not None and dummy.above.is_dynamic
 
 
 class Imported(NamedTuple):
-    """What an import made."""
+    """The result of an import: the scene file, counts, and the report."""
 
     scene: Path
     objects: int
@@ -106,10 +106,10 @@ class Imported(NamedTuple):
 
 
 def import_file(path: Path, out: Path) -> Imported:
-    """Write what is in a file into the folder `out`. Raises VrepFileError and OSError."""
-    work = _Import(read_file(path), path.name, Folder(out))
-    imported = work.run()
-    bring(path.parent, out, work.script_files.lua_names)
+    """Import the file at `path` into the folder `out`. Raises VrepFileError and OSError."""
+    process = _Import(read_file(path), path.name, Folder(out))
+    imported = process.run()
+    bring(path.parent, out, process.script_files.lua_names)
     return imported
 
 
@@ -119,36 +119,38 @@ class _Import:
         self._name = name
         self._folder = folder
         self._report = Report()
-        folder.keep_free(one for script in file.scripts for files in asked_for(script.text) for one in files)
+        folder.keep_free(name for script in file.scripts for names in asked_for(script.text) for name in names)
         self._writer = MeshWriter(folder)
         self.script_files = ScriptFiles(folder)
         self._objects = placed(file)
-        self._by_handle = {one.object.handle: one for one in self._objects}
+        self._by_handle = {node.object.handle: node for node in self._objects}
         self._floor = floor_parts(self._objects)
         self._scripts = self._child_scripts()
-        found = find(self._objects, self._scripts)
-        self._vehicles = [ImportedVehicle(*pair) for pair in zip(found, [self._scripts] * len(found), suffixes(found))]
-        self._vehicle_names = vehicle_names(found)
+        drones = find(self._objects, self._scripts)
+        self._vehicles = [
+            ImportedVehicle(*pair) for pair in zip(drones, [self._scripts] * len(drones), suffixes(drones))
+        ]
+        self._vehicle_names = vehicle_names(drones)
         self._words = set(re.findall(r"\w+", "\n".join(script.text for script in file.scripts)))
-        self._of_vehicles = {id(one) for vehicle in self._vehicles for one in vehicle.objects.values()}
+        self._of_vehicles = {id(node) for vehicle in self._vehicles for node in vehicle.objects.values()}
         taken: set[str] = set()
-        for vehicle in self._vehicles:  # whose objects have our names, too, which no other vehicle's may have
-            suffixes_of_others = [one.suffix for one in self._vehicles if one is not vehicle]
+        for vehicle in self._vehicles:  # its objects must not get the names of another vehicle's standard objects
+            suffixes_of_others = [other.suffix for other in self._vehicles if other is not vehicle]
             taken_by_others = taken | reserved_names(suffixes_of_others) if suffixes_of_others else set()
             UniqueNames(taken_by_others).give(vehicle.objects.values(), self._report)
-            taken |= {one.name for one in vehicle.objects.values()}
+            taken |= {node.name for node in vehicle.objects.values()}
         taken |= reserved_names([vehicle.suffix for vehicle in self._vehicles])
-        ours = self._of_vehicles | {id(one) for one in self._floor}
-        others = [one for one in self._objects if id(one) not in ours]
-        flown = {id(vehicle.root.top) for vehicle in self._vehicles}
+        excluded = self._of_vehicles | {id(node) for node in self._floor}
+        others = [node for node in self._objects if id(node) not in excluded]
+        vehicle_roots = {id(vehicle.root.top) for vehicle in self._vehicles}
         names = UniqueNames(taken)
-        names.give((one for one in others if id(one.top) in flown), self._report)
-        names.give_in_trees((one for one in others if id(one.top) not in flown), self._report)
+        names.give((node for node in others if id(node.top) in vehicle_roots), self._report)
+        names.give_in_trees((node for node in others if id(node.top) not in vehicle_roots), self._report)
 
     def run(self) -> Imported:
         content: dict[str, Any] = {**self._world()}
         tools = self._folder, self._writer, self.script_files, self._report
-        vehicles = {name: one.entry(*tools) for name, one in zip(self._vehicle_names, self._vehicles)}
+        vehicles = {name: vehicle.entry(*tools) for name, vehicle in zip(self._vehicle_names, self._vehicles)}
         content["vehicles"] = vehicles
         self._find_holes()
         if not vehicles:
@@ -158,9 +160,9 @@ class _Import:
         scripts = list(self._attached())
         if scripts:
             content["scripts"] = scripts
-        there = self._kept | self._of_vehicles
-        brought = {one.object.handle: one.name for one in self._objects if id(one) in there}
-        collections = list(object_collections.entries(self._file.collections, brought, self._report))
+        imported_ids = self._kept | self._of_vehicles
+        names = {node.object.handle: node.name for node in self._objects if id(node) in imported_ids}
+        collections = list(object_collections.entries(self._file.collections, names, self._report))
         if collections:
             content["collections"] = collections
         self._write(content)
@@ -171,16 +173,16 @@ class _Import:
     def _world(self) -> dict[str, Any]:
         settings = self._file.settings
         world: dict[str, Any] = {}
-        step = settings.time_step or _STEP
+        step = settings.time_step or _TIME_STEP
         step = number(min(max(step, 1e-3), 1.0))
-        if step != _STEP:
+        if step != _TIME_STEP:
             world["time_step"] = step
-        wanted = settings.dynamics_step or _SUB_STEP
-        sub_step = step / max(1, round(step / min(max(wanted, 1e-4), step)))
+        file_sub_step = settings.dynamics_step or _SUB_STEP
+        sub_step = step / max(1, round(step / min(max(file_sub_step, 1e-4), step)))
         if abs(sub_step - _SUB_STEP) > 1e-9:
             world["sub_step"] = number(sub_step, 12)
         if settings.engine != BULLET:
-            world["physics"] = {"gyroscopic": True}  # CoppeliaSim's Bullet alone leaves that term out
+            world["physics"] = {"gyroscopic": True}  # of all V-REP's engines, only Bullet omits this term
         if settings.gravity is not None and abs(settings.gravity[2] - _GRAVITY) > 1e-6:
             world["gravity"] = number(settings.gravity[2])
         if settings.gravity is not None and any(settings.gravity[:2]):
@@ -194,52 +196,52 @@ class _Import:
     # ---- what will not work
 
     def _find_holes(self) -> None:
-        """Report customization scripts that act in a simulation, and links of dummies that would hold bodies."""
+        """Report customization scripts that act in a simulation, and dummy links that would hold bodies."""
         for script in self._file.scripts:
-            on = self._by_handle.get(script.object)
-            if on is None or not script.is_enabled:
+            owner = self._by_handle.get(script.object)
+            if owner is None or not script.is_enabled:
                 continue
             code = without_comments(script)
-            if script.kind == "customization" and _ACTS.search(code):
-                problem = "its customization script acts in flight, and is not imported: what it drives stays still"
-                self._report.holes.append(f"{on.name}: {problem}")
-            if script.kind in ("child", "customization") and _LINKS.search(code):
+            if script.kind == "customization" and _SIMULATION_CALLBACK.search(code):
+                problem = "its customization script acts in flight, and is not imported: nothing that it drives moves"
+                self._report.holes.append(f"{owner.name}: {problem}")
+            if script.kind in ("child", "customization") and _LINKS_DUMMIES.search(code):
                 problem = "its script links dummies (setLinkDummy): links hold nothing here, so the bodies stay apart"
-                self._report.holes.append(f"{on.name}: {problem}")
-        for one in self._objects:
-            of = one.object.of
-            other = self._by_handle.get(of.linked) if isinstance(of, VrepDummy) and of.holds else None
-            is_second = other is not None and other.object.handle < one.object.handle
-            if other is not None and not is_second and (_is_on_a_body(one) or _is_on_a_body(other)):
+                self._report.holes.append(f"{owner.name}: {problem}")
+        for node in self._objects:
+            content = node.object.of
+            other = self._by_handle.get(content.linked) if isinstance(content, VrepDummy) and content.holds else None
+            is_reported = other is not None and other.object.handle < node.object.handle
+            if other is not None and not is_reported and (_has_dynamic_parent(node) or _has_dynamic_parent(other)):
                 problem = "this link of dummies holds two bodies together; it is not imported, so they come apart"
-                self._report.holes.append(f"{one.name}, {other.name}: {problem}")
+                self._report.holes.append(f"{node.name}, {other.name}: {problem}")
 
     # ---- scripts
 
     def _child_scripts(self) -> Mapping[int, list[VrepScript]]:
-        """Return the child scripts that run, by the handle of their object."""
-        found: dict[int, list[VrepScript]] = defaultdict(list)
+        """Return the enabled child scripts, by the handle of their object."""
+        by_object: dict[int, list[VrepScript]] = defaultdict(list)
         for script in self._file.scripts:
-            on = self._by_handle.get(script.object)
-            if on in self._floor:
+            owner = self._by_handle.get(script.object)
+            if owner in self._floor:
                 continue
-            name = on.object.name if on is not None else ""
+            name = owner.object.name if owner is not None else ""
             if script.kind == "main":
                 if not script.is_stock_main:
                     self._report.add(
                         "",
                         "its own main script is not imported: the phases run in V-REP's default order",
                     )
-            elif script.kind != "child" or on is None:
+            elif script.kind != "child" or owner is None:
                 self._report.add(name, f"its {script.kind} script is not imported")
-            elif not script.is_enabled or not on.runs_scripts:
+            elif not script.is_enabled or not owner.runs_scripts:
                 self._report.add(name, "its child script is disabled in the file, and is not imported")
             else:
-                found[script.object].append(script)
-        return found
+                by_object[script.object].append(script)
+        return by_object
 
     def _attached(self) -> Iterator[dict[str, Any]]:
-        """Yield the entries of `scripts:`: what is on a vehicle's body, or what its built-in law does, aside."""
+        """Yield the entries of `scripts:`, without those of vehicles' bodies and of built-in propeller scripts."""
         built_in = {
             id(propeller.body)
             for vehicle in self._vehicles
@@ -247,108 +249,110 @@ class _Import:
             if vehicle.law is not None
         }
         roots = {id(vehicle.root) for vehicle in self._vehicles}
-        kept = self._kept | self._of_vehicles
+        imported_ids = self._kept | self._of_vehicles
         scripted: set[int] = set()
-        for one in self._objects:
-            own = self._scripts.get(one.object.handle, [])
-            if id(one) in built_in:
+        for node in self._objects:
+            scripts = self._scripts.get(node.object.handle, [])
+            if id(node) in built_in:
                 continue
-            if own and id(one) not in kept:
-                self._report.add(one.name, "its child script is not imported, because the object is not")
+            if scripts and id(node) not in imported_ids:
+                self._report.add(node.name, "its child script is not imported, because the object is not")
                 continue
-            for script in own:
-                places = (one, self._by_handle.get(script.own_object))  # another script may be on the first already
-                on = next((place for place in places if place is not None and id(place) not in scripted), None)
-                if on is None:
-                    self._report.add(one.name, "has a second child script: not imported")
+            for script in scripts:
+                candidates = (node, self._by_handle.get(script.own_object))  # the first may have a script already
+                target = next((place for place in candidates if place is not None and id(place) not in scripted), None)
+                if target is None:
+                    self._report.add(node.name, "has a second child script: not imported")
                     continue
-                scripted.add(id(on))
-                if on is not one or id(one) not in roots:
-                    yield self._entry_of(script, on, on is not one or script.is_embedded)
+                scripted.add(id(target))
+                if target is not node or id(node) not in roots:
+                    yield self._entry_of(script, target, target is not node or script.is_embedded)
 
-    def _entry_of(self, script: VrepScript, on: Placed, embedded: bool) -> dict[str, Any]:
-        entry: dict[str, Any] = {"object": on.name, "script": self.script_files.write(on.name, script)}
+    def _entry_of(self, script: VrepScript, target: Placed, embedded: bool) -> dict[str, Any]:
+        entry: dict[str, Any] = {"object": target.name, "script": self.script_files.write(target.name, script)}
         if embedded:
             entry["embedded"] = True
-        parameters = values(script.parameters or on.object.parameters)
+        parameters = values(script.parameters or target.object.parameters)
         return {**entry, "parameters": parameters} if parameters else entry
 
     # ---- objects
 
     def _entries(self) -> Iterator[dict[str, Any]]:
         entries = Entries(self._writer, self._report)
-        by_vehicle = {id(one): vehicle for vehicle in self._vehicles for one in vehicle.quadricopter.inside()}
-        self._kept = self._chosen()
-        for one in self._objects:
-            if id(one) not in self._kept:
+        by_vehicle = {id(node): vehicle for vehicle in self._vehicles for node in vehicle.quadricopter.inside()}
+        self._kept = self._objects_to_import()
+        for node in self._objects:
+            if id(node) not in self._kept:
                 continue
-            parent, local = self._hangs_on(one)
-            vehicle = by_vehicle.get(id(one))
-            if vehicle is not None and vehicle.carries(one) and one.object.shape is not None:
-                yield {**entries.frame(one, parent), "position": [0.0, 0.0, 0.0], **pose_keys(local)}
+            parent, pose = self._parent_and_pose(node)
+            vehicle = by_vehicle.get(id(node))
+            if vehicle is not None and vehicle.carries(node) and node.object.shape is not None:
+                yield {**entries.frame(node, parent), "position": [0.0, 0.0, 0.0], **pose_keys(pose)}
             else:
-                yield entries.make(one, parent, local)
+                yield entries.make(node, parent, pose)
 
-    def _chosen(self) -> set[int]:
-        """Return the objects that get an entry: not those of vehicles and the floor, nor idle ones (`_is_idle`)."""
-        without = {id(one) for one in self._floor} | self._of_vehicles
-        without |= {id(one) for vehicle in self._vehicles for one in vehicle.cameras}
-        seen = {id(one) for vehicle in self._vehicles for one in (*vehicle.parts, *vehicle.looks)}
-        seconds = {self._by_handle.get(two.own_object) for several in self._scripts.values() for two in several[1:]}
-        kept: set[int] = set()
-        for one in reversed(self._objects):  # children first
-            if id(one) in without:
-                continue
-            if not all(abs(value) < _FARTHEST for value in frames.position(one.matrix)):
-                self._report.add(one.name, f"is left out: it is more than {_FARTHEST / 1e3:g} km away")
-                continue
-            has_kept = any(id(child) in kept for child in one.children)
-            is_asked_for = self._is_mentioned(one) or bool(self._scripts.get(one.object.handle)) or one in seconds
-            if has_kept or is_asked_for or not (id(one) in seen or self._is_idle(one)):
-                kept.add(id(one))
-        return self._as_many_as_may_be(kept)
-
-    def _as_many_as_may_be(self, kept: set[int]) -> set[int]:
+    def _objects_to_import(self) -> set[int]:
+        """Return ids of the objects that get an entry: no objects of vehicles or the floor, nor unused idle ones."""
+        excluded = {id(node) for node in self._floor} | self._of_vehicles
+        excluded |= {id(node) for vehicle in self._vehicles for node in vehicle.cameras}
+        drawn = {id(node) for vehicle in self._vehicles for node in (*vehicle.parts, *vehicle.looks)}
+        second = {
+            self._by_handle.get(script.own_object) for scripts in self._scripts.values() for script in scripts[1:]
+        }
         chosen: set[int] = set()
-        for one in self._objects:
-            if id(one) in kept and len(chosen) < MAX_OBJECTS:
-                chosen.add(id(one))
-            elif id(one) in kept:
-                self._report.add(one.name, f"is left out: a scene has {MAX_OBJECTS} objects at most")
+        for node in reversed(self._objects):  # children first
+            if id(node) in excluded:
+                continue
+            if not all(abs(value) < _MAX_COORDINATE for value in frames.position(node.matrix)):
+                self._report.add(node.name, f"is left out: it is more than {_MAX_COORDINATE / 1e3:g} km away")
+                continue
+            has_chosen_child = any(id(child) in chosen for child in node.children)
+            is_used = self._is_mentioned(node) or bool(self._scripts.get(node.object.handle)) or node in second
+            if has_chosen_child or is_used or not (id(node) in drawn or self._is_idle(node)):
+                chosen.add(id(node))
+        return self._limited(chosen)
+
+    def _limited(self, wanted: set[int]) -> set[int]:
+        chosen: set[int] = set()
+        for node in self._objects:
+            if id(node) in wanted and len(chosen) < MAX_OBJECTS:
+                chosen.add(id(node))
+            elif id(node) in wanted:
+                self._report.add(node.name, f"is left out: a scene has {MAX_OBJECTS} objects at most")
         return chosen
 
-    def _is_idle(self, one: Placed) -> bool:
-        """Tell whether a scene is the same without an object that nothing asks for and nothing hangs on."""
-        of = one.object.of
-        if isinstance(of, VrepDummy):
-            return bool(one.children) and not of.path  # it held nothing but what is left out
-        return (isinstance(of, VrepCamera) and of.resolution is None) or (
-            isinstance(of, Other) and of.kind in (*_ONLY_LOOKED_THROUGH, "force sensor")
+    def _is_idle(self, node: Placed) -> bool:
+        """Return whether an object without scripts, mentions and children makes no difference to the scene."""
+        content = node.object.of
+        if isinstance(content, VrepDummy):
+            return bool(node.children) and not content.path  # all of its children are left out
+        return (isinstance(content, VrepCamera) and content.resolution is None) or (
+            isinstance(content, Other) and content.kind in (*_IDLE_KINDS, "force sensor")
         )
 
-    def _is_mentioned(self, one: Placed) -> bool:
-        names = (plain_name(one), one.object.alias)
+    def _is_mentioned(self, node: Placed) -> bool:
+        names = (plain_name(node), node.object.alias)
         return any(name in self._words for name in names if name)
 
-    def _hangs_on(self, one: Placed) -> tuple[str, frames.Matrix]:
-        """Return the nearest object above that is there, '' for the world, and the pose in its frame."""
-        here = one.above
-        while here is not None and id(here) not in self._kept and id(here) not in self._of_vehicles:
-            here = here.above
-        if here is None:
-            return "", one.matrix
-        if here is one.above:
-            return here.name, one.local
-        return here.name, frames.relative(here.below, one.matrix)
+    def _parent_and_pose(self, node: Placed) -> tuple[str, frames.Matrix]:
+        """Return the nearest imported ancestor's name, '' for the world, and the pose in its frame."""
+        parent = node.above
+        while parent is not None and id(parent) not in self._kept and id(parent) not in self._of_vehicles:
+            parent = parent.above
+        if parent is None:
+            return "", node.matrix
+        if parent is node.above:
+            return parent.name, node.local
+        return parent.name, frames.relative(parent.below, node.matrix)
 
     # ---- files
 
     def _write(self, content: dict[str, Any]) -> None:
         lines = list(self._report.lines())
-        said = f"From {self._name}, {self._file.program} (format {self._file.version})."
+        origin = f"From {self._name}, {self._file.program} (format {self._file.version})."
         if lines:
-            self._folder.write(LIST, "\n".join([said, "", *lines, ""]))
-        head = f"# {said}{f' What is not as it was there: {LIST}.' if lines else ''}\n"
-        head += "".join(f"# {note}.\n" for note in self._report.notes)
+            self._folder.write(LIST, "\n".join([origin, "", *lines, ""]))
+        header = f"# {origin}{f' Differences from the file: see {LIST}.' if lines else ''}\n"
+        header += "".join(f"# {note}.\n" for note in self._report.notes)
         text = yaml_files.dump(content, default_flow_style=None, width=120)
-        self._folder.write(SCENE, head + text)
+        self._folder.write(SCENE, header + text)

@@ -1,6 +1,6 @@
-"""What a shape of a file is in a scene: a simple form where it is made of such, a mesh file where not.
+"""Conversion of V-REP shapes: primitives where possible, mesh files otherwise.
 
-Mesh files are OBJ, with a list of materials where there are several colours, or textures.
+Mesh files are OBJ, with an MTL file if there are textures or more than one colour.
 """
 
 from __future__ import annotations
@@ -18,47 +18,47 @@ from drone_sim.importing.folder import Folder, numbers, pose_keys, shade
 from drone_sim.mechanics.frames import IDENTITY, Matrix
 from drone_sim.vrep_files.model import Rgba, VrepMesh, VrepPrimitive, VrepShape, VrepTexture
 
-MAX_SCENE_TRIANGLES = 450_000  # of all files that are written: a scene may have 500 000
-Surface = tuple[VrepMesh, Matrix]  # and where it stands
+MAX_SCENE_TRIANGLES = 450_000  # in all written files; a scene is limited to 500 000
+Surface = tuple[VrepMesh, Matrix]  # a mesh and its pose
 _WHITE = (1.0, 1.0, 1.0)
 
 
 class TooLarge(ValueError):
-    """A mesh has more triangles than a file may have, or than a scene has left."""
+    """A mesh has more triangles than are allowed in a file, or than are left for the scene."""
 
 
 class Look(NamedTuple):
-    """How a surface looks: its colour, and the texture on it."""
+    """A surface's material: its colour and texture."""
 
     color: Rgba
     texture: VrepTexture | None
 
 
 class MeshWriter:
-    """Writes mesh files, the same one for the same meshes, as long as there are triangles left."""
+    """Writes mesh files, one for equal meshes, within the triangle limit of a scene."""
 
     def __init__(self, folder: Folder):
-        """Take where they go."""
+        """Write below `folder`."""
         self._folder = folder
         self._written: dict[int, str] = {}
         self._images: dict[VrepTexture, str] = {}
-        self._left = MAX_SCENE_TRIANGLES
+        self._triangles_left = MAX_SCENE_TRIANGLES
 
     def write(self, name: str, surfaces: Sequence[Surface]) -> str:
-        """Return the name of a file with these surfaces; it has their textures, and their colours if several.
+        """Write these surfaces to a mesh file, unless an equal one exists; return the file's name.
 
-        Raises TooLarge.
+        The file refers to their textures, and to their colours if there is more than one. Raises TooLarge.
         """
         triangles = sum(len(mesh.faces) for mesh, _ in surfaces)
-        if triangles > min(MAX_TRIANGLES, self._left):
+        if triangles > min(MAX_TRIANGLES, self._triangles_left):
             raise TooLarge(f"its {triangles} triangles are more than a scene can have")
         materials = _materials(surfaces)
         content = _obj(surfaces, materials)
         key = hash((content, tuple(materials.items())))
-        self._left -= triangles
+        self._triangles_left -= triangles
         if key not in self._written:
             file = self._folder.free_name(name, ".obj", "meshes/")
-            if _are_listed(materials):
+            if _need_mtl(materials):
                 listed = file.removesuffix(".obj") + ".mtl"
                 self._folder.write(listed, _mtl(materials, self._image))
                 content = f"mtllib {listed.rpartition('/')[2]}\n{content}"
@@ -67,7 +67,7 @@ class MeshWriter:
         return self._written[key]
 
     def _image(self, texture: VrepTexture) -> str:
-        """Return the name of a texture's file, beside the mesh files."""
+        """Write a texture, unless it is written already; return its file name, relative to the mesh files."""
         if texture not in self._images:
             name = self._folder.free_name(Path(texture.name).stem or "texture", ".png", "meshes/")
             self._folder.write(name, images.png(texture.image))
@@ -76,13 +76,13 @@ class MeshWriter:
 
 
 def color(surfaces: Sequence[Surface]) -> Rgba | None:
-    """Return the one colour of some surfaces; None where they have several, or textures, which their file says."""
+    """Return the colour that all surfaces share; None if the mesh file has materials (several colours, or textures)."""
     looks = _materials(surfaces)
-    return None if _are_listed(looks) else next(iter(looks)).color
+    return None if _need_mtl(looks) else next(iter(looks)).color
 
 
 def has_triangles(mesh: VrepMesh) -> bool:
-    """Tell whether there is anything to see of a mesh."""
+    """Return whether a mesh has triangles."""
     return len(mesh.faces) > 0
 
 
@@ -94,19 +94,19 @@ def _look(mesh: VrepMesh) -> Look:
 
 def _materials(surfaces: Sequence[Surface]) -> dict[Look, str]:
     looks = dict.fromkeys(_look(mesh) for mesh, _ in surfaces)
-    return {one: f"color_{number}" for number, one in enumerate(looks)}
+    return {look: f"color_{number}" for number, look in enumerate(looks)}
 
 
-def _are_listed(materials: Mapping[Look, str]) -> bool:
-    return len(materials) > 1 or any(one.texture is not None for one in materials)
+def _need_mtl(materials: Mapping[Look, str]) -> bool:
+    return len(materials) > 1 or any(look.texture is not None for look in materials)
 
 
 def _obj(surfaces: Sequence[Surface], materials: dict[Look, str]) -> str:
     lines, first, first_corner = [], 1, 1
     for number, (look, material) in enumerate(materials.items()):
-        if _are_listed(materials) and number < MAX_PARTS:  # what comes after the last one that may be looks like it
+        if _need_mtl(materials) and number < MAX_PARTS:  # further parts share the last allowed material
             lines.append(f"usemtl {material}")
-        for mesh, matrix in (one for one in surfaces if _look(one[0]) == look):
+        for mesh, matrix in (surface for surface in surfaces if _look(surface[0]) == look):
             vertices = moved(mesh.vertices, matrix)
             lines += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in cast("list[list[float]]", vertices.tolist())]
             lines += _faces(mesh, first, first_corner)
@@ -116,21 +116,21 @@ def _obj(surfaces: Sequence[Surface], materials: dict[Look, str]) -> str:
 
 
 def _faces(mesh: VrepMesh, first: int, first_corner: int) -> list[str]:
-    """Return the lines of a mesh's faces, with where their corners lie on its texture."""
+    """Return the OBJ lines of a mesh's faces, with their texture coordinates if it has a texture."""
     faces = cast("list[list[int]]", (mesh.faces + first).tolist())
     if mesh.cover is None:
         return [f"f {a} {b} {c}" for a, b, c in faces]
-    on_texture = cast("list[list[float]]", mesh.cover.corners.reshape(-1, 2).tolist())
-    covered = (f"f {a}/{n} {b}/{n + 1} {c}/{n + 2}" for n, (a, b, c) in zip(itertools.count(first_corner, 3), faces))
-    return [*(f"vt {u:.6g} {v:.6g}" for u, v in on_texture), *covered]
+    coordinates = cast("list[list[float]]", mesh.cover.corners.reshape(-1, 2).tolist())
+    face_lines = (f"f {a}/{n} {b}/{n + 1} {c}/{n + 2}" for n, (a, b, c) in zip(itertools.count(first_corner, 3), faces))
+    return [*(f"vt {u:.6g} {v:.6g}" for u, v in coordinates), *face_lines]
 
 
 def moved(vertices: np.ndarray, matrix: Matrix) -> np.ndarray:
-    """Return vertices (n, 3) at a transform."""
+    """Return vertices (n, 3) transformed by `matrix`."""
     if matrix == IDENTITY:
         return vertices
-    turn = np.array(matrix).reshape(3, 4)
-    return vertices @ turn[:, :3].T + turn[:, 3]
+    transform = np.array(matrix).reshape(3, 4)
+    return vertices @ transform[:, :3].T + transform[:, 3]
 
 
 def _mtl(materials: dict[Look, str], file_of: Callable[[VrepTexture], str]) -> str:
@@ -141,29 +141,29 @@ def _mtl(materials: dict[Look, str], file_of: Callable[[VrepTexture], str]) -> s
     return "\n".join([*lines, ""])
 
 
-_THIN = 1e-3  # m, of what has no thickness
-_SHORTEST = 1e-4  # m, of a length in a scene file
-_MOST_PARTS = 64  # of a compound
-_EQUAL = 1e-3  # two lengths that differ by less than this part of them
+_THICKNESS = 1e-3  # m, of planes and discs
+_MIN_LENGTH = 1e-4  # m, in a scene file
+_MAX_COMPOUND_PARTS = 64  # of a compound
+_EQUALITY = 1e-3  # relative difference below which lengths are equal
 
 
 def form(name: str, shape: VrepShape, writer: MeshWriter, is_solid: bool) -> dict[str, Any] | None:
-    """Return the keys of a shape in a scene file; None where there is nothing of it.
+    """Return the keys of a shape in a scene file; None if it has no surface.
 
-    `is_solid`: it is convex in each of its meshes, as what the dynamics moves has to be. Raises TooLarge.
+    `is_solid`: each of its meshes must be convex, because the dynamics moves it. Raises TooLarge.
     """
     meshes = [mesh for mesh in shape.meshes if has_triangles(mesh) or mesh.primitive is not None]
     simple = [_simple(mesh) for mesh in meshes]
     if not meshes:
         return None
     if len(meshes) == 1:
-        return _one(name, meshes[0], simple[0], writer)
-    if len(meshes) <= _MOST_PARTS and (is_solid or all(simple)):
+        return _single(name, meshes[0], simple[0], writer)
+    if len(meshes) <= _MAX_COMPOUND_PARTS and (is_solid or all(simple)):
         return {"shape": "compound", "parts": [_part(name, *pair, writer) for pair in zip(meshes, simple)]}
     return _mesh(name, [(mesh, IDENTITY) for mesh in meshes if has_triangles(mesh)], writer)
 
 
-def _one(name: str, mesh: VrepMesh, simple: dict[str, Any] | None, writer: MeshWriter) -> dict[str, Any] | None:
+def _single(name: str, mesh: VrepMesh, simple: dict[str, Any] | None, writer: MeshWriter) -> dict[str, Any] | None:
     if simple is None:
         return _mesh(name, [(mesh, IDENTITY)], writer) if has_triangles(mesh) else None
     if "position" in simple or "rpy" in simple:  # a scene's shapes are centred on their frames
@@ -181,32 +181,32 @@ def _mesh(name: str, surfaces: list[Surface], writer: MeshWriter) -> dict[str, A
     if not surfaces:
         raise TooLarge("it has no triangles")
     keys: dict[str, Any] = {"shape": "mesh", "file": writer.write(name, surfaces)}
-    own = color(surfaces)
-    return keys if own is None else {**keys, "color": shade(own)}
+    shared = color(surfaces)
+    return keys if shared is None else {**keys, "color": shade(shared)}
 
 
 def _simple(mesh: VrepMesh) -> dict[str, Any] | None:
-    """Return shape, size and place of a simple form; None for what a scene file has no word for."""
-    found = None if mesh.primitive is None else simple_size(mesh.primitive)
-    if found is None or mesh.primitive is None:
+    """Return the keys of a primitive; None if a scene file has no such shape."""
+    simple = None if mesh.primitive is None else simple_size(mesh.primitive)
+    if simple is None or mesh.primitive is None:
         return None
-    word, size = found
+    word, size = simple
     return {"shape": word, "size": numbers(size), **pose_keys(mesh.primitive.pose.matrix)}
 
 
 def simple_size(primitive: VrepPrimitive) -> tuple[str, tuple[float, ...]] | None:
-    """Return the word and the size (m) of a form in a scene file; None for what that has no word for."""
+    """Return the shape name and size (m) of a primitive in a scene file; None if there is no such shape there."""
     x, y, z = primitive.size
     word = primitive.word
     if word in ("plane", "disc"):
-        z = _THIN
-    if min(x, y, z) < _SHORTEST and word not in ("spheroid", "capsule"):
-        x, y, z = (max(length, _SHORTEST) for length in (x, y, z))
+        z = _THICKNESS
+    if min(x, y, z) < _MIN_LENGTH and word not in ("spheroid", "capsule"):
+        x, y, z = (max(length, _MIN_LENGTH) for length in (x, y, z))
     if word in ("cuboid", "plane"):
         return "box", (x, y, z)
-    round_ = abs(x - y) < _EQUAL * max(x, y, _SHORTEST)
-    if word in ("cylinder", "disc") and round_:
+    is_round = abs(x - y) < _EQUALITY * max(x, y, _MIN_LENGTH)
+    if word in ("cylinder", "disc") and is_round:
         return "cylinder", (x / 2, z)
-    if word == "spheroid" and round_ and abs(x - z) < _EQUAL * max(x, z, _SHORTEST) and x > 2 * _SHORTEST:
+    if word == "spheroid" and is_round and abs(x - z) < _EQUALITY * max(x, z, _MIN_LENGTH) and x > 2 * _MIN_LENGTH:
         return "sphere", (x / 2,)
     return None

@@ -1,4 +1,4 @@
-"""A quadricopter of a file as a URDF: its own masses, inertias, places, collision shapes, and looks."""
+"""URDF of an imported quadricopter: its masses, inertias, poses, collision shapes and visuals."""
 
 from __future__ import annotations
 
@@ -14,42 +14,46 @@ from drone_sim.mechanics.frames import IDENTITY, Matrix
 from drone_sim.vrep_files.model import Rgba, VrepMesh
 
 PLACES = ("front_left", "back_left", "back_right", "front_right")  # of V-REP's propellers 1 to 4
-_MOST_COLLISIONS = 16  # of one body; more become one hull
-_MOST_COLORS = 64  # of one link
-_LEAST_MASS = 1e-6
-_RADIUS_OF_GYRATION = 0.05  # m, of what a file gives a mass and no inertia
+_MAX_COLLISIONS = 16  # of a body; more are merged into one hull
+_MAX_COLORS = 64  # of a link
+_MIN_MASS = 1e-6  # kg
+_RADIUS_OF_GYRATION = 0.05  # m, of a body without an inertia in the file
 
 
 class VehicleUrdf:
-    """Builds the URDF of one quadricopter; poses in it are relative to the root's."""
+    """Builds the URDF of a quadricopter; its poses are relative to the root's."""
 
     def __init__(self, quadricopter: VrepQuadricopter, writer: MeshWriter, report: Report):
-        """Take what to build, what writes mesh files, and what is told of the rest."""
+        """Write meshes with `writer`; add differences to `report`."""
         self._quadricopter = quadricopter
         self._writer = writer
         self._report = report
         self._robot = Xml.Element("robot", name="quadricopter")
 
     def build(self, parts: Sequence[Placed], looks: Sequence[Placed]) -> str:
-        """Return the URDF; `parts` are further bodies tied to it, `looks` all that is only to be seen."""
+        """Return the URDF; `parts` are further bodies fixed to it, `looks` its other shapes, which are only drawn."""
         quadricopter = self._quadricopter
         root = quadricopter.root
         base = self._link("base_link", root, root.matrix)
-        joints = (one.joint for one in quadricopter.propellers)
-        turning = [[] if joint is None else list(joint.subtree()) for joint in joints]
-        bodies = [root, *(one.body for one in quadricopter.propellers), *parts]
-        still = [one for one in (*bodies, *looks) if one.is_visible and not any(one in each for each in turning)]
-        self._add_visuals(base, root.name, still, root.matrix)
-        for place, propeller, blades in zip(PLACES, quadricopter.propellers, turning):
-            self._add_propeller(place, propeller, [one for one in blades if one.is_visible and one in looks])
-        for index, one in enumerate(parts, start=1):
-            name, swings = f"part_{index}", swings_on(one, root)
-            frame = one.matrix if swings is None else swings.matrix
+        joints = (propeller.joint for propeller in quadricopter.propellers)
+        blades_by_propeller = [[] if joint is None else list(joint.subtree()) for joint in joints]
+        bodies = [root, *(propeller.body for propeller in quadricopter.propellers), *parts]
+        fixed = [
+            node
+            for node in (*bodies, *looks)
+            if node.is_visible and not any(node in blades for blades in blades_by_propeller)
+        ]
+        self._add_visuals(base, root.name, fixed, root.matrix)
+        for place, propeller, blades in zip(PLACES, quadricopter.propellers, blades_by_propeller):
+            self._add_propeller(place, propeller, [node for node in blades if node.is_visible and node in looks])
+        for index, part in enumerate(parts, start=1):
+            name, swings = f"part_{index}", swings_on(part, root)
+            frame = part.matrix if swings is None else swings.matrix
             if swings is None:
-                self._link(name, one, frame)
-            else:  # its weight is where its joint holds it, which hands on no torque
-                mass = one.object.shape.mass if one.object.shape is not None else 0.0
-                mass = max(mass, _LEAST_MASS) if mass else 0.0
+                self._link(name, part, frame)
+            else:  # a point mass at its joint, because a spherical joint transfers no torque
+                mass = part.object.shape.mass if part.object.shape is not None else 0.0
+                mass = max(mass, _MIN_MASS) if mass else 0.0
                 _add_inertial(Xml.SubElement(self._robot, "link", name=name), mass, IDENTITY, (0.0, 0.0, 0.0))
             self._joint(name, "base_link", frames.relative(root.matrix, frame))
         self._add_front_camera()
@@ -69,13 +73,13 @@ class VehicleUrdf:
             self._joint(f"blades_{place}", name, frames.relative(frame, propeller.joint.matrix), "continuous")
 
     def _link(self, name: str, body: Placed, frame: Matrix) -> Xml.Element:
-        """Add a link, whose frame is given in the world, with the mass and the collision shapes of a body."""
+        """Add a link with the mass and collision shapes of a body; `frame` is its frame in the world."""
         place = frames.relative(frame, body.matrix)
         link = Xml.SubElement(self._robot, "link", name=name)
         shape = body.object.shape
         if shape is None:
             return link
-        mass = max(shape.mass, _LEAST_MASS)
+        mass = max(shape.mass, _MIN_MASS)
         if shape.inertia is None or max(shape.inertia.moments) == 0:
             self._report.add(body.name, "has no inertia in the file: that of a ball of 0.1 m is used")
             moment = mass * _RADIUS_OF_GYRATION**2
@@ -88,7 +92,7 @@ class VehicleUrdf:
         return link
 
     def _add_collisions(self, link: Xml.Element, body: Placed, meshes: Sequence[VrepMesh], place: Matrix) -> None:
-        if len(meshes) > _MOST_COLLISIONS:
+        if len(meshes) > _MAX_COLLISIONS:
             self._add_mesh(link, "collision", body.name, [(mesh, IDENTITY) for mesh in meshes], place)
             return
         for mesh in meshes:
@@ -109,45 +113,45 @@ class VehicleUrdf:
             Xml.SubElement(joint, "axis", xyz="0 0 1")
 
     def _add_front_camera(self) -> None:
-        """Add the link that our own front camera looks from: the front of the body."""
+        """Add the frame of drone_sim's front camera, at the front of the body."""
         _add_inertial(Xml.SubElement(self._robot, "link", name="front_optical"), 0.0, IDENTITY, (0.0, 0.0, 0.0))
         forward = frames.from_rpy((0.16, 0.0, 0.0), (-1.5707963267948966, 0.0, -1.5707963267948966))
         self._joint("front_optical", "base_link", forward)
 
     # ---- looks
 
-    def _add_visuals(self, link: Xml.Element, name: str, seen: Iterable[Placed], frame: Matrix) -> None:
-        """Add what is seen of some shapes: one mesh for each colour."""
+    def _add_visuals(self, link: Xml.Element, name: str, shapes: Iterable[Placed], frame: Matrix) -> None:
+        """Add a visual mesh for each colour of some shapes."""
         by_color: dict[Rgba, list[Surface]] = {}
-        for one in seen:
-            place = frames.relative(frame, one.matrix)
-            for mesh in one.object.shape.meshes if one.object.shape is not None else ():
+        for node in shapes:
+            place = frames.relative(frame, node.matrix)
+            for mesh in node.object.shape.meshes if node.object.shape is not None else ():
                 if has_triangles(mesh):
-                    key = mesh.color if len(by_color) < _MOST_COLORS or mesh.color in by_color else next(iter(by_color))
+                    key = mesh.color if len(by_color) < _MAX_COLORS or mesh.color in by_color else next(iter(by_color))
                     by_color.setdefault(key, []).append((mesh, place))
         for surfaces in by_color.values():
             self._add_mesh(link, "visual", name, surfaces, IDENTITY)
 
     def _add_mesh(self, link: Xml.Element, kind: str, name: str, surfaces: Sequence[Surface], place: Matrix) -> None:
-        solid = [one for one in surfaces if has_triangles(one[0])]
-        if not solid:
+        nonempty = [surface for surface in surfaces if has_triangles(surface[0])]
+        if not nonempty:
             return
         try:
-            file = self._writer.write(name, solid)
+            file = self._writer.write(name, nonempty)
         except TooLarge as error:
             self._report.add(name, f"{'is not drawn' if kind == 'visual' else 'collides with nothing'}: {error}")
             return
         element = Xml.SubElement(link, kind)
         _add_origin(element, place)
         Xml.SubElement(Xml.SubElement(element, "geometry"), "mesh", filename=file)
-        rgba = color(solid)
+        rgba = color(nonempty)
         if kind == "visual" and rgba is not None:
             material = Xml.SubElement(element, "material", name=" ".join(f"{value:.4g}" for value in rgba))
             Xml.SubElement(material, "color", rgba=_text(rgba))
 
 
 def force_frame(propeller: Propeller) -> Matrix:
-    """Return the frame, in the world, where a propeller pushes along z: body's centre of mass, force sensor's axes."""
+    """Return the frame, in the world, of a propeller's thrust along z: body's centre of mass, force sensor's axes."""
     body, inertia = propeller.body, propeller.body.object.shape.inertia if propeller.body.object.shape else None
     centre = frames.transform(body.matrix, (0.0, 0.0, 0.0) if inertia is None else inertia.pose.position)
     m = propeller.link.matrix
