@@ -1,5 +1,5 @@
-"""The door between a simulation and a child script in another process: calls of the API, and nothing else.
+"""RPC between a simulation and a child script in a separate process; only calls of the script API are transferred.
 
-The script's process has the script alone, and stands in for the API (script_process, stand_ins); the simulation's has
-all the rest, and checks what comes through as a message from outside (simulation_end, script_there).
+The script's process contains the script and stubs of the API (script_process, stand_ins). The simulation's process
+contains everything else and validates each message from the script (simulation_end, script_there).
 """

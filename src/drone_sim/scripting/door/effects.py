@@ -1,8 +1,7 @@
-"""Functions of the API that only read, with their kind of data; and what functions without a return value change.
+"""Which functions of the API only read, which kind of data they read, and which kinds other functions change.
 
-A read may be made before the script asks for it, and its answer kept until a call may have changed data of its kind.
-A call that returns nothing may wait for the next message. Any other function is called when the script calls it, and
-may have changed everything.
+A read may be made in advance, and its result is valid until a call may have changed data of its kind. A call without a
+return value may be sent with the next message. Any other function is called at once, and may change everything.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from drone_sim.scripting.api.packing import Bits, Packing, Tables
 PLACES, MOTION, PARAMETERS, SIGNALS, TIME, NAMES = "places", "motion", "parameters", "signals", "time", "names"
 KINDS = (PLACES, MOTION, PARAMETERS, SIGNALS, TIME, NAMES)
 
-# Neither reads nor changes anything but what it is given: called in the script's process.
+# Pure functions of their arguments, which are called in the script's process.
 OWN_CLASSES: tuple[type, ...] = (Matrices, Poses, Bits, Packing, Tables)
 OWN_THREADS = [
     "setThreadSwitchTiming",
@@ -28,7 +27,7 @@ OWN_THREADS = [
 ]
 OWN_LOG = ("addLog", "addStatusbarMessage")
 
-# Reads of places that are known, and settings of marks, which the script's process may do by itself (`places`).
+# Reads of known poses, and changes of marks' poses, which the script's process may do by itself (`places`).
 PLACED = ["getObjectPosition", "getObjectOrientation", "getObjectQuaternion", "getObjectPose", "getObjectMatrix"]
 PUT = ["setObjectPosition", "setObjectOrientation", "setObjectQuaternion", "setObjectPose", "setObjectMatrix"]
 

@@ -1,4 +1,4 @@
-"""What a script is expected to read next: it is read before the script asks for it, and sent with another answer."""
+"""Reads that a script is expected to make next; their results are sent in advance, with another reply."""
 
 from __future__ import annotations
 
@@ -15,42 +15,42 @@ if TYPE_CHECKING:
     from drone_sim.scripting.door.simulation_end import SimulationEnd
 
 _LOG = logging.getLogger(__name__)
-_MOST = 200  # reads that are expected, at a time, and lists of them
-_LONGEST = 1000  # characters of a phase
-_PLACED = f"sim.{effects.PLACED[-1]}"  # which reads all of an object's place
+_MAX_READS = 200  # in a list, and lists
+_MAX_PHASE_LENGTH = 1000  # characters of a phase
+_POSE_FUNCTION = f"sim.{effects.PLACED[-1]}"  # reads the complete pose of an object
 _NOTHING: tuple[list[Any], list[int]] = ([], [])
 
 
 class ExpectedReads:
-    """The reads of a script, by phase and stretch of it."""
+    """The expected reads of a script, by phase and segment."""
 
     def __init__(self, door: SimulationEnd, functions: Mapping[str, Function], value: Callable[[Any], Any]):
-        """Expect none yet; `functions` are the script's modules', `value` returns what an argument stands for."""
+        """Create empty lists; `functions` are the script's API, `value` decodes an argument."""
         self._door, self._functions, self._value = door, functions, value
         self._expected: dict[tuple[str, int], tuple[list[tuple[Function, list[Any]]], list[int]]] = {}
 
     def note(self, item: list[Any]) -> None:
-        """Take what a script says that it reads in a stretch of a phase. Raises NoMessage."""
-        if [type(one) for one in item[1:]] != [str, int, list, list]:
-            raise NoMessage("no reads")
-        if max(len(item[3]), len(item[4]), len(self._expected)) > _MOST:
+        """Store the reads that the script announces for a segment of a phase. Raises NoMessage."""
+        if [type(field) for field in item[1:]] != [str, int, list, list]:
+            raise NoMessage("malformed list of reads")
+        if max(len(item[3]), len(item[4]), len(self._expected)) > _MAX_READS:
             raise NoMessage("too many reads")
-        if not all(type(one) is int for one in item[4]):
-            raise NoMessage("no handles")
-        reads = [self._read(one) for one in item[3]]
-        handles = [one for one in item[4] if self._may(_PLACED, [one])]
-        self._expected[item[1][:_LONGEST], item[2]] = reads, handles
+        if not all(type(handle) is int for handle in item[4]):
+            raise NoMessage("handles must be integers")
+        reads = [self._read(read) for read in item[3]]
+        handles = [handle for handle in item[4] if self._is_permitted(_POSE_FUNCTION, [handle])]
+        self._expected[item[1][:_MAX_PHASE_LENGTH], item[2]] = reads, handles
 
-    def _read(self, said: Any) -> tuple[Function, list[Any]]:
-        if type(said) is not list or not said or type(said[0]) is not str:
-            raise NoMessage("no read")
-        name = said[0]
+    def _read(self, read: Any) -> tuple[Function, list[Any]]:
+        if type(read) is not list or not read or type(read[0]) is not str:
+            raise NoMessage("not a read")
+        name = read[0]
         if name not in effects.READS or name not in self._functions:
-            raise NoMessage("no read")
-        arguments = [self._value(one) for one in said[1:]]
-        return (self._functions[name] if self._may(name, arguments) else _refused), arguments
+            raise NoMessage("not a read")
+        arguments = [self._value(value) for value in read[1:]]
+        return (self._functions[name] if self._is_permitted(name, arguments) else _refused), arguments
 
-    def _may(self, name: str, arguments: list[Any]) -> bool:
+    def _is_permitted(self, name: str, arguments: list[Any]) -> bool:
         try:
             self._door.permit(name, arguments)
         except ValueError:
@@ -58,19 +58,19 @@ class ExpectedReads:
         return True
 
     def answers(self, phase: str, stretch: int) -> tuple[list[Any], list[Place]]:
-        """Return the answers to what is expected, Ellipsis for what cannot be answered, and where objects are."""
+        """Return the results of the expected reads (Ellipsis if a read fails), and poses of objects."""
         reads, handles = self._expected.get((phase, stretch), _NOTHING)
-        found = []
+        results = []
         for function, arguments in reads:
             try:
-                found.append(values.outgoing(function(*arguments)))
+                results.append(values.outgoing(function(*arguments)))
             except Exception:  # raised again if the script makes the call
                 _LOG.debug("an expected read failed:", exc_info=True)
-                found.append(...)
+                results.append(...)
         objects = self._door.objects
         if objects is None:
-            return found, []
-        return found, [place for handle in handles if (place := place_of(objects, handle)) is not None]
+            return results, []
+        return results, [place for handle in handles if (place := place_of(objects, handle)) is not None]
 
 
 def _refused(*_: Any) -> NoReturn:

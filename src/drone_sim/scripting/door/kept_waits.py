@@ -1,4 +1,4 @@
-"""What the coroutines of a script in another process wait for; the script knows each by a number."""
+"""Waits of the coroutines of a script in another process, which refers to each of them by a number."""
 
 from __future__ import annotations
 
@@ -6,41 +6,41 @@ from typing import Any
 
 from drone_sim.scripting.api.control import Wait
 
-_MOST = 1000
+_MAX_WAITS = 1000
 
 
 class KeptWaits:
     """The waits of a script."""
 
     def __init__(self) -> None:
-        """Keep none yet."""
+        """Create an empty table."""
         self._waits: dict[int, tuple[Any, Wait]] = {}
         self._last = 0
 
-    def kept(self, found: Any) -> Any:
-        """Return a value, or the number under which a Wait is kept here. Raises ValueError for too many."""
-        if not isinstance(found, Wait):
-            return found
-        if len(self._waits) >= _MOST:
-            raise ValueError(f"at most {_MOST} coroutines of a script may wait at once")
+    def kept(self, value: Any) -> Any:
+        """Return `value`, or for a Wait the number that it is stored under. Raises ValueError for too many waits."""
+        if not isinstance(value, Wait):
+            return value
+        if len(self._waits) >= _MAX_WAITS:
+            raise ValueError(f"at most {_MAX_WAITS} coroutines of a script may wait at once")
         self._last += 1
-        self._waits[self._last] = iter(found), found
+        self._waits[self._last] = iter(value), value
         return self._last
 
     def step(self, number: Any = None, answer: Any = None, *_: Any) -> Any:
-        """Go on with what is waited for: return ("wait",), ("call", function, arguments) or ("over", value).
+        """Advance a wait: return ("wait",), ("call", function, arguments) or ("over", value).
 
-        Raises ValueError for a number of nothing, and what the wait raises.
+        Raises ValueError for an unknown number, and any error of the wait.
         """
         if number not in self._waits:
             raise ValueError("there is no wait with this number")
         steps, wait = self._waits[number]
         try:
-            asked = steps.send(answer)
+            call = steps.send(answer)
         except StopIteration:
             del self._waits[number]
             return "over", wait.value()
         except BaseException:
             self._waits.pop(number, None)
             raise
-        return ("call", asked.callback, asked.arguments) if asked else ("wait",)
+        return ("call", call.callback, call.arguments) if call else ("wait",)

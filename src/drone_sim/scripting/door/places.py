@@ -1,6 +1,6 @@
-"""Places of objects in the script's process, valid as long as only the script's own marks have moved.
+"""Poses of objects in the script's process, valid while only the script's own marks are moved.
 
-The functions on places are those of the API itself: the same numbers come out, to the last bit.
+The API's own functions compute with these poses, so results are identical to the last bit.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ Place = tuple[int, Matrix, Matrix | None, int, bool]  # see `place_of`
 
 
 def place_of(objects: ObjectTree, handle: Any) -> Place | None:
-    """Return, in the simulation's process, where an object is; None if there is no such object.
+    """Return an object's Place, in the simulation's process; None if there is no such object.
 
-    That is its handle; the transform from its frame to the world; that from its children's frame, None if it is the
-    same; the handle of its root object; and whether it is a mark: a dummy without a parent, which a script moves for
-    its own use, such as V-REP's track frame.
+    A Place is: its handle; the transform from its frame to the world; the same for its children's frame (None: equal);
+    the handle of its root object; whether it is a mark. A mark is a dummy without a parent that a script moves for its
+    own use, such as V-REP's track frame.
     """
-    one = objects.get(handle)
-    if one is None:
+    item = objects.get(handle)
+    if item is None:
         return None
-    root = one
+    root = item
     while root.parent is not None:
         root = root.parent
-    matrix, below = one.matrix(), one.below()
-    is_mark = root is one and one.kind == "dummy" and one.body is None and type(one).put is SceneObject.put
-    return handle, matrix, None if below is matrix else below, objects.handle_of(root), is_mark
+    matrix, child_frame = item.matrix(), item.below()
+    is_mark = root is item and item.kind == "dummy" and item.body is None and type(item).put is SceneObject.put
+    return handle, matrix, None if child_frame is matrix else child_frame, objects.handle_of(root), is_mark
 
 
 class _Frame(SceneObject):
-    """An object at the place that the simulation's process has sent."""
+    """An object at a pose received from the simulation's process."""
 
     def __init__(self) -> None:
         super().__init__(("",), "", None)
@@ -47,7 +47,7 @@ class _Frame(SceneObject):
 
 
 class _Tree(ObjectTree):
-    """The objects whose places are known."""
+    """The objects whose poses are known."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -59,22 +59,22 @@ class _Tree(ObjectTree):
 
 
 class Places:
-    """The objects whose places are known in the phase that runs."""
+    """The poses known in the current phase."""
 
     def __init__(self) -> None:
-        """Know none."""
+        """Know no poses."""
         self._frames: dict[int, _Frame] = {}
         self._tree = _Tree()
         self._objects = Objects.__new__(Objects)
         self._objects._objects = self._tree
 
     def function(self, name: str) -> Callable[..., Any]:
-        """Return a function of the API that acts on these places."""
-        found: Callable[..., Any] = getattr(self._objects, name)
-        return found
+        """Return a function of the API that uses these poses."""
+        function: Callable[..., Any] = getattr(self._objects, name)
+        return function
 
     def take(self, places: Iterable[Place]) -> None:
-        """Know these, and no others."""
+        """Replace all known poses by `places`."""
         known: dict[int, _Frame] = {}
         for handle, matrix, under, root, is_mark in places:
             frame = self._frames.get(handle)
@@ -85,22 +85,22 @@ class Places:
         self._tree.take(known)
 
     def knows(self, handle: Any, frame: Any) -> bool:
-        """Tell whether one object's place relative to another, or to the world, is known."""
+        """Return whether the pose of an object relative to another object, or to the world, is known."""
         known = self._tree.known
         return handle in known and (frame == WORLD or frame in known)
 
     def is_mark(self, handle: Any) -> bool:
-        """Tell whether an object is known, and a mark."""
+        """Return whether an object is known to be a mark."""
         frame = self._tree.known.get(handle)
         return frame is not None and frame.is_mark
 
     def forget_below(self, mark: int) -> None:
-        """Forget the places of the objects that hang on a mark."""
+        """Forget the poses of a mark's descendants."""
         known = self._tree.known
-        for handle in [one for one, frame in known.items() if frame.root == mark and one != mark]:
+        for handle in [key for key, frame in known.items() if frame.root == mark and key != mark]:
             del known[handle]
 
     def is_apart(self, handle: int, mark: int) -> bool:
-        """Tell whether an object is known, and is neither this mark nor hangs on it."""
+        """Return whether an object is known, and is neither this mark nor a descendant of it."""
         frame = self._tree.known.get(handle)
         return frame is not None and frame.root != mark

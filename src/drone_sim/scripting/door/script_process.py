@@ -1,4 +1,4 @@
-"""The script's process: it obeys the simulation's process, one command at a time, and sends it the API calls."""
+"""The script's process: executes the simulation's commands, one at a time, and sends it the script's API calls."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from drone_sim.scripting.door.stand_ins import NO_ANSWERS, Answers, StandIns
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.time_limit import TimeLimit
 
-_MOST_WAITING = 1000  # items, for the next message
-_FIRST = "pilot"  # that is loaded, once, before any other
-_MOST_FUNCTIONS = 100_000  # that a script has handed over
+_MAX_QUEUED = 1000  # items in a message
+_WARM_UP_SCRIPT = "pilot"  # loaded once, before the process forks
+_MAX_FUNCTIONS = 100_000  # passed to the simulation
 
 
 def serve(script_end: ScriptEnd, end: socket.socket, path: str) -> None:
-    """Load and call the script in a file as the other end of a connection says, until that is closed."""
+    """Execute the commands for the script file at `path` that the other end sends, until it disconnects."""
     script_end.open(Channel(end), path)
     try:
         while True:
@@ -36,23 +36,23 @@ def serve(script_end: ScriptEnd, end: socket.socket, path: str) -> None:
 
 
 class ScriptEnd:
-    """The door, seen from the script: of one file, from which several scripts may be loaded."""
+    """The script's end of the RPC; it may load several scripts from its file."""
 
     _channel: Channel
     path: str  # of the script's file
 
     def __init__(self) -> None:
-        """Be ready for the first script; `open` comes before anything else."""
-        self._hosted: dict[int, _Hosted] = {}  # by the number that the simulation has given it
+        """Prepare for the first script; `open` must be called next."""
+        self._hosted: dict[int, _Hosted] = {}  # by the number that the simulation assigned
         self._next = _Hosted(self)
-        self._waiting: list[list[Any]] = []
+        self._queued: list[list[Any]] = []  # items for the next message
         self._functions: list[Any] = []
-        self._numbers: dict[int, int] = {}  # by id()
-        self._caller: _Hosted | None = None  # the script that runs
-        self._asked = 0  # questions in the call that runs
+        self._numbers: dict[int, int] = {}  # numbers of functions, by id()
+        self._caller: _Hosted | None = None  # the running script
+        self._requests = 0  # in the current call
 
     def open(self, channel: Channel, path: str) -> None:
-        """Take the channel for messages, and the script's file."""
+        """Set the message channel and the script's file."""
         self._channel, self.path = channel, path
 
     # ---- messages
@@ -62,92 +62,94 @@ class ScriptEnd:
         message = self._channel.receive()
         if message is None:
             raise Disconnected("no message arrived")
-        read: tuple[Any, ...] = marshal.loads(message)
-        return read
+        content: tuple[Any, ...] = marshal.loads(message)
+        return content
 
     def leave(self, item: list[Any]) -> None:
-        """Leave an item for the next message."""
-        self._waiting.append(item)
-        if len(self._waiting) > _MOST_WAITING:
+        """Queue an item for the next message."""
+        self._queued.append(item)
+        if len(self._queued) > _MAX_QUEUED:
             self._send()
 
     def _send(self) -> None:
-        items, self._waiting = self._waiting, []
+        items, self._queued = self._queued, []
         self._channel.send(values.written(items))
 
     def ask(self, item: list[Any]) -> tuple[Any, Answers]:
-        """Return the answer to an item, and to what is expected next; raises the error that there was."""
-        self._waiting.append(item)
+        """Send an item; return its result, and the results of the expected reads. Raises the error received."""
+        self._queued.append(item)
         self._send()
-        self._asked += 1
+        self._requests += 1
         while True:
             message = self.receive()
             if message[0] == "go":
                 self.obey(message)
             elif message[0] == "is":
-                _, found, (answers, places) = message
-                return self._given(found), (self._given(answers), places)
+                _, value, (answers, places) = message
+                return self._decoded(value), (self._decoded(answers), places)
             else:
                 _, kind, text, line = message
                 error = ERRORS.get(kind, RuntimeError)(text)
                 error.explained = line
                 raise error
 
-    def _given(self, value: Any) -> Any:
+    def _decoded(self, value: Any) -> Any:
         return values.incoming(value, self._functions.__getitem__, self._functions_of)
 
     def _functions_of(self, script: int) -> FunctionsOfScript:
-        assert self._caller is not None  # it has asked for them
+        assert self._caller is not None  # it has requested them
         return FunctionsOfScript(self._caller.call_script_function, script)
 
     def marked(self, value: Any) -> Any:
-        """Return a value as a message can have it."""
+        """Return a value encoded for a message."""
         return values.marked(value, self._number)
 
     def _number(self, function: Any) -> int:
         if id(function) not in self._numbers:
-            if len(self._functions) >= _MOST_FUNCTIONS:
-                raise ValueError(f"a script can pass at most {_MOST_FUNCTIONS} functions")
+            if len(self._functions) >= _MAX_FUNCTIONS:
+                raise ValueError(f"a script can pass at most {_MAX_FUNCTIONS} functions")
             self._numbers[id(function)] = len(self._functions)
-            self._functions.append(function)  # kept: nothing else ever has its id
+            self._functions.append(function)  # this reference keeps its id() from being reused
         return self._numbers[id(function)]
 
-    # ---- what is asked of the scripts
+    # ---- commands for the scripts
 
     def obey(self, message: tuple[Any, ...]) -> None:
-        """Do what a message says, and tell how it ended."""
-        _, number, what, arguments, (answers, places), may_go_on = message
+        """Execute a command, and send how it ended."""
+        _, number, command, arguments, (answers, places), may_go_on = message
         hosted = self._hosted.get(number)
         if hosted is None:
             hosted = self._hosted[number] = self._next if not self._hosted else _Hosted(self)
-        before, self._caller = self._caller, hosted
+        outer, self._caller = self._caller, hosted
         try:
-            self._asked = 0
-            goes_on = self._do(hosted, what, [self._given(one) for one in arguments], (self._given(answers), places))
-            if what == "call" and arguments == ["actuation"]:
-                hosted.is_silent = not self._asked
-            if may_go_on and goes_on and hosted.is_silent and not self._asked:
-                self._waiting[-1].append("goes on")
+            self._requests = 0
+            has_succeeded = self._do(
+                hosted, command, [self._decoded(argument) for argument in arguments], (self._decoded(answers), places)
+            )
+            if command == "call" and arguments == ["actuation"]:
+                hosted.is_silent = not self._requests
+            if may_go_on and has_succeeded and hosted.is_silent and not self._requests:
+                self._queued[-1].append("goes on")
                 self._do(hosted, "call", ["actuation"], NO_ANSWERS)
-                hosted.is_silent = not self._asked
+                hosted.is_silent = not self._requests
         finally:
-            self._caller = before
+            self._caller = outer
         self._send()
 
-    def _do(self, hosted: _Hosted, what: str, arguments: list[Any], answers: Answers) -> bool:
-        """Do one thing, and leave word how it ended; return whether it has not failed."""
+    def _do(self, hosted: _Hosted, command: str, arguments: list[Any], answers: Answers) -> bool:
+        """Execute one command, and queue how it ended; return whether it succeeded."""
         try:
-            found = hosted.do(what, arguments, answers)
+            result = hosted.do(command, arguments, answers)
         except ScriptError as error:
             place = [error.phase, error.path, error.line, error.reason]
-            self._waiting.append(["failed", hosted.is_threaded, *map(_sent, place)])
+            self._queued.append(["failed", hosted.is_threaded, *map(_sent, place)])
             return False
-        self._waiting.append(["end", hosted.is_threaded, self.marked(found)])
+        self._queued.append(["end", hosted.is_threaded, self.marked(result)])
         return True
 
 
 class _Hosted:
-    """One script, and what stands in for the API there."""
+    """A script with its stubs of the API."""
 
     def __init__(self, end: ScriptEnd):
         self._end = end
@@ -155,18 +157,18 @@ class _Hosted:
         self._stand_ins = StandIns(end, self._limit.outside, self._turns)
         self._script: load.Script = load.no_script()
         self._snapshots: list[Callable[[], None]] = []
-        self.is_silent = False  # whether its last actuation asked for nothing
+        self.is_silent = False  # whether its last actuation made no request
         self.call_script_function = vars(self._stand_ins.modules["sim"])["callScriptFunction"]
 
     @property
     def is_threaded(self) -> bool:
-        """Whether it has a thread that has not ended."""
+        """Whether it has an unfinished thread."""
         return self._script.threaded
 
     def do(self, what: str, arguments: list[Any], answers: Any) -> Any:
-        """Do what the simulation says. Raises ScriptError."""
-        named = arguments[0] if arguments and isinstance(arguments[0], str) else ""
-        self._stand_ins.begin(f"{what} {named}", answers)
+        """Execute a command of the simulation. Raises ScriptError."""
+        name = arguments[0] if arguments and isinstance(arguments[0], str) else ""
+        self._stand_ins.begin(f"{what} {name}", answers)
         try:
             if what in ("load", "save", "restore"):
                 return getattr(self, f"_{what}")(*arguments)
@@ -195,12 +197,12 @@ def _sent(value: Any) -> Any:
 
 
 def prepared() -> ScriptEnd:
-    """Return an end for each fork of this process, which has imported what scripts of either language need."""
+    """Return an end for the forks of this process, with the imports of both script languages loaded."""
     for name in ("drone_sim.scripting.lua.script", "drone_sim.scripting.python.thread"):
         importlib.import_module(name)
-    here, there = socket.socketpair()
-    with here, there:  # what the first script of a process reads and compiles, forks have
+    simulation_socket, script_socket = socket.socketpair()
+    with simulation_socket, script_socket:  # warm up: forks share what the first script has read and compiled
         first = ScriptEnd()
-        first.open(Channel(there), _FIRST)
+        first.open(Channel(script_socket), _WARM_UP_SCRIPT)
         first.obey(("go", 1, "load", [0.0, None], NO_ANSWERS, False))
     return ScriptEnd()

@@ -1,7 +1,7 @@
-"""A script in another process: it is called, and what it asks for is carried out.
+"""Proxy of a script in another process: calls the script, and executes the API calls that it requests.
 
-Nothing that comes from there is believed: a function is looked up by name among those of the script's own modules, its
-arguments are numbers, texts, bytes, lists and mappings of them, and all of it has a size and a time that it may take.
+Nothing that the script's process sends is trusted: functions are looked up by name in the script's own modules, their
+arguments are numbers, strings, bytes, lists and mappings of these, and size and time of everything are limited.
 """
 
 from __future__ import annotations
@@ -28,45 +28,45 @@ from drone_sim.scripting.time_limit import TimeLimit
 if TYPE_CHECKING:
     from drone_sim.scripting.door.simulation_end import SimulationEnd
 
-GRACE = 5.0  # s beyond the time limit, which the script's process keeps by itself
-_MOST_FUNCTIONS = 100_000
+GRACE = 5.0  # s beyond the time limit, which the script's process should enforce itself
+_MAX_FUNCTIONS = 100_000
 _PLAIN = frozenset((float, int, bool, str, type(None)))
 _ALL_PLAIN = _PLAIN.issuperset
-_LONGEST = 1000  # characters of a text that says what went wrong
+_MAX_TEXT = 1000  # characters of an error text
 
 
 class DoorClosed(ScriptError):
-    """The script's process is gone, or does not keep to what is agreed: nothing of it is called any more."""
+    """The script's process has ended or violated the protocol; its scripts are not called any more."""
 
 
 class ScriptThere:
-    """A script in another process, as the simulation calls any (scripting.load.Script)."""
+    """A script in another process, with the interface of scripting.load.Script."""
 
     def __init__(self, door: SimulationEnd, number: int, path: str, modules: Mapping[str, Api], limit: TimeLimit):
-        """Take the door, the script's number there, its file, and its modules here; `load` comes first."""
+        """`number` identifies the script in its process, `modules` is its API; `load` must be called next."""
         self._door, self._number, self._path = door, number, path
         self._modules, self._limit = modules, limit
         self._functions = {
-            f"{name}.{key}": one for name, api in modules.items() for key, one in contents(api)[1].items()
+            f"{name}.{key}": function for name, api in modules.items() for key, function in contents(api)[1].items()
         }
-        self._changes = {name: one for name, one in self._functions.items() if name in effects.CHANGES}
+        self._changes = {name: function for name, function in self._functions.items() if name in effects.CHANGES}
         self._handed: dict[int, ScriptFunction] = {}
         self._expected = ExpectedReads(door, self._functions, self._value)
         self._waits = KeptWaits()
-        self._failure: tuple[str, Exception] | None = None  # of a call whose answer the script did not wait for
+        self._failure: tuple[str, Exception] | None = None  # of a call whose reply the script did not wait for
         self._deadline = 0.0
-        self._phase = ""  # that runs
-        self._has_gone_on = False  # after a sensing, with the next actuation
+        self._phase = ""  # the current one
+        self._has_gone_on = False  # whether it ran the next actuation right after a sensing
         self.language = "python" if path.endswith(".py") else "lua"
         self.idle, self.is_empty, self.threaded = "", False, False
         self.flat_names: Collection[str] = ()
 
     def load(self) -> None:
-        """Load it. Raises ScriptError."""
-        found = self._do("load", [self._limit.seconds, self._door.processor])
-        self.idle, self.is_empty = str(found[0])[:_LONGEST], bool(found[1])
+        """Load the script. Raises ScriptError."""
+        result = self._do("load", [self._limit.seconds, self._door.processor])
+        self.idle, self.is_empty = str(result[0])[:_MAX_TEXT], bool(result[1])
 
-    # ---- as any script
+    # ---- interface of a script
 
     def call(self, phase: str) -> None:
         """Run a phase: init, actuation, sensing or cleanup. Raises ScriptError."""
@@ -76,11 +76,11 @@ class ScriptThere:
             self._do("call", [phase], phase == "sensing" and self._door.is_quiet())
 
     def take_turn(self) -> None:
-        """Let its thread run until it is left; raises ScriptError."""
+        """Resume its thread until it yields. Raises ScriptError."""
         self._do("take_turn", [])
 
     def defines(self, name: str) -> bool:
-        """Return False: only scripts in this process are asked, because the other process could lie."""
+        """Return False: only scripts in this process are asked, because another process could lie."""
         return False
 
     def call_function(self, name: str, arguments: list[Any]) -> Any:
@@ -88,15 +88,15 @@ class ScriptThere:
         return self._do("call_function", [name, arguments])
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
-        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
+        """Like call_function, for a call by the script itself: counts towards its current time limit."""
         return self._do("call_own", [name, arguments])
 
     def execute(self, text: str) -> Any:
-        """Run a text in the script; return None, a value or a tuple of several. Raises ScriptError."""
+        """Run `text` as code of the script; return None, a value or a tuple of values. Raises ScriptError."""
         return self._do("execute", [text])
 
     def execute_own(self, text: str) -> Any:
-        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
+        """Like execute, for a call by the script itself: counts towards its current time limit."""
         return self._do("execute_own", [text])
 
     def callback(self, callback: Callback, message: Any) -> None:
@@ -108,74 +108,74 @@ class ScriptThere:
         return self._do("answer", [callback, request])
 
     def check(self, callback: Callback) -> None:
-        """Raise ScriptError where the script has no such function to call back."""
+        """Raise ScriptError if the script does not have this callback function."""
         if not isinstance(callback, ScriptFunction):
             self._do("check", [callback])
 
     def follow_breakpoints(self) -> None:
-        """Look at no line: nobody watches a submission while it is graded."""
+        """Do nothing: nobody debugs a submission while it is graded."""
 
     def variables(self) -> list[Scope]:
-        """Return none, for the same reason."""
+        """Return none: nobody debugs a submission while it is graded."""
         return []
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that gives the script's variables the values that they have now."""
+        """Return a function that restores the current values of the script's variables."""
         number, restoring = self._do("save", []), save_state(self._modules.values())
 
         def restore() -> None:
             self._do("restore", [number])
-            for one in restoring:
-                one()
+            for restore_module in restoring:
+                restore_module()
 
         return restore
 
     def close(self) -> None:
-        """Free what the script holds; may be called twice."""
+        """Free the script's resources; a second call does nothing."""
         if not self._door.why_closed:
             self._do("close", [])
 
-    # ---- through the door
+    # ---- messages
 
     def _finish(self) -> None:
-        """Carry out what it has asked for in an actuation that it has run already."""
+        """Execute the requests of an actuation that the script has already run."""
         self._has_gone_on = False
         self._phase = "call actuation"
         self._guarded("actuation")
 
-    def _do(self, what: str, arguments: list[Any], may_go_on: bool = False) -> Any:
-        """Let the script do something; carry out what it asks for meanwhile; return what it returned.
+    def _do(self, command: str, arguments: list[Any], may_go_on: bool = False) -> Any:
+        """Send a command to the script, execute the calls that it requests, and return its result.
 
-        `may_go_on`: whether it may run the actuation of the next step right after this sensing.
+        `may_go_on`: whether the script may run the next step's actuation right after this sensing.
         """
-        if self._has_gone_on:  # the flight ends without that step
+        if self._has_gone_on:  # the flight ends before that step
             with contextlib.suppress(ScriptError):
                 self._finish()
-        is_text = what.startswith("execute")
-        named = arguments[0] if arguments and isinstance(arguments[0], str) and not is_text else ""
-        phase = f"{what} {named}"
-        said = str(arguments[0]) if what not in ("load", "take_turn") and arguments and not is_text else what
+        is_text = command.startswith("execute")
+        name = arguments[0] if arguments and isinstance(arguments[0], str) and not is_text else ""
+        phase = f"{command} {name}"
+        shown = str(arguments[0]) if command not in ("load", "take_turn") and arguments and not is_text else command
         if self._door.why_closed:
-            raise DoorClosed(said, self._path, 0, self._door.why_closed)
-        given = [values.outgoing(one) for one in arguments]
-        message = "go", self._number, what, given, self._reads(phase, 0), may_go_on
-        return self._guarded(said, message)
+            raise DoorClosed(shown, self._path, 0, self._door.why_closed)
+        encoded = [values.outgoing(argument) for argument in arguments]
+        message = "go", self._number, command, encoded, self._reads(phase, 0), may_go_on
+        return self._guarded(shown, message)
 
-    def _guarded(self, said: str, message: tuple[Any, ...] | None = None) -> Any:
-        """Send a message, and carry out what comes until the script has returned; `said` is the phase in an error."""
+    def _guarded(self, phase: str, message: tuple[Any, ...] | None = None) -> Any:
+        """Send a message, and handle the script's items until it returns; `phase` is for error texts."""
         limit = self._limit.seconds
         outer, self._deadline = self._deadline, monotonic() + (limit + GRACE if limit else 1e9)
         try:
             if message is not None:
                 self._door.send(message)
-            return self._until_end(said)
+            return self._until_end(phase)
         except TimeoutError:
-            self._end(said, f"did not return after {self._limit.seconds:g} s (script_time_limit)")
+            self._end(phase, f"did not return after {self._limit.seconds:g} s (script_time_limit)")
         except Disconnected:
             self._door.is_gone = True
-            self._end(said, "its process has ended")
+            self._end(phase, "its process has ended")
         except NoMessage as error:
-            self._end(said, f"its process sent an invalid message: {error}")
+            self._end(phase, f"its process sent an invalid message: {error}")
         finally:
             self._deadline = outer
 
@@ -184,25 +184,25 @@ class ScriptThere:
         raise DoorClosed(phase, self._path, 0, why) from None
 
     def _until_end(self, phase: str) -> Any:
-        """Carry out what comes until the script has returned."""
+        """Handle the script's items until it has returned."""
         self._failure, outer = None, self._failure
-        door, came = self._door, self._door.items
+        door, items = self._door, self._door.items
         try:
             while True:
-                item = came.popleft() if came else door.next_item(self._deadline)
-                how = item[0]
-                if how == "set" and len(item) > 1:
+                item = items.popleft() if items else door.next_item(self._deadline)
+                kind = item[0]
+                if kind == "set" and len(item) > 1:
                     self._set(item)
-                elif how == "call":
+                elif kind == "call":
                     self._answer(item)
-                elif how == "reads":
+                elif kind == "reads":
                     self._expected.note(item)
-                elif how == "end":
+                elif kind == "end":
                     return self._returned(phase, item)
-                elif how == "failed":
+                elif kind == "failed":
                     self._failed(item)
                 else:
-                    raise NoMessage(f"unknown reply '{how:.20}'")
+                    raise NoMessage(f"unknown reply '{kind:.20}'")
         finally:
             self._failure = outer
 
@@ -220,30 +220,30 @@ class ScriptThere:
             raise NoMessage("malformed failure")
         _, threaded, phase, path, line, reason = item
         self.threaded = threaded is True
-        raise ScriptError(phase[:_LONGEST], path[:_LONGEST], line, reason)
+        raise ScriptError(phase[:_MAX_TEXT], path[:_MAX_TEXT], line, reason)
 
-    # ---- what it asks for
+    # ---- requests of the script
 
     def _set(self, item: list[Any]) -> None:
-        """Carry out a call that returns nothing, and for which the script does not wait."""
+        """Execute a call without a return value, whose reply the script does not wait for."""
         name, arguments = item[1], item[2:]
         function = self._changes.get(name) if type(name) is str else None
         if function is None:
-            raise NoMessage("unexpected call that waits")
+            raise NoMessage("function that needs a reply")
         if self._failure is not None:
             return
         if not _ALL_PLAIN(map(type, arguments)):
-            arguments = [one if type(one) in _PLAIN else self._value(one) for one in arguments]
+            arguments = [value if type(value) in _PLAIN else self._value(value) for value in arguments]
         try:
-            done = self._door.permit(name, arguments)
+            on_result = self._door.permit(name, arguments)
             function(*arguments)
-            if done is not None:
-                done(None)
+            if on_result is not None:
+                on_result(None)
         except Exception as error:
             self._failure = name, error
 
     def _answer(self, item: list[Any]) -> None:
-        """Carry out a call, and answer it, with what is expected to be read next."""
+        """Execute a call, and send its result with the results of the reads that are expected next."""
         if len(item) < 4 or type(item[2]) is not int or type(item[3]) is not list:
             raise NoMessage("malformed call")
         began = monotonic()
@@ -252,8 +252,8 @@ class ScriptThere:
             if self._failure is not None:
                 (item[1], failure), self._failure = self._failure, None
                 raise failure
-            found = self._called(item[1], item[4:], _named(item[3]))
-            answer: tuple[Any, ...] = "is", values.outgoing(self._waits.kept(found)), self._reads(phase, item[2])
+            result = self._called(item[1], item[4:], _named_arguments(item[3]))
+            answer: tuple[Any, ...] = "is", values.outgoing(self._waits.kept(result)), self._reads(phase, item[2])
         except (NoMessage, DoorClosed):
             raise
         except Exception as error:
@@ -264,55 +264,55 @@ class ScriptThere:
 
     def _called(self, name: Any, arguments: list[Any], named: Mapping[str, Any]) -> Any:
         function = self._functions.get(name) if type(name) is str else None
-        given = arguments if _ALL_PLAIN(map(type, arguments)) else [self._value(one) for one in arguments]
-        by_name = {key: self._value(one) for key, one in named.items()} if named else named
+        in_order = arguments if _ALL_PLAIN(map(type, arguments)) else [self._value(value) for value in arguments]
+        by_name = {key: self._value(value) for key, value in named.items()} if named else named
         if name == "wait":
-            return self._waits.step(*given)
+            return self._waits.step(*in_order)
         if function is None:
             raise NoMessage("unknown function of the API")
-        done = self._door.permit(name, _in_order(function, given, by_name))
-        found = function(*given, **by_name)
-        if done is not None:
-            done(found)
-        return found
+        on_result = self._door.permit(name, _in_order(function, in_order, by_name))
+        result = function(*in_order, **by_name)
+        if on_result is not None:
+            on_result(result)
+        return result
 
     def _value(self, value: Any) -> Any:
         return values.unmarked(value, self._function_there)
 
     def _function_there(self, number: int) -> ScriptFunction:
         if number not in self._handed:
-            if len(self._handed) >= _MOST_FUNCTIONS:
+            if len(self._handed) >= _MAX_FUNCTIONS:
                 raise NoMessage("too many functions")
             self._handed[number] = ScriptFunction(number)
         return self._handed[number]
 
     def _explained(self, name: Any, error: Exception) -> str:
-        said = mistake(error, self._modules.values())
-        if said is None:
-            said = f"{name if isinstance(error, ValueError) else type(error).__name__}: {_text(error)}"
-        return said[: 2 * _LONGEST]
+        text = mistake(error, self._modules.values())
+        if text is None:
+            text = f"{name if isinstance(error, ValueError) else type(error).__name__}: {_text(error)}"
+        return text[: 2 * _MAX_TEXT]
 
     def _reads(self, phase: str, stretch: int) -> tuple[list[Any], list[Place]]:
-        """Return what is expected to be read in a stretch of the phase, which runs from now on."""
+        """Start a segment of a phase; return the results of its expected reads."""
         self._phase = phase
         return self._expected.answers(phase, stretch)
 
 
-def _named(pairs: list[Any]) -> dict[str, Any]:
+def _named_arguments(pairs: list[Any]) -> dict[str, Any]:
     """Return arguments by name. Raises NoMessage."""
-    if not all(type(one) is list and len(one) == 2 and type(one[0]) is str for one in pairs):
+    if not all(type(pair) is list and len(pair) == 2 and type(pair[0]) is str for pair in pairs):
         raise NoMessage("malformed named arguments")
     return dict(pairs)
 
 
-def _in_order(function: Function, given: list[Any], by_name: Mapping[str, Any]) -> list[Any]:
-    """Return the arguments of a call in their order; those that do not fit are left to the function to complain of."""
+def _in_order(function: Function, positional: list[Any], by_name: Mapping[str, Any]) -> list[Any]:
+    """Return a call's arguments in order; the function itself reports arguments that do not fit."""
     if not by_name:
-        return given
+        return positional
     names = [*inspect.signature(function).parameters]
-    return [*given, *(by_name.get(name) for name in names[len(given) :])]
+    return [*positional, *(by_name.get(name) for name in names[len(positional) :])]
 
 
 def _text(error: Exception) -> str:
-    said = error.args[0] if isinstance(error, KeyError) and error.args else error
-    return str(said)[:_LONGEST]
+    text = error.args[0] if isinstance(error, KeyError) and error.args else error
+    return str(text)[:_MAX_TEXT]

@@ -1,9 +1,9 @@
-"""The API in the script's process: functions that look like those of the simulation, and ask it through the door.
+"""Stubs of the API in the script's process, which forward calls to the simulation's process.
 
-Most calls of a controller need no message of their own: the answers to what it reads in every phase come with the start
-of the phase, and are valid until it changes something of that kind; what it sets goes with the end of the phase, once a
-call of the same form has succeeded. A `stretch` is the part of a phase between two questions to the simulation; the
-expected reads of each stretch are remembered.
+Most calls of a controller need no message of their own: the results of its usual reads arrive with the start of the
+phase, and are valid until the script changes something of that kind. Writes are sent with the end of the phase, once a
+call of the same form has succeeded. A `stretch` is a segment of a phase between two requests to the simulation; the
+expected reads of each segment are remembered.
 """
 
 from __future__ import annotations
@@ -27,77 +27,77 @@ from drone_sim.scripting.api.threads import Threads
 from drone_sim.scripting.door import effects
 from drone_sim.scripting.door.places import Place, Places
 
-MOST_EXPECTED = 200  # reads of a stretch
-_MOST_STRETCHES = 50  # of a phase, that are remembered
-_MOST_FORMS = 10_000  # of calls that have succeeded
-_NOT_KNOWN = object()
+MOST_EXPECTED = 200  # reads of a segment
+_MAX_STRETCHES = 50  # of a phase; more are not remembered
+_MAX_FORMS = 10_000  # remembered forms of successful calls
+_UNKNOWN = object()
 _PLAIN = frozenset((int, float, str, bool, type(None)))
 _ALL_PLAIN = _PLAIN.issuperset
 _ALL_NUMBERS = frozenset((float, int)).issuperset
-Read = tuple[str, tuple[Any, ...]]  # a function, and what it is called with
-Answers = tuple[list[Any], list[Place]]  # what expected reads have brought (Ellipsis: nothing), where objects are
+Read = tuple[str, tuple[Any, ...]]  # a function's name and its arguments
+Answers = tuple[list[Any], list[Place]]  # results of expected reads (Ellipsis: none), and poses of objects
 NO_ANSWERS: Answers = ([], [])
 
 
 class Asking(Protocol):
-    """What leads to the simulation."""
+    """Connection to the simulation."""
 
     def ask(self, item: list[Any]) -> tuple[Any, Answers]:
-        """Return the answer to an item, and what is expected to be read next; raises its error."""
+        """Send an item; return its result and the results of the expected reads. Raises the error received."""
 
     def leave(self, item: list[Any]) -> None:
-        """Leave an item for the next message."""
+        """Queue an item for the next message."""
 
     def marked(self, value: Any) -> Any:
-        """Return a value as a message can have it."""
+        """Return a value encoded for a message."""
 
 
 class Expected(NamedTuple):
-    """What a stretch is expected to read."""
+    """The expected reads of a segment."""
 
     reads: tuple[Read, ...] = ()
-    handles: tuple[int, ...] = ()  # of objects whose places it asks for
+    handles: tuple[int, ...] = ()  # of objects whose poses it reads
 
 
 _NOTHING = Expected()
 
 
 class Stretch:
-    """What a part of a phase reads: before its first question, or between one and the next."""
+    """A segment of a phase: before its first request, or between two requests."""
 
     __slots__ = ("changed", "handles", "known", "number", "phase", "reads")
 
     def __init__(self, phase: str, number: int, known: dict[Read, Any]):
-        """Begin the stretch with a `number` (from 0) in a `phase`; `known`: the answers to its reads that have come."""
+        """Begin segment `number` (from 0) of a phase; `known` contains the results of its expected reads."""
         self.phase, self.number, self.known = phase, number, known
         self.reads: dict[Read, None] = {}
         self.handles: dict[int, None] = {}
-        self.changed: set[str] = set()  # kinds of what is not as it was at its beginning
+        self.changed: set[str] = set()  # kinds of data that may differ from those at its beginning
 
     def forget(self, kind: str) -> None:
-        """Know nothing of a kind any more."""
+        """Discard all known results of a kind."""
         if kind not in self.changed:
             self.changed.add(kind)
             self.known = {read: value for read, value in self.known.items() if effects.READS[read[0]] != kind}
 
 
 class StandIns:
-    """The modules of one script."""
+    """The API modules of a script."""
 
     def __init__(self, end: Asking, called: Callable[[Callable[[], Any]], Any], turns: Turns):
-        """`end` leads to the simulation; `called` calls a function that waits for it, outside the script's time limit.
+        """`end` leads to the simulation; `called` calls a blocking function outside the script's time limit.
 
         `turns` are those of the script's thread.
         """
         self._end, self._called = end, called
-        self._stretches: list[Stretch] = []  # of the phases that run, each in the one before
+        self._stretches: list[Stretch] = []  # of the running phases, each nested in the previous one
         self._expected: dict[tuple[str, int], Expected] = {}
         self._succeeded: set[Any] = set()
         self._places = Places()
-        own = _own_functions(turns)
+        local = _local_functions(turns)
         self.modules = {
             name: Api(
-                name, {key: own.get(one) or self._stand_in(name, one) for key, one in functions.items()}, constants
+                name, {key: local.get(func) or self._stub(name, func) for key, func in functions.items()}, constants
             )
             for name, functions, constants in declared()
         }
@@ -105,7 +105,7 @@ class StandIns:
     # ---- phases
 
     def begin(self, phase: str, answers: Answers) -> None:
-        """Begin a phase with the answers to what is expected in it."""
+        """Begin a phase with the results of its expected reads."""
         self._begin(phase, 0, answers)
 
     def _begin(self, phase: str, number: int, answers: Answers) -> None:
@@ -116,45 +116,45 @@ class StandIns:
         self._places.take(places)
 
     def end(self) -> None:
-        """End the phase."""
+        """End the phase, and announce its reads if they are not the expected ones."""
         stretch = self._stretches.pop()
         key = stretch.phase, stretch.number
-        before = self._expected.get(key, _NOTHING)
-        if before.reads == (*stretch.reads,) and before.handles == (*stretch.handles,):
+        expected = self._expected.get(key, _NOTHING)
+        if expected.reads == (*stretch.reads,) and expected.handles == (*stretch.handles,):
             return
-        if stretch.number < _MOST_STRETCHES:
+        if stretch.number < _MAX_STRETCHES:
             self._expected[key] = Expected(tuple(stretch.reads), tuple(stretch.handles))
             reads = [[name, *self._end.marked(list(arguments))] for name, arguments in stretch.reads]
             self._end.leave(["reads", stretch.phase, stretch.number, reads, list(stretch.handles)])
 
     # ---- calls
 
-    def _stand_in(self, module: str, function: Function) -> Function:
+    def _stub(self, module: str, function: Function) -> Function:
         name = f"{module}.{function.__name__}"
         if waits(function):
-            made = self._waiting(name)
+            stub = self._waiting_stub(name)
         elif module == "sim" and function.__name__ in effects.PLACED:
-            made = self._placed(name, self._places.function(function.__name__))
+            stub = self._pose_reading_stub(name, self._places.function(function.__name__))
         elif module == "sim" and function.__name__ in effects.PUT:
-            made = self._putting(name, self._places.function(function.__name__))
+            stub = self._pose_changing_stub(name, self._places.function(function.__name__))
         elif name in effects.READS:
-            made = self._reading(name, effects.READS[name])
+            stub = self._reading_stub(name, effects.READS[name])
         elif name in effects.CHANGES:
-            made = self._changing(name, effects.CHANGES[name])
+            stub = self._changing_stub(name, effects.CHANGES[name])
         else:
-            made = self._asking(name)
-        made.__name__, made.__qualname__, made.__doc__ = function.__name__, function.__qualname__, function.__doc__
-        made.__annotations__ = function.__annotations__
-        made.__signature__ = _signature(function)  # type: ignore[attr-defined]
-        return made
+            stub = self._forwarding_stub(name)
+        stub.__name__, stub.__qualname__, stub.__doc__ = function.__name__, function.__qualname__, function.__doc__
+        stub.__annotations__ = function.__annotations__
+        stub.__signature__ = _signature(function)  # type: ignore[attr-defined]
+        return stub
 
-    def _asking(self, name: str) -> Function:
+    def _forwarding_stub(self, name: str) -> Function:
         def call(*arguments: Any, **named: Any) -> Any:
             return self._ask(name, arguments, named)
 
         return call
 
-    def _reading(self, name: str, kind: str) -> Function:
+    def _reading_stub(self, name: str, kind: str) -> Function:
         stretches = self._stretches
 
         def read(*arguments: Any, **named: Any) -> Any:
@@ -162,18 +162,18 @@ class StandIns:
             if named or kind in stretch.changed:
                 return self._ask(name, arguments, named)
             try:
-                found = stretch.known.get(key, _NOT_KNOWN)
-            except TypeError:  # of a list, for example, there is no hash
+                result = stretch.known.get(key, _UNKNOWN)
+            except TypeError:  # unhashable arguments, such as a list
                 return self._ask(name, arguments, named)
             if len(stretch.reads) < MOST_EXPECTED:
                 stretch.reads[key] = None
-            if found is _NOT_KNOWN:
-                found = stretch.known[key] = self._send(name, arguments, named, -1)[0]
-            return _copied(found)
+            if result is _UNKNOWN:
+                result = stretch.known[key] = self._send(name, arguments, named, -1)[0]
+            return _copied(result)
 
         return read
 
-    def _placed(self, name: str, function: Function) -> Function:
+    def _pose_reading_stub(self, name: str, function: Function) -> Function:
         stretches, places = self._stretches, self._places
 
         def read(*arguments: Any, **named: Any) -> Any:
@@ -192,8 +192,8 @@ class StandIns:
 
         return read
 
-    def _putting(self, name: str, function: Function) -> Function:
-        change = self._changing(name, (effects.PLACES, effects.MOTION))
+    def _pose_changing_stub(self, name: str, function: Function) -> Function:
+        change = self._changing_stub(name, (effects.PLACES, effects.MOTION))
         stretches, places, succeeded, end = self._stretches, self._places, self._succeeded, self._end
 
         def put(*arguments: Any, **named: Any) -> Any:
@@ -206,18 +206,18 @@ class StandIns:
                 return change(*arguments, **named)
             try:
                 function(*arguments)
-            except Exception:  # which the simulation says better
+            except Exception:  # the simulation's error text is better
                 return change(*arguments, **named)
             end.leave(["set", name, *arguments])
             places.forget_below(handle)
-            for key in [one for one in stretch.known if effects.READS[one[0]] == effects.MOTION]:
+            for key in [read for read in stretch.known if effects.READS[read[0]] == effects.MOTION]:
                 if not places.is_apart(bare(key[1][0]), handle):
                     del stretch.known[key]
             return None
 
         return put
 
-    def _changing(self, name: str, kinds: tuple[str, ...]) -> Function:
+    def _changing_stub(self, name: str, kinds: tuple[str, ...]) -> Function:
         stretches, succeeded, end = self._stretches, self._succeeded, self._end
 
         def change(*arguments: Any, **named: Any) -> Any:
@@ -228,19 +228,19 @@ class StandIns:
             if form in succeeded and form is not None:
                 end.leave(["set", name, *arguments])
                 return None
-            found, _ = self._send(name, arguments, named, -1)
-            if form is not None and found is None and len(succeeded) < _MOST_FORMS:
+            result, _ = self._send(name, arguments, named, -1)
+            if form is not None and result is None and len(succeeded) < _MAX_FORMS:
                 succeeded.add(form)
-            return found
+            return result
 
         return change
 
     def _ask(self, name: str, arguments: Any, named: Any) -> Any:
-        """Call a function in the simulation's process; the known answers may no longer be valid."""
+        """Call a function in the simulation's process; afterwards known results may be invalid."""
         stretch = self._stretches[-1]
         try:
-            found, answers = self._send(name, arguments, named, stretch.number + 1)
-        except Exception:  # it may have done something before it failed
+            result, answers = self._send(name, arguments, named, stretch.number + 1)
+        except Exception:  # the function may have changed something before it failed
             for kind in effects.KINDS:
                 stretch.forget(kind)
             self._places.take(())
@@ -248,17 +248,17 @@ class StandIns:
         phase, number = stretch.phase, stretch.number + 1
         self.end()
         self._begin(phase, number, answers)
-        return found
+        return result
 
     def _send(self, name: str, arguments: Any, named: Any, stretch: int) -> tuple[Any, Answers]:
         marked = self._end.marked
-        by_name = [[key, marked(one)] for key, one in named.items()]
+        by_name = [[key, marked(value)] for key, value in named.items()]
         item = ["call", name, stretch, by_name, *map(marked, arguments)]
         return self._called(lambda: self._end.ask(item))  # type: ignore[no-any-return]
 
-    # ---- what has to be waited for
+    # ---- waits
 
-    def _waiting(self, name: str) -> Function:
+    def _waiting_stub(self, name: str) -> Function:
         def call(*arguments: Any, **named: Any) -> Wait:
             return _WaitThere(self._ask(name, arguments, named), self._step)
 
@@ -269,7 +269,7 @@ class StandIns:
 
 
 class _WaitThere(Wait):
-    """What a function waits for in the simulation's process."""
+    """A wait in the simulation's process."""
 
     def __init__(self, number: int, step: Callable[[int, Any], Any]):
         super().__init__(lambda: False)
@@ -279,15 +279,15 @@ class _WaitThere(Wait):
     def __iter__(self) -> Steps:
         answer = None
         while True:
-            how, *rest = self._step(self._number, answer)
-            if how == "over":
+            kind, *rest = self._step(self._number, answer)
+            if kind == "over":
                 self._value = rest[0]
                 return
-            answer = yield Call(rest[0], list(rest[1])) if how == "call" else None
+            answer = yield Call(rest[0], list(rest[1])) if kind == "call" else None
 
 
 def _form(name: str, arguments: tuple[Any, ...]) -> Any:
-    """Return a key that calls share if they differ only in their last argument, finite numbers; else None."""
+    """Return a key shared by calls that differ only in finite numbers of their last argument; None if there is none."""
     others = arguments[:-1]
     if not arguments or not _ALL_PLAIN(map(type, others)):
         return None
@@ -296,29 +296,29 @@ def _form(name: str, arguments: tuple[Any, ...]) -> Any:
     if kind is float:
         return (name, others, float) if isfinite(last) else None
     if kind is list:
-        is_fit = last and _ALL_NUMBERS(map(type, last)) and isfinite(sum(last))
-        return (name, others, list, len(last)) if is_fit else None
+        is_suitable = last and _ALL_NUMBERS(map(type, last)) and isfinite(sum(last))
+        return (name, others, list, len(last)) if is_suitable else None
     return (name, arguments) if kind in _PLAIN else None
 
 
 def _copied(value: Any) -> Any:
-    """Return a value of the script's own, which it may change."""
+    """Return a copy of a value, which the script may change."""
     kind = type(value)
     if kind is list:
         return list(map(_copied, value)) if value and type(value[0]) is not float else value[:]
     if kind is tuple:
         return tuple(map(_copied, value))
     if kind is dict:
-        return {key: _copied(one) for key, one in value.items()}
+        return {key: _copied(item) for key, item in value.items()}
     return value
 
 
-# ---- what there is
+# ---- the declared API
 
 
 @functools.cache
 def declared() -> list[tuple[str, dict[str, Function], dict[str, Any]]]:
-    """Return each module: its name, its functions (of empty objects: not to be called), its constants."""
+    """Return each module's name, functions (bound to empty objects: not to be called) and constants."""
     ignored = Ignored("", int)
     return [
         ("sim", {**ignored.functions("sim"), **_functions_of(modules.SIM)}, CONSTANTS),
@@ -343,13 +343,13 @@ def _functions_of(kinds: tuple[type, ...]) -> dict[str, Function]:
     return functions_of(*map(_empty, kinds))
 
 
-def _own_functions(turns: Turns) -> dict[Function, Function]:
-    """Return the functions that are called here, by what `declared` gives for them."""
+def _local_functions(turns: Turns) -> dict[Function, Function]:
+    """Return the functions that are called in this process, by the declared functions that they replace."""
     threads = Threads.__new__(Threads)
     threads._surroundings = Surroundings(turns=turns)
     log = _empty(ScriptFunctions)
-    found = {getattr(_empty(Threads), name): getattr(threads, name) for name in effects.OWN_THREADS}
-    found.update((one, one) for name in effects.OWN_LOG if (one := getattr(log, name)))
+    functions = {getattr(_empty(Threads), name): getattr(threads, name) for name in effects.OWN_THREADS}
+    functions.update((function, function) for name in effects.OWN_LOG if (function := getattr(log, name)))
     for kind in effects.OWN_CLASSES:
-        found.update((one, one) for one in functions_of(_empty(kind)).values())
-    return found
+        functions.update((function, function) for function in functions_of(_empty(kind)).values())
+    return functions
