@@ -555,7 +555,7 @@ def test_signals_that_are_set_before_the_start_are_there_in_flight_and_gone_afte
 
 
 def test_there_is_an_end_to_an_answer(stage, monkeypatch):
-    monkeypatch.setattr(session, "_LARGEST", 100_000)
+    monkeypatch.setattr(session, "_MAX_REPLY_SIZE", 100_000)
     client = stage.client()
     client.call(SET_STRING, text("long"), bytes(60_000))
     client.ask(*[command(GET_STRING | BLOCKING, text("long"))] * 4)

@@ -1,1 +1,1 @@
-"""CoppeliaSim's ZeroMQ remote API: programs outside call the functions that child scripts call."""
+"""CoppeliaSim's ZeroMQ remote API: external programs call the functions that child scripts call."""

@@ -1,4 +1,4 @@
-"""A program outside: what it may call, and what it has left here."""
+"""A remote client: the functions that it may call, and the resources that it owns in the simulation."""
 
 from __future__ import annotations
 
@@ -24,13 +24,19 @@ from drone_sim.scripting.api.types import Name
 from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.errors import ScriptError
 
-_IS_FUNCTION = "@func"  # what the name of a client's own function ends in, among the arguments
-_BUFFERS = ("getStringSignal", "getVisionSensorImg", "getVisionSensorDepth", "packTable", "readCustomDataBlock")
-_OWN_LINES = (ScriptError, Diverged, OSError, RuntimeError)  # their messages are one line for the user
+_FUNCTION_SUFFIX = "@func"  # of an argument that names a function of the client
+_BUFFER_FUNCTIONS = (
+    "getStringSignal",
+    "getVisionSensorImg",
+    "getVisionSensorDepth",
+    "packTable",
+    "readCustomDataBlock",
+)
+_ONE_LINE_ERRORS = (ScriptError, Diverged, OSError, RuntimeError)  # their texts are written for the user
 
 
 class Client:
-    """Answers requests. `sim` is that of the first vehicle's script; what it draws and hears is the client's own."""
+    """Executes a client's requests. `sim` is the first vehicle's; drawings and subscriptions are the client's own."""
 
     def __init__(
         self,
@@ -41,17 +47,17 @@ class Client:
         clock: Callable[[], float],
         watched: Watched,
     ):
-        """`player` plays the simulation, `moved` watches where objects are put, `backend` carries messages.
+        """`player` runs the simulation, `moved` records moved objects, `backend` transports ROS messages.
 
-        `everybody` returns the Stepping of each client; `clock` counts real seconds; `watched` returns what is called
-        instead of a function, by its name.
+        `everybody` returns the Stepping of each client; `clock` returns real seconds; `watched` returns the function to
+        call in place of a named function.
         """
         self._watched = watched
         self.stepping = Stepping()
         self.connections: set[int] = set()
-        self.heard = clock()  # s, when it last said something
-        self.patience = 0.0  # s
-        self.tasks: dict[tuple[bytes, ...], list[Task]] = {}  # what is not answered yet, by the way back
+        self.heard = clock()  # s, time of its last message
+        self.patience = 0.0  # s of silence after which it is removed
+        self.tasks: dict[tuple[bytes, ...], list[Task]] = {}  # unfinished requests, by envelope
         self._simulation = player.simulation
         self._control = ClientControl(player, moved, self.stepping, everybody, clock)
         self._bus = MessageBus(next(iter(self._simulation.vehicles), ""), {})
@@ -62,16 +68,16 @@ class Client:
         self._functions: dict[str, Function] = {}
 
     def functions(self) -> Mapping[str, Function]:
-        """Return what it may call now, by names such as sim.getObject; another mapping where that has changed."""
-        self._keep_up()
+        """Return the functions by name, such as sim.getObject; a new mapping after a change."""
+        self._update_modules()
         return self._functions
 
     def answer(self, request: ClientRequest) -> Task:
-        """Carry out a request; raises RequestRefused."""
-        self._keep_up()
+        """Execute a request. Raises RequestRefused."""
+        self._update_modules()
         yield from self._hear()
         function = self._function(request.function)
-        arguments = [_argument(one) for one in request.arguments]
+        arguments = [_argument(value) for value in request.arguments]
         while arguments and arguments[-1] is None:
             arguments.pop()
         try:
@@ -89,7 +95,7 @@ class Client:
         return _values(request.function, values)
 
     def leave(self) -> None:
-        """Remove what it has left: drawings, subscriptions, what it advertises, and its say in the steps."""
+        """Remove the client's drawings, subscriptions, advertised topics and services, and its hold on the steps."""
         self.stepping.let_go()
         self.tasks.clear()
         self._bus.close()
@@ -99,10 +105,10 @@ class Client:
                 drawings.remove(handle)
         self._drawn.clear()
 
-    # ---- what it may call
+    # ---- functions
 
-    def _keep_up(self) -> None:
-        """Update the modules to the simulation as it is now; what the client left in an earlier run is removed."""
+    def _update_modules(self) -> None:
+        """Update the modules after a change of the scene; remove what the client left in an earlier run."""
         simulation = self._simulation
         if self._run != simulation.run:
             self._run = simulation.run
@@ -114,9 +120,9 @@ class Client:
             ros = make_sim_ros(self._bus, simulation.clock)
             self._modules = {"sim": self._sim(host), "simROS": ros, **make_plugins(host)}
             self._functions = {
-                f"{name}.{function}": self._watched(f"{name}.{function}", one)
+                f"{name}.{key}": self._watched(f"{name}.{key}", function)
                 for name, api in self._modules.items()
-                for function, one in contents(api)[1].items()
+                for key, function in contents(api)[1].items()
             }
 
     def _sim(self, host: ClientHost) -> Api:
@@ -132,11 +138,11 @@ class Client:
         return Api(name, {**functions, draw.__name__: recorded, **functions_of(self._control)}, constants)
 
     def _function(self, name: str) -> Function:
-        """Return a function by name; raises RequestRefused."""
+        """Return a function by name. Raises RequestRefused."""
         function = self._functions.get(name)
         if function is not None:
             return function
-        own = {f"zmqRemoteApi.{one.__name__}": one for one in (self.info, self.require)}
+        own = {f"zmqRemoteApi.{method.__name__}": method for method in (self.info, self.require)}
         if name in own:
             return own[name]
         module, dot, function_name = name.partition(".")
@@ -148,7 +154,7 @@ class Client:
         raise RequestRefused(f"there is no function '{name:.80}'; {near_names(name[:80], [*self._functions, *own])}")
 
     def require(self, module: Name) -> None:
-        """Raise ValueError for a module that there is not."""
+        """Raise ValueError if there is no such module."""
         if module in PLUGINS:
             raise ValueError(not_there("", module, ()))
         if module not in self._modules:
@@ -162,7 +168,7 @@ class Client:
         return {**called, **{name: {"const": value} for name, value in constants.items()}}
 
     def _hear(self) -> Task:
-        """Let the client's functions have the messages and requests that wait for it."""
+        """Call the client's functions with the messages and service requests received for them."""
         self._bus.new_callbacks()
         for callback, message in self._bus.take():
             name = name_of(callback)
@@ -173,20 +179,20 @@ class Client:
 
 
 def one_line(name: str, function: Function, arguments: Sequence[Any], error: Exception) -> str:
-    """Return what a client is told of an error in a call of a function, under the name that it knows it by."""
-    return str(error) if isinstance(error, _OWN_LINES) else explain(name, function, arguments, error)
+    """Return the error text for a client of an error in a call, with the function's name as the client knows it."""
+    return str(error) if isinstance(error, _ONE_LINE_ERRORS) else explain(name, function, arguments, error)
 
 
 def _argument(value: Any) -> Any:
-    if isinstance(value, dict):  # of parameters, one of which may be a function
-        return {key: _argument(one) for key, one in value.items()}
-    is_function = isinstance(value, str) and value.endswith(_IS_FUNCTION)
-    return ClientFunction(value.removesuffix(_IS_FUNCTION)) if is_function else value
+    if isinstance(value, dict):  # named parameters, one of which may be a function
+        return {key: _argument(item) for key, item in value.items()}
+    is_function = isinstance(value, str) and value.endswith(_FUNCTION_SUFFIX)
+    return ClientFunction(value.removesuffix(_FUNCTION_SUFFIX)) if is_function else value
 
 
 def _values(function: str, values: Any) -> list[Any]:
-    """Return what a function returned as the list that is sent, where buffers are bytes and texts are texts."""
-    listed = list(values) if isinstance(values, tuple) else [] if values is None else [values]
-    if listed and isinstance(listed[0], str) and function.partition(".")[2] in _BUFFERS:
-        listed[0] = listed[0].encode("utf-8", "surrogateescape")
-    return listed
+    """Return a function's result as the list to send, with buffers as bytes."""
+    results = list(values) if isinstance(values, tuple) else [] if values is None else [values]
+    if results and isinstance(results[0], str) and function.partition(".")[2] in _BUFFER_FUNCTIONS:
+        results[0] = results[0].encode("utf-8", "surrogateescape")
+    return results

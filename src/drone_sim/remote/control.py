@@ -1,4 +1,4 @@
-"""`sim`, as far as it is about the simulation as a whole, and as clients outside have it."""
+"""The functions of `sim` that control the whole simulation, for remote clients."""
 
 from __future__ import annotations
 
@@ -21,73 +21,73 @@ from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.control import Action, Wait, has_passed
 from drone_sim.scripting.api.types import Name, Number, WrongValue, numbers
 
-_STOPPED, _PAUSED, _RUNNING = (CONSTANTS[f"simulation_{one}"] for one in ("stopped", "paused", "advancing_running"))
-_MOST_CALLS = 10_000
+_STOPPED, _PAUSED, _RUNNING = (CONSTANTS[f"simulation_{state}"] for state in ("stopped", "paused", "advancing_running"))
+_MAX_CALLS = 10_000
 
 
 class Arrangement(NamedTuple):
-    """Where an object is (in the world what the dynamics moves, else in its parent), and how a joint stands."""
+    """The pose of an object (in the world if the dynamics moves it, else in its parent), and a joint's state."""
 
     place: Matrix
     value: float = 0.0  # rad or m
     control: JointControl | None = None
 
 
-Arrangements = dict[str, Arrangement]  # by the names of objects
+Arrangements = dict[str, Arrangement]  # by object name
 
 
 class MovedObjects:
-    """Changes of objects' places and of joints that are made while the simulation is stopped.
+    """Records changes of poses and joints that are made while the simulation is stopped.
 
-    V-REP starts with these changes; here `start` reads the scene again, so they are kept here.
+    V-REP starts with these changes; here `start` reads the scene again, so they are recorded to be applied after it.
     """
 
     def __init__(self, simulation: Simulation):
-        """Take the simulation."""
+        """Record the changes of `simulation`."""
         self._simulation = simulation
         self._era = -1
         self._initial: Arrangements = {}
 
     def watch(self) -> None:
-        """Remember how an era begins; call it before anything is done to the simulation."""
+        """Save the arrangement at the beginning of an era; to be called before any change."""
         if self._era != self._simulation.era:
             self._era = self._simulation.era
             self._initial = {} if self._simulation.running else self._all()
 
     def changed(self) -> Arrangements:
-        """Return what has changed since the simulation stopped; places are in the world.
+        """Return what has changed since the simulation stopped, with poses in the world frame.
 
-        An object that was only carried along by a moved one has not changed.
+        An object that only moved with its parent has not changed.
         """
         objects = self._simulation.context.objects
-        changed = {name: one for name, one in self._all().items() if self._initial.get(name, one) != one}
-        return {name: one._replace(place=objects[objects.handle(name)].matrix()) for name, one in changed.items()}
+        changed = {name: new for name, new in self._all().items() if self._initial.get(name, new) != new}
+        return {name: new._replace(place=objects[objects.handle(name)].matrix()) for name, new in changed.items()}
 
     def arrange(self, arrangements: Arrangements) -> None:
-        """Put objects and joints back into these arrangements, if objects of these names still exist."""
+        """Restore these poses and joint states, for objects whose names still exist."""
         objects = self._simulation.context.objects
         for name, (place, value, control) in arrangements.items():
-            one = objects[objects.handle(name)] if name in objects else None
-            if one is not None:
-                one.put(place)
-            if isinstance(one, Joint) and control is not None:
-                one.place(value)
-                one.command(control)
+            item = objects[objects.handle(name)] if name in objects else None
+            if item is not None:
+                item.put(place)
+            if isinstance(item, Joint) and control is not None:
+                item.place(value)
+                item.command(control)
 
     def _all(self) -> Arrangements:
-        """Return the arrangement of every object, except those that a joint holds: the joint gives their places."""
+        """Return the arrangement of every object, except those held by a joint, which determines their poses."""
         objects = self._simulation.context.objects
-        found = (objects[handle] for handle in objects)
-        return {one.name: _arrangement(one) for one in found if not getattr(one, "is_held", False)}
+        items = (objects[handle] for handle in objects)
+        return {item.name: _arrangement(item) for item in items if not getattr(item, "is_held", False)}
 
 
-def _arrangement(one: SceneObject) -> Arrangement:
-    place = one.local if one.body is None else one.matrix()
-    return Arrangement(place, one.value, one.control) if isinstance(one, Joint) else Arrangement(place)
+def _arrangement(item: SceneObject) -> Arrangement:
+    place = item.local if item.body is None else item.matrix()
+    return Arrangement(place, item.value, item.control) if isinstance(item, Joint) else Arrangement(place)
 
 
 class ClientControl:
-    """What a client does with the simulation as V-REP's toolbar does, and how it steps."""
+    """A client's control of the simulation, like V-REP's toolbar, and of its steps."""
 
     def __init__(
         self,
@@ -97,9 +97,9 @@ class ClientControl:
         everybody: Callable[[], Iterable[Stepping]],
         clock: Callable[[], float],
     ):
-        """`player` plays the simulation, `moved` watches where objects are put; `clock` counts real seconds.
+        """`player` runs the simulation, `moved` records moved objects; `clock` returns real seconds.
 
-        `stepping` is the client's control of the steps, `everybody` returns that of each client.
+        `stepping` is this client's control of the steps, `everybody` returns that of each client.
         """
         self._clock = clock
         self._player = player
@@ -112,9 +112,9 @@ class ClientControl:
 
     @sim("345")
     def startSimulation(self) -> None:
-        """Begin at time 0, or go on after a pause; what was moved while it was stopped begins where it was put.
+        """Start at time 0, or resume a paused simulation. Objects moved while stopped start where they are.
 
-        Signals that were set then are set, unless a script's init has set them.
+        Signals that were set while stopped stay set, unless a script's init sets them.
         """
         if self._player.playing:
             return
@@ -128,15 +128,15 @@ class ClientControl:
 
     @sim("345")
     def pauseSimulation(self) -> None:
-        """Pause, unless it is stopped."""
+        """Pause a running simulation."""
         if self._simulation.running:
             self._player.pause(True)
 
     @sim("345")
     def stopSimulation(self, _wait: bool = True) -> None:
-        """Stop, and restore the initial scene. As in CoppeliaSim, stepping is off for all clients then."""
-        for one in self._everybody():
-            one.let_go()
+        """Stop, and restore the initial scene. As in CoppeliaSim, this switches stepping off for all clients."""
+        for stepping in self._everybody():
+            stepping.let_go()
         self._player.stop()
 
     @sim("345")
@@ -148,10 +148,10 @@ class ClientControl:
 
     @sim("345")
     def loadScene(self, filename: Name) -> int:
-        """Let another scene file take the last one's place while the simulation is stopped; return 1.
+        """Replace the scene by that of a file (.yaml or .ttt) while the simulation is stopped; return 1.
 
-        It may be one of V-REP's (.ttt), and lies in sim.stringparam_scenedefaultdir: beside the last one, or in
-        `remote_api: {scenes: ...}`. '' is the scene that there is without a file.
+        The file must be in sim.stringparam_scenedefaultdir: the folder of the last scene file, or
+        `remote_api: {scenes: ...}`. '' loads the default scene, without a file.
         """
         if self._simulation.running:
             raise ValueError("a scene can only be loaded while the simulation is stopped: call stopSimulation first")
@@ -160,78 +160,78 @@ class ClientControl:
 
     @sim("345")
     def saveScene(self, filename: Name) -> int:
-        """Write the scene as it stands into a file (.yaml) beside the scene file; return 1."""
+        """Save the current scene to a file (.yaml) in the folder of the scene file; return 1."""
         self._simulation.save_scene(inside(self._folder(), filename))
         return 1
 
     @sim("5", getStringParameter="345")
     def getStringParam(self, parameter: int) -> str:
-        """Return sim.stringparam_scenedefaultdir, the folder of which loadScene takes files; '' for any other."""
+        """Return sim.stringparam_scenedefaultdir, the folder of loadScene's files; '' for other parameters."""
         return str(self._folder() or "") if parameter == CONSTANTS["stringparam_scenedefaultdir"] else ""
 
     def _folder(self) -> Path | None:
-        """Return the folder where scene files lie, None for none."""
-        known = self._simulation.parameters
-        if known.remote_api.scenes:
-            return locate(known.remote_api.scenes)
-        return resolve(known.scene_file).parent if known.scene_file else None
+        """Return the folder of scene files, None if there is none."""
+        parameters = self._simulation.parameters
+        if parameters.remote_api.scenes:
+            return locate(parameters.remote_api.scenes)
+        return resolve(parameters.scene_file).parent if parameters.scene_file else None
 
     # ---- steps
 
     @sim("5")
     def setStepping(self, enabled: bool = True) -> int:
-        """Let the simulation step only when this client calls `step`, or freely; return the level from before."""
+        """Make each simulation step wait for this client's `step`, or not; return the previous level."""
         return self._stepping.set(bool(enabled))
 
     @sim("345")
     def wait(self, seconds: Number, simulationTime: bool = True) -> Wait:
-        """Return after so many seconds: of simulated time, for which it is stepped, or else of real time."""
+        """Wait for a number of seconds: simulated time, with the steps that this takes, or real time."""
         (duration,) = numbers((seconds,), 1)
         clock = (lambda: self._simulation.time) if simulationTime else self._clock
         return Wait(has_passed(clock, duration), lambda: duration, by_steps=bool(simulationTime))
 
     @sim("345")
     def getSystemTime(self) -> float:
-        """Return the real time in seconds, from any beginning."""
+        """Return the real time in seconds; its zero is arbitrary."""
         return self._clock()
 
     @sim("5")
     def acquireLock(self) -> None:
-        """Let the simulation stand still until releaseLock."""
+        """Block the simulation until releaseLock is called."""
         self._stepping.lock(1)
 
     @sim("5")
     def releaseLock(self) -> None:
-        """Let the simulation go on after acquireLock."""
+        """Resume the simulation after acquireLock."""
         self._stepping.lock(-1)
 
     # ---- calls of the client's own functions
 
     @sim("")
     def handleExtCalls(self) -> None:
-        """Do nothing: messages that wait for the client are handed to it before whatever it asks for."""
+        """Do nothing: pending messages are delivered to the client before each of its requests."""
 
     @sim("")
     def testCB(self, first: Any, callback: Any, second: Any, iterations: int = 99) -> Task:
-        """Call a function of the client's with two values, `iterations` + 1 times; return its last result."""
+        """Call a function of the client with two values, `iterations` + 1 times; return its last result."""
         if not isinstance(callback, ClientFunction):
             raise WrongValue("expected a function of the client")
-        if not 0 <= iterations <= _MOST_CALLS:
-            raise ValueError(f"iterations = {iterations}: must be at most {_MOST_CALLS}")
+        if not 0 <= iterations <= _MAX_CALLS:
+            raise ValueError(f"iterations = {iterations}: must be at most {_MAX_CALLS}")
         answer: Any = []
         for _ in range(int(iterations) + 1):
             answer = yield Call(callback.name, [first, second])
         return answer
 
     def wait_for(self, wait: Wait) -> Task:
-        """Let the simulation go on until a wait is over; return what it brings.
+        """Run the simulation until a wait is over; return its value.
 
-        Where that takes steps, and the simulation is not playing, nothing is waited for. Raises RequestRefused where a
-        script fails in such a step.
+        If it needs simulation steps while the simulation is not playing, return at once. Raises RequestRefused if a
+        script fails in one of these steps.
         """
         simulation, run = self._simulation, self._simulation.run
         if isinstance(wait, Action):
-            yield from self._carry_out(wait)
+            yield from self._execute(wait)
             return wait.value()
         if wait.by_steps and not self._player.playing:
             return wait.value()
@@ -241,28 +241,25 @@ class ClientControl:
             raise RequestRefused(str(self._player.failure))
         return wait.value()
 
-    def _carry_out(self, action: Action) -> Task:
-        """Carry out an action, at most until the simulation stops; a playing one goes on between the action's steps.
-
-        Raises ValueError if the simulation is not playing and the action takes too many steps.
-        """
+    def _execute(self, action: Action) -> Task:
+        """Execute an action, at most until the simulation stops; while playing, it steps between the action's steps."""
         simulation, run, answer = self._simulation, self._simulation.run, None
-        steps, at_once = iter(action), 0
+        steps, steps_in_place = iter(action), 0
         while simulation.run == run:
             try:
-                asked = steps.send(answer)
+                call = steps.send(answer)
             except StopIteration:
                 return
-            answer, now = None, simulation.context.clock.steps
-            if asked:
-                answer = yield Call(name_of(asked.callback), asked.arguments)
+            answer, step = None, simulation.context.clock.steps
+            if call:
+                answer = yield Call(name_of(call.callback), call.arguments)
             elif not self._player.playing:
-                at_once += 1
-                if at_once > _MOST_CALLS:
-                    raise ValueError(f"more than {_MOST_CALLS} steps: start the simulation first")
+                steps_in_place += 1
+                if steps_in_place > _MAX_CALLS:
+                    raise ValueError(f"more than {_MAX_CALLS} steps: start the simulation first")
             else:
-                yield self._stepping.wait(Until(partial(self._has_left, run, now)))
+                yield self._stepping.wait(Until(partial(self._has_left, run, step)))
 
     def _has_left(self, run: int, steps: int) -> bool:
-        """Tell whether the simulation is in another step, or another run."""
+        """Return whether the simulation is in another step or another run than given."""
         return self._simulation.run != run or self._simulation.context.clock.steps != steps

@@ -1,4 +1,4 @@
-"""Start of the remote API servers, through which programs outside control the simulation, if they are switched on."""
+"""Start of the remote API servers, through which external programs control the simulation, if they are enabled."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from drone_sim.scripting.api.backend import Backend
 def start_server(
     parameters: RemoteApiParameters, player: Player, backend: Backend | None = None, watched: Watched = unwatched
 ) -> RemoteApi:
-    """Return the servers, see RemoteApiServers; without any if switched off. Raises OSError, in one line."""
+    """Return the servers (RemoteApiServers), or none if disabled. Raises OSError, in one line."""
     if not parameters.serve:
         return RemoteApi()
     try:
-        from drone_sim.remote.servers import RemoteApiServers  # whoever serves nobody needs neither pyzmq nor cbor2
+        from drone_sim.remote.servers import RemoteApiServers  # needs pyzmq and cbor2
     except ImportError as error:
         raise OSError(f"the remote API needs pyzmq and cbor2 (pip install pyzmq cbor2): {error}") from None
     return RemoteApiServers(parameters, player, backend, watched)

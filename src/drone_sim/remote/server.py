@@ -1,4 +1,4 @@
-"""The server: in the simulation's thread it answers what clients ask, between two steps and while one is awaited."""
+"""ZeroMQ server, which handles clients' requests in the simulation's thread, between and during waits for steps."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from drone_sim.run.player import Player
 from drone_sim.scripting.api.backend import Backend
 
 _LOG = logging.getLogger(__name__)
-_MOST_CLIENTS = 100
-_MOST_TASKS = 16  # of one socket: a client's function may call functions itself
-_BATCH = 64  # messages; then a step may be due
-_LOOK = 0.005  # s between two looks at what a client waits for
-_SELDOM = 1.0  # s between two looks for clients that have fallen silent
+_MAX_CLIENTS = 100
+_MAX_TASKS = 16  # of a socket: a client's function may make requests itself
+_BATCH = 64  # messages handled at once; then a step may be due
+_CHECK_INTERVAL = 0.005  # s between checks of the conditions that clients wait for
+_CLEANUP_INTERVAL = 1.0  # s between checks for silent clients
 
 
 class _Waiting(NamedTuple):
@@ -32,7 +32,7 @@ class _Waiting(NamedTuple):
 
 
 class RemoteApiServer(RemoteApi):
-    """Serves the remote API. One thread owns it, that of the simulation; `wake` alone may be called from any."""
+    """Server of the remote API, for the simulation's thread only; `wake` alone is thread-safe."""
 
     def __init__(
         self,
@@ -44,10 +44,10 @@ class RemoteApiServer(RemoteApi):
         moved: MovedObjects | None = None,
         watched: Watched = unwatched,
     ):
-        """Listen for clients that control a `player`, on an `address` and a `port` (0: a free one).
+        """Listen for clients that control `player`, on an address and a port (0: a free one).
 
-        `backend` carries clients' messages, `clock` counts real seconds, `moved` watches where objects are put;
-        `watched` is what clients call instead of a function. Raises OSError.
+        `backend` transports clients' ROS messages, `clock` returns real seconds, `moved` records moved objects;
+        `watched` returns the function to call in place of a named function. Raises OSError.
         """
         self._player, self._watched = player, watched
         self._backend = backend
@@ -55,30 +55,30 @@ class RemoteApiServer(RemoteApi):
         self._clients: dict[str, Client] = {}
         self._waiting: list[_Waiting] = []
         self._clock = clock
-        self._seldom = Throttle(_SELDOM, clock)
+        self._cleanup = Throttle(_CLEANUP_INTERVAL, clock)
         self._endpoint = Endpoint(address, port)
         self.address, self.port = self._endpoint.address, self._endpoint.port
 
     @property
     def holds(self) -> bool:
-        """Whether a client wants to be asked before the next step, and has not said so yet."""
-        return any(one.stepping.holds for one in self._clients.values())
+        """Whether a client in stepping mode has not requested the next step yet."""
+        return any(client.stepping.holds for client in self._clients.values())
 
     def watch(self, number: int) -> None:
-        """Let a `wait` also end when another file can be read, given by its descriptor."""
+        """Let `wait` also end when another file, given by its descriptor, is readable."""
         self._endpoint.watch(number)
 
     def wait(self, seconds: float) -> None:
-        """Sleep for so long, or until something has been done for a client."""
-        if not self._go_on_waiting():
-            self._endpoint.wait(min(seconds, _LOOK) if self._waiting else seconds)
+        """Sleep for `seconds`, or until a request has been handled."""
+        if not self._resume_waiting():
+            self._endpoint.wait(min(seconds, _CHECK_INTERVAL) if self._waiting else seconds)
         self.serve()
 
     def serve(self) -> None:
-        """Answer what has come by now."""
+        """Handle the requests received."""
         self._moved.watch()
-        self._forget()
-        self._go_on_waiting()
+        self._remove_lost_clients()
+        self._resume_waiting()
         for _ in range(_BATCH):
             incoming = self._endpoint.receive()
             if incoming is None:
@@ -90,7 +90,7 @@ class RemoteApiServer(RemoteApi):
         self._endpoint.wake()
 
     def close(self) -> None:
-        """Let go of the clients, and of the port."""
+        """Disconnect all clients, and close the port."""
         for client in self._clients.values():
             client.leave()
         self._clients.clear()
@@ -107,37 +107,37 @@ class RemoteApiServer(RemoteApi):
             self._endpoint.send(envelope, messages.failure(str(error)))
             return
         if request.function == messages.EXECUTED:
-            self._go_on(client, envelope, returned(request.arguments))
+            self._resume(client, envelope, returned(request.arguments))
         elif request.function == messages.END:
             self._endpoint.send(envelope, messages.success([]))
-            self._let_go(request.client)
+            self._remove(request.client)
         else:
             tasks = client.tasks.setdefault(envelope, [])
-            if len(tasks) >= _MOST_TASKS:
-                del tasks[0]  # the client's function failed: it has never come back to this one
+            if len(tasks) >= _MAX_TASKS:
+                del tasks[0]  # the client's function failed, so this task is never continued
             tasks.append(client.answer(request))
-            self._go_on(client, envelope, None)
+            self._resume(client, envelope, None)
 
-    def _go_on(self, client: Client, envelope: tuple[bytes, ...], value: Any) -> None:
-        """Carry on with the newest task of a socket, and answer."""
+    def _resume(self, client: Client, envelope: tuple[bytes, ...], value: Any) -> None:
+        """Resume the newest task of a socket with `value`, and reply."""
         client.heard = self._clock()
         tasks = client.tasks.get(envelope)
         if not tasks:
             self._endpoint.send(envelope, messages.failure("no call of this client waits for a result"))
             return
         try:
-            asked = tasks[-1].send(value)
-            if isinstance(asked, Until):
-                self._waiting.append(_Waiting(client, envelope, asked))
+            yielded = tasks[-1].send(value)
+            if isinstance(yielded, Until):
+                self._waiting.append(_Waiting(client, envelope, yielded))
                 return
-            reply = messages.call(*asked)
+            reply = messages.call(*yielded)
         except StopIteration as done:
             tasks.pop()
             try:
                 reply = messages.success(done.value)
             except ValueError as error:
                 reply = messages.failure(str(error))
-        except Exception as error:  # whatever it is, the flight goes on
+        except Exception as error:  # an error must not end the flight
             _LOG.debug("a request failed:", exc_info=True)
             tasks.pop()
             reply = messages.failure(" ".join(str(error).split()))
@@ -145,23 +145,23 @@ class RemoteApiServer(RemoteApi):
             client.tasks.pop(envelope, None)
         self._endpoint.send(envelope, reply)
 
-    def _go_on_waiting(self) -> bool:
-        """Answer those whose waiting is over; return whether there were any."""
-        over = [one for one in self._waiting if one.until.over()] if self._waiting else []
-        for one in over:
-            self._waiting.remove(one)
-            self._go_on(one.client, one.envelope, None)
-        return bool(over)
+    def _resume_waiting(self) -> bool:
+        """Resume the tasks whose wait is over; return whether there were any."""
+        ready = [waiting for waiting in self._waiting if waiting.until.over()] if self._waiting else []
+        for waiting in ready:
+            self._waiting.remove(waiting)
+            self._resume(waiting.client, waiting.envelope, None)
+        return bool(ready)
 
     # ---- clients
 
     def _client(self, request: ClientRequest, incoming: Incoming) -> Client:
-        """Return the client that a request is from. Raises ValueError where there are too many."""
+        """Return the client of a request, created if new. Raises ValueError if there are too many."""
         name = request.client or incoming.envelope[0].hex()
         client = self._clients.get(name)
         if client is None:
-            if len(self._clients) >= _MOST_CLIENTS:
-                raise ValueError(f"{_MOST_CLIENTS} clients are already connected")
+            if len(self._clients) >= _MAX_CLIENTS:
+                raise ValueError(f"{_MAX_CLIENTS} clients are already connected")
             client = Client(self._player, self._moved, self._backend, self.everybody, self._clock, self._watched)
             client.patience = request.patience
             self._clients[name] = client
@@ -170,24 +170,24 @@ class RemoteApiServer(RemoteApi):
 
     def everybody(self) -> Iterator[Stepping]:
         """Yield the Stepping of each client."""
-        return (one.stepping for one in self._clients.values())
+        return (client.stepping for client in self._clients.values())
 
-    def _forget(self) -> None:
-        """Let go of clients whose last connection has ended, and of those that have been silent for too long."""
+    def _remove_lost_clients(self) -> None:
+        """Remove clients whose last connection has closed, and those silent for too long."""
         for number in self._endpoint.ended():
             for name, client in list(self._clients.items()):
                 if number in client.connections:
                     client.connections.remove(number)
                     if not client.connections:
-                        self._let_go(name)
-        if self._seldom.passes():
-            waiting = [one.client for one in self._waiting]
+                        self._remove(name)
+        if self._cleanup.passes():
+            waiting = [item.client for item in self._waiting]
             for name, client in list(self._clients.items()):
                 if self._clock() - client.heard > client.patience and client not in waiting:
-                    self._let_go(name)
+                    self._remove(name)
 
-    def _let_go(self, name: str) -> None:
+    def _remove(self, name: str) -> None:
         client = self._clients.pop(name, None)
         if client is not None:
             client.leave()
-            self._waiting = [one for one in self._waiting if one.client is not client]
+            self._waiting = [item for item in self._waiting if item.client is not client]

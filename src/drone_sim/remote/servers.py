@@ -1,4 +1,4 @@
-"""Both remote APIs at once: CoppeliaSim's over ZeroMQ, and V-REP's legacy one."""
+"""Both remote APIs together: CoppeliaSim's over ZeroMQ, and V-REP's legacy one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drone_sim.scripting.api.backend import Backend
 
 
 class RemoteApiServers(RemoteApi):
-    """Serves both. One thread owns it, that of the simulation; `wake` alone may be called from any."""
+    """Both servers, for the simulation's thread only; `wake` alone is thread-safe."""
 
     def __init__(
         self,
@@ -21,9 +21,9 @@ class RemoteApiServers(RemoteApi):
         backend: Backend | None = None,
         watched: Watched = unwatched,
     ):
-        """Listen for clients that control a `player`; `backend` carries the messages of the clients that have some.
+        """Listen for clients that control `player`; `backend` transports the ROS messages of ZeroMQ clients.
 
-        `watched` is what clients call instead of a function. Raises OSError, in one line.
+        `watched` returns the function to call in place of a named function. Raises OSError, in one line.
         """
         moved, address = MovedObjects(player.simulation), parameters.address
         self.zeromq = RemoteApiServer(player, address, parameters.port, backend, moved=moved, watched=watched)
@@ -39,16 +39,16 @@ class RemoteApiServers(RemoteApi):
 
     @property
     def holds(self) -> bool:
-        """Whether a client of either wants to be asked before the next step, and has not said so yet."""
+        """Whether a client in stepping mode has not requested the next step yet."""
         return self.zeromq.holds or self.legacy.holds
 
     def wait(self, seconds: float) -> None:
-        """Sleep for so long, or until something has been done for a client."""
+        """Sleep for `seconds`, or until a request has been handled."""
         self.zeromq.wait(0.0 if self.legacy.has_work else seconds)
         self.legacy.serve()
 
     def serve(self) -> None:
-        """Answer what has come by now."""
+        """Handle the requests received."""
         self.zeromq.serve()
         self.legacy.serve()
 
@@ -57,6 +57,6 @@ class RemoteApiServers(RemoteApi):
         self.zeromq.wake()
 
     def close(self) -> None:
-        """Let go of all clients, and of the ports."""
+        """Disconnect all clients, and close the ports."""
         self.legacy.close()
         self.zeromq.close()

@@ -1,4 +1,4 @@
-"""A simulation that clients drive, without ROS."""
+"""A simulation controlled by remote clients, without ROS."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from drone_sim.run.parameters import Parameters
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 
-_LOOK = 0.1  # s between two looks whether it is over
+_CHECK_INTERVAL = 0.1  # s between calls of `over`
 
 
 def play(parameters: Parameters, over: Callable[[], bool], listening: Callable[[RemoteApiServer], None]) -> None:
-    """Wait for clients, and step as they say, at the parameters' pace, until it is over.
+    """Run a simulation that clients start and step, at the parameters' pace, until `over` returns true.
 
-    `listening` is called once, before that. Raises what Simulation raises, and OSError where nobody can be heard.
+    `listening` is called once clients can connect. Raises what Simulation raises, and OSError if it cannot listen.
     """
     remote_api = parameters.remote_api
     with closing(Simulation(parameters, started=False)) as simulation:
@@ -32,5 +32,5 @@ def play(parameters: Parameters, over: Callable[[], bool], listening: Callable[[
                     if player.playing and not server.holds:
                         player.step()
                 else:
-                    server.wait(_LOOK)
+                    server.wait(_CHECK_INTERVAL)
                     pacer.excuse()

@@ -1,1 +1,1 @@
-"""V-REP's legacy remote API (`simxStart`): commands over TCP call the functions that child scripts call."""
+"""V-REP's legacy remote API (`simxStart`): commands over TCP that call the functions that child scripts call."""

@@ -1,4 +1,4 @@
-"""One command of a client's, and what it may do to carry it out."""
+"""A command of a client, with access to the script API to execute it."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from drone_sim.scripting.api.calls import Function
 
 
 class Refused(Exception):
-    """A command cannot be carried out: one line that says why, '' where that is nothing to speak of."""
+    """A command cannot be executed; the one-line reason, '' if it is not worth reporting."""
 
 
 class Reach(NamedTuple):
-    """What the commands of a client reach: the script API's functions by name, such as sim.getObject, and a selection.
+    """What a client's commands can access: functions of the script API by name, such as sim.getObject, and a selection.
 
-    The selection is what clients have selected, and no more than a list.
+    The selection is only a list, of the objects that clients have selected.
     """
 
     functions: Mapping[str, Function]
@@ -26,7 +26,7 @@ class Reach(NamedTuple):
 
 
 class Asked:
-    """A command; handlers read `key` and data, and call functions of the script API."""
+    """A command; handlers read its key and data, and call functions of the script API."""
 
     def __init__(self, name: str, command: Command, reach: Reach):
         """`name` is the client's function, such as simxGetObjectHandle."""
@@ -37,14 +37,14 @@ class Asked:
 
     def sim(self, function: str, *arguments: Any) -> Any:
         """Call a function of `sim`. Raises Refused."""
-        called = self.reach.functions[f"sim.{function}"]
+        method = self.reach.functions[f"sim.{function}"]
         try:
-            return called(*arguments)
+            return method(*arguments)
         except Exception as error:
-            raise Refused(one_line(self.name, called, arguments, error)) from error
+            raise Refused(one_line(self.name, method, arguments, error)) from error
 
     def take(self, layout: str) -> tuple[Any, ...]:
-        """Return the numbers in the data, such as "3f". Raises Refused where they are not so many."""
+        """Return the numbers in the data, with a struct layout such as "3f". Raises Refused if the size differs."""
         try:
             return struct.unpack(f"<{layout}", self.data)
         except struct.error:
@@ -52,28 +52,28 @@ class Asked:
             raise self.refused(f"has {len(self.data)} bytes of data, must have {size}") from None
 
     def handles(self) -> list[int]:
-        """Return the whole numbers in the data. Raises Refused where it ends within one."""
+        """Return the 32-bit integers in the data. Raises Refused if the last one is incomplete."""
         return list(self.take(f"{len(self.data) // 4}i"))
 
     def refused(self, why: str) -> Refused:
-        """Return what to raise."""
+        """Return the exception to raise, with the function's name in front of `why`."""
         return Refused(f"{self.name}: {why}")
 
 
-# Returns what the client reads; None where there is nothing to answer yet.
+# Returns the data of the reply; None if there is no reply yet.
 Handler = Callable[[Asked], bytes | None]
 
 
 class Served(NamedTuple):
-    """A function of the client's, and what carries it out."""
+    """A function of the client, and its handler."""
 
     name: str
     do: Handler
 
 
-Table = dict[int, Served]  # by the codes of commands
+Table = dict[int, Served]  # by command code
 
 
 def nothing(_returned: Any) -> bytes:
-    """Return what a client reads of a function that returns nothing to it."""
+    """Return the empty reply of a function without a result."""
     return b""

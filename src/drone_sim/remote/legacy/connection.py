@@ -1,4 +1,4 @@
-"""One client's socket: what it has sent, and what it has not read yet."""
+"""A client's socket: received packets, and replies not sent completely yet."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import socket
 
 from drone_sim.remote.legacy.wire import Packets
 
-_AT_ONCE = 256 * 1024  # bytes that are read
-_DEAD_AFTER = (  # a machine that is lost: s of silence, s between questions, times, ms for what it does not take
+_READ_SIZE = 256 * 1024  # bytes
+_KEEP_ALIVE = (  # detects a lost machine: s of silence, s between probes, probes, ms for unacknowledged data
     (socket.TCP_KEEPIDLE, 2),
     (socket.TCP_KEEPINTVL, 2),
     (socket.TCP_KEEPCNT, 3),
@@ -16,40 +16,40 @@ _DEAD_AFTER = (  # a machine that is lost: s of silence, s between questions, ti
 
 
 class Connection:
-    """A client's socket; while an answer has not been sent completely, no further requests are read."""
+    """A client's socket; while a reply has not been sent completely, no further requests are read."""
 
     def __init__(self, peer: socket.socket, name: str):
-        """Take a connected socket, and what it is called in the log."""
+        """Use the connected socket `peer`; `name` is for the log."""
         self.name = name
-        self.ended = False  # whether nothing more comes
+        self.ended = False  # whether the client has closed it
         self._peer = peer
         self._packets = Packets()
         self._out = memoryview(b"")
         peer.setblocking(False)
         peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         peer.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        for option, value in _DEAD_AFTER:
+        for option, value in _KEEP_ALIVE:
             peer.setsockopt(socket.IPPROTO_TCP, option, value)
 
     def fileno(self) -> int:
-        """Return the socket's number."""
+        """Return the socket's file descriptor."""
         return self._peer.fileno()
 
     @property
     def port(self) -> int:
-        """Our port, which the client has connected to."""
+        """The server's port that the client has connected to."""
         return int(self._peer.getsockname()[1])
 
     @property
     def has_to_write(self) -> bool:
-        """Whether an answer waits for the client to read."""
+        """Whether a reply has not been sent completely."""
         return len(self._out) > 0
 
     def receive(self) -> None:
-        """Take what has come."""
+        """Read available data."""
         try:
-            received = self._peer.recv(_AT_ONCE)
-            # Clients send packet by packet, each when the one before has been acknowledged: at once, not after 40 ms.
+            received = self._peer.recv(_READ_SIZE)
+            # A client sends each packet when the last one is acknowledged: acknowledge at once, not after 40 ms.
             self._peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
         except BlockingIOError:
             return
@@ -59,16 +59,16 @@ class Connection:
         self._packets.add(received)
 
     def take(self) -> bytes | None:
-        """Return the next message, None before it is all there. Raises ValueError for what is none."""
+        """Return the next message, None if it is incomplete. Raises ValueError for an invalid message."""
         return self._packets.take()
 
     def send(self, message: bytes) -> None:
-        """Send an answer, as far as the client reads it."""
+        """Send a reply, as far as the socket accepts it."""
         self._out = memoryview(self._packets.of(message))
         self.flush()
 
     def flush(self) -> None:
-        """Send what has not gone out yet."""
+        """Send the rest of the reply, as far as the socket accepts it."""
         try:
             while self._out:
                 self._out = self._out[self._peer.send(self._out) :]
@@ -78,5 +78,5 @@ class Connection:
             self.ended, self._out = True, memoryview(b"")
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the socket."""
         self._peer.close()

@@ -1,4 +1,4 @@
-"""The ports that the server listens on: one all the time, and those that scripts ask for."""
+"""The server's listening sockets: a permanent one, and those that scripts request."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ _BACKLOG = 256
 
 
 class Doors:
-    """Sockets that listen, by their file descriptors, as `epoll` reports them."""
+    """Listening sockets by file descriptor, as `epoll` reports them."""
 
     def __init__(self, host: str, epoll: select.epoll):
-        """Take the address to listen on, '' for all of this machine's, and the `epoll` that reports new connections."""
+        """`host` is the address to listen on, '' for all; `epoll` reports new connections."""
         self._host, self._epoll = host, epoll
         self._doors: dict[int, socket.socket] = {}
-        self._ports: dict[int, int] = {}  # those of scripts: by port the number, -1 where there is none
+        self._ports: dict[int, int] = {}  # of scripts: file descriptor by port, -1 if not opened
 
     def __contains__(self, number: int) -> bool:
-        """Tell whether it is the number of a door."""
+        """Return whether a file descriptor is that of a listening socket."""
         return number in self._doors
 
     def open(self, port: int) -> int:
-        """Listen on a port, 0 a free one; return it. Raises OSError, in one line."""
+        """Listen on a port (0: a free one); return it. Raises OSError, in one line."""
         try:
             door = socket.create_server((self._host, port), backlog=_BACKLOG)
         except (OSError, OverflowError) as error:
@@ -37,7 +37,7 @@ class Doors:
         return int(door.getsockname()[1])
 
     def accept(self, number: int) -> tuple[socket.socket, str] | None:
-        """Return who knocks at a door, and a name for it; None for nobody. Raises OSError."""
+        """Return a pending connection and its name; None if there is none. Raises OSError."""
         try:
             peer, (host, port) = self._doors[number].accept()
         except BlockingIOError:
@@ -45,7 +45,7 @@ class Doors:
         return peer, f"{host}:{port}"
 
     def follow(self, wanted: Iterable[int]) -> list[int]:
-        """Listen on the ports that scripts ask for, and no others of theirs; return those that were closed."""
+        """Listen on exactly these ports for scripts; return the ports that were closed."""
         closed = [port for port in self._ports if port not in wanted]
         for port in closed:
             self._close(self._ports.pop(port))
@@ -55,18 +55,18 @@ class Doors:
         return closed
 
     def close(self) -> None:
-        """Listen no more."""
+        """Close all listening sockets."""
         for number in list(self._doors):
             self._close(number)
 
     def _open_for_script(self, port: int) -> int:
-        """Open a port; return its socket's number, -1 if it is open already or cannot be opened (logged once)."""
+        """Open a port; return its file descriptor, -1 if it is open already or cannot be opened (logged once)."""
         if any(door.getsockname()[1] == port for door in self._doors.values()):
             return -1
         try:
             self.open(port)
         except OSError as error:
-            _LOG.error("%s, as a script asks", error)
+            _LOG.error("%s, which a script requests", error)
             return -1
         return next(reversed(self._doors))
 

@@ -1,4 +1,4 @@
-"""What clients may ask for: every command by its code, and why some are refused."""
+"""All commands of clients by code, and the reasons why some are refused."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _FILES = (
     "files are not transferred: put it into the folder of the scene, and do not set the option for a client-side file"
 )
 _PAIRS = "collision and distance objects are not supported; pass two objects to simxCheckCollision or simxCheckDistance"
-_WHY = {
+_UNSUPPORTED = {
     0x3004: ("simxTransferFile", _FILES),
     0x3006: ("simxEraseFile", _FILES),
     0x300A: ("simxGetCollisionHandle", _PAIRS),
@@ -44,10 +44,10 @@ FUNCTIONS: Table = {
     **WINDOWS,
     **SCRIPTS,
     **GROUPS,
-    **{code: _refused(*why) for code, why in _WHY.items()},
+    **{code: _refused(*why) for code, why in _UNSUPPORTED.items()},
 }
 
 
 def served(code: int) -> Served:
-    """Return the function that carries out a command; for an unknown one, a function that refuses it."""
+    """Return the handler of a command; for an unknown one, a handler that refuses it."""
     return FUNCTIONS.get(code) or _refused(f"command {code:#06x}", "there is no such command")

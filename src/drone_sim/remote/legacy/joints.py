@@ -1,4 +1,4 @@
-"""Joints: where they are, and what moves them."""
+"""Joint commands: positions, targets and forces."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def _set_number(function: str) -> Served:
     return Served(f"simxS{function[1:]}", lambda ask: nothing(ask.sim(function, *ask.key, *ask.take("f"))))
 
 
-def _turn(ask: Asked) -> bytes:
+def _set_spherical_matrix(ask: Asked) -> bytes:
     return nothing(ask.sim("setSphericalJointMatrix", *ask.key, list(ask.take("12f"))))
 
 
@@ -27,5 +27,5 @@ JOINTS: Table = {
     0x100E: _set_number("setJointForce"),
     0x1038: _number("getJointMaxForce"),
     0x100A: Served("simxGetJointMatrix", lambda ask: floats(*ask.sim("getJointMatrix", *ask.key))),
-    0x100B: Served("simxSetSphericalJointMatrix", _turn),
+    0x100B: Served("simxSetSphericalJointMatrix", _set_spherical_matrix),
 }

@@ -1,4 +1,4 @@
-"""Objects: which there are, where they are, how they move, what they hang on."""
+"""Object commands: handles, poses, velocities, parents, parameters, copying and removal."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from drone_sim.remote.legacy.values import counted, floats, ints
 _SCENE = -12  # sim.handle_scene
 
 
-def _read_place(function: str) -> Served:
+def _get_pose(function: str) -> Served:
     return Served(f"simxG{function[1:]}", lambda ask: floats(*ask.sim(function, *ask.key)))
 
 
-def _read_place_as_before(function: str) -> Served:
-    """Return the older form of a command, which has the object that the place is relative to in its data."""
+def _get_pose_3_1(function: str) -> Served:
+    """Return the older form of a command, whose data is the handle of the reference object."""
     return Served(f"simxG{function[1:]}", lambda ask: floats(*ask.sim(function, *ask.key, *ask.take("i"))))
 
 
-def _put(function: str, count: int) -> Served:
+def _set_pose(function: str, count: int) -> Served:
     def put(ask: Asked) -> bytes:
         relative_to, *place = ask.take(f"i{count}f")
         return nothing(ask.sim(function, *ask.key, relative_to, place))
@@ -35,12 +35,12 @@ def _set_parent(ask: Asked) -> bytes:
     return nothing(ask.sim("setObjectParent", *ask.key, parent, bool(keep_in_place)))
 
 
-def _parameter(function: str, write: str) -> Served:
+def _parameter(function: str, layout: str) -> Served:
     def read(ask: Asked) -> bytes:
-        known, value = ask.sim(function, *ask.key)
-        if not known:
+        is_supported, value = ask.sim(function, *ask.key)
+        if not is_supported:
             raise ask.refused(f"the parameter {ask.key[1]} is not supported")
-        return floats(value) if write == "f" else ints(value)
+        return floats(value) if layout == "f" else ints(value)
 
     return Served(f"simxG{function[1:]}", read)
 
@@ -70,14 +70,14 @@ OBJECTS: Table = {
     0x1012: Served("simxGetObjectParent", lambda ask: ints(ask.sim("getObjectParent", *ask.key))),
     0x101C: Served("simxSetObjectParent", _set_parent),
     0x200B: Served("simxGetObjectChild", lambda ask: ints(ask.sim("getObjectChild", *ask.key))),
-    0x200E: _read_place("getObjectPosition"),
-    0x200D: _read_place("getObjectOrientation"),
-    0x2801: _read_place("getObjectQuaternion"),
-    0x1019: _read_place_as_before("getObjectPosition"),
-    0x1018: _read_place_as_before("getObjectOrientation"),
-    0x101B: _put("setObjectPosition", 3),
-    0x101A: _put("setObjectOrientation", 3),
-    0x1801: _put("setObjectQuaternion", 4),
+    0x200E: _get_pose("getObjectPosition"),
+    0x200D: _get_pose("getObjectOrientation"),
+    0x2801: _get_pose("getObjectQuaternion"),
+    0x1019: _get_pose_3_1("getObjectPosition"),
+    0x1018: _get_pose_3_1("getObjectOrientation"),
+    0x101B: _set_pose("setObjectPosition", 3),
+    0x101A: _set_pose("setObjectOrientation", 3),
+    0x1801: _set_pose("setObjectQuaternion", 4),
     0x1036: Served("simxGetObjectVelocity", _velocity),
     0x2007: _parameter("getObjectFloatParameter", "f"),
     0x2008: _parameter("getObjectIntParameter", "i"),

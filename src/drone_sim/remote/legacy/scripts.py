@@ -1,4 +1,4 @@
-"""simxCallScriptFunction: functions of child scripts, with four lists of values in and out."""
+"""simxCallScriptFunction: calls of child scripts' functions, with four lists of arguments and results."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ def _call(ask: Asked) -> bytes:
     kind, name, function = ask.key
     if kind & 0xF != _CHILD:
         raise ask.refused(f"type of script {kind}: must be sim_scripttype_childscript ({_CHILD})")
-    called, _, below = function.partition("@")  # older programs name the object behind the function
-    script = ask.sim("getScriptHandle", name or below)
-    returned = ask.sim("callScriptFunction", called, script, *_given(ask))
+    function_name, _, object_name = function.partition("@")  # older programs append the object's name to the function's
+    script = ask.sim("getScriptHandle", name or object_name)
+    returned = ask.sim("callScriptFunction", function_name, script, *_arguments(ask))
     return _written(ask, list(returned) if isinstance(returned, tuple) else [returned])
 
 
-def _given(ask: Asked) -> list[Any]:
-    """Return whole numbers, numbers, texts and a buffer. Raises Refused where there are not so many."""
+def _arguments(ask: Asked) -> list[Any]:
+    """Return integers, floats, strings and a buffer. Raises Refused if the data does not match their counts."""
     if len(ask.data) < _COUNTS.size:
         raise ask.refused(f"{len(ask.data)} bytes of data are too few for the arguments")
     counts = whole, real, strings, size = _COUNTS.unpack_from(ask.data)
@@ -33,14 +33,14 @@ def _given(ask: Asked) -> list[Any]:
     if min(counts) < 0 or texts_at > len(ask.data) or len(texts) != strings or len(buffer) != size:
         raise ask.refused(f"{len(ask.data)} bytes of data are not {whole}, {real}, {strings} and {size} values")
     numbers = struct.unpack_from(f"<{whole}i{real}f", ask.data, _COUNTS.size)
-    return [list(numbers[:whole]), list(numbers[whole:]), [string(one) for one in texts], string(buffer)]
+    return [list(numbers[:whole]), list(numbers[whole:]), [string(value) for value in texts], string(buffer)]
 
 
 def _written(ask: Asked, returned: Sequence[Any]) -> bytes:
-    """Return what a script returned. Raises Refused where that is not such lists."""
-    whole, real, strings, buffer = [one if one is not None else "" for one in [*returned, *[None] * 4][:4]]
+    """Return the encoded results of a script. Raises Refused if they are not such lists."""
+    whole, real, strings, buffer = [part if part is not None else "" for part in [*returned, *[None] * 4][:4]]
     try:
-        texts = [text(one) for one in strings]
+        texts = [text(value) for value in strings]
         values = ints(*whole) + floats(*real) + b"".join(texts) + raw(buffer)
         return ints(len(whole), len(real), len(texts), len(raw(buffer))) + values
     except (TypeError, ValueError, struct.error, OverflowError):

@@ -1,4 +1,4 @@
-"""Sensors: vision sensors, proximity sensors, force sensors; distances and collisions."""
+"""Commands for vision, proximity and force sensors, distances and collisions."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def _show(ask: Asked) -> bytes:
     return nothing(ask.sim("setVisionSensorCharImage", *ask.key, ask.data))
 
 
-def _seen(ask: Asked) -> bytes:
+def _read_vision(ask: Asked) -> bytes:
     triggers, *packets = ask.sim("readVisionSensor", *ask.key)
-    packets = [one for one in packets if one != ()]  # those that the sensor has
+    packets = [packet for packet in packets if packet != ()]  # () is a packet that the sensor does not have
     sizes = ints(len(packets), *map(len, packets))
-    return bytes([bool(triggers)]) + sizes + b"".join(floats(*one) for one in packets)
+    return bytes([bool(triggers)]) + sizes + b"".join(floats(*packet) for packet in packets)
 
 
 def _proximity(ask: Asked) -> bytes:
@@ -43,10 +43,10 @@ def _force(ask: Asked) -> bytes:
 
 
 def _distance(ask: Asked) -> bytes:
-    near, way, _ = ask.sim("checkDistance", *ask.key)
-    if not near:
+    is_measured, segment, _ = ask.sim("checkDistance", *ask.key)
+    if not is_measured:
         raise ask.refused("the distance between the two objects cannot be measured")
-    return floats(way[6])
+    return floats(segment[6])
 
 
 SENSORS: Table = {
@@ -55,7 +55,7 @@ SENSORS: Table = {
     0x1017: Served("simxGetVisionSensorDepthBuffer", _depths),
     0x1005: Served("simxSetVisionSensorImage", _show),
     0x1006: Served("simxSetVisionSensorImage", _show),
-    0x1011: Served("simxReadVisionSensor", _seen),
+    0x1011: Served("simxReadVisionSensor", _read_vision),
     0x1009: Served("simxReadProximitySensor", _proximity),
     0x100F: Served("simxReadForceSensor", _force),
     0x1010: Served("simxBreakForceSensor", lambda ask: nothing(ask.sim("breakForceSensor", *ask.key))),

@@ -1,4 +1,4 @@
-"""What one client asks for: commands that are carried out once, commands that stream, and steps that it triggers."""
+"""A client's session: commands executed once, streaming commands, and the steps that the client triggers."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ from drone_sim.scripting import script_log
 _LOG = logging.getLogger(__name__)
 _LOG.setLevel(logging.INFO)
 _SYNCHRONOUS, _FREE, _NEXT, _ERRORS, _GOODBYE = 0x0001, 0x0002, 0x0003, 0x0004, 0x000A  # commands
-_MOST_STREAMS = 1000
-_LARGEST = 64 * 1024 * 1024  # bytes of an answer
-_MOST_SPLIT = 16  # commands that come in pieces, at a time
-_MOST_ERRORS = 50  # that are kept for simxGetLastErrors, and that are written to the log
-_STANDING = 0.05  # s between two looks at what streams, while the simulation stands
+_MAX_STREAMS = 1000
+_MAX_REPLY_SIZE = 64 * 1024 * 1024  # bytes
+_MAX_SPLIT = 16  # incomplete commands, which are sent in pieces, at a time
+_MAX_ERRORS = 50  # kept for simxGetLastErrors, and written to the log
+_IDLE_INTERVAL = 0.05  # s between executions of streaming commands while the simulation is not stepping
 _WORD, _SIGN = 0xFFFFFFFF, 0x80000000
 
 
 class _Stream:
-    """A command that is carried out again and again."""
+    """A command that is executed repeatedly."""
 
     def __init__(self, command: Command, ask: Asked, do: Handler):
         self.command, self.ask, self.do = command, ask, do
-        self.step = (-1, -1)  # run and step in which it was carried out last
-        self.last = -math.inf  # s, when that was
+        self.step = (-1, -1)  # run and step of the last execution
+        self.last = -math.inf  # s, time of the last execution
 
     def is_due(self, step: tuple[int, int], now: float) -> bool:
-        """Tell whether it may say something new, by the step and the real time."""
-        since = now - self.last
-        return since >= 1e-3 * self.command.delay and (self.step != step or since >= _STANDING)
+        """Return whether the result may have changed, by the step and the real time (s)."""
+        elapsed = now - self.last
+        return elapsed >= 1e-3 * self.command.delay and (self.step != step or elapsed >= _IDLE_INTERVAL)
 
 
 class Session:
@@ -57,17 +57,17 @@ class Session:
         selected: list[int],
         clock: Callable[[], float] = time.monotonic,
     ):
-        """`name` says in the log who it is, `client` has the functions; `selected` is what clients have selected."""
+        """`name` is for the log, `client` has the functions; `selected` contains the objects selected by clients."""
         self.name = name
-        self.is_over = False  # whether it has said goodbye
+        self.is_over = False  # whether the client has ended it
         self._client, self._player, self._clock = client, player, clock
         self._selected = selected
         self._reach = Reach({}, selected)
         self._streams: dict[tuple[int, bytes], _Stream] = {}
         self._split: dict[tuple[int, bytes], bytearray] = {}
-        self._errors: deque[str] = deque(maxlen=_MOST_ERRORS)
-        self._said: set[str] = set()
-        self._size = 0  # bytes of the answer so far
+        self._errors: deque[str] = deque(maxlen=_MAX_ERRORS)
+        self._logged: set[str] = set()
+        self._size = 0  # bytes of the reply so far
 
     @property
     def holds(self) -> bool:
@@ -75,39 +75,39 @@ class Session:
         return self._client.stepping.holds
 
     def synchronous(self, on: bool) -> None:
-        """Let the simulation step only when this client triggers it, or freely."""
+        """Switch synchronous mode, in which the simulation steps only when this client triggers it."""
         if on != bool(self._client.stepping.level):
             self._client.stepping.set(on)
 
     def leave(self) -> None:
-        """Hold nothing up, and remove what it has left."""
+        """Release the simulation, and remove the client's streams, drawings and the like."""
         self._streams.clear()
         self._split.clear()
         self._client.leave()
 
     def answer(self, message: bytes) -> Task:
-        """Carry out what a message asks for; return the message that answers it. Raises ValueError for what is none."""
-        asked = wire.read(message)
+        """Execute the commands in a message; return the reply. Raises ValueError for an invalid message."""
+        request = wire.read(message)
         answers, self._size = [], 0
-        for command in asked.commands:
-            whole = self._put_together(command)
-            if whole is None:
+        for command in request.commands:
+            complete = self._put_together(command)
+            if complete is None:
                 continue
-            if whole.code == _NEXT:
+            if complete.code == _NEXT:
                 yield from self._step()
-            self._keep_up()
-            answer = self._carried_out(whole)
+            self._update_functions()
+            answer = self._execute(complete)
             if answer is not None:
                 answers.append(answer)
-        self._keep_up()
-        answers += self._streamed()
+        self._update_functions()
+        answers += self._stream_replies()
         script_log.end_call()
-        return wire.write(asked, answers, self._stamp())
+        return wire.write(request, answers, self._stamp())
 
     # ---- steps
 
     def _step(self) -> Task:
-        """Let the simulation take one step, if it is playing and waits for this client; return when it has."""
+        """Let the simulation take a step, if it is playing in synchronous mode; return after it."""
         simulation, stepping = self._player.simulation, self._client.stepping
         if self._player.playing and stepping.level:
             before = simulation.run, simulation.steps
@@ -115,7 +115,7 @@ class Session:
 
     # ---- commands
 
-    def _keep_up(self) -> None:
+    def _update_functions(self) -> None:
         functions = self._client.functions()
         if functions is not self._reach.functions:
             self._reach = Reach(functions, self._selected)
@@ -123,12 +123,12 @@ class Session:
                 stream.ask.reach = self._reach
 
     def _put_together(self, command: Command) -> Command | None:
-        """Return a command with all of its data, None where more are to come."""
+        """Return a command with all of its data, None if parts are missing."""
         if command.is_whole:
             return command
         key = command.code, command.raw_key
         data = self._split.setdefault(key, bytearray())
-        if len(data) != command.shift or (len(self._split) > _MOST_SPLIT and not data):
+        if len(data) != command.shift or (len(self._split) > _MAX_SPLIT and not data):
             del self._split[key]
             return command._replace(data=b"", shift=0, whole=0) if command.shift else None
         data += command.data
@@ -136,26 +136,25 @@ class Session:
             return None
         return command._replace(data=bytes(self._split.pop(key)), shift=0)
 
-    def _carried_out(self, command: Command) -> Answer | None:
-        """Return what became of a command, None where there is nothing to say."""
+    def _execute(self, command: Command) -> Answer | None:
+        """Execute a command; return its reply, None if there is none."""
         key = command.code, command.raw_key
         if command.mode == wire.DISCONTINUE:
             self._streams.pop(key, None)
             return Answer(command, b"")
         if command.code in (_SYNCHRONOUS, _FREE, _NEXT, _ERRORS, _GOODBYE):
-            return Answer(command, self._own(command.code))
+            return Answer(command, self._execute_session_command(command.code))
         function = served(command.code)
         ask = Asked(function.name, command, self._reach)
         if command.mode not in (wire.STREAMING, wire.STREAMING_SPLIT):
-            return self._done(command, ask, function.do)
-        if key not in self._streams and len(self._streams) >= _MOST_STREAMS:
-            self._tell(f"{function.name}: at most {_MOST_STREAMS} commands can stream at once")
+            return self._call(command, ask, function.do)
+        if key not in self._streams and len(self._streams) >= _MAX_STREAMS:
+            self._report(f"{function.name}: at most {_MAX_STREAMS} commands can stream at once")
             return Answer(command, None)
         self._streams[key] = _Stream(command, ask, function.do)
         return None
 
-    def _own(self, code: int) -> bytes:
-        """Carry out a command that is about the session itself."""
+    def _execute_session_command(self, code: int) -> bytes:
         if code == _ERRORS:
             errors = list(self._errors)
             self._errors.clear()
@@ -165,47 +164,47 @@ class Session:
         self.is_over = self.is_over or code == _GOODBYE
         return b""
 
-    def _streamed(self) -> list[Answer]:
-        """Return what streams and may be new."""
+    def _stream_replies(self) -> list[Answer]:
+        """Execute the streaming commands that are due; return their replies."""
         simulation = self._player.simulation
         step, now = (simulation.run, simulation.steps), self._clock()
         answers = []
-        for key, one in list(self._streams.items()):
-            if one.is_due(step, now):
-                one.step, one.last = step, now
-                answer = self._done(one.command, one.ask, one.do)
+        for key, stream in list(self._streams.items()):
+            if stream.is_due(step, now):
+                stream.step, stream.last = step, now
+                answer = self._call(stream.command, stream.ask, stream.do)
                 if answer is not None:
                     answers.append(answer)
-                    if one.command.code == TAKE_STRING and answer.data is not None:
+                    if stream.command.code == TAKE_STRING and answer.data is not None:
                         del self._streams[key]  # the client waits for one value
         return answers
 
-    def _done(self, command: Command, ask: Asked, do: Handler) -> Answer | None:
+    def _call(self, command: Command, ask: Asked, do: Handler) -> Answer | None:
         try:
-            if self._size > _LARGEST:
-                raise ask.refused(f"the reply has more than {_LARGEST} bytes")
+            if self._size > _MAX_REPLY_SIZE:
+                raise ask.refused(f"the reply has more than {_MAX_REPLY_SIZE} bytes")
             data = do(ask)
             self._size += len(data or b"")
         except Refused as refused:
             _LOG.debug("a command failed:", exc_info=True)
             if str(refused):
-                self._tell(str(refused))
+                self._report(str(refused))
             return Answer(command, None)
         return None if data is None else Answer(command, data)
 
-    def _tell(self, line: str) -> None:
-        """Keep what was refused for simxGetLastErrors; write it to the log, the first time."""
+    def _report(self, line: str) -> None:
+        """Keep an error for simxGetLastErrors; write it to the log at its first occurrence."""
         self._errors.append(line)
-        if line not in self._said and len(self._said) < _MOST_ERRORS:
-            self._said.add(line)
+        if line not in self._logged and len(self._logged) < _MAX_ERRORS:
+            self._logged.add(line)
             _LOG.warning("%s (requested by %s)", encodable(printable(line)), self.name)
 
     def _stamp(self) -> wire.Stamp:
         simulation, player = self._player.simulation, self._player
-        known = simulation.parameters
+        parameters = simulation.parameters
         running, paused = simulation.running, simulation.running and player.paused
-        state = running | paused << 1 | (known.real_time_factor == 1) << 2
+        state = running | paused << 1 | (parameters.real_time_factor == 1) << 2
         simulated = round(1e3 * simulation.time) if running else 0
         now = round(1e3 * self._clock()) & _WORD
-        scene = zlib.crc32(known.scene_file.encode()) & 0xFFFF
+        scene = zlib.crc32(parameters.scene_file.encode()) & 0xFFFF
         return wire.Stamp((now ^ _SIGN) - _SIGN, simulated, scene, state)

@@ -1,4 +1,4 @@
-"""Signals, values under a name that client and scripts leave for each other."""
+"""Signals: named values through which clients and scripts exchange data."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drone_sim.remote.legacy.values import floats, ints, raw, string
 
 
 def _value(ask: Asked, function: str) -> Any:
-    """Return the value of a signal. Raises Refused, without a word, where it is not set."""
+    """Return the value of a signal. Raises Refused, without a text, if it is not set."""
     value = ask.sim(function, *ask.key)
     if value is None:
         raise Refused("")
@@ -32,7 +32,7 @@ def _take(ask: Asked) -> bytes:
 
 
 def _read_stream(ask: Asked) -> bytes | None:
-    """Return what has been written since the last time; the client puts it behind what it has not read yet."""
+    """Return what was written since the last call; the client appends it to its unread data."""
     return _take(ask) if ask.sim("getStringSignal", *ask.key) else None
 
 

@@ -1,14 +1,14 @@
-"""The simulation as a whole: start, pause and stop, scenes and models, parameters of the simulator."""
+"""Simulator commands: start, pause and stop, scenes and models, simulator parameters."""
 
 from __future__ import annotations
 
 from drone_sim.remote.legacy.asked import Asked, Served, Table, nothing
 from drone_sim.remote.legacy.values import floats, ints, text
 
-_TOOLBAR = ("startSimulation", "pauseSimulation", "stopSimulation")  # by what the key says
+_TOOLBAR = ("startSimulation", "pauseSimulation", "stopSimulation")  # by key
 
 
-def _press(ask: Asked) -> bytes:
+def _press_button(ask: Asked) -> bytes:
     (which,) = ask.key
     if not 0 <= which < len(_TOOLBAR):
         raise ask.refused(f"{which}: must be 0 (start), 1 (pause) or 2 (stop)")
@@ -28,7 +28,7 @@ def _set_array(ask: Asked) -> bytes:
 
 
 SIMULATOR: Table = {
-    0x1007: Served("simxStartSimulation", _press),
+    0x1007: Served("simxStartSimulation", _press_button),
     0x3002: Served("simxLoadScene", lambda ask: nothing(ask.sim("loadScene", *ask.key))),
     0x3003: Served("simxLoadModel", lambda ask: ints(ask.sim("loadModel", *ask.key))),
     0x101D: Served("simxGetArrayParameter", _array),

@@ -1,4 +1,4 @@
-"""How values are written that a client reads."""
+"""Binary encoding of values for clients."""
 
 from __future__ import annotations
 
@@ -6,41 +6,43 @@ import math
 import struct
 from collections.abc import Iterable
 
-_LARGEST = 3.4028234663852886e38  # of single precision
+_MAX_FLOAT = 3.4028234663852886e38  # largest finite single-precision number
 
 
 def floats(*values: float) -> bytes:
-    """Return numbers in single precision; what is too large for that is infinite."""
+    """Return single-precision numbers; values beyond their range become infinite."""
     layout = f"<{len(values)}f"
     try:
         return struct.pack(layout, *values)
     except OverflowError:
-        return struct.pack(layout, *(one if abs(one) <= _LARGEST else math.copysign(math.inf, one) for one in values))
+        return struct.pack(
+            layout, *(value if abs(value) <= _MAX_FLOAT else math.copysign(math.inf, value) for value in values)
+        )
 
 
 def ints(*values: float) -> bytes:
-    """Return whole numbers of 32 bits."""
+    """Return 32-bit integers."""
     return struct.pack(f"<{len(values)}i", *map(int, values))
 
 
 def counted(values: Iterable[int]) -> bytes:
-    """Return how many whole numbers there are, and these."""
-    listed = list(values)
-    return ints(len(listed), *listed)
+    """Return the number of integers, and the integers."""
+    numbers = list(values)
+    return ints(len(numbers), *numbers)
 
 
 def raw(value: str | bytes) -> bytes:
-    """Return a string as it is."""
+    """Return a string's bytes."""
     return value.encode("utf-8", "surrogateescape") if isinstance(value, str) else value
 
 
 def text(value: str | bytes) -> bytes:
-    """Return a string that ends in a zero."""
+    """Return a zero-terminated string."""
     return raw(value) + b"\0"
 
 
 def string(data: bytes) -> str | bytes:
-    """Return a string as scripts have it: bytes where it is no UTF-8."""
+    """Return a string as scripts represent it: bytes if it is not valid UTF-8."""
     try:
         return data.decode()
     except UnicodeDecodeError:

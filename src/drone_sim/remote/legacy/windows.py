@@ -1,4 +1,4 @@
-"""What is for a person to look at: the status bar, consoles, dialogs, and V-REP 3.x's user interfaces."""
+"""User interface commands: status bar, consoles, dialogs, and V-REP 3.x's custom user interfaces."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from drone_sim.remote.legacy.asked import Asked, Served, Table, nothing
 from drone_sim.remote.legacy.values import ints, text
 
 _NO_BUTTON = -1
-_LOST = 0  # clients read as if its key had two numbers
+_SKIPPED = 0  # clients skip a number, because they expect a key of two numbers
 _COLORS = 48  # bytes, of a dialog's title and text
 
 
@@ -27,12 +27,12 @@ def _show(ask: Asked) -> bytes:
 
 
 def _open_dialog(ask: Asked) -> bytes:
-    said, end, rest = ask.data.partition(b"\0")
+    message, end, rest = ask.data.partition(b"\0")
     if not end or len(rest) < struct.calcsize("<i") + 1 + _COLORS:
         raise ask.refused(f"{len(ask.data)} bytes of data are not a valid dialog")
     (style,) = struct.unpack_from("<i", rest)
     initial = rest[4:-_COLORS].rstrip(b"\0")
-    texts = said.decode("utf-8", "replace"), initial.decode("utf-8", "replace")
+    texts = message.decode("utf-8", "replace"), initial.decode("utf-8", "replace")
     handle = ask.sim("displayDialog", *ask.key, texts[0], style, False, texts[1])
     return ints(handle, handle)
 
@@ -61,7 +61,7 @@ WINDOWS: Table = {
     0x2001: Served("simxGetUISlider", lambda ask: ints(ask.sim("getUISlider", *ask.key))),
     0x2002: _set_ui("simxSetUISlider", "setUISlider"),
     0x1029: _set_ui("simxRemoveUI", "removeUI"),
-    0x2003: Served("simxGetUIEventButton", lambda ask: ints(_LOST, _NO_BUTTON, 0, 0)),
+    0x2003: Served("simxGetUIEventButton", lambda ask: ints(_SKIPPED, _NO_BUTTON, 0, 0)),
     0x2004: Served("simxGetUIButtonProperty", lambda ask: ints(ask.sim("getUIButtonProperty", *ask.key))),
     0x2005: _set_ui("simxSetUIButtonProperty", "setUIButtonProperty"),
     0x2006: _set_ui("simxSetUIButtonLabel", "setUIButtonLabel"),

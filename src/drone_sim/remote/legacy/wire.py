@@ -1,9 +1,9 @@
-"""What goes over the wire: packets, the messages that they carry, and the commands in a message.
+"""Wire format: packets, messages and commands.
 
-All numbers are little-endian. A packet is 1, its size and how many more of the message follow (three of 16 bits), and a
-piece of the message. A message is a header and commands; the server answers each with one message, in which a command
-comes back with what it returned. What comes behind a command's own header is its key, which says what it is about
-(nothing, a number or two, a text, or a number and two texts: its code says which), and its data.
+All numbers are little-endian. A packet is the number 1, its size, the number of following packets of the message (three
+16-bit integers), and a piece of the message. A message is a header and commands; the server replies to each with a
+message, in which each command returns with its result. After a command's header follow its key, which identifies its
+object (nothing, one or two numbers, a string, or a number and two strings, depending on its code), and its data.
 """
 
 from __future__ import annotations
@@ -15,35 +15,35 @@ from typing import NamedTuple
 
 LARGEST = 8 * 1024 * 1024  # bytes of a message
 VERSION = 11  # of the protocol
-_MOST_COMMANDS = 2000  # of a message
+_MAX_COMMANDS = 2000  # of a message
 _PACKET = struct.Struct("<hhh")
 _PIECE, _OLD_PIECE = (
     30_000,
     244,
-)  # bytes of a message in a packet that is sent; V-REP 3.1's clients have room for no more
-_MOST_PACKETS = 2**15 - 1  # of a message
+)  # bytes of a message in a sent packet; V-REP 3.1's clients have no larger buffer
+_MAX_PACKETS = 2**15 - 1  # of a message
 _HEADER = struct.Struct(
     "<HBiiiHB"
-)  # check sum (of V-REP 3.1's clients), version, number, client's time, server's time, scene, state
-_COMMAND = struct.Struct("<iiHiiHiBB")  # size, size of the whole, key's, shift, code and mode, delay, time, status, 0
-_FAILED = 1  # of a status
+)  # checksum (V-REP 3.1 only), version, number, client's time, server's time, scene, state
+_COMMAND = struct.Struct("<iiHiiHiBB")  # size, total size, key size, shift, code and mode, delay, time, status, 0
+_FAILED = 1  # bit of the status
 _CODE = 0xFFFF
 
-# The modes, in which a command asks to be carried out.
+# Execution modes of a command.
 ONESHOT, BLOCKING, STREAMING, ONESHOT_SPLIT, STREAMING_SPLIT, DISCONTINUE = range(6)
 _MODES = range(6)
 
 _Key = tuple[int | str, ...]
-# What the key of a command is, by the first code that has it: numbers before, texts behind.
+# The keys of commands: first code with this kind of key, count of numbers, count of strings after them.
 _KEYS = ((0x0000, 0, 0), (0x1000, 1, 0), (0x2000, 2, 0), (0x3000, 0, 1), (0x3400, 1, 2), (0x3500, 0, 1))
-_OTHERS = {0x000A: (1, 0), 0x2003: (1, 0)}  # codes whose key is none of their kind: goodbye, and simxGetUIEventButton
+_KEY_EXCEPTIONS = {0x000A: (1, 0), 0x2003: (1, 0)}  # exceptions: the end of a session, and simxGetUIEventButton
 
 
 class Command(NamedTuple):
-    """What a client asks for.
+    """A command of a client.
 
-    delay: ms between two answers to a command that streams; raw_key: the key as it came; whole: bytes of all its data,
-    of which `data` begin at `shift`.
+    delay: ms between two replies to a streaming command; raw_key: the key as received; whole: size of all its data in
+    bytes, of which `data` begins at offset `shift`.
     """
 
     code: int
@@ -57,12 +57,12 @@ class Command(NamedTuple):
 
     @property
     def is_whole(self) -> bool:
-        """Whether these are all of its data."""
+        """Whether `data` is all of its data."""
         return self.shift == 0 and len(self.data) == self.whole
 
 
 class Message(NamedTuple):
-    """A client's: its number, when it was sent (ms of the client's clock), and what it asks for."""
+    """A client's message: its number, when it was sent (ms of the client's clock), and its commands."""
 
     number: int
     sent: int
@@ -70,17 +70,14 @@ class Message(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What became of a command; `data` is None where it failed."""
+    """The reply to a command; `data` is None if it failed."""
 
     command: Command
     data: bytes | None
 
 
 class Stamp(NamedTuple):
-    """What every message of the server's says: its clock and the simulation's (ms), the scene, and bits of its state.
-
-    The bits: 1 not stopped, 2 paused, 4 at real time.
-    """
+    """Part of every reply's header: the server's clock and the simulation's (ms), the scene, and state bits."""
 
     time: int
     simulated: int
@@ -92,21 +89,21 @@ class Packets:
     """Joins the packets of a connection into messages, and splits answers into packets that its client can read."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
-        self._is_old = False  # whether the client sends check sums, and drops what has none: V-REP 3.1's, and before
+        """Start with an empty buffer."""
+        self._is_old = False  # whether the client sends and requires checksums, as up to V-REP 3.1
         self._bytes = bytearray()
-        self._at = 0  # where the next packet begins
+        self._at = 0  # offset of the next packet
         self._message = bytearray()
-        self._left: int | None = None  # packets of the message that has begun
+        self._left: int | None = None  # missing packets of an incomplete message
 
     def add(self, received: bytes) -> None:
-        """Take what has been received."""
+        """Append received data."""
         del self._bytes[: self._at]
         self._at = 0
         self._bytes += received
 
     def take(self) -> bytes | None:
-        """Return the next message, None before it is all there. Raises ValueError, in one line, for what is none."""
+        """Return the next message, None if it is incomplete. Raises ValueError, in one line, for an invalid one."""
         while len(self._bytes) - self._at >= _PACKET.size:
             first, size, left = _PACKET.unpack_from(self._bytes, self._at)
             self._check(first, size, left)
@@ -123,11 +120,11 @@ class Packets:
         return None
 
     def of(self, answer: bytes) -> bytes:
-        """Return an answer in packets."""
+        """Return a reply as packets."""
         if not self._is_old:
             return packets(answer, _PIECE)
         check_sum = struct.pack("<H", binascii.crc_hqx(answer[2:], 0))
-        return packets(check_sum + answer[2:], max(_OLD_PIECE, -(-len(answer) // _MOST_PACKETS)))
+        return packets(check_sum + answer[2:], max(_OLD_PIECE, -(-len(answer) // _MAX_PACKETS)))
 
     def _check(self, first: int, size: int, left: int) -> None:
         if first != 1:
@@ -143,22 +140,22 @@ class Packets:
 
 
 def packets(message: bytes, piece: int) -> bytes:
-    """Return a message in packets, so many bytes of it in each."""
+    """Return a message as packets with `piece` bytes of it in each."""
     pieces = [message[start : start + piece] for start in range(0, len(message), piece)]
     left = len(pieces)
-    return b"".join(_PACKET.pack(1, len(one), left - count) + one for count, one in enumerate(pieces, 1))
+    return b"".join(_PACKET.pack(1, len(part), left - count) + part for count, part in enumerate(pieces, 1))
 
 
 def read(message: bytes) -> Message:
-    """Return what a message says. Raises ValueError, in one line, for what is none."""
+    """Return a decoded message. Raises ValueError, in one line, for an invalid message."""
     if len(message) < _HEADER.size:
         raise ValueError(f"malformed message: {len(message)} bytes, but a header alone has {_HEADER.size}")
     _, _, number, sent, *_ = _HEADER.unpack_from(message)
     commands: list[Command] = []
     for command in _commands(message):
         commands.append(command)
-        if len(commands) > _MOST_COMMANDS:
-            raise ValueError(f"a message has more than {_MOST_COMMANDS} commands")
+        if len(commands) > _MAX_COMMANDS:
+            raise ValueError(f"a message has more than {_MAX_COMMANDS} commands")
     return Message(number, sent, commands)
 
 
@@ -185,9 +182,9 @@ def _commands(message: bytes) -> Iterator[Command]:
 
 
 def _key(code: int, raw: bytes) -> _Key:
-    """Return a command's key. Raises ValueError where it is not what such a command has."""
+    """Return a command's decoded key. Raises ValueError if it does not match the command's code."""
     kinds = ((numbers, texts) for first, numbers, texts in reversed(_KEYS) if code >= first)
-    count, texts = _OTHERS.get(code) or next(kinds)
+    count, texts = _KEY_EXCEPTIONS.get(code) or next(kinds)
     size = 4 * count
     *parts, rest = raw[size:].split(b"\0", texts) if texts else [raw[size:]]
     if len(raw) < size or len(parts) != texts or rest:
@@ -196,7 +193,7 @@ def _key(code: int, raw: bytes) -> _Key:
 
 
 def write(to: Message, answers: Sequence[Answer], stamp: Stamp) -> bytes:
-    """Return the message that answers one."""
+    """Return the reply to a message."""
     parts = [_HEADER.pack(0, VERSION, to.number, to.sent, stamp.time, stamp.scene, stamp.state)]
     for command, data in answers:
         key = command.raw_key

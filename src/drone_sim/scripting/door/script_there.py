@@ -216,7 +216,7 @@ class ScriptThere:
         return None if item[2] is None else self._value(item[2])
 
     def _failed(self, item: list[Any]) -> NoReturn:
-        if len(item) != 6 or [type(one) for one in item[2:]] != [str, str, int, str]:
+        if len(item) != 6 or [type(field) for field in item[2:]] != [str, str, int, str]:
             raise NoMessage("malformed failure")
         _, threaded, phase, path, line, reason = item
         self.threaded = threaded is True
