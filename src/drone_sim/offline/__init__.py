@@ -1,1 +1,1 @@
-"""Flying without ROS: a timeline of commands in; a CSV, a plot and a summary out."""
+"""Flights without ROS: a timeline of commands as input; a CSV file, a plot, a video and a dataset as output."""

@@ -1,4 +1,4 @@
-"""`rosrun drone_sim fly`: the simulation without ROS and without a master, as fast as it can."""
+"""`rosrun drone_sim fly`: run the simulation without ROS and without a master, as fast as possible."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ from drone_sim.vrep_files.model import SUFFIXES
 if TYPE_CHECKING:
     from drone_sim.offline.video import CameraRecorder
 
-    _Film = CameraRecorder | dataset.TruthRecorder
+    _CameraWriter = CameraRecorder | dataset.TruthRecorder
 
-_AFTER = 5.0  # s flown on after the last command
-_WITHOUT_COMMANDS = 10.0  # s
-_PLOTTED = 500_000  # steps
-_BAR_AFTER = 2.0  # s of real time; a shorter flight shows no progress bar
+_EXTRA_TIME = 5.0  # s of flight after the last command
+_IDLE_TIME = 10.0  # s
+_MAX_PLOTTED_STEPS = 500_000
+_BAR_DELAY = 2.0  # s of real time; a shorter flight shows no progress bar
 _YAML, _OUTPUTS = (".yaml", ".yml"), ("csv", "plot", "video", "truth")
 _FILES = ("script", "scene", "config", "commands", *_OUTPUTS)
 _ENDINGS = {
@@ -57,9 +57,9 @@ _ENDINGS = {
 
 
 def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = None) -> int:
-    """Fly; return 0, or 1 after a line on stderr for a wrong input or script, or 130 after Ctrl-C.
+    """Fly; return 0, 1 after an error line on stderr for a wrong input or script, or 130 after Ctrl-C.
 
-    With a guardian the flight ends between two steps when a signal comes; without one, signals are the caller's.
+    With a guardian, a signal ends the flight between two steps; without one, signals are left to the caller.
     """
     options = _parser().parse_args(arguments)
     if guardian is not None:
@@ -69,9 +69,9 @@ def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = Non
 
 
 def settings(assignments: Sequence[str]) -> dict[str, Any]:
-    """Return `a.b=VALUE` assignments as the nested mapping that parameters.load takes; VALUE is YAML.
+    """Return `a.b=VALUE` assignments as the nested mapping for parameters.load; VALUE is YAML.
 
-    Of several for one key the last one counts. Raises ParameterError.
+    The last assignment of a key wins. Raises ParameterError.
     """
     values: list[tuple[str, Any]] = []
     for assignment in assignments:
@@ -93,50 +93,50 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
     _check_names(options)
     files = {"config": options.config, "scene_file": options.scene}
     parameters = parameters_module.load({**settings(options.set), **{key: name for key, name in files.items() if name}})
-    recorded = _vehicle(options.vehicle, parameters)
+    vehicle = _vehicle(options.vehicle, parameters)
     timeline = Timeline((), parameters.time_step)
     if options.commands:
         timeline = timeline_module.read(options.commands, parameters)
     steps = first_step(_duration(options, timeline), parameters.time_step)
-    camera = _camera(options, parameters, recorded)
+    camera = _camera(options, parameters, vehicle)
     _check_outputs(options, steps)
     simulation = Simulation(parameters, script=options.script or parameters.script, gui=parameters.gui)
-    began = time.perf_counter()
+    start = time.perf_counter()
     try:
-        with contextlib.ExitStack() as written:
-            file = written.enter_context(writing.replacing(options.csv)) if options.csv else None
-            made = _films(options, simulation, recorded, camera)
-            films = {name: written.enter_context(film) for name, film in made.items()}
-            recording = Recording(file, keep=bool(options.plot), vehicle=recorded)
-            flown = status_of(
+        with contextlib.ExitStack() as stack:
+            file = stack.enter_context(writing.replacing(options.csv)) if options.csv else None
+            managers = _camera_writers(options, simulation, vehicle, camera)
+            writers = {name: stack.enter_context(writer) for name, writer in managers.items()}
+            recording = Recording(file, keep=bool(options.plot), vehicle=vehicle)
+            status = status_of(
                 "fly",
-                lambda: _fly(simulation, timeline, steps, (recording, *films.values()), guardian),
-                passed_on=OutputError,  # which ends the writing of the file, which then says so
+                lambda: _fly(simulation, timeline, steps, (recording, *writers.values()), guardian),
+                passed_on=OutputError,  # handled by the context manager that writes the file
             )
-            took = time.perf_counter() - began
-            flown = flown or int(bool(simulation.failed_scripts))
+            wall_time = time.perf_counter() - start
+            status = status or int(bool(simulation.failed_scripts))
     finally:
-        # What was flown is of use even where the flight failed: cleanup, summary and plot come in any case.
-        closed = status_of("fly", simulation.close)
+        # The part flown before a failure is useful, too: cleanup, summary and plot follow in any case.
+        close_status = status_of("fly", simulation.close)
     if guardian is not None:
-        guardian.stand_down()  # no script runs any more, and a plot takes its time
-    print(_summary(recording, took), flush=True)
-    for name, film in films.items():
-        print(f"wrote {name}: {film}", flush=True)
-    drawn = 0
+        guardian.stand_down()  # no script runs any more, and drawing a plot takes long
+    print(_summary(recording, wall_time), flush=True)
+    for name, writer in writers.items():
+        print(f"wrote {name}: {writer}", flush=True)
+    plot_status = 0
     if options.plot and recording.rows:
-        drawn = status_of("fly", lambda: _draw(options.plot, recording, timeline.of(recorded)))
-    return flown or closed or drawn
+        plot_status = status_of("fly", lambda: _draw(options.plot, recording, timeline.of(vehicle)))
+    return status or close_status or plot_status
 
 
 def _check_outputs(options: argparse.Namespace, steps: int) -> None:
-    """Raise OSError or ValueError for what cannot be written."""
+    """Raise OSError or ValueError for an output that cannot be written."""
     if options.plot:
         from drone_sim.offline import plot  # matplotlib takes as long to import as a short flight
 
         plot.check(options.plot)
-        if steps > _PLOTTED:
-            raise ValueError(f"--plot: {steps} steps are too many; at most {_PLOTTED} can be drawn")
+        if steps > _MAX_PLOTTED_STEPS:
+            raise ValueError(f"--plot: {steps} steps are too many; at most {_MAX_PLOTTED_STEPS} can be drawn")
     for output in filter(None, (options.csv, options.video)):
         writing.check(output)
     if options.truth:
@@ -150,7 +150,7 @@ def _draw(path: str, recording: Recording, timeline: Timeline) -> None:
 
 
 def _check_names(options: argparse.Namespace) -> None:
-    """Raise ValueError for a file name with a wrong ending, and for an output that is another option's file."""
+    """Raise ValueError for a file name with a wrong ending, or an output that is also another option's file."""
     for option, endings in _ENDINGS.items():
         name = getattr(options, option)
         if name is not None and Path(name).suffix.lower() not in endings:
@@ -164,56 +164,56 @@ def _check_names(options: argparse.Namespace) -> None:
 
 
 def _vehicle(name: str | None, parameters: Parameters) -> str:
-    """Return the vehicle whose flight is recorded; raises ValueError."""
-    names = [one.name for one in parameters.fleet]
+    """Return the name of the vehicle to record. Raises ValueError."""
+    names = [vehicle.name for vehicle in parameters.fleet]
     if name is not None and name not in names:
         raise ValueError(f"--vehicle {_shown(name)}: no such vehicle; {near_names(name, names)}")
     return parameters.first.name if name is None else name
 
 
 def _camera(options: argparse.Namespace, parameters: Parameters, vehicle: str) -> str:
-    """Return the camera of video and truth, '' without one. Raises ValueError."""
-    asked = "--video" if options.video else "--truth"
+    """Return the camera for video and ground truth, '' if neither is written. Raises ValueError."""
+    option = "--video" if options.video else "--truth"
     if not (options.video or options.truth):
         if options.camera is not None:
             raise ValueError(f"--camera {_shown(options.camera)}: only works with --video or --truth")
         return ""
-    own = next(one for one in parameters.fleet if one.name == vehicle)
-    camera = _camera_of(own, options.camera, asked)
+    equipment = next(item for item in parameters.fleet if item.name == vehicle)
+    camera = _camera_of(equipment, options.camera, option)
     if options.video:
-        from drone_sim.offline import video  # PyAV, which few have
+        from drone_sim.offline import video  # needs PyAV, an optional dependency
 
-        video.rate_of(own.cameras[camera], parameters.time_step)
+        video.rate_of(equipment.cameras[camera], parameters.time_step)
     return camera
 
 
-def _camera_of(vehicle: EquipmentParameters, name: str | None, asked: str) -> str:
-    """Return the name of a vehicle's camera, by default of its first one. Raises ValueError."""
+def _camera_of(vehicle: EquipmentParameters, name: str | None, option: str) -> str:
+    """Return the name of a vehicle's camera, by default its first one. Raises ValueError."""
     cameras = vehicle.cameras
     if not cameras:
-        raise ValueError(f"{asked}: the vehicle has no camera")
+        raise ValueError(f"{option}: the vehicle has no camera")
     if name is not None and name not in cameras:
         raise ValueError(f"--camera {shown(name)}: no such camera; {near_names(name, cameras)}")
     return next(iter(cameras)) if name is None else name
 
 
-def _films(
+def _camera_writers(
     options: argparse.Namespace, simulation: Simulation, vehicle: str, camera: str
-) -> dict[str, AbstractContextManager[_Film]]:
-    """Return what writes the camera's pictures, by the names of what is written."""
-    films: dict[str, AbstractContextManager[_Film]] = {}
+) -> dict[str, AbstractContextManager[_CameraWriter]]:
+    """Return the writers of the camera's images, by output path."""
+    writers: dict[str, AbstractContextManager[_CameraWriter]] = {}
     if options.video:
         from drone_sim.offline import video
 
-        films[options.video] = video.filming(options.video, simulation, vehicle, camera)
+        writers[options.video] = video.filming(options.video, simulation, vehicle, camera)
     if options.truth:
-        films[options.truth] = dataset.recording_to(options.truth, simulation, vehicle, camera)
-    return films
+        writers[options.truth] = dataset.recording_to(options.truth, simulation, vehicle, camera)
+    return writers
 
 
 @contextlib.contextmanager
 def _shown_on_stdout(log: logging.Logger) -> Iterator[None]:
-    """Show what scripts print on stdout, with escapes for what the terminal cannot show."""
+    """Print scripts' log messages on stdout, with escapes for characters that the terminal cannot show."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
     handler = logging.StreamHandler(sys.stdout)
@@ -227,20 +227,20 @@ def _shown_on_stdout(log: logging.Logger) -> Iterator[None]:
 def _duration(options: argparse.Namespace, timeline: Timeline) -> float:
     if options.duration is not None:
         return float(options.duration)
-    return timeline.end + _AFTER if timeline.entries else _WITHOUT_COMMANDS
+    return timeline.end + _EXTRA_TIME if timeline.entries else _IDLE_TIME
 
 
 def _fly(
     simulation: Simulation,
     timeline: Timeline,
     steps: int,
-    observers: Iterable[Recording | _Film],
+    observers: Iterable[Recording | _CameraWriter],
     guardian: Guardian | None,
 ) -> int:
     for observer in observers:
         observer.add(simulation)
     # disable=None: no bar where stderr is not a terminal.
-    with tqdm(total=steps, unit=" steps", delay=_BAR_AFTER, disable=None, leave=False) as bar:
+    with tqdm(total=steps, unit=" steps", delay=_BAR_DELAY, disable=None, leave=False) as bar:
         for step in range(steps):
             if guardian is not None and guardian.asked:
                 return SIGNALLED + guardian.asked
@@ -254,15 +254,15 @@ def _fly(
     return 0
 
 
-def _summary(recording: Recording, took: float) -> str:
+def _summary(recording: Recording, wall_time: float) -> str:
     if not recording.rows:
         return "flew 0.00 s"
     row = recording.rows[-1]
-    # + 0.0 makes a 0 of -0
+    # + 0.0 turns -0 into 0
     x, y, z, yaw = (round(value, 3) + 0.0 for value in (*row[1:4], to_euler(recording.matrix(-1))[2]))
-    factor = row[0] / took
+    factor = row[0] / wall_time
     return (
-        f"flew {row[0]:.2f} s in {took:.2f} s ({factor:.{0 if factor >= 10 else 2}f} times real time); "
+        f"flew {row[0]:.2f} s in {wall_time:.2f} s ({factor:.{0 if factor >= 10 else 2}f} times real time); "
         f"ended at x {x:.3f} y {y:.3f} z {z:.3f} m, yaw {yaw:.3f} rad"
     )
 
@@ -286,7 +286,7 @@ def _parser() -> argparse.ArgumentParser:
         "--duration",
         metavar="S",
         type=_seconds,
-        help=f"simulated seconds (default: {_AFTER:g} after the last command, {_WITHOUT_COMMANDS:g} without commands)",
+        help=f"simulated seconds (default: {_EXTRA_TIME:g} after the last command, {_IDLE_TIME:g} without commands)",
     )
     parser.add_argument(
         "--set",

@@ -1,4 +1,4 @@
-"""A flight as a picture: commanded and flown velocities, the drone itself, its path from above, and its propellers."""
+"""Plot of a flight: commanded and flown velocities, pose, path from above, propellers, and sensors."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ _BLUE, _ORANGE, _GREEN, _RED = "#1f5fa8", "#d9730d", "#2c8a57", "#a8325e"
 _GREY, _GRID, _SHADE = "#707070", "#e4e4e4", "#f2c9c4"
 _PROPELLERS = (("1 front left", _BLUE), ("2 back left", _ORANGE), ("3 back right", _GREEN), ("4 front right", _RED))
 _VELOCITIES = ("forward $v_x$ [m/s]", "left $v_y$ [m/s]", "up $v_z$ [m/s]", "yaw rate $w_z$ [rad/s]")
-_USUAL = (1, 99)  # percentiles of the propellers' velocities, between which their axis shows everything
-_SMALLEST_PROPELLER_RANGE = 1.0  # m/s
-_SMALLEST_PATH = 1.0  # m
-_PLACES = (
+_PERCENTILES = (1, 99)  # of the propellers' velocities: range of their axis, plus a margin
+_MIN_PROPELLER_RANGE = 1.0  # m/s
+_MIN_PATH_SIZE = 1.0  # m
+_LAYOUT = (
     ("vx", "place", "path"),
     ("vy", "height", "path"),
     ("vz", "lean", "propellers"),
     ("wz", "heading", "propellers"),
 )
-_HEIGHT, _SENSOR_HEIGHT = 9.5, 2.6  # inches, of all above the sensors, and of a row of them
-_PANELS, _PANEL_COLUMNS = 12, 3  # of the sensors: at most, and beside each other
-_LARGEST = 1e12  # beyond it a sensor has measured nothing
-_SMALLEST_RANGE = 0.05  # of an axis, in its unit: less would blow a ripple up to look like a manoeuvre
+_HEIGHT, _SENSOR_HEIGHT = 9.5, 2.6  # inches, of the part above the sensors, and of a row of sensors
+_MAX_PANELS, _PANEL_COLUMNS = 12, 3  # of sensors: at most, and in a row
+_MAX_VALUE = 1e12  # larger values mean that a sensor measured nothing
+_MIN_AXIS_RANGE = 0.05  # of an axis, in its unit: a smaller range would make a ripple look like a manoeuvre
 
 
 def check(path: str) -> None:
-    """Raise OSError where `path` cannot be written, and ValueError for a format that matplotlib does not have."""
+    """Raise OSError if `path` cannot be written, and ValueError for a format that matplotlib does not support."""
     writing.check(path)
     known = Figure().canvas.get_supported_filetypes()
     ending = Path(path).suffix[1:].lower()
@@ -45,29 +45,29 @@ def check(path: str) -> None:
 
 
 def save(path: str, recording: Recording, timeline: Timeline, sensors: Sequence[SensorSeries] = ()) -> None:
-    """Draw a recording, with the timeline's poses and pushes marked; the path's ending gives the format.
+    """Plot a recording, with the timeline's poses and pushes marked; the path's ending determines the format.
 
-    What sensors measured stands below, as far as there is room. Propellers that are not known are NaN.
-    Raises OSError, and ValueError for a format that matplotlib does not have.
+    Sensor series are drawn below, as far as there is room. Unknown propeller velocities are NaN.
+    Raises OSError, and ValueError for a format that matplotlib does not support.
     """
-    sensors = sensors[:_PANELS]
-    figure, axes = _laid_out(len(sensors))
-    of_time = {name: ax for name, ax in axes.items() if name != "path"}
-    lowest = [axes[name] for name in (*_PLACES[-1], *map(str, range(len(sensors))))]
-    velocities, drone, _ = ([axes[name] for name in column] for column in zip(*_PLACES))
+    sensors = sensors[:_MAX_PANELS]
+    figure, axes = _create_figure(len(sensors))
+    time_axes = {name: ax for name, ax in axes.items() if name != "path"}
+    bottom_axes = [axes[name] for name in (*_LAYOUT[-1], *map(str, range(len(sensors))))]
+    velocities, pose_axes, _ = ([axes[name] for name in column] for column in zip(*_LAYOUT))
     rows = np.array(recording.rows)
     in_track = np.array([_in_track(recording.matrix(index), row[8:11]) for index, row in enumerate(rows)])
     flown = np.column_stack((in_track[:, :3], rows[:, 13]))
     _draw_velocities(velocities, rows[:, 0], rows[:, 14:18], flown)
-    _draw_drone(drone, rows, in_track[:, 3:])
+    _draw_drone(pose_axes, rows, in_track[:, 3:])
     _draw_propellers(axes["propellers"], rows)
     for number, series in enumerate(sensors):
         _draw_sensor(axes[str(number)], series)
-    for ax in of_time.values():
+    for ax in time_axes.values():
         _finish(ax)
         _mark(ax, timeline)
-        ax.tick_params(labelbottom=ax in lowest)
-    for ax in lowest:
+        ax.tick_params(labelbottom=ax in bottom_axes)
+    for ax in bottom_axes:
         ax.set_xlabel(f"{recording.clock} [s]")
         ax.set_xlim(0, max(rows[-1, 0], 1e-3))
     _draw_path(axes["path"], rows, timeline)
@@ -75,17 +75,17 @@ def save(path: str, recording: Recording, timeline: Timeline, sensors: Sequence[
         figure.savefig(file, dpi=120, format=Path(path).suffix[1:] or "png")
 
 
-def _laid_out(sensors: int) -> tuple[Figure, dict[str, Axes]]:
-    """Return an empty figure and its axes by name; the sensors', below the others, have numbers."""
-    below = -(-sensors // _PANEL_COLUMNS)
-    names = [*map(str, range(sensors)), *["."] * (below * _PANEL_COLUMNS - sensors)]
-    # No pyplot: it would look for a display, and keep every figure.
-    figure = Figure(figsize=(16, _HEIGHT + _SENSOR_HEIGHT * below), layout="constrained")
+def _create_figure(sensors: int) -> tuple[Figure, dict[str, Axes]]:
+    """Return an empty figure and its axes by name; the sensors' axes, below the others, have numbers."""
+    sensor_rows = -(-sensors // _PANEL_COLUMNS)
+    names = [*map(str, range(sensors)), *["."] * (sensor_rows * _PANEL_COLUMNS - sensors)]
+    # Not pyplot: it would need a display, and keep every figure in memory.
+    figure = Figure(figsize=(16, _HEIGHT + _SENSOR_HEIGHT * sensor_rows), layout="constrained")
     panels = (names[first : first + _PANEL_COLUMNS] for first in range(0, len(names), _PANEL_COLUMNS))
-    rows: list[Any] = [*_PLACES, *panels]
+    rows: list[Any] = [*_LAYOUT, *panels]
     axes = figure.subplot_mosaic(
         rows,
-        gridspec_kw={"width_ratios": (1, 1, 1.1), "height_ratios": [_HEIGHT / 4] * 4 + [_SENSOR_HEIGHT] * below},
+        gridspec_kw={"width_ratios": (1, 1, 1.1), "height_ratios": [_HEIGHT / 4] * 4 + [_SENSOR_HEIGHT] * sensor_rows},
     )
     for name, ax in axes.items():
         if name not in ("path", "vx"):
@@ -94,7 +94,7 @@ def _laid_out(sensors: int) -> tuple[Figure, dict[str, Axes]]:
 
 
 def _in_track(matrix: frames.Matrix, velocity: Sequence[float]) -> tuple[float, ...]:
-    """Return velocity (m/s) and pitch, roll (rad) in the track frame, as the tutorial has them, and the yaw."""
+    """Return velocity (m/s), pitch and roll (rad) in the track frame, as in the tutorial, and the yaw (rad)."""
     yaw = frames.to_euler(matrix)[2]
     track_from_world = frames.from_euler((0.0, 0.0, 0.0), (0.0, 0.0, -yaw))
     alpha, beta, _ = frames.to_euler(frames.multiply(track_from_world, matrix))
@@ -103,7 +103,7 @@ def _in_track(matrix: frames.Matrix, velocity: Sequence[float]) -> tuple[float, 
 
 def _draw_velocities(axes: Sequence[Axes], times: np.ndarray, commanded: np.ndarray, flown: np.ndarray) -> None:
     for column, (ax, name) in enumerate(zip(axes, _VELOCITIES)):
-        # A command is in force during the step that ends at its row's time.
+        # A command applies to the step that ends at its row's time.
         ax.step(times, commanded[:, column], where="pre", color=_ORANGE, linestyle="--", label="commanded")
         ax.plot(times, flown[:, column], color=_BLUE, label="flown")
         ax.set_ylabel(name)
@@ -135,20 +135,19 @@ def _draw_propellers(ax: Axes, rows: np.ndarray) -> None:
         return
     for (name, color), velocities in zip(_PROPELLERS, rows[:, 18:22].T):
         ax.step(rows[:, 0], velocities, where="pre", color=color, linewidth=1, label=name)
-    commanded = rows[1:, 18:22] if len(rows) > 1 else rows[:, 18:22]  # nothing is, at time 0
-    low, high = np.percentile(commanded, _USUAL)
-    margin = max(0.5 * (high - low), _SMALLEST_PROPELLER_RANGE / 2)
-    least, most = float(commanded.min()), float(commanded.max())
-    ax.set_ylim(max(low, least) - margin, min(high, most) + margin)
-    if least < low - margin or most > high + margin:
-        ax.text(0.99, 0.01, f"goes from {least:.1f} to {most:.1f} m/s", transform=ax.transAxes,
+    commanded = rows[1:, 18:22] if len(rows) > 1 else rows[:, 18:22]  # there is no command at time 0
+    low, high = np.percentile(commanded, _PERCENTILES)
+    margin = max(0.5 * (high - low), _MIN_PROPELLER_RANGE / 2)
+    minimum, maximum = float(commanded.min()), float(commanded.max())
+    ax.set_ylim(max(low, minimum) - margin, min(high, maximum) + margin)
+    if minimum < low - margin or maximum > high + margin:
+        ax.text(0.99, 0.01, f"goes from {minimum:.1f} to {maximum:.1f} m/s", transform=ax.transAxes,
                 ha="right", va="bottom", fontsize="small", color=_GREY)  # fmt: skip
     _title(ax, legend=True)
 
 
 def _draw_sensor(ax: Axes, series: SensorSeries) -> None:
-    """Draw what one sensor measured."""
-    values = np.where(np.abs(series.values) < _LARGEST, series.values, np.nan)
+    values = np.where(np.abs(series.values) < _MAX_VALUE, series.values, np.nan)
     for column, color in zip(range(values.shape[1]), (_BLUE, _ORANGE, _GREEN)):
         label = series.labels[column] if series.labels else ""
         ax.plot(series.times, values[:, column], color=color, linewidth=1, label=label)
@@ -157,14 +156,16 @@ def _draw_sensor(ax: Axes, series: SensorSeries) -> None:
 
 
 def _draw_path(ax: Axes, rows: np.ndarray, timeline: Timeline) -> None:
-    """Draw the way over ground, seen from above; where a pose puts the drone elsewhere there is a gap."""
+    """Draw the path seen from above, with a gap where a pose command moves the drone."""
     x, y = rows[:, 1], rows[:, 2]
-    jumps = np.searchsorted(rows[:, 0], [one.at for one in timeline.entries if isinstance(one.action, Pose)], "right")
+    jumps = np.searchsorted(
+        rows[:, 0], [entry.at for entry in timeline.entries if isinstance(entry.action, Pose)], "right"
+    )
     jumps = jumps[jumps < len(rows)]
     ax.plot(np.insert(x, jumps, np.nan), np.insert(y, jumps, np.nan), color=_BLUE)
     ax.plot(x[0], y[0], "o", color=_GREEN, label="start")
     ax.plot(x[-1], y[-1], "s", color=_RED, label="end")
-    half = max(np.ptp(x), np.ptp(y), _SMALLEST_PATH) * 0.55
+    half = max(np.ptp(x), np.ptp(y), _MIN_PATH_SIZE) * 0.55
     middle_x, middle_y = (x.min() + x.max()) / 2, (y.min() + y.max()) / 2
     ax.set_xlim(middle_x - half, middle_x + half)
     ax.set_ylim(middle_y - half, middle_y + half)
@@ -178,13 +179,13 @@ def _draw_path(ax: Axes, rows: np.ndarray, timeline: Timeline) -> None:
 
 def _title(ax: Axes, title: str = "", legend: bool = False) -> None:
     ax.set_title(title, loc="left", fontweight="bold")
-    if legend:  # above the axes, where it hides nothing
+    if legend:  # above the axes, where it covers no data
         ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncol=4, fontsize="small", frameon=False, borderpad=0)
 
 
 def _finish(ax: Axes) -> None:
     low, high = ax.get_ylim()
-    missing = _SMALLEST_RANGE - (high - low)
+    missing = _MIN_AXIS_RANGE - (high - low)
     if missing > 0:
         ax.set_ylim(low - missing / 2, high + missing / 2)
     ax.grid(color=_GRID)
@@ -193,7 +194,7 @@ def _finish(ax: Axes) -> None:
 
 
 def _mark(ax: Axes, timeline: Timeline) -> None:
-    """Shade the pushes, draw a line at the poses, and name them."""
+    """Shade the pushes, draw a line at the poses, and label both."""
     for entry in timeline.entries:
         if isinstance(entry.action, Twist):
             continue
@@ -204,5 +205,5 @@ def _mark(ax: Axes, timeline: Timeline) -> None:
         name = type(entry.action).__name__.lower()
         text = ax.annotate(name, (entry.end, 1), xycoords=("data", "axes fraction"), xytext=(3, -1),
                            textcoords="offset points", va="top", fontsize="x-small", color=_GREY)  # fmt: skip
-        text.set_clip_on(True)  # those after the end of the flight
+        text.set_clip_on(True)  # hides labels after the end of the flight
         text.set_in_layout(False)

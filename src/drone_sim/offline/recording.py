@@ -1,4 +1,4 @@
-"""What a flight was, step by step: kept for the plot, written to a CSV file as it goes, and read back from one."""
+"""Recording of a flight step by step, in memory for the plot and in a CSV file, and reading of such a file."""
 
 from __future__ import annotations
 
@@ -23,34 +23,34 @@ COLUMNS = (
     *(f"propeller{number} [m/s]" for number in (1, 2, 3, 4)),
 )
 
-MAX_ROWS = 500_000  # of a table that is read: as many as are drawn
-LARGEST = 1e9  # m, m/s, ...: nothing is there, and no axis goes so far
-_LONGEST = 10_000  # characters of a line
+MAX_ROWS = 500_000  # of a table that is read; as many as can be plotted
+LARGEST = 1e9  # m, m/s, ...: larger values are invalid
+_MAX_LINE = 10_000  # characters of a line
 _Row = tuple[float, ...]
 
 
 class OutputError(OSError):
-    """A table or a video of a flight cannot be continued; what was written of it is not kept."""
+    """A table or a video of a flight cannot be written; the incomplete file is discarded."""
 
 
 class TableRefused(ValueError):
-    """A table cannot be read; one line that names the file, the line (from 1) and what is wrong."""
+    """A table cannot be read; one line with the file, the line number (from 1) and the problem."""
 
 
 class Recording:
-    """A row per step: the state after it, and the command and the propellers that led there.
+    """A row per step: the state after the step, and the command and propeller velocities during it.
 
     The row of t = 0 is the state before any step. Position, quaternion and velocities are those of
     base_link in the world frame, the command is in the track frame, propellers are particle velocities.
     """
 
-    clock = "simulated time"  # what its times are
+    clock = "simulated time"  # the kind of its times
 
     def __init__(self, file: IO[str] | None = None, keep: bool = True, vehicle: str = ""):
-        """Begin, with the header in the CSV `file` if there is one. Raises OutputError.
+        """Write the header to the CSV `file`, if given. Raises OutputError.
 
-        `vehicle` is the one whose flight it is; by default the first.
-        Without `keep`, `rows` holds the last one alone: a long flight must not fill the memory.
+        `vehicle` is the recorded one, by default the first. Without `keep`, `rows` has only the last row, so that a
+        long flight does not fill the memory.
         """
         self.rows: list[_Row] = []
         self._file = file
@@ -59,7 +59,7 @@ class Recording:
         self._write(COLUMNS)
 
     def add(self, simulation: Simulation) -> None:
-        """Add a row: now. Raises OutputError where the disk is full."""
+        """Add a row with the current state. Raises OutputError if the disk is full."""
         drone = simulation.vehicles.get(self._vehicle, simulation.drone)
         position, orientation, linear, angular = drone.body.state
         command = (*drone.commands.now.linear, drone.commands.now.angular.z)
@@ -71,42 +71,42 @@ class Recording:
         self.write_row(row)
 
     def write_row(self, row: Iterable[float]) -> None:
-        """Write a row to the file alone. Raises OutputError where the disk is full."""
+        """Write a row to the file only. Raises OutputError if the disk is full."""
         self._write(map(_shortest, row))
 
     def matrix(self, index: int) -> Matrix:
-        """Return the transform world from base_link of a row."""
+        """Return a row's transform from base_link to the world."""
         row = self.rows[index]
         return from_quaternion(row[1:4], row[4:8])
 
     def _write(self, fields: Iterable[str]) -> None:
         if self._file is not None:
             try:
-                self._file.write(",".join(fields) + "\n")  # at once: Ctrl-C leaves no half row
+                self._file.write(",".join(fields) + "\n")  # a single call, so that Ctrl-C leaves no incomplete row
             except OSError as error:
                 raise OutputError(error.errno, error.strerror) from None
 
 
 def _shortest(value: float) -> str:
-    """Return the shortest text that a float can be read back from to the last bit."""
+    """Return the shortest text from which the same float is read back exactly."""
     return repr(float(value)).removesuffix(".0")
 
 
 class SensorSeries(NamedTuple):
-    """What one sensor measured of one thing, beside the recording."""
+    """A sensor's measurements of a quantity, drawn beside the recording."""
 
     title: str  # its topic
-    unit: str  # with the quantity, such as "range [m]"
+    unit: str  # with the quantity: "range [m]"
     times: np.ndarray  # (n,), s of the flight
-    values: np.ndarray  # (n, k), in that unit; not finite where there was nothing to measure
+    values: np.ndarray  # (n, k), in that unit; not finite where nothing was measured
     labels: tuple[str, ...] = ()  # of the k columns, if there is more than one
 
 
-# ---- a table that is there
+# ---- reading a table
 
 
 def read_table(path: str | Path) -> Recording:
-    """Return the flight in a table. Raises OSError and TableRefused."""
+    """Return the flight in a CSV file. Raises OSError and TableRefused."""
     with open(path, encoding="utf-8") as file:
         try:
             rows = _rows(file)
@@ -120,14 +120,14 @@ def read_table(path: str | Path) -> Recording:
 
 
 def _rows(file: TextIO) -> list[_Row]:
-    header = file.readline(_LONGEST)
+    header = file.readline(_MAX_LINE)
     if not header:
         raise TableRefused("is empty")
     if header.rstrip("\r\n").split(",") != list(COLUMNS):
-        there = shown(header.strip()[:60])
-        raise TableRefused(f"line 1 is {there}: a table of `fly --csv` begins with {COLUMNS[0]},{COLUMNS[1]},...")
+        first_line = shown(header.strip()[:60])
+        raise TableRefused(f"line 1 is {first_line}: a table of `fly --csv` begins with {COLUMNS[0]},{COLUMNS[1]},...")
     rows: list[_Row] = []
-    while line := file.readline(_LONGEST):
+    while line := file.readline(_MAX_LINE):
         number = len(rows) + 2
         if len(rows) == MAX_ROWS:
             raise TableRefused(f"has more than {MAX_ROWS} rows")

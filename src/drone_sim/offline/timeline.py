@@ -1,16 +1,16 @@
-"""A flight's commands in a YAML file: what happens to the drone, and when.
+"""Timeline: a flight's commands and events in a YAML file.
 
     - {at: 1.0, twist: {linear: [1, 0, 0], angular: [0, 0, 0]}}            # m/s, rad/s, track frame
-    - {at: 5.0, pose: {position: [0, 0, 2], rpy: [0.3, 0, 0]}}             # m, rad; put there at rest
+    - {at: 5.0, pose: {position: [0, 0, 2], rpy: [0.3, 0, 0]}}             # m, rad; at rest
     - {at: 8.0, push: {force: [1, 0, 0], torque: [0, 0, 0], duration: 0.2}}  # N, N m, world frame; s
-    - {at: 9.0, vehicle: drone2, twist: {linear: [0, 1, 0]}}               # of several; the first one otherwise
-    - {at: 10.0, weather: {wind: [3, 0, 0]}}                               # other values for keys of `weather`
-    - {at: 11.0, faults: {propellers: [1, 1, 0, 1]}}                       # and of `faults`; the others stay
+    - {at: 9.0, vehicle: drone2, twist: {linear: [0, 1, 0]}}               # default: the first vehicle
+    - {at: 10.0, weather: {wind: [3, 0, 0]}}                               # new values of keys of `weather`
+    - {at: 11.0, faults: {propellers: [1, 1, 0, 1]}}                       # or `faults`; other keys keep theirs
     - {at: 12.0, land: {}}                                                 # or takeoff, reset, home: docs/states.md
     - {at: 20.0, goto: {position: [1, 0, 2], rpy: [0, 0, 1.57]}}           # m, rad
     - {at: 30.0, object: {name: Ball, position: [1, 0, 2], rpy: [0, 0, 0]}} # of the scene; m, rad, world
 
-`at` is in seconds of simulated time, in any order; three numbers that are left out are zeros.
+`at` is in seconds of simulated time; entries may be in any order. Omitted vectors are zeros.
 """
 
 from __future__ import annotations
@@ -48,29 +48,29 @@ from drone_sim.vehicles.vehicle import Vehicle
 
 MAX_TIME = 1e6  # s, the longest flight
 _ZERO = (0.0, 0.0, 0.0)
-_TOLERANCE = 1e-6  # of a step: decimal times are not exact multiples of a binary step
+_TOLERANCE = 1e-6  # in steps: decimal times are not exact multiples of a binary step
 
 
 class TimelineError(ValueError):
-    """A timeline is wrong; one line that names file, entry (from 1), key, value and what is allowed."""
+    """A timeline is invalid; one line with file, entry (from 1), key, value and what is allowed."""
 
 
 class ScriptRequest(NamedTuple):
-    """What a vehicle's script is asked for: the topic, and a pose where it needs one."""
+    """A request to a vehicle's script: the topic, and a pose if the request has one."""
 
     topic: str
     pose: Pose | None = None
 
 
 class ObjectMove(NamedTuple):
-    """Where an object is to be (m, rad, world); without angles it stays turned as it is."""
+    """The pose that an object is moved to (m, rad, world); without angles it keeps its orientation."""
 
-    name: str  # as scripts find it
+    name: str  # its name in scripts
     position: Vector
     rpy: Vector | None
 
     def apply(self, objects: ObjectTree) -> None:
-        """Put it there, with all that hangs on it. Raises ValueError where there is no such object."""
+        """Move the object with its descendants. Raises ValueError if there is no such object."""
         handle = objects.handle(self.name)
         rpy = to_rpy(objects.matrix(handle)) if self.rpy is None else self.rpy
         objects.set_matrix(handle, WORLD, from_rpy(self.position, rpy))
@@ -78,32 +78,32 @@ class ObjectMove(NamedTuple):
 
 @dataclass(frozen=True)
 class ParameterChange:
-    """Keys of the parameters that become others."""
+    """New values of some parameters."""
 
     changes: Mapping[str, Any]
 
     def checked(self, _parameters: EquipmentParameters) -> ParameterChange:
-        """Return this: it has been checked."""
+        """Return itself: it was checked when it was read."""
         return self
 
     def apply(self, vehicle: Vehicle) -> None:
-        """Change them."""
+        """Change the parameters."""
         raise NotImplementedError
 
 
 class WeatherChange(ParameterChange):
-    """Keys of `weather`, for all vehicles."""
+    """New values of `weather`, for all vehicles."""
 
     def apply(self, vehicle: Vehicle) -> None:
-        """Change the air that it is in."""
+        """Change the weather."""
         vehicle.context.change_weather(self.changes)
 
 
 class FaultsChange(ParameterChange):
-    """Keys of `faults`, for one vehicle."""
+    """New values of `faults`, for one vehicle."""
 
     def apply(self, vehicle: Vehicle) -> None:
-        """Change what is wrong with it."""
+        """Change the vehicle's faults."""
         vehicle.change_faults(self.changes)
 
 
@@ -111,7 +111,7 @@ CHANGES: dict[str, type[ParameterChange]] = {"weather": WeatherChange, "faults":
 
 
 class Entry(NamedTuple):
-    """What happens to a vehicle ('' is the first) at `at` seconds of simulated time."""
+    """A command or event for a vehicle ('' is the first) at `at` seconds of simulated time."""
 
     at: float
     action: Twist | Pose | Push | ParameterChange | ScriptRequest | ObjectMove
@@ -119,11 +119,11 @@ class Entry(NamedTuple):
 
     @property
     def end(self) -> float:
-        """The time (s) at which a push is over; of anything else `at`."""
+        """The time (s) at which a push ends; `at` for other actions."""
         return self.at + (self.action.duration if isinstance(self.action, Push) else 0.0)
 
     def apply(self, vehicles: Mapping[str, Vehicle]) -> None:
-        """Carry the entry out, on the vehicle among these that it is for."""
+        """Apply the action to the entry's vehicle."""
         vehicle = vehicles[self.vehicle] if self.vehicle else next(iter(vehicles.values()))
         if isinstance(self.action, Twist):
             vehicle.commands.receive(self.action)
@@ -140,10 +140,10 @@ class Entry(NamedTuple):
 
 
 class Timeline:
-    """Entries by the simulation step whose actuation is the first at or after their time."""
+    """Entries by simulation step: the first step that begins at or after their time."""
 
     def __init__(self, entries: Iterable[Entry], time_step: float):
-        """Sort the `entries` by time, those of one time in the order given; `time_step` in seconds."""
+        """Sort the entries by time, stably; `time_step` in seconds."""
         self.entries = sorted(entries, key=lambda entry: entry.at)
         self._time_step = time_step
         self._due: dict[int, list[Entry]] = {}
@@ -152,19 +152,19 @@ class Timeline:
 
     @property
     def end(self) -> float:
-        """The time (s) at which the last command is given and the last push is over; 0 without entries."""
+        """The time (s) of the last command or the end of the last push; 0 without entries."""
         return max((entry.end for entry in self.entries), default=0.0)
 
     def of(self, vehicle: str) -> Timeline:
-        """Return what happens to one vehicle, which is the first where an entry names none."""
-        return Timeline([one for one in self.entries if one.vehicle in ("", vehicle)], self._time_step)
+        """Return the entries of a vehicle, including those without a vehicle's name."""
+        return Timeline([entry for entry in self.entries if entry.vehicle in ("", vehicle)], self._time_step)
 
     def is_due(self, step: int) -> bool:
-        """Tell whether anything is due in a step."""
+        """Return whether an entry is due in a step."""
         return step in self._due
 
     def apply(self, step: int, vehicles: Mapping[str, Vehicle]) -> None:
-        """Do what is due in a step (counted from 0), just before it runs."""
+        """Apply the entries of a step (counted from 0), just before it runs."""
         for entry in self._due.get(step, ()):
             entry.apply(vehicles)
 
@@ -175,7 +175,7 @@ def first_step(time: float, time_step: float) -> int:
 
 
 def read(path: str, parameters: Parameters) -> Timeline:
-    """Return the timeline in a YAML file; raises TimelineError."""
+    """Return the timeline in a YAML file. Raises TimelineError."""
     try:
         rows = yaml_files.read(path)
     except yaml_files.YamlError as error:
@@ -184,18 +184,18 @@ def read(path: str, parameters: Parameters) -> Timeline:
 
 
 def of_rows(rows: Any, parameters: Parameters, path: str, above: Location = ()) -> Timeline:
-    """Return the timeline that stands under the keys `above` in a YAML file; raises TimelineError."""
+    """Return the timeline under the keys `above` in a YAML file. Raises TimelineError."""
     if not isinstance(rows, list):
         key = f"{readable_key(above)}: " if above else ""
         raise TimelineError(f"{path}: {key}must be a list of `- {{at: 1.0, twist: ...}}` entries, not {shown(rows)}")
     entries: list[Entry] = []
-    wrong: _Wrong = []
+    wrong: _Problems = []
     for index, row in enumerate(rows):
-        found: _Wrong = []
-        entry = _entry(row, parameters, found)
+        problems: _Problems = []
+        entry = _entry(row, parameters, problems)
         if entry is not None:
             entries.append(entry)
-        wrong += [((*above, index, *location), f"entry {index + 1}: {text}") for location, text in found]
+        wrong += [((*above, index, *location), f"entry {index + 1}: {text}") for location, text in problems]
     if wrong:
         lines = yaml_files.lines(path)
         raise TimelineError(one_line([(lines.find(location).line, text) for location, text in wrong], path))
@@ -256,14 +256,14 @@ class _GotoModel(_PoseModel):
         return ScriptRequest("goto", super().checked(parameters))
 
 
-def _asking(topic: str) -> type[_Model]:
-    """Return the model of a request that says no more than its name."""
+def _request_model(topic: str) -> type[_Model]:
+    """Return the model of a request without parameters."""
 
-    class Asking(_Model):
+    class RequestModel(_Model):
         def checked(self, _parameters: EquipmentParameters) -> ScriptRequest:
             return ScriptRequest(topic)
 
-    return Asking
+    return RequestModel
 
 
 class _PushModel(_Model):
@@ -277,16 +277,16 @@ class _PushModel(_Model):
 
 _KINDS: dict[str, type[Any]] = {
     **{"twist": _TwistModel, "pose": _PoseModel, "push": _PushModel, "goto": _GotoModel, "object": _ObjectModel},
-    **{topic: _asking(topic) for topic, kind in REQUESTS.items() if kind == EMPTY},
+    **{topic: _request_model(topic) for topic, kind in REQUESTS.items() if kind == EMPTY},
 }
 _ALL_KINDS = (*_KINDS, *CHANGES)
 
 
-_Wrong = list[tuple[Location, str]]  # the keys on the way to each wrong value, and a text
+_Problems = list[tuple[Location, str]]  # location of each wrong value, and a text
 
 
-def _entry(row: Any, parameters: Parameters, wrong: _Wrong) -> Entry | None:
-    """Return an entry; or None, with what is wrong with it added to `wrong`, which is empty before."""
+def _entry(row: Any, parameters: Parameters, wrong: _Problems) -> Entry | None:
+    """Return an entry; or None, with its problems added to `wrong`, which must be empty."""
     if not isinstance(row, dict):
         wrong.append(((), f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}"))
         return None
@@ -295,57 +295,59 @@ def _entry(row: Any, parameters: Parameters, wrong: _Wrong) -> Entry | None:
     wrong += [((key,), f"{readable_key((key,))}: {unknown}") for key in row if key not in known]
     kinds = [kind for kind in _ALL_KINDS if kind in row]
     if len(kinds) != 1:
-        held = " and ".join(kinds) or "none"
-        wrong += [] if wrong else [((), f"must hold one of {', '.join(_ALL_KINDS)}; it holds {held}")]
+        present = " and ".join(kinds) or "none"
+        wrong += [] if wrong else [((), f"must hold one of {', '.join(_ALL_KINDS)}; it holds {present}")]
         return None
     kind = kinds[0]
     at = _checked(_TimeModel, {"at": row["at"]} if "at" in row else {}, (), wrong)
-    own = _vehicle(row.get("vehicle", ""), parameters, wrong)
+    vehicle = _vehicle(row.get("vehicle", ""), parameters, wrong)
     values = {} if row[kind] is None and REQUESTS.get(kind) == EMPTY else row[kind]
     is_change = kind in CHANGES
     action = (
-        _change(kind, values, parameters, own, wrong) if is_change else _checked(_KINDS[kind], values, (kind,), wrong)
+        _change(kind, values, parameters, vehicle, wrong)
+        if is_change
+        else _checked(_KINDS[kind], values, (kind,), wrong)
     )
     if wrong:
         return None
     try:
-        return Entry(at.at, action.checked(own), row.get("vehicle", ""))
+        return Entry(at.at, action.checked(vehicle), row.get("vehicle", ""))
     except checks.Refused as refused:
         wrong.append(((kind, refused.field), f"{kind}.{refused}"))
         return None
 
 
-def _vehicle(name: Any, parameters: Parameters, wrong: _Wrong) -> VehicleParameters:
-    """Return what is allowed of a vehicle; of the first one for a wrong name."""
-    fleet = {one.name: one for one in parameters.fleet}
+def _vehicle(name: Any, parameters: Parameters, wrong: _Problems) -> VehicleParameters:
+    """Return the parameters of a vehicle; those of the first one for an unknown name."""
+    fleet = {vehicle.name: vehicle for vehicle in parameters.fleet}
     if name != "" and not (isinstance(name, str) and name in fleet):
         wrong.append((("vehicle",), f"vehicle = {shown(name)}: no such vehicle; {near_names(str(name), fleet)}"))
         return parameters.first
     return fleet.get(name, parameters.first)
 
 
-def _change(kind: str, values: Any, parameters: Parameters, vehicle: VehicleParameters, wrong: _Wrong) -> Any:
-    """Return the change that an entry's `weather` or `faults` asks for, or None."""
+def _change(kind: str, values: Any, parameters: Parameters, vehicle: VehicleParameters, wrong: _Problems) -> Any:
+    """Return the change of an entry's `weather` or `faults`, or None if it is invalid."""
     base: Checked = parameters.weather if kind == "weather" else vehicle.faults
     try:
         new = changed(base, values)
     except ParameterError as error:
-        wrong += [(one.location, one.text) for one in error.below(kind).problems]
+        wrong += [(problem.location, problem.text) for problem in error.below(kind).problems]
         return None
     try:
         if kind == "faults":
             vehicle.model_copy(update={"faults": new}).check_faults()
     except ParameterError as error:
-        wrong += [(one.location, one.text) for one in error.problems]
+        wrong += [(problem.location, problem.text) for problem in error.problems]
     return CHANGES[kind](values)
 
 
-def _checked(model: type[Any], values: Any, above: Location, wrong: _Wrong) -> Any:
-    """Return a model of the values, or None."""
+def _checked(model: type[Any], values: Any, above: Location, wrong: _Problems) -> Any:
+    """Return the values as a model, or None if they are invalid."""
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        wrong += [((*above, *one["loc"]), _one_line(one, model, above)) for one in error.errors()]
+        wrong += [((*above, *problem["loc"]), _one_line(problem, model, above)) for problem in error.errors()]
         return None
 
 

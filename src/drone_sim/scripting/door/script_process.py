@@ -165,14 +165,14 @@ class _Hosted:
         """Whether it has an unfinished thread."""
         return self._script.threaded
 
-    def do(self, what: str, arguments: list[Any], answers: Any) -> Any:
+    def do(self, command: str, arguments: list[Any], answers: Any) -> Any:
         """Execute a command of the simulation. Raises ScriptError."""
         name = arguments[0] if arguments and isinstance(arguments[0], str) else ""
-        self._stand_ins.begin(f"{what} {name}", answers)
+        self._stand_ins.begin(f"{command} {name}", answers)
         try:
-            if what in ("load", "save", "restore"):
-                return getattr(self, f"_{what}")(*arguments)
-            return getattr(self._script, what)(*arguments)
+            if command in ("load", "save", "restore"):
+                return getattr(self, f"_{command}")(*arguments)
+            return getattr(self._script, command)(*arguments)
         finally:
             self._stand_ins.end()
 
