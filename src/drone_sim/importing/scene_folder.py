@@ -126,11 +126,9 @@ class _Import:
         self._by_handle = {node.object.handle: node for node in self._objects}
         self._floor = floor_parts(self._objects)
         self._scripts = self._child_scripts()
-        drones = find(self._objects, self._scripts)
-        self._vehicles = [
-            ImportedVehicle(*pair) for pair in zip(drones, [self._scripts] * len(drones), suffixes(drones))
-        ]
-        self._vehicle_names = vehicle_names(drones)
+        quads = find(self._objects, self._scripts)
+        self._vehicles = [ImportedVehicle(*pair) for pair in zip(quads, [self._scripts] * len(quads), suffixes(quads))]
+        self._vehicle_names = vehicle_names(quads)
         self._words = set(re.findall(r"\w+", "\n".join(script.text for script in file.scripts)))
         self._of_vehicles = {id(node) for vehicle in self._vehicles for node in vehicle.objects.values()}
         taken: set[str] = set()
@@ -296,9 +294,7 @@ class _Import:
         excluded = {id(node) for node in self._floor} | self._of_vehicles
         excluded |= {id(node) for vehicle in self._vehicles for node in vehicle.cameras}
         drawn = {id(node) for vehicle in self._vehicles for node in (*vehicle.parts, *vehicle.looks)}
-        second = {
-            self._by_handle.get(script.own_object) for scripts in self._scripts.values() for script in scripts[1:]
-        }
+        second = {self._by_handle.get(item.own_object) for items in self._scripts.values() for item in items[1:]}
         chosen: set[int] = set()
         for node in reversed(self._objects):  # children first
             if id(node) in excluded:

@@ -36,15 +36,13 @@ class VehicleUrdf:
         root = quadricopter.root
         base = self._link("base_link", root, root.matrix)
         joints = (propeller.joint for propeller in quadricopter.propellers)
-        blades_by_propeller = [[] if joint is None else list(joint.subtree()) for joint in joints]
+        blade_sets = [[] if joint is None else list(joint.subtree()) for joint in joints]
         bodies = [root, *(propeller.body for propeller in quadricopter.propellers), *parts]
         fixed = [
-            node
-            for node in (*bodies, *looks)
-            if node.is_visible and not any(node in blades for blades in blades_by_propeller)
+            node for node in (*bodies, *looks) if node.is_visible and not any(node in blades for blades in blade_sets)
         ]
         self._add_visuals(base, root.name, fixed, root.matrix)
-        for place, propeller, blades in zip(PLACES, quadricopter.propellers, blades_by_propeller):
+        for place, propeller, blades in zip(PLACES, quadricopter.propellers, blade_sets):
             self._add_propeller(place, propeller, [node for node in blades if node.is_visible and node in looks])
         for index, part in enumerate(parts, start=1):
             name, swings = f"part_{index}", swings_on(part, root)

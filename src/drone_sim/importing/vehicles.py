@@ -22,8 +22,7 @@ from drone_sim.vehicles.quadricopter_objects import BASE, DRONE, SCRIPT, TARGET,
 from drone_sim.vrep_files.model import VrepCamera, VrepJoint, VrepScript
 
 _STANDARD_CAMERAS = {"FrontVision": "front", "DepthVision": "depth", "TrackCam": "track", "FloorVision": "floor"}
-# Body axes (x forward, y left, z up) in a vision sensor's frame.
-_BODY_AXES = (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+_BODY_AXES = (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # in a vision sensor: x forward, y left, z up
 _OBJECT_BY_ENDING = {
     "track_base": TRACK_BASE,
     "floorcamera": "Quadricopter_floorCamera",

@@ -159,7 +159,7 @@ def _draw_path(ax: Axes, rows: np.ndarray, timeline: Timeline) -> None:
     """Draw the path seen from above, with a gap where a pose command moves the drone."""
     x, y = rows[:, 1], rows[:, 2]
     jumps = np.searchsorted(
-        rows[:, 0], [entry.at for entry in timeline.entries if isinstance(entry.action, Pose)], "right"
+        rows[:, 0], [item.at for item in timeline.entries if isinstance(item.action, Pose)], "right"
     )
     jumps = jumps[jumps < len(rows)]
     ax.plot(np.insert(x, jumps, np.nan), np.insert(y, jumps, np.nan), color=_BLUE)

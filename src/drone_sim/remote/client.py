@@ -25,13 +25,7 @@ from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.errors import ScriptError
 
 _FUNCTION_SUFFIX = "@func"  # of an argument that names a function of the client
-_BUFFER_FUNCTIONS = (
-    "getStringSignal",
-    "getVisionSensorImg",
-    "getVisionSensorDepth",
-    "packTable",
-    "readCustomDataBlock",
-)
+_RETURN_BYTES = ("getStringSignal", "getVisionSensorImg", "getVisionSensorDepth", "packTable", "readCustomDataBlock")
 _ONE_LINE_ERRORS = (ScriptError, Diverged, OSError, RuntimeError)  # their texts are written for the user
 
 
@@ -193,6 +187,6 @@ def _argument(value: Any) -> Any:
 def _values(function: str, values: Any) -> list[Any]:
     """Return a function's result as the list to send, with buffers as bytes."""
     results = list(values) if isinstance(values, tuple) else [] if values is None else [values]
-    if results and isinstance(results[0], str) and function.partition(".")[2] in _BUFFER_FUNCTIONS:
+    if results and isinstance(results[0], str) and function.partition(".")[2] in _RETURN_BYTES:
         results[0] = results[0].encode("utf-8", "surrogateescape")
     return results

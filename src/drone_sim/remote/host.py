@@ -59,10 +59,7 @@ class ClientHost:
         """
         if not self._vehicles:
             raise ValueError(f"'{name}' is not a part of a vehicle, and the scene has no vehicle")
-        return next(
-            (vehicle for vehicle in self._vehicles if vehicle.suffix and name.endswith(vehicle.suffix)),
-            self._vehicles[0],
-        )
+        return next((item for item in self._vehicles if item.suffix and name.endswith(item.suffix)), self._vehicles[0])
 
 
 class _ScriptsForClients(Scripts):

@@ -13,7 +13,7 @@ _ANY, _OBJECT_TYPES = 109, 20  # sim_appobj_object_type; object types are below 
 _CYCLIC = -1.0  # sent as the range of a cyclic joint
 
 
-class _ObjectData(NamedTuple):
+class _Data(NamedTuple):
     """The data of an object: integers, floats and strings."""
 
     whole: Sequence[float] = ()
@@ -21,45 +21,43 @@ class _ObjectData(NamedTuple):
     texts: Sequence[str] = ()
 
 
-def _pose(frame: int, *functions: str) -> Callable[[Asked, int], _ObjectData]:
-    return lambda ask, handle: _ObjectData(
-        real=[number for function in functions for number in ask.sim(function, handle, frame)]
-    )
+def _pose(frame: int, *functions: str) -> Callable[[Asked, int], _Data]:
+    return lambda ask, handle: _Data(real=[value for name in functions for value in ask.sim(name, handle, frame)])
 
 
-def _velocity(*which: int) -> Callable[[Asked, int], _ObjectData]:
-    def read(ask: Asked, handle: int) -> _ObjectData:
+def _velocity(*which: int) -> Callable[[Asked, int], _Data]:
+    def read(ask: Asked, handle: int) -> _Data:
         linear_and_angular = ask.sim("getObjectVelocity", handle)
-        return _ObjectData(real=[number for index in which for number in linear_and_angular[index]])
+        return _Data(real=[number for index in which for number in linear_and_angular[index]])
 
     return read
 
 
-def _proximity(ask: Asked, handle: int) -> _ObjectData:
+def _proximity(ask: Asked, handle: int) -> _Data:
     state, _, point, detected, normal = ask.sim("readProximitySensor", handle)
-    return _ObjectData([max(0, state), detected], [*point, *normal])
+    return _Data([max(0, state), detected], [*point, *normal])
 
 
-def _force(ask: Asked, handle: int) -> _ObjectData:
+def _force(ask: Asked, handle: int) -> _Data:
     state, force, torque = ask.sim("readForceSensor", handle)
-    return _ObjectData([state], [*force, *torque])
+    return _Data([state], [*force, *torque])
 
 
-def _joint(ask: Asked, handle: int) -> _ObjectData:
-    return _ObjectData(real=[ask.sim("getJointPosition", handle), ask.sim("getJointForce", handle)])
+def _joint(ask: Asked, handle: int) -> _Data:
+    return _Data(real=[ask.sim("getJointPosition", handle), ask.sim("getJointForce", handle)])
 
 
-def _joint_kind(ask: Asked, handle: int) -> _ObjectData:
+def _joint_kind(ask: Asked, handle: int) -> _Data:
     cyclic, (low, extent) = ask.sim("getJointInterval", handle)
     whole = ask.sim("getJointType", handle), ask.sim("getJointMode", handle)[0]
-    return _ObjectData(whole, [low, _CYCLIC if cyclic else extent])
+    return _Data(whole, [low, _CYCLIC if cyclic else extent])
 
 
 _POSITION, _EULER, _QUATERNION = "getObjectPosition", "getObjectOrientation", "getObjectQuaternion"
-_KINDS: Sequence[Callable[[Asked, int], _ObjectData]] = (
-    lambda ask, handle: _ObjectData(texts=[ask.sim("getObjectName", handle)]),
-    lambda ask, handle: _ObjectData([ask.sim("getObjectType", handle)]),
-    lambda ask, handle: _ObjectData([ask.sim("getObjectParent", handle)]),
+_KINDS: Sequence[Callable[[Asked, int], _Data]] = (
+    lambda ask, handle: _Data(texts=[ask.sim("getObjectName", handle)]),
+    lambda ask, handle: _Data([ask.sim("getObjectType", handle)]),
+    lambda ask, handle: _Data([ask.sim("getObjectParent", handle)]),
     _pose(_WORLD, _POSITION),
     _pose(_PARENT, _POSITION),
     _pose(_WORLD, _EULER),

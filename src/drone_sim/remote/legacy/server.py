@@ -23,7 +23,7 @@ _LOG.setLevel(logging.INFO)
 _MAX_CLIENTS = 100
 _MAX_ACCEPTED = 256  # connections accepted between two steps
 _TIME_SLICE = 0.005  # s for clients' requests between two steps, at most
-_CLEANUP_INTERVAL = 1.0  # s between checks for silent clients, and between log lines about clients
+_INTERVAL = 1.0  # s between checks for silent clients, and between log lines about clients
 _MAX_SILENCE = 600.0  # s without a message after which a client is disconnected
 _GONE = select.EPOLLRDHUP | select.EPOLLHUP | select.EPOLLERR
 
@@ -69,11 +69,7 @@ class LegacyServer(RemoteApi):
         self._player, self._clock, self._others, self._watched = player, clock, others, watched
         self._moved = moved or MovedObjects(player.simulation)
         self._selected: list[int] = []
-        self._cleanup, self._log_throttle, self._suppressed = (
-            Throttle(_CLEANUP_INTERVAL, clock),
-            Throttle(_CLEANUP_INTERVAL, clock),
-            0,
-        )
+        self._cleanup, self._log_limit, self._suppressed = Throttle(_INTERVAL, clock), Throttle(_INTERVAL, clock), 0
         self._epoll = select.epoll()
         self._doors = Doors("" if address == "*" else address, self._epoll)
         self._guests: dict[int, _Guest] = {}
@@ -186,7 +182,7 @@ class LegacyServer(RemoteApi):
 
     def _log(self, line: str) -> None:
         """Write a line to the log, at most one per second, so that clients cannot flood it."""
-        if self._log_throttle.passes():
+        if self._log_limit.passes():
             more = f" ({self._suppressed} similar lines were left out)" if self._suppressed else ""
             self._suppressed = 0
             _LOG.warning("remote API: %s%s", printable(line), more)

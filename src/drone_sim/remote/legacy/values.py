@@ -15,9 +15,7 @@ def floats(*values: float) -> bytes:
     try:
         return struct.pack(layout, *values)
     except OverflowError:
-        return struct.pack(
-            layout, *(value if abs(value) <= _MAX_FLOAT else math.copysign(math.inf, value) for value in values)
-        )
+        return struct.pack(layout, *(x if abs(x) <= _MAX_FLOAT else math.copysign(math.inf, x) for x in values))
 
 
 def ints(*values: float) -> bytes:

@@ -17,14 +17,10 @@ LARGEST = 8 * 1024 * 1024  # bytes of a message
 VERSION = 11  # of the protocol
 _MAX_COMMANDS = 2000  # of a message
 _PACKET = struct.Struct("<hhh")
-_PIECE, _OLD_PIECE = (
-    30_000,
-    244,
-)  # bytes of a message in a sent packet; V-REP 3.1's clients have no larger buffer
+_PIECE, _OLD_PIECE = 30_000, 244  # bytes in a sent packet; V-REP 3.1's clients have no larger buffer
 _MAX_PACKETS = 2**15 - 1  # of a message
-_HEADER = struct.Struct(
-    "<HBiiiHB"
-)  # checksum (V-REP 3.1 only), version, number, client's time, server's time, scene, state
+# Checksum (V-REP 3.1 only), version, number, client's time, server's time, scene, state.
+_HEADER = struct.Struct("<HBiiiHB")
 _COMMAND = struct.Struct("<iiHiiHiBB")  # size, total size, key size, shift, code and mode, delay, time, status, 0
 _FAILED = 1  # bit of the status
 _CODE = 0xFFFF

@@ -123,9 +123,8 @@ class ScriptEnd:
         outer, self._caller = self._caller, hosted
         try:
             self._requests = 0
-            has_succeeded = self._do(
-                hosted, command, [self._decoded(argument) for argument in arguments], (self._decoded(answers), places)
-            )
+            decoded = [self._decoded(argument) for argument in arguments]
+            has_succeeded = self._do(hosted, command, decoded, (self._decoded(answers), places))
             if command == "call" and arguments == ["actuation"]:
                 hosted.is_silent = not self._requests
             if may_go_on and has_succeeded and hosted.is_silent and not self._requests:
