@@ -38,7 +38,7 @@ BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
         ({"time_step": 1e9}, "time_step = 1000000000.0: input should be less than or equal to 1"),
         ({"time_step": True}, "time_step = True: input should be a valid number"),
         ({"time_step": "0.05"}, "time_step = '0.05': input should be a valid number"),
-        ({"sub_step": 1e-5}, "sub_step = 1e-05: makes 5000 of a time_step of 0.05 s; at most 1000 are allowed"),
+        ({"sub_step": 1e-5}, "sub_step = 1e-05: makes 5000 "),
         ({"sub_step": 1e-300}, "sub_step = 1e-300: input should be greater than or equal to 0.00001"),
         ({"gravity": 10**5000}, "gravity = 1e+300: input should be less than or equal to 100"),
         ({"gravity": "9" * 10**7}, "input should be a valid number"),

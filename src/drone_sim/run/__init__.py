@@ -1,1 +1,1 @@
-"""What runs: the simulation, its player, its pace, its parameters."""
+"""The simulation, its player, its real-time pace and its parameters."""

@@ -1,4 +1,4 @@
-"""When the next step is due, at which pace, and when it is time to show something. The clock is an argument."""
+"""Timing in real time: when the next step is due, and when to publish a state. The clock is an argument."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from drone_sim.message_text import near_names, shown
 from drone_sim.run.parameters import PaceParameters, Parameters
 from drone_sim.run.simulation import Simulation
 
-_SLICE = 0.1  # s; a long sleep is cut so that a shutdown is noticed
+_SLICE = 0.1  # s; long sleeps are split, so that a shutdown is noticed
 
 
 class Pacer:
-    """Lets a loop pass once per period. A step that comes too late is counted, never caught up."""
+    """Rate of a loop, like rospy.Rate. A step that is late is counted, and its delay is never caught up."""
 
     def __init__(
         self,
@@ -25,36 +25,36 @@ class Pacer:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ):
-        """Take the period in real seconds (0: as fast as it can), a monotonic clock, and a sleep."""
+        """Start the first period now. `period` is in s of real time (0: unpaced); `clock` must be monotonic."""
         self.overruns = 0
-        self.worst = 0.0  # s, of the overruns
+        self.worst = 0.0  # s, the longest overrun
         self._period = period
         self._clock = clock
         self._sleep = sleep
         self._due = clock() + period
-        self._excused = False
+        self._is_excused = False
 
     @property
     def is_far(self) -> bool:
-        """Whether the next period begins so late that a request that comes meanwhile would have to wait."""
+        """Whether the next period is so far away that a request received before would have to wait."""
         return self._due - self._clock() > _SLICE
 
     def change(self, period: float) -> None:
-        """Let the periods be others (real seconds; 0: as fast as it can), the one that has begun too."""
+        """Change the period (s of real time; 0: unpaced), including the current one."""
         now = self._clock()
-        begun = self._due - self._period if self._period else now
-        self._period, self._due = period, max(now, begun + period)
+        began = self._due - self._period if self._period else now
+        self._period, self._due = period, max(now, began + period)
 
     def wait(self, interrupted: Callable[[], bool] = lambda: False) -> float:
         """Sleep until the next period begins, or until interrupted; return the lateness in seconds.
 
-        Due times are multiples of the period after the start, so a late wake-up does not add up. When
-        a step took longer than its period, the following ones are put off by as much.
+        Due times are multiples of the period after the start, so late wake-ups do not add up. If a
+        step took longer than its period, the following ones are delayed by the excess.
         """
         late = max(0.0, self._clock() - self._due) if self._period else 0.0
         self._due += late
-        if self._excused:
-            late, self._excused = 0.0, False
+        if self._is_excused:
+            late, self._is_excused = 0.0, False
         if late:
             self.overruns += 1
             self.worst = max(self.worst, late)
@@ -64,25 +64,25 @@ class Pacer:
         return late
 
     def excuse(self) -> None:
-        """Let the next step not count as late: others have held it up."""
-        self._excused = True
+        """Do not count the next step as late, because something else delayed it."""
+        self._is_excused = True
 
     def restart(self) -> None:
-        """Begin to count anew, as after a pause: the next step is due one period from now."""
+        """Start a new period, as after a pause: the next step is due one period from now."""
         self._due = self._clock() + self._period
 
 
 class Throttle:
-    """Lets something pass, but not more often than once per period."""
+    """Limit of an action to once per period."""
 
     def __init__(self, period: float, clock: Callable[[], float] = time.monotonic):
-        """Take the period in real seconds, and a monotonic clock."""
+        """`period` is in s of real time; `clock` must be monotonic."""
         self._period = period
         self._clock = clock
         self._next = -math.inf
 
     def passes(self) -> bool:
-        """Tell whether it may pass now; it counts as passed then."""
+        """Return whether the action may happen now; if so, a new period begins."""
         now = self._clock()
         if now < self._next:
             return False
@@ -91,20 +91,20 @@ class Throttle:
 
 
 class Beat:
-    """Says when to show a state again: soon after a change, but not too often, and seldom without a change."""
+    """Rate limit for publishing a state: period `soon` after a change, period `seldom` without a change."""
 
     def __init__(self, soon: float, seldom: float, clock: Callable[[], float] = time.monotonic):
-        """Take both periods in real seconds, and a monotonic clock."""
+        """Both periods are in s of real time; `clock` must be monotonic."""
         self._soon, self._seldom = soon, seldom
         self._clock = clock
         self.restart()
 
     def left(self, changed: bool) -> float:
-        """Return the seconds until it is time: 0 when it is."""
+        """Return the time in s until the state is due, 0 if it is due now."""
         return max(0.0, self._last + (self._soon if changed else self._seldom) - self._clock())
 
     def restart(self) -> None:
-        """Count from now: it has been shown."""
+        """Start a new period, after the state was published."""
         self._last = self._clock()
 
 
@@ -112,26 +112,28 @@ FACTOR = "real_time_factor"
 
 
 def period(parameters: Parameters) -> float:
-    """Return the real seconds from one step to the next, 0 where they come as fast as they can."""
+    """Return the period of the steps in s of real time, 0 if they are unpaced."""
     factor = parameters.real_time_factor
     return parameters.time_step / factor if factor else 0.0
 
 
 class Pace:
-    """The pace of one simulation. It holds from the step that is waited for, through every start."""
+    """Real-time factor of a simulation. A change applies from the next step on, and persists across starts."""
 
     def __init__(self, simulation: Simulation, pacer: Pacer):
-        """Take the simulation, and what lets its steps pass."""
+        """`pacer` times the steps of `simulation`."""
         self._simulation, self._pacer = simulation, pacer
-        said = comments()[FACTOR]
-        self.known: dict[str, ParameterField] = {one.name: one._replace(said=said) for one in fields_of(PaceParameters)}
+        comment = comments()[FACTOR]
+        self.known: dict[str, ParameterField] = {
+            field.name: field._replace(said=comment) for field in fields_of(PaceParameters)
+        }
 
     def values(self) -> dict[str, Any]:
-        """Return what holds now, by name."""
+        """Return the present values by name."""
         return {FACTOR: self._simulation.parameters.real_time_factor}
 
     def change(self, changes: Mapping[str, Any]) -> None:
-        """Let another factor hold. Raises ParameterError."""
+        """Change the real-time factor. Raises ParameterError."""
         for name in changes.keys() - self.known.keys():
             near = near_names(name[:80], self.known)
             raise ParameterError(f"cannot be changed while the simulation runs; {near}", (shown(name),))

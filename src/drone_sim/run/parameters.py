@@ -1,6 +1,6 @@
-"""The numbers of config/*.yaml, checked once when read, frozen after that.
+"""Parameters of config/*.yaml, checked when they are read, and frozen.
 
-No value is defined here: config/drone.yaml holds every default, this module says what is allowed.
+This module defines what is allowed, and no values: config/drone.yaml holds every default.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _SPACING = 1.0  # m, between two vehicles in a row
 
 
 class RemoteApiParameters(Checked):
-    """Who may drive the simulation from outside."""
+    """Access of clients to the remote API."""
 
     serve: Switch
     address: Annotated[str, Field(pattern=ADDRESS, max_length=MAX_NAME)]
@@ -59,19 +59,19 @@ class RemoteApiParameters(Checked):
 
 
 class PaceParameters(Checked):
-    """How fast the simulation goes."""
+    """Speed of the simulation compared with real time."""
 
     real_time_factor: Annotated[Finite, Within(1e-3, 1e3, or_zero=True)]
 
 
 class PhysicsParameters(Checked):
-    """What of the textbook's dynamics V-REP leaves out."""
+    """Terms of rigid-body dynamics that V-REP leaves out."""
 
     gyroscopic: Switch
 
 
 class Parameters(PaceParameters, EquipmentParameters):
-    """Everything in config/drone.yaml."""
+    """All parameters in config/drone.yaml."""
 
     config: FileName
     gui: Switch
@@ -87,17 +87,16 @@ class Parameters(PaceParameters, EquipmentParameters):
     weather: WeatherParameters
     vehicles: Annotated[dict[Name, VehicleParameters], Field(max_length=MAX_VEHICLES)]
     samples: Annotated[Literal[0, 2, 4, 8], BeforeValidator(numeric)]
-    _given: dict[str, Any] = PrivateAttr(default_factory=dict)  # what stands without the scene file
-
+    _values: dict[str, Any] = PrivateAttr(default_factory=dict)  # the parameters without the scene file
     _in_scene_file: dict[str, Any] = PrivateAttr(default_factory=dict)
     _fleet: tuple[VehicleParameters, ...] = PrivateAttr(default=())
 
     @model_validator(mode="before")
     @classmethod
-    def _lay_vehicles_over(cls, values: Any) -> Any:
+    def _complete_vehicles(cls, values: Any) -> Any:
         if not isinstance(values, Mapping) or "vehicles" not in values:
             return values
-        entries = _entries(values["vehicles"], values.get("drone"))
+        entries = _vehicle_entries(values["vehicles"], values.get("drone"))
         if isinstance(entries, Mapping):
             entries = {
                 name: laid_over(entry, str(name), values) if isinstance(entry, Mapping) else entry
@@ -107,15 +106,15 @@ class Parameters(PaceParameters, EquipmentParameters):
 
     @property
     def fleet(self) -> tuple[VehicleParameters, ...]:
-        """What flies: the `vehicles`, or the drone alone where there are none, or one that has the drone's name.
+        """The vehicles that fly: those of `vehicles`, or the drone alone if there are none or only one with its name.
 
-        Nobody flies where the scene file says `vehicles: {}`, and nothing beside it says otherwise.
+        Empty if the scene file has `vehicles: {}` and no other source adds vehicles.
         """
         return self._fleet
 
     @property
     def first(self) -> VehicleParameters:
-        """The first vehicle, most often the only one. Raises ParameterError where nobody flies."""
+        """The first vehicle, usually the only one. Raises ParameterError if there is none."""
         if not self._fleet:
             raise ParameterError(
                 f"{self.scene_file}: the scene has no vehicle (vehicles: {{}}); add one, such as vehicles: 1"
@@ -124,17 +123,17 @@ class Parameters(PaceParameters, EquipmentParameters):
 
     @property
     def vehicle_entries(self) -> dict[str, dict[str, Any]]:
-        """The entries of `vehicles` that stand for what flies; none where the scene file has some."""
+        """The entries of `vehicles` for the present fleet, with positions and yaw; {} if the scene file has entries."""
         if "vehicles" in self._in_scene_file:
             return {}
-        given = self._given.get("vehicles")
-        places = {one.name: {"position": list(one.position), "yaw": one.yaw} for one in self._fleet}
-        own = given if isinstance(given, Mapping) else {}
-        return {name: {**place, **own.get(name, {})} for name, place in places.items()}
+        configured = self._values.get("vehicles")
+        poses = {vehicle.name: {"position": list(vehicle.position), "yaw": vehicle.yaw} for vehicle in self._fleet}
+        entries = configured if isinstance(configured, Mapping) else {}
+        return {name: {**pose, **entries.get(name, {})} for name, pose in poses.items()}
 
     @property
     def in_scene_file(self) -> Mapping[str, Any]:
-        """What the scene file says beside the scene: `drone`, `vehicles`, `weather`, `time_step`, ..."""
+        """The scene file's keys other than the scene: `drone`, `vehicles`, `weather`, `time_step`, ..."""
         return self._in_scene_file
 
     @property
@@ -143,60 +142,60 @@ class Parameters(PaceParameters, EquipmentParameters):
         return round(self.time_step / self.sub_step)
 
     def in_scene(self, file: str) -> Parameters:
-        """Return the parameters with floor, objects and drone as a scene file says now. Raises ParameterError.
+        """Return the parameters with floor, objects and drone of a scene file, read now. Raises ParameterError.
 
-        '' is the scene that was given without a file.
+        For '' the scene is that of the parameters, without a file.
         """
-        return self._at_the_same_step(_in_scene(self._given, file), file)
+        return self._with_same_time_step(_parameters_in_scene(self._values, file), file)
 
     def with_content(self, content: Mapping[str, Any], folder: Path, lines: YamlLines | None = None) -> Parameters:
-        """Return the parameters in a scene of this content, such as a file in `folder` could have.
+        """Return the parameters with the scene in `content`, whose file names are relative to `folder`.
 
-        Raises ParameterError, with where it stands in the `lines` of its text.
+        Raises ParameterError, with the line numbers of `lines`, the text of the content.
         """
-        said = scene_parameters.from_content(copy.deepcopy(dict(content)), folder)
-        return self._at_the_same_step(_checked(self._given, self.scene_file, said, lines=lines), "")
+        scene = scene_parameters.from_content(copy.deepcopy(dict(content)), folder)
+        return self._with_same_time_step(_checked(self._values, self.scene_file, scene, lines=lines), "")
 
     def in_file(self, file: str) -> Parameters:
-        """Return the same parameters, of a scene that has another file from now on."""
+        """Return the same parameters with another path for the scene file."""
         return self.model_copy(update={"scene_file": file})
 
-    def _at_the_same_step(self, found: Parameters, file: str) -> Parameters:
-        if found.time_step != self.time_step:
-            said = f"the time step cannot change while the simulation runs; it stays {self.time_step:g} s"
-            raise ParameterError(f"{file or 'the scene'}: time_step = {found.time_step:g}: {said}", ("time_step",))
-        return found
+    def _with_same_time_step(self, other: Parameters, file: str) -> Parameters:
+        if other.time_step != self.time_step:
+            reason = f"the time step cannot change while the simulation runs; it stays {self.time_step:g} s"
+            raise ParameterError(f"{file or 'the scene'}: time_step = {other.time_step:g}: {reason}", ("time_step",))
+        return other
 
     def with_vehicles(self, entries: Any) -> Parameters:
-        """Return the parameters with other `vehicles` given beside the scene file's. Raises ParameterError."""
-        return _in_scene({**self._given, "vehicles": entries}, self.scene_file)
+        """Return the parameters with other `vehicles` in addition to the scene file's. Raises ParameterError."""
+        return _parameters_in_scene({**self._values, "vehicles": entries}, self.scene_file)
 
     def at_pace(self, factor: Any) -> Parameters:
-        """Return the parameters with another real-time factor, also for scenes read later. Raises ParameterError."""
+        """Return the parameters with another real-time factor, which scenes read later keep. Raises ParameterError."""
         pace = changed(PaceParameters(real_time_factor=self.real_time_factor), {"real_time_factor": factor})
-        made = self.model_copy(update=pace.model_dump())
-        made._given = {**self._given, **pace.model_dump()}
-        return made
+        parameters = self.model_copy(update=pace.model_dump())
+        parameters._values = {**self._values, **pace.model_dump()}
+        return parameters
 
     def varied(
         self, weather: WeatherParameters, scene: SceneParameters, fleet: tuple[VehicleParameters, ...]
     ) -> Parameters:
-        """Return the parameters with other weather and places, of the same objects and vehicles, for one simulation.
+        """Return the parameters with another weather, scene and fleet, for the same objects and vehicles.
 
-        They are checked already; a scene file that is read anew forgets them.
+        The arguments are already validated. Reading a scene file again discards them.
         """
-        made = self.model_copy(update={"weather": weather, "scene": scene})
-        made._fleet = fleet
-        return made
+        parameters = self.model_copy(update={"weather": weather, "scene": scene})
+        parameters._fleet = fleet
+        return parameters
 
     def scene_place(self, location: Location) -> str:
-        """Return where a key of the scene stands, for a message: file and line, or just `scene`."""
+        """Return the position of a key of the scene for a message: file and line, or `scene` without a file."""
         if not self.scene_file:
             return "scene"
         return f"{self.scene_file}: line {yaml_files.lines(resolve(self.scene_file)).find(location).line}"
 
     def model_post_init(self, _context: Any) -> None:
-        """Check what concerns several keys at once."""
+        """Check conditions on several keys, and set the fleet."""
         steps = self.sub_steps
         if steps < 1 or abs(steps * self.sub_step - self.time_step) > 1e-9 * self.time_step:
             raise ParameterError(
@@ -204,7 +203,7 @@ class Parameters(PaceParameters, EquipmentParameters):
             )
         if steps > MAX_SUB_STEPS:
             raise ParameterError(
-                f"makes {steps} of a time_step of {self.time_step} s; at most {MAX_SUB_STEPS} are allowed",
+                f"makes {steps} sub-steps of a time_step of {self.time_step} s; at most {MAX_SUB_STEPS} are allowed",
                 ("sub_step",),
                 str(self.sub_step),
             )
@@ -213,51 +212,51 @@ class Parameters(PaceParameters, EquipmentParameters):
         for name, vehicle in self.vehicles.items():
             check_rates(vehicle.sensors, self.sub_step, ("vehicles", name))
         fleet = tuple(self.vehicles.values()) or (VehicleParameters.only(self.drone, self),)
-        self._fleet = (fleet[0].alone(),) if [one.name for one in fleet] == [self.drone.name] else fleet
+        self._fleet = (fleet[0].alone(),) if [vehicle.name for vehicle in fleet] == [self.drone.name] else fleet
 
 
-def _entries(given: Any, drone: Any) -> Any:
-    """Return the entries that a number of vehicles stands for: drone1, drone2, ... in a row about the drone."""
-    if isinstance(given, Mapping):
-        return given
-    is_number = isinstance(given, (int, float)) and not isinstance(given, bool)
-    if not (is_number and 0 <= given <= MAX_VEHICLES and given == int(given)):
-        must = f"a whole number from 0 to {MAX_VEHICLES}, or entries such as drone1: {{position: [0, 0, 0.8]}}"
-        raise ParameterError(f"must be {must}", ("vehicles",), shown(given))
+def _vehicle_entries(value: Any, drone: Any) -> Any:
+    """Return the entries of `vehicles`; a number n becomes drone1 ... drone<n>, in a row centred on the drone."""
+    if isinstance(value, Mapping):
+        return value
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not (is_number and 0 <= value <= MAX_VEHICLES and value == int(value)):
+        allowed = f"a whole number from 0 to {MAX_VEHICLES}, or entries such as drone1: {{position: [0, 0, 0.8]}}"
+        raise ParameterError(f"must be {allowed}", ("vehicles",), shown(value))
     try:
         x, y, z = map(float, drone["position"])
-    except (TypeError, KeyError, ValueError):  # refused with the other values
+    except (TypeError, KeyError, ValueError):  # reported when the other values are checked
         return {}
-    middle = (given - 1) / 2
-    sides = [_SPACING * (middle - number) for number in range(int(given))]
-    return {f"drone{number}": {"position": [x, y + side, z]} for number, side in enumerate(sides, start=1)}
+    middle = (value - 1) / 2
+    offsets = [_SPACING * (middle - number) for number in range(int(value))]
+    return {f"drone{number}": {"position": [x, y + offset, z]} for number, offset in enumerate(offsets, start=1)}
 
 
 def load(overrides: Mapping[str, Any] | None = None) -> Parameters:
-    """Return config/drone.yaml with a file and `overrides` (nested mappings of the same shape) laid over it.
+    """Return the parameters of config/drone.yaml, overridden by config files, then by `overrides` (nested mappings).
 
-    The file is named by the overrides' key `config`; '' is none, and of several, parted by commas, the later are laid
-    over the earlier. The files that it names are relative to it, those in `overrides` to where the process runs.
+    The key `config` of the overrides names the files, separated by commas ('' for none); later files override earlier
+    ones. File names in a config file are relative to it, those in `overrides` to the working directory.
     Raises ParameterError.
     """
     overrides = {} if overrides is None else overrides
     if not isinstance(overrides, Mapping):
         raise ParameterError(f"parameters = {shown(overrides)}: must be a mapping of the keys of config/drone.yaml")
-    given = read_yaml(package_path() / "config" / "drone.yaml")
+    values = read_yaml(package_path() / "config" / "drone.yaml")
     config = overrides.get("config") or ""
     if not isinstance(config, str):
         raise ParameterError("must be the name of a file", ("config",), shown(config))
     for name in filter(None, config.split(",")):
-        given = merged(given, _config(name, given))
-        _checked(given, "", {}, name)
-    if overrides.get("vehicles") == 0:  # roslaunch's arguments cannot be left out
+        values = merged(values, _read_config(name, values))
+        _checked(values, "", {}, name)
+    if overrides.get("vehicles") == 0:  # means no override: arguments of roslaunch cannot be omitted
         overrides = {key: value for key, value in overrides.items() if key != "vehicles"}
-    given = merged(given, overrides)
-    return _in_scene(given, given["scene_file"])
+    values = merged(values, overrides)
+    return _parameters_in_scene(values, values["scene_file"])
 
 
-def _config(name: str, below: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a file says, which is laid over what stands `below`. Raises ParameterError."""
+def _read_config(name: str, below: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content of a config file that overrides `below`. Raises ParameterError."""
     try:
         path = resolve(name)
     except FileNotFoundError as error:
@@ -267,21 +266,21 @@ def _config(name: str, below: Mapping[str, Any]) -> dict[str, Any]:
         raise ParameterError(f"{name}: a config file must not have the key `config`")
     scene_parameters.find_files_beside(path.parent, values)
     for key in ("script", "scene_file"):
-        if isinstance(values.get(key), str) and Path(values[key]).suffix:  # tutorial and target have none
+        if isinstance(values.get(key), str) and Path(values[key]).suffix:  # `tutorial` and `target` are no files
             values[key] = named_in(path.parent, values[key])
     return values
 
 
-def _in_scene(given: dict[str, Any], file: Any) -> Parameters:
+def _parameters_in_scene(values: dict[str, Any], file: Any) -> Parameters:
     if not (isinstance(file, str) and file):
-        return _checked(given, file, {})
+        return _checked(values, file, {})
     if Path(file).suffix.lower() in SUFFIXES:
-        file = _imported(file)
-    return _checked(given, file, scene_parameters.read(file), file)
+        file = _import_scene(file)
+    return _checked(values, file, scene_parameters.read(file), file)
 
 
-def _imported(file: str) -> str:
-    """Return the scene file that one of V-REP's is made into. Raises ParameterError."""
+def _import_scene(file: str) -> str:
+    """Import a V-REP file and return the path of the scene file made from it. Raises ParameterError."""
     try:
         return str(imported_scene(resolve(file)))
     except (OSError, VrepFileError) as error:
@@ -289,50 +288,50 @@ def _imported(file: str) -> str:
 
 
 def _checked(
-    given: dict[str, Any], file: Any, scene: dict[str, Any], named: str = "", lines: YamlLines | None = None
+    values: dict[str, Any], file: Any, scene: dict[str, Any], named: str = "", lines: YamlLines | None = None
 ) -> Parameters:
-    """Return the parameters with what the scene file says; `file` is its name, '' where there is none.
+    """Return the parameters of `values` with the scene in `scene`; `file` is the scene file's name, '' for none.
 
-    What is wrong may stand in the file `named`, which is the scene file or one laid over config/drone.yaml, or in the
-    `lines` of a scene's text.
+    Messages give line numbers in the file `named` (the scene file or a config file), or in `lines`, a scene's text.
     """
-    nobody = scene.get("vehicles") == {}
-    laid = {key: value for key, value in scene.items() if key != "vehicles"} if nobody else scene
+    is_empty = scene.get("vehicles") == {}
+    overrides = {key: value for key, value in scene.items() if key != "vehicles"} if is_empty else scene
     try:
-        parameters = Parameters.model_validate(merged({**given, "scene_file": file}, laid))
+        parameters = Parameters.model_validate(merged({**values, "scene_file": file}, overrides))
     except ValidationError as error:
-        found = problems(error, Parameters)
-        own = [one for one in found if _is_given(one, given, scene)]  # what is only a vehicle's own is told at the top
-        told = own or list(dict.fromkeys(one._replace(location=one.location[2:]) for one in found))
-        raise ParameterError.of(told, _in_file(told, named, bool(scene), lines)) from None
-    parameters._given = given
+        wrong = problems(error, Parameters)
+        # A wrong value that a vehicle inherits is reported at the top level.
+        own = [problem for problem in wrong if _is_in(problem, values, scene)]
+        told = own or list(dict.fromkeys(problem._replace(location=problem.location[2:]) for problem in wrong))
+        raise ParameterError.of(told, _line_in_file(told, named, bool(scene), lines)) from None
+    parameters._values = values
     parameters._in_scene_file = {key: scene[key] for key in scene_parameters.BESIDE if key in scene}
-    if nobody and not parameters.vehicles:
+    if is_empty and not parameters.vehicles:
         parameters._fleet = ()
     return parameters
 
 
-def _is_given(problem: ParameterProblem, *sources: Mapping[str, Any]) -> bool:
-    """Tell whether a wrong value is the vehicle's own; one from the keys at the top is reported there instead."""
+def _is_in(problem: ParameterProblem, *sources: Mapping[str, Any]) -> bool:
+    """Return whether a wrong value stands in the vehicle's entry; inherited values are reported at the top level."""
     if problem.location[:1] != ("vehicles",) or len(problem.location) < 3:
         return True
     for source in sources:
-        here: Any = source
+        value: Any = source
         for key in problem.location[:3]:
-            here = here.get(key) if isinstance(here, Mapping) else None
-        if here is not None:
+            value = value.get(key) if isinstance(value, Mapping) else None
+        if value is not None:
             return True
     return False
 
 
-def _in_file(found: Sequence[ParameterProblem], file: str, is_scene: bool, lines: YamlLines | None) -> str:
-    """Return what is wrong with the lines of a file, or of a text, that it stands in; '' where there is none."""
+def _line_in_file(wrong: Sequence[ParameterProblem], file: str, is_scene: bool, lines: YamlLines | None) -> str:
+    """Return one line with all problems and their line numbers in the file or text; '' if there is neither."""
     if not file and lines is None:
         return ""
     lines = lines or yaml_files.lines(resolve(file))
     placed = []
-    for problem in found:
-        inner = scene_parameters.problem_in_file(problem) if is_scene else problem
-        line = line_of(lines, inner) if inner is not None else None
-        placed.append((line, problem.sentence if line is None or inner is None else inner.sentence))
+    for problem in wrong:
+        in_scene = scene_parameters.problem_in_file(problem) if is_scene else problem
+        line = line_of(lines, in_scene) if in_scene is not None else None
+        placed.append((line, problem.sentence if line is None or in_scene is None else in_scene.sentence))
     return one_line(placed, file if not is_scene or any(line for line, _ in placed) else "")

@@ -18,11 +18,11 @@ from drone_sim.scripting.script_log import LOG
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
-_NOT_ITS_OWN = (*PLACE, "suffix")  # keys of which no other value makes another vehicle
+_CHANGEABLE = (*PLACE, "suffix")  # keys whose change does not need a new vehicle
 
 
-class Hanging(NamedTuple):
-    """An object of the scene that hangs on an object of a vehicle: its handle, that object's name, its place there."""
+class AttachedObject(NamedTuple):
+    """A scene object that is a child of a vehicle's object: its handle, the parent's name, its pose in the parent."""
 
     handle: int
     parent: str
@@ -30,118 +30,124 @@ class Hanging(NamedTuple):
 
 
 def rearrange(setup: SimulationSetup, before: Parameters, after: Parameters, script: str) -> bool:
-    """Change floor, weather and vehicles to what other parameters say; return whether a vehicle has come or gone.
+    """Apply the floor, weather and vehicles of `after`; return whether a vehicle was added, replaced or removed.
 
-    A vehicle that is only moved flies on from its new place; one that differs in more is built anew where it is.
-    `script` flies the vehicles that name none of their own. Raises ParameterError, UrdfError and ScriptError, where all
-    is as it was.
+    A vehicle with a new start pose is put there, at rest; one with other changes is built again where it is. `script`
+    flies vehicles without a script of their own. Raises ParameterError, UrdfError and ScriptError, without a change.
     """
-    came = _exchange(setup, before, after, script)
+    added = _replace_vehicles(setup, before, after, script)
     if after.scene.floor != before.scene.floor:
         setup.scene.lay_floor(after.scene.floor)
     if after.weather != before.weather:
         setup.context.change_weather(after.weather.model_dump())
-    old = {one.name: one for one in before.fleet}
-    for one in after.fleet:
-        if one.name not in came and not are_same(one.matrix, old[one.name].matrix):
-            put(setup.vehicles[one.name], one.matrix)
-    return bool(came) or len(before.fleet) != len(after.fleet)
+    before_by_name = {vehicle.name: vehicle for vehicle in before.fleet}
+    for vehicle in after.fleet:
+        if vehicle.name not in added and not are_same(vehicle.matrix, before_by_name[vehicle.name].matrix):
+            put(setup.vehicles[vehicle.name], vehicle.matrix)
+    return bool(added) or len(before.fleet) != len(after.fleet)
 
 
 def put(vehicle: Vehicle, matrix: Matrix) -> None:
-    """Put a vehicle somewhere in the world, at rest, unless it is there."""
+    """Put a vehicle at a pose in the world, at rest, unless it is there already."""
     if not are_same(vehicle.body.matrix, matrix):
         tree = vehicle.context.objects
         tree.set_matrix(tree.handle_of(vehicle.object), WORLD, matrix)
 
 
-def _exchange(setup: SimulationSetup, before: Parameters, after: Parameters, script: str) -> Collection[str]:
-    """Let vehicles come, go, and take the place of others; return the names of the new ones."""
-    old, wanted = ({one.name: one for one in several.fleet} for several in (before, after))
+def _replace_vehicles(setup: SimulationSetup, before: Parameters, after: Parameters, script: str) -> Collection[str]:
+    """Add, remove and replace vehicles; return the names of the new ones."""
+    old, wanted = ({vehicle.name: vehicle for vehicle in parameters.fleet} for parameters in (before, after))
     new = {
-        name: one for name, one in wanted.items() if name not in old or not _is_as(setup.vehicles[name], old[name], one)
+        name: vehicle
+        for name, vehicle in wanted.items()
+        if name not in old or not _can_stay(setup.vehicles[name], old[name], vehicle)
     }
-    going = [one for name, one in setup.vehicles.items() if name in new or name not in wanted]
-    if not new and not going:
+    removed = [vehicle for name, vehicle in setup.vehicles.items() if name in new or name not in wanted]
+    if not new and not removed:
         return ()
-    for one in new.values():
-        load.script_path(script_of(one, after, script))
-    coming = [_in_place_of(one, _predecessor(one, old, wanted), setup.vehicles) for one in new.values()]
-    hanging = [child for one in going for child in _hanging(one)]
-    _replace(setup, going, coming, script)
-    for child in hanging:
+    for vehicle in new.values():
+        load.script_path(script_of(vehicle, after, script))
+    added = [_as_successor(vehicle, _predecessor(vehicle, old, wanted), setup.vehicles) for vehicle in new.values()]
+    attached_objects = [attached for vehicle in removed for attached in _attached_objects(vehicle)]
+    _remove_and_add(setup, removed, added, script)
+    for attached in attached_objects:
         tree = setup.context.objects
-        if child.parent in tree:
-            setup.operations.set_parent(child.handle, tree.handle(child.parent), keep_in_place=True)
-            setup.operations.put(child.handle, child.local)
-    for name in wanted:  # in their order
+        if attached.parent in tree:
+            setup.operations.set_parent(attached.handle, tree.handle(attached.parent), keep_in_place=True)
+            setup.operations.put(attached.handle, attached.local)
+    for name in wanted:  # in the order of the parameters
         setup.vehicles[name] = setup.vehicles.pop(name)
     return new
 
 
-def _is_as(vehicle: Vehicle, old: VehicleParameters, new: VehicleParameters) -> bool:
-    """Tell whether a vehicle can stay, perhaps at another place."""
-    others = [key for key in VehicleParameters.model_fields if key not in _NOT_ITS_OWN]
-    has_its_names = new.suffix is None or suffixed("", new.suffix) == vehicle.suffix
-    return has_its_names and all(getattr(old, key) == getattr(new, key) for key in others)
+def _can_stay(vehicle: Vehicle, old: VehicleParameters, new: VehicleParameters) -> bool:
+    """Return whether the vehicle for `old` can also be the one for `new`, perhaps at another pose."""
+    keys = [key for key in VehicleParameters.model_fields if key not in _CHANGEABLE]
+    has_same_suffix = new.suffix is None or suffixed("", new.suffix) == vehicle.suffix
+    return has_same_suffix and all(getattr(old, key) == getattr(new, key) for key in keys)
 
 
 def _predecessor(
     new: VehicleParameters, old: Mapping[str, VehicleParameters], wanted: Collection[str]
 ) -> VehicleParameters | None:
-    """Return the vehicle that a new one replaces: that of its name, else one that is gone and began at its place."""
-    gone = [one for name, one in old.items() if name not in wanted and are_same(one.matrix, new.matrix)]
-    return old.get(new.name) or next(iter(gone), None)
+    """Return the vehicle that `new` replaces: the one with its name, or a removed one with the same start pose."""
+    removed = [vehicle for name, vehicle in old.items() if name not in wanted and are_same(vehicle.matrix, new.matrix)]
+    return old.get(new.name) or next(iter(removed), None)
 
 
-def _in_place_of(
+def _as_successor(
     new: VehicleParameters, old: VehicleParameters | None, vehicles: Mapping[str, Vehicle]
 ) -> VehicleParameters:
-    """Return a vehicle with the object names of the one it replaces, at its present place unless another is given."""
+    """Return `new` with the suffix of the vehicle it replaces, and with its present pose unless the start differs."""
     if old is None:
         return new
     vehicle = vehicles[old.name]
     suffix = split(f"_{vehicle.suffix}")[1] if new.suffix is None else new.suffix
-    kept = new.model_copy(update={"suffix": suffix})
+    successor = new.model_copy(update={"suffix": suffix})
     if not are_same(new.matrix, old.matrix):
-        return kept
+        return successor
     (x, y, z), (_, _, yaw) = frames.position(vehicle.body.matrix), frames.to_rpy(vehicle.body.matrix)
-    return kept.model_copy(update={"position": (x, y, max(z, 0.0)), "yaw": yaw, "tilt": (0.0, 0.0)})
+    return successor.model_copy(update={"position": (x, y, max(z, 0.0)), "yaw": yaw, "tilt": (0.0, 0.0)})
 
 
-def _hanging(vehicle: Vehicle) -> Iterable[Hanging]:
+def _attached_objects(vehicle: Vehicle) -> Iterable[AttachedObject]:
     tree = vehicle.context.objects
-    for above in vehicle.handles:
-        for child, _ in tree.children(tree[above]):
+    for parent in vehicle.handles:
+        for child, _ in tree.children(tree[parent]):
             if child not in vehicle.handles:
-                yield Hanging(child, tree[above].name, tree.matrix(child, PARENT))
+                yield AttachedObject(child, tree[parent].name, tree.matrix(child, PARENT))
 
 
-def _replace(setup: SimulationSetup, going: list[Vehicle], coming: list[VehicleParameters], script: str) -> None:
-    """Remove some vehicles and add others; where one cannot be added, restore them all."""
+def _remove_and_add(
+    setup: SimulationSetup, removed: list[Vehicle], added: list[VehicleParameters], script: str
+) -> None:
+    """Remove vehicles and add others; if one cannot be added, restore the removed ones and raise."""
     handles: Mapping[str, int] = {
-        name: handle for one in going for handle in one.handles for name in one.context.objects[handle].names
+        name: handle
+        for vehicle in removed
+        for handle in vehicle.handles
+        for name in vehicle.context.objects[handle].names
     }
-    for one in going:
-        _take_out(setup, one.name)
-    came: list[str] = []
+    for vehicle in removed:
+        _remove(setup, vehicle.name)
+    done: list[str] = []
     try:
-        for new in coming:
+        for new in added:
             setup.context.objects.reserve(handles)
             setup.add(new, True, script)
-            came.append(new.name)
+            done.append(new.name)
     except BaseException:
-        for name in came:
-            _take_out(setup, name)
-        for one in going:
-            back = one.parameters.model_copy(update={"suffix": split(f"_{one.suffix}")[1]})
+        for name in done:
+            _remove(setup, name)
+        for vehicle in removed:
+            restored = vehicle.parameters.model_copy(update={"suffix": split(f"_{vehicle.suffix}")[1]})
             setup.context.objects.reserve(handles)
-            setup.add(_in_place_of(back, one.parameters, {one.name: one}), True, script)
+            setup.add(_as_successor(restored, vehicle.parameters, {vehicle.name: vehicle}), True, script)
         raise
 
 
-def _take_out(setup: SimulationSetup, name: str) -> None:
-    """Remove a vehicle, even where the cleanup of its scripts fails."""
+def _remove(setup: SimulationSetup, name: str) -> None:
+    """Remove a vehicle, even if the cleanup of its scripts fails."""
     try:
         setup.remove(name, running=True)
     except ScriptError as error:

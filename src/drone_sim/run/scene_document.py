@@ -1,4 +1,4 @@
-"""The scene as a file: the text that it was read from, which keeps what its author wrote, and what it would say now."""
+"""The scene file: its text, with the author's comments and order, and the text for the present scene."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from drone_sim.scene import models, scene_parameters
 from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters
 
-_Handles = Mapping[str, int]  # of objects, by their names
+_Handles = Mapping[str, int]  # by object name
 
 
 def home() -> Path:
-    """Return the folder for scenes that have no file, or whose folder cannot be written to."""
+    """Return the folder for scenes without a file, or whose folder is not writable."""
     return Path(os.path.expanduser("~/.ros/drone_sim"))
 
 
 class SceneContent(NamedTuple):
-    """A scene at a moment: entries by the handles of their objects, scripts by the names of theirs."""
+    """Content of a scene: entries by object handle, scripts by object name, and settings."""
 
     entries: Mapping[int, EntryParameters]
     scripts: Mapping[str, AttachedScriptParameters]
@@ -39,28 +39,28 @@ class SceneContent(NamedTuple):
 
 
 class SceneDocument:
-    """The file of a scene, or none, its text, and its settings, as they are by now.
+    """The scene file (or None), its text, and the present settings.
 
-    Settings and text name files relative to `folder`.
+    File names in settings and text are relative to `folder`.
     """
 
     def __init__(self, parameters: Parameters, handles: _Handles):
-        """Take the scene file of the parameters; `handles` are those of its objects."""
+        """Read the scene file of the parameters; `handles` are those of the scene's objects."""
         file = resolve(parameters.scene_file) if parameters.scene_file else None
         self.folder = file.parent if file else home()
         self._text = _Text(file.read_text(encoding="utf-8-sig") if file else "", self.folder, handles)
         self._read = partial(settings_without_file, parameters, self.folder) if file is None else self._in_text
         self._settings: Settings | None = None
-        is_made = file is not None and cache_path() in file.parents  # of one of V-REP's
-        self.file = None if is_made else file
-        self._age: int | None = None  # when this wrote the file, as the disk says it
+        is_imported = file is not None and cache_path() in file.parents  # from a V-REP file
+        self.file = None if is_imported else file
+        self._mtime: int | None = None  # ns, modification time of the file when it was written here
 
     def _in_text(self) -> Settings:
-        return settings_of(self._text.said)
+        return settings_of(self._text.content)
 
     @property
     def settings(self) -> Settings:
-        """What is said beside objects and scripts."""
+        """The scene file's content without objects and scripts."""
         if self._settings is None:
             self._settings = self._read()
         return self._settings
@@ -71,36 +71,36 @@ class SceneDocument:
 
     @property
     def is_changed_on_disk(self) -> bool:
-        """Whether somebody has written the file since it was saved here."""
-        return self.file is not None and self._age is not None and _age(self.file) != self._age
+        """Whether another program has modified the file since it was saved here."""
+        return self.file is not None and self._mtime is not None and _mtime(self.file) != self._mtime
 
     def take_text(self, text: YamlText, handles: _Handles) -> None:
-        """Know that a text says what the scene is now."""
+        """Use `text` as the text of the present scene."""
         self._text = _Text(text.text, self.folder, handles)
 
     def save_state(self) -> Restore:
-        """Return a function that brings text and settings back."""
+        """Return a function that restores text and settings."""
         return saved(self, "_text", "_settings")
 
     def belong_to(self, file: Path | None, folder: Path, text: str, handles: _Handles) -> None:
-        """Belong to another file with this text, or to no file, in another folder."""
-        self.file, self.folder, self._age = file, folder, _age(file) if file else None
+        """Use another file (None: no file) with this text, and another folder."""
+        self.file, self.folder, self._mtime = file, folder, _mtime(file) if file else None
         self._text = _Text(text, folder, handles)
         self._settings, self._read = None, self._in_text
 
     # ---- as a text
 
     def text(self, now: SceneContent, folder: Path | None = None) -> str:
-        """Return what a file in a folder, its own where none is given, would say of a scene."""
-        said, kept = self._said(now, folder or self.folder)
-        text = self._text.yaml.rewritten(said, kept)
-        return text if says(text, said) else dumped(said)
+        """Return the text of a scene file in `folder` (default: the present folder) for a scene."""
+        content, kept = self._content(now, folder or self.folder)
+        text = self._text.yaml.rewritten(content, kept)
+        return text if says(text, content) else dumped(content)
 
     def write(self, path: Path, now: SceneContent, parameters: Parameters) -> str:
-        """Write a scene into a file; return the text. What another file said before stays beside it, as FILE.bak.
+        """Write a scene to a file and return the text. Another file that is overwritten is kept as FILE.bak.
 
-        Raises ParameterError where that would be no scene that can be loaded with the parameters, such as with the
-        drone below the floor, and OSError; what was in the file is then still there.
+        Raises ParameterError if the scene could not be loaded with the parameters, for example with the drone below
+        the floor, and OSError; the file is then unchanged.
         """
         text = self.text(now, path.parent)
         try:
@@ -109,32 +109,35 @@ class SceneDocument:
             raise ParameterError(f"the current scene cannot be saved: {error}") from None
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.resolve() != self.file and path.is_file():
-            with contextlib.suppress(FileNotFoundError), writing.replacing(f"{path}.bak", binary=True) as before:
-                before.write(path.read_bytes())
+            with contextlib.suppress(FileNotFoundError), writing.replacing(f"{path}.bak", binary=True) as backup:
+                backup.write(path.read_bytes())
         writing.write(path, text)
         return text
 
-    def _said(self, now: SceneContent, folder: Path) -> tuple[dict[str, Any], dict[str, list[int | None]]]:
-        """Return what a file in a folder says of a scene, and which items of its lists the text had."""
+    def _content(self, now: SceneContent, folder: Path) -> tuple[dict[str, Any], dict[str, list[int | None]]]:
+        """Return the content for a file in `folder`, and the old index of each list item (None: new), by key."""
         before, here = self._text, self.folder
         items: list[Any] = []
         kept: list[int | None] = []
         rest = dict(now.entries)
-        for index, (handle, one) in enumerate(before.entries):
+        for index, (handle, old) in enumerate(before.entries):
             entry = rest.pop(handle, None)
-            if entry is not None and type(entry) is type(one):
-                raw = before.said["objects"][index]
-                items.append(_changed(raw, models.plain(one, here), models.plain(entry, folder)))
+            if entry is not None and type(entry) is type(old):
+                raw = before.content["objects"][index]
+                items.append(_updated(raw, models.plain(old, here), models.plain(entry, folder)))
                 kept.append(index)
             elif entry is not None:
                 rest[handle] = entry
-        new = [models.in_order(models.plain(one, folder)) for one in rest.values()]
+        new = [models.in_order(models.plain(entry, folder)) for entry in rest.values()]
         new_scripts, kept_scripts = self._script_items(now.scripts, folder)
         settings = with_files_seen_from(now.settings, here, folder)
         lists = {"objects": [*items, *new], "scripts": new_scripts}
-        needed = {"objects"} if not before.said else before.said.keys()
-        said: dict[str, Any] = {**settings, **{key: one for key, one in lists.items() if one or key in needed}}
-        ordered = {key: said[key] for key in (*before.said, *said) if key in said}
+        needed = {"objects"} if not before.content else before.content.keys()
+        content: dict[str, Any] = {
+            **settings,
+            **{key: values for key, values in lists.items() if values or key in needed},
+        }
+        ordered = {key: content[key] for key in (*before.content, *content) if key in content}
         return ordered, {"objects": [*kept, *[None] * len(new)], "scripts": kept_scripts}
 
     def _script_items(
@@ -144,51 +147,51 @@ class SceneDocument:
         for index, before in enumerate(self._text.scripts):
             script = rest.pop(before.object, None)
             if script is not None:
-                raw = self._text.said["scripts"][index]
-                items.append(_changed(raw, models.plain(before, self.folder), models.plain(script, folder)))
+                raw = self._text.content["scripts"][index]
+                items.append(_updated(raw, models.plain(before, self.folder), models.plain(script, folder)))
                 kept.append(index)
-        return [*items, *(models.plain(one, folder) for one in rest.values())], [*kept, *[None] * len(rest)]
+        return [*items, *(models.plain(script, folder) for script in rest.values())], [*kept, *[None] * len(rest)]
 
 
 class _Text:
-    """A text, and what it says, in the words of the scene."""
+    """A scene file's text, its parsed content, and its entries and scripts."""
 
     def __init__(self, text: str, folder: Path, handles: _Handles):
-        self._given, self._folder, self._handles = text, folder, handles
+        self._source, self._folder, self._handles = text, folder, handles
 
     @cached_property
     def yaml(self) -> YamlText:
-        return YamlText(self._given)
+        return YamlText(self._source)
 
     @property
-    def said(self) -> Mapping[str, Any]:
+    def content(self) -> Mapping[str, Any]:
         return self.yaml.values
 
     @cached_property
     def entries(self) -> list[tuple[int, EntryParameters]]:
-        """The entries, each with the handle of its object."""
-        entries = [scene_parameters.entry_from(one) for one in self._found("objects")]
+        """The entries of objects, each with the handle of its object (WORLD if it has none)."""
+        entries = [scene_parameters.entry_from(values) for values in self._items("objects")]
         scene_parameters.name_shapes(entries)
-        return [(self._handles.get(one.name, WORLD), one) for one in entries]
+        return [(self._handles.get(entry.name, WORLD), entry) for entry in entries]
 
     @cached_property
     def scripts(self) -> list[AttachedScriptParameters]:
-        return [scene_parameters.script_from(one) for one in self._found("scripts")]
+        return [scene_parameters.script_from(values) for values in self._items("scripts")]
 
-    def _found(self, key: str) -> list[Any]:
-        found = scene_parameters.from_content(copy.deepcopy(dict(self.said)), self._folder)
-        return found["scene"].get(key) or []
+    def _items(self, key: str) -> list[Any]:
+        content = scene_parameters.from_content(copy.deepcopy(dict(self.content)), self._folder)
+        return content["scene"].get(key) or []
 
 
-def _age(path: Path) -> int | None:
+def _mtime(path: Path) -> int | None:
     try:
         return path.stat().st_mtime_ns
     except OSError:
         return None
 
 
-def _changed(raw: Mapping[str, Any], before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an entry as it was written in the text, with the values that have changed since."""
+def _updated(raw: Mapping[str, Any], before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entry `raw` of the text with the values that have changed from `before` to `now`."""
     keys = {key for key in {**before, **now} if before.get(key) != now.get(key)}
     written = {key: value for key, value in raw.items() if key not in keys or key in now}
     return {**written, **{key: now[key] for key in now if key in keys}}

@@ -1,4 +1,4 @@
-"""What a scene file says beside objects and scripts: the floor, who flies, the weather."""
+"""Settings of a scene file: all but objects and scripts, such as floor, vehicles and weather."""
 
 from __future__ import annotations
 
@@ -18,142 +18,145 @@ from drone_sim.scene import models, scene_parameters
 from drone_sim.vehicles.parameters import PlaceParameters, VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
-Settings = Mapping[str, Any]  # never changed, but replaced
+Settings = Mapping[str, Any]  # never modified in place
 PLACE = ("position", "yaw", "tilt")
-LISTS = ("objects", "scripts")  # what of a scene file is no setting
-_SAME = 1e-9  # m, and of a turn's matrix
-_Said = dict[str, dict[str, Any]]
+LISTS = ("objects", "scripts")  # keys of a scene file that are no settings
+_TOLERANCE = 1e-9  # m, and elements of a rotation matrix
+_VehicleSettings = dict[str, dict[str, Any]]  # by vehicle
 
 
-def settings_of(said: Mapping[str, Any]) -> Settings:
-    """Return those of a scene file's content."""
-    return {key: value for key, value in said.items() if key not in LISTS}
+def settings_of(content: Mapping[str, Any]) -> Settings:
+    """Return the settings in the content of a scene file."""
+    return {key: value for key, value in content.items() if key not in LISTS}
 
 
 def settings_without_file(parameters: Parameters, folder: Path) -> Settings:
-    """Return what a file in `folder` would say of the scene of the parameters."""
-    own, default = parameters.scene, load().scene
+    """Return the settings that a scene file in `folder` would need for the scene of the parameters."""
+    scene, default = parameters.scene, load().scene
     settings: dict[str, Any] = {}
     for key in ("floor", "datum"):
-        if getattr(own, key) != getattr(default, key):
-            settings[key] = models.plain(getattr(own, key), folder)
-    if own.magnetic_field != default.magnetic_field:
-        settings["magnetic_field"] = list(own.magnetic_field)
-    if own.collections:
-        settings["collections"] = [one.model_dump(mode="json", exclude_defaults=True) for one in own.collections]
+        if getattr(scene, key) != getattr(default, key):
+            settings[key] = models.plain(getattr(scene, key), folder)
+    if scene.magnetic_field != default.magnetic_field:
+        settings["magnetic_field"] = list(scene.magnetic_field)
+    if scene.collections:
+        settings["collections"] = [group.model_dump(mode="json", exclude_defaults=True) for group in scene.collections]
     return with_vehicles(settings, vehicles_in({}, parameters), parameters)
 
 
 def settings_now(
     settings: Settings, parameters: Parameters, vehicles: Mapping[str, Vehicle], weather: WeatherParameters
 ) -> Settings:
-    """Return settings with vehicles where they are, and the weather that there is, where that is not as they say."""
-    said = vehicles_in(settings, parameters)
-    moved = False
-    for one in parameters.fleet:
-        own, now = said[one.name], _place_now(vehicles[one.name])
-        begins = frames.from_rpy(own["position"], (*own.get("tilt", one.tilt), own.get("yaw", one.yaw)))
-        if not are_same(now, begins):
-            moved = True
-            say_place(own, now, any(one.tilt))
-    if moved:
-        settings = with_vehicles(settings, said, parameters)
+    """Return the settings, updated with the present poses of the vehicles and the present weather."""
+    entries = vehicles_in(settings, parameters)
+    has_moved = False
+    for vehicle in parameters.fleet:
+        entry, pose = entries[vehicle.name], _current_pose(vehicles[vehicle.name])
+        start = frames.from_rpy(entry["position"], (*entry.get("tilt", vehicle.tilt), entry.get("yaw", vehicle.yaw)))
+        if not are_same(pose, start):
+            has_moved = True
+            say_place(entry, pose, any(vehicle.tilt))
+    if has_moved:
+        settings = with_vehicles(settings, entries, parameters)
     if weather != parameters.weather:
-        otherwise = _otherwise(weather.model_dump(mode="json"), parameters.weather.model_dump(mode="json"))
-        settings = {**settings, "weather": merged(settings.get("weather") or {}, otherwise)}
+        differences = _differences(weather.model_dump(mode="json"), parameters.weather.model_dump(mode="json"))
+        settings = {**settings, "weather": merged(settings.get("weather") or {}, differences)}
     return settings
 
 
-def _place_now(vehicle: Vehicle) -> Matrix:
-    """Return where a vehicle is; one that has not moved yet is where its entry says, if only above the floor there."""
+def _current_pose(vehicle: Vehicle) -> Matrix:
+    """Return a vehicle's pose; before it moves, that of its entry, which its start on the floor may differ from."""
     body = vehicle.body
     return vehicle.parameters.matrix if are_same(body.matrix, body.start.matrix) else body.matrix
 
 
 def as_between(now: Settings, before: Settings, after: Settings) -> Settings:
     """Return the settings `now` with the changes from `before` to `after`, also inside nested mappings."""
-    made = dict(now)
+    result = dict(now)
     for key in {**before, **after}:
-        one, two = before.get(key), after.get(key)
+        old, new = before.get(key), after.get(key)
         if key not in after and key in before:
-            made.pop(key, None)
-        elif one != two:
-            are_maps = all(isinstance(each, Mapping) for each in (made.get(key), one, two))
-            made[key] = as_between(made[key], one or {}, two or {}) if are_maps else two
-    return made
+            result.pop(key, None)
+        elif old != new:
+            are_mappings = all(isinstance(value, Mapping) for value in (result.get(key), old, new))
+            result[key] = as_between(result[key], old or {}, new or {}) if are_mappings else new
+    return result
 
 
 def are_same(one: Matrix, other: Matrix) -> bool:
-    """Tell whether two transforms are the same, to 1e-9."""
-    return all(abs(first - second) <= _SAME for first, second in zip(one, other))
+    """Return whether two transforms are equal within 1e-9."""
+    return all(abs(first - second) <= _TOLERANCE for first, second in zip(one, other))
 
 
-def _otherwise(now: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keys that have other values than before, of mappings inside, too."""
+def _differences(now: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys whose values differ from `before`, also inside nested mappings."""
     return {
-        key: _otherwise(value, before[key]) if isinstance(value, Mapping) else value
+        key: _differences(value, before[key]) if isinstance(value, Mapping) else value
         for key, value in now.items()
         if value != before[key]
     }
 
 
-# ---- who flies
+# ---- vehicles
 
 
-def vehicles_in(settings: Settings, parameters: Parameters) -> _Said:
-    """Return what is said of each vehicle, by its name, of which at least the place."""
-    given = settings.get("vehicles")
-    said = given if isinstance(given, Mapping) else {}
-    drone = settings.get("drone") if not said else None
-    alone = {key: value for key, value in drone.items() if key != "name"} if isinstance(drone, Mapping) else {}
-    own = {one.name: said.get(one.name, alone) or {} for one in parameters.fleet}
-    return {one.name: {**_place(one, own[one.name]), **copy.deepcopy(own[one.name])} for one in parameters.fleet}
+def vehicles_in(settings: Settings, parameters: Parameters) -> _VehicleSettings:
+    """Return the entry of each vehicle, by name, with at least its position."""
+    configured = settings.get("vehicles")
+    entries = configured if isinstance(configured, Mapping) else {}
+    drone = settings.get("drone") if not entries else None
+    default = {key: value for key, value in drone.items() if key != "name"} if isinstance(drone, Mapping) else {}
+    own = {vehicle.name: entries.get(vehicle.name, default) or {} for vehicle in parameters.fleet}
+    return {
+        vehicle.name: {**_place(vehicle, own[vehicle.name]), **copy.deepcopy(own[vehicle.name])}
+        for vehicle in parameters.fleet
+    }
 
 
-def _place(one: VehicleParameters, said: Mapping[str, Any]) -> dict[str, Any]:
-    place: dict[str, Any] = {"position": list(one.position)}
-    return {**place, "yaw": one.yaw} if one.yaw or "yaw" in said else place
+def _place(vehicle: VehicleParameters, entry: Mapping[str, Any]) -> dict[str, Any]:
+    place: dict[str, Any] = {"position": list(vehicle.position)}
+    return {**place, "yaw": vehicle.yaw} if vehicle.yaw or "yaw" in entry else place
 
 
-def say_place(said: dict[str, Any], matrix: Matrix, leans: bool = True) -> None:
-    """Let what is said of a vehicle say that it begins there; `leans`: at that roll and pitch, too."""
+def say_place(entry: dict[str, Any], matrix: Matrix, leans: bool = True) -> None:
+    """Set the start pose in a vehicle's entry; roll and pitch only if `leans`."""
     (roll, pitch, yaw), position = (
-        [round(one, 9) + 0.0 for one in three] for three in (frames.to_rpy(matrix), frames.position(matrix))
+        [round(value, 9) + 0.0 for value in values] for values in (frames.to_rpy(matrix), frames.position(matrix))
     )
-    said["position"] = position
-    if yaw or "yaw" in said:
-        said["yaw"] = yaw
-    if leans and (roll or pitch or "tilt" in said):
-        said["tilt"] = [roll, pitch]
+    entry["position"] = position
+    if yaw or "yaw" in entry:
+        entry["yaw"] = yaw
+    if leans and (roll or pitch or "tilt" in entry):
+        entry["tilt"] = [roll, pitch]
 
 
-def with_vehicles(settings: Settings, said: _Said, parameters: Parameters) -> Settings:
-    """Return settings that say this of the vehicles; the only drone stays `drone:` where nothing else asks for more."""
+def with_vehicles(settings: Settings, fleet: _VehicleSettings, parameters: Parameters) -> Settings:
+    """Return settings with the entries `fleet`, or with `drone:` if that is a single drone with only a start pose."""
     others = {key: value for key, value in settings.items() if key not in ("drone", "vehicles")}
-    drone = parameters.drone.name
-    if "vehicles" not in settings and [*said] == [drone] and said[drone].keys() <= PlaceParameters.model_fields.keys():
+    name = parameters.drone.name
+    if "vehicles" not in settings and [*fleet] == [name] and fleet[name].keys() <= PlaceParameters.model_fields.keys():
         before = settings.get("drone") or {}
-        return {**others, "drone": {**({"name": before["name"]} if "name" in before else {}), **said[drone]}}
-    return {**others, "vehicles": said}
+        return {**others, "drone": {**({"name": before["name"]} if "name" in before else {}), **fleet[name]}}
+    return {**others, "vehicles": fleet}
 
 
-def keep_names(said: _Said, vehicles: Mapping[str, Vehicle]) -> None:
-    """Let those who stay have the names that their objects have: their suffixes are said where they would differ."""
+def keep_names(entries: _VehicleSettings, vehicles: Mapping[str, Vehicle]) -> None:
+    """Keep the object names of existing vehicles: write an explicit suffix where the default would differ."""
     free = itertools.chain([""], map("#{}".format, itertools.count()))
-    taken = {vehicles[name].suffix for name, one in said.items() if name in vehicles and "suffix" in one}
-    for name, one in said.items():
-        if "suffix" in one or name not in vehicles:
+    taken = {vehicles[name].suffix for name, entry in entries.items() if name in vehicles and "suffix" in entry}
+    for name, entry in entries.items():
+        if "suffix" in entry or name not in vehicles:
             continue
-        own = vehicles[name].suffix
-        if next(suffix for suffix in free if suffix not in taken) != own:
-            one["suffix"] = split(f"_{own}")[1]
+        present = vehicles[name].suffix
+        if next(suffix for suffix in free if suffix not in taken) != present:
+            entry["suffix"] = split(f"_{present}")[1]
 
 
 # ---- floor and files
 
 
 def with_floor(settings: Settings, values: Mapping[str, Any]) -> Settings:
-    """Return settings with other keys of the floor; None among them is what is so by default."""
+    """Return settings with changed keys of the floor; the value None removes a key, so that its default applies."""
     floor = {**(settings.get("floor") or {}), **values}
     floor = {key: value for key, value in floor.items() if value is not None}
     others = {key: value for key, value in settings.items() if key != "floor"}
@@ -161,18 +164,18 @@ def with_floor(settings: Settings, values: Mapping[str, Any]) -> Settings:
 
 
 def with_files_seen_from(settings: Settings, here: Path, there: Path) -> Settings:
-    """Return the settings of a file in one folder, their files named as a file in another one can name them."""
+    """Return settings of a file in folder `here`, with file names as a file in folder `there` needs them."""
     if here == there:
         return settings
-    found = scene_parameters.from_content(copy.deepcopy(dict(settings)), here)
-    inside = found.pop("scene")
-    made: dict[str, Any] = _seen_from({**inside, **found}, there)
-    return {key: made[key] for key in settings}
+    content = scene_parameters.from_content(copy.deepcopy(dict(settings)), here)
+    scene = content.pop("scene")
+    seen: dict[str, Any] = _with_files_from({**scene, **content}, there)
+    return {key: seen[key] for key in settings}
 
 
-def _seen_from(value: Any, folder: Path) -> Any:
+def _with_files_from(value: Any, folder: Path) -> Any:
     if isinstance(value, Mapping):
-        return {key: _seen_from(one, folder) for key, one in value.items()}
+        return {key: _with_files_from(item, folder) for key, item in value.items()}
     if isinstance(value, list):
-        return [_seen_from(one, folder) for one in value]
+        return [_with_files_from(item, folder) for item in value]
     return value.seen_from(folder) if isinstance(value, FoundFile) else value

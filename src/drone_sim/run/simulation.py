@@ -1,4 +1,4 @@
-"""The simulation: V-REP's phases in V-REP's order, without ROS.
+"""The simulation, with V-REP's phases in V-REP's order, without ROS.
 
 For example:
 
@@ -40,19 +40,19 @@ from drone_sim.world import World
 
 
 class Snapshot(NamedTuple):
-    """The exact dynamic state at a moment; see Simulation.snapshot."""
+    """Exact dynamic state at one time; see Simulation.snapshot."""
 
     era: int
-    scripts: int  # that had come or gone on objects
+    scripts: int  # ScriptScheduler.changes at that time
     world: int
     restore: Restore
 
 
 class Simulation:
-    """A world, what flies in it, and the clock that counts steps.
+    """A world, the vehicles in it, and the clock that counts steps.
 
-    Not thread-safe: one thread owns it. The `bus` of a vehicle alone may be used from others. World, scene and
-    vehicles are new ones after every start.
+    Not thread-safe: one thread owns it, and other threads may only use the `bus` of a vehicle. Every start replaces
+    world, scene and vehicles by new objects.
     """
 
     def __init__(
@@ -68,11 +68,11 @@ class Simulation:
     ):
         """Build the scene and, if `started`, run the init of the child scripts.
 
-        `script` flies the vehicles that name none of their own; '' is the parameters', or the pilot. `backend`
-        carries what scripts subscribe to and publish; without it the messages go nowhere.
-        `drawings` takes what scripts draw; without it that is ignored. `load_script` loads scripts, as load.load does.
+        `script` flies the vehicles without a script of their own; '' is the parameters' script, or the pilot.
+        `backend` transports the scripts' ROS subscriptions and publications; without it messages are dropped.
+        `drawings` receives what scripts draw; without it drawings are ignored. `load_script` replaces load.load.
 
-        Raises ParameterError, UrdfError, ScriptError, and RuntimeError where `gui` finds no display.
+        Raises ParameterError, UrdfError, ScriptError, and RuntimeError if `gui` is set without a display.
         """
         self.script, self.running = script, False
         self._gui = gui
@@ -81,7 +81,7 @@ class Simulation:
         self.clock = Clock(parameters.time_step)
         self.vision = Vision(parameters.samples)
         self.breakpoints = Breakpoints(lambda: self.clock.time)
-        self._set_up = partial(
+        self._new_setup = partial(
             SimulationSetup,
             clock=self.clock,
             vision=self.vision,
@@ -91,18 +91,19 @@ class Simulation:
             backend=backend,
             load_script=load_script,
         )
-        self.scenes_read = 0  # how often a scene file, or none, has taken the last one's place
-        self._handles = NO_HANDLES  # of the objects as the scene began
-        self._is_arranged = False  # whether that is what was made of it, not what the scene file says
-        self._before: Parameters | None = None  # what stop brings back, once it was rearranged in flight
-        self.run = 0  # number of the run: another one after every start and every stop
-        self.era = 0  # another number after every start, every stop, and whenever a vehicle has come or gone
-        flown = [script_of(one, parameters, script) for one in parameters.fleet]
-        for path in (*flown, *(one.script for one in parameters.scene.scripts)):  # one that is not there needs no world
+        self.scenes_read = 0  # number of times that a scene was loaded from a file or the parameters
+        self._handles = NO_HANDLES  # of the objects in the initial scene
+        self._is_edited = False  # whether the initial scene was edited and differs from the scene file
+        self._original: Parameters | None = None  # what stop restores after `rearrange` in this run
+        self.run = 0  # run number, incremented by every start and stop
+        self.era = 0  # incremented by every start and stop, and when vehicles are added or removed
+        flying_scripts = [script_of(vehicle, parameters, script) for vehicle in parameters.fleet]
+        # Missing files are reported before a world is built.
+        for path in (*flying_scripts, *(attached.script for attached in parameters.scene.scripts)):
             load.script_path(path)
-        self._take(self._set_up(parameters, _world(parameters, gui)))
-        self.holes: list[str] = []  # what will not work in an imported scene
-        self._find_holes()
+        self._use(self._new_setup(parameters, _world(parameters, gui)))
+        self.holes: list[str] = []  # what does not work here in a scene imported from V-REP
+        self._warn_of_unsupported()
         self.document = SceneDocument(parameters, self.object_handles)
         try:
             if started:
@@ -110,144 +111,144 @@ class Simulation:
         except BaseException:
             try:
                 self.close()
-            except ScriptError as second:  # in cleanup; the first one is what the caller is told
+            except ScriptError as second:  # in cleanup; the caller gets the first error
                 LOG.error("%s", second)
             raise
 
     def _rebuild(self, parameters: Parameters, handles: Handles) -> None:
-        """Put scene and vehicles without scripts into a new world, which then takes the last one's place."""
-        built = self._set_up(parameters, _world(parameters), handles)
-        if self._gui:  # a process has one window: what can be built is built there once more
+        """Build scene and vehicles, without scripts, in a new world that then replaces the present one."""
+        built = self._new_setup(parameters, _world(parameters), handles)
+        if self._gui:  # a process can have one window, so the setup is tested first, then built in it
             built.context.world.close()
             self.world.clear()
-            built = self._set_up(parameters, self.world, handles)
+            built = self._new_setup(parameters, self.world, handles)
         else:
             self.world.close()
         built.tune_as(self._setup)
-        self._take(built)
+        self._use(built)
 
-    def _take(self, built: SimulationSetup) -> None:
-        """Use the new setup from now on, and begin a run in it."""
+    def _use(self, built: SimulationSetup) -> None:
+        """Replace the present setup by `built`, and begin a run in it."""
         self._setup = built
         self.parameters = built.parameters
-        self.context = built.context  # what all that flies, and every script, has in common
+        self.context = built.context  # shared by all vehicles and scripts
         self.world, self.scene, self.operations = built.context.world, built.scene, built.operations
         self.vehicles: dict[str, Vehicle] = built.vehicles  # by name
-        self.child_scripts: dict[str, ChildScript] = built.scripts.child_scripts  # that fly them, by vehicle
+        self.child_scripts: dict[str, ChildScript] = built.scripts.child_scripts  # by vehicle
         self.vision.look_at(self.world.pictures, self.context.blades, self._identify)
-        self._begin()
+        self._begin_run()
 
     def _identify(self) -> list[Identity]:
-        """Return for each of the world's visuals the object that it belongs to."""
+        """Return the name and category of the object of each of the world's visuals."""
         categories = self.scene.categories()
         return [
             Identity(name, categories.get(name) or (VEHICLE if name in self.vehicles else category_of(name)))
             for name in map(self.context.person_name_of, self.world.pictures.places())
         ]
 
-    def _begin(self) -> None:
-        """Be at time 0 of a new run, in the initial scene."""
+    def _begin_run(self) -> None:
+        """Begin a new run at time 0."""
         self._stepper = Stepper(self._setup)
         self.run += 1
         self.era += 1
         self._drawings.clear()
         self.windows.clear()
 
-    # ---- what flies
+    # ---- vehicles
 
     @property
     def drone(self) -> Vehicle:
-        """The first vehicle, most often the only one. Raises LookupError where nobody flies."""
+        """The first vehicle, usually the only one. Raises LookupError if there is none."""
         for first in self.vehicles.values():
             return first
         raise LookupError("the scene has no vehicle")
 
     def set_vehicles(self, entries: Any) -> tuple[list[str], list[str]]:
-        """Let the vehicles in `entries`, as in the parameter `vehicles`, fly; return which came and which went.
+        """Add and remove vehicles to match `entries` (as the parameter `vehicles`); return the added and removed names.
 
-        Vehicles that stay fly on unchanged, to the last bit. A new one whose script fails in init is removed again.
-        Snapshots are forgotten. Raises ParameterError, UrdfError and ScriptError.
+        Other vehicles fly on unchanged, to the last bit. A new one whose script fails in init is removed again.
+        Snapshots become invalid. Raises ParameterError, UrdfError and ScriptError.
         """
         parameters = self.parameters.with_vehicles(entries)
-        if self._is_arranged or self._before:
+        if self._is_edited or self._original:
             parameters = parameters.varied(self.parameters.weather, self.parameters.scene, parameters.fleet)
-        wanted = {one.name: one for one in parameters.fleet}
-        came = [name for name in wanted if name not in self.vehicles]
-        went = [name for name in self.vehicles if name not in wanted]
-        for name in came:
+        wanted = {vehicle.name: vehicle for vehicle in parameters.fleet}
+        added = [name for name in wanted if name not in self.vehicles]
+        removed = [name for name in self.vehicles if name not in wanted]
+        for name in added:
             load.script_path(script_of(wanted[name], parameters, self.script))
         try:
-            for name in came:
+            for name in added:
                 self._setup.add(wanted[name], self.running, self.script)
-            for name in went:
+            for name in removed:
                 self._setup.remove(name, self.running)
         finally:
-            if came or went:
+            if added or removed:
                 self.era += 1
                 self._stepper.list_vehicles()
         self.parameters = parameters
-        if self._before:
-            self._before = parameters.varied(self._before.weather, self._before.scene, parameters.fleet)
-        return came, went
+        if self._original:
+            self._original = parameters.varied(self._original.weather, self._original.scene, parameters.fleet)
+        return added, removed
 
     def set_pace(self, factor: Any) -> None:
-        """Have whoever plays it play at another real-time factor, through every start. Raises ParameterError."""
+        """Set the real-time factor, which persists across starts. Raises ParameterError."""
         self.parameters = self.parameters.at_pace(factor)
 
     # ---- start and stop
 
     def start(self, scene_file: str | None = None) -> None:
-        """Read scene and scripts from disk, run the scripts' init; another scene file may take the last one's place.
+        """Read scene and scripts from disk, and run the scripts' init; `scene_file` replaces the present scene file.
 
-        A scene whose objects have been changed while it was stopped begins as it stands. Where scene or vehicles cannot
-        be read, the last ones stay, stopped. Raises ParameterError, UrdfError, ScriptError.
+        A scene that was edited while stopped is not read again. If scene or vehicles cannot be read, the present ones
+        stay, stopped. Raises ParameterError, UrdfError, ScriptError.
         """
         self.stop()
-        if scene_file is None and self._is_arranged:
+        if scene_file is None and self._is_edited:
             self._rebuild(self.parameters, self._handles)
         else:
-            self._read(self.parameters.scene_file if scene_file is None else scene_file)
+            self._load_scene(self.parameters.scene_file if scene_file is None else scene_file)
         give_back_memory()
         self.load_scripts()
 
     def load_scene(self, scene_file: str) -> None:
-        """Stop, and let another scene file take the last one's place. Raises ParameterError, UrdfError, ScriptError."""
+        """Stop, and load another scene file. Raises ParameterError, UrdfError, ScriptError."""
         self.stop()
-        self._read(scene_file)
+        self._load_scene(scene_file)
 
-    def _read(self, scene_file: str) -> None:
+    def _load_scene(self, scene_file: str) -> None:
         self._rebuild(self.parameters.in_scene(scene_file), NO_HANDLES)
-        self._find_holes()
+        self._warn_of_unsupported()
         self.document = SceneDocument(self.parameters, self.object_handles)
-        self._is_arranged = False
+        self._is_edited = False
         self.scenes_read += 1
 
-    def _find_holes(self) -> None:
-        """Warn of what will not work in a scene that was imported from V-REP, unless it was said before."""
+    def _warn_of_unsupported(self) -> None:
+        """Warn of what does not work in a scene imported from V-REP, unless the same warning was given before."""
         file, before = self.parameters.scene_file, self.holes
         self.holes = holes(file) if file else []
-        for one in self.holes:
-            if one not in before:
-                LOG.warning("%s: %s", file, one)
+        for unsupported in self.holes:
+            if unsupported not in before:
+                LOG.warning("%s: %s", file, unsupported)
 
     def arrange(self, parameters: Parameters, rebuild: bool = True) -> None:
-        """While it is stopped: begin as these parameters say from now on, with the handles that objects have, or had.
+        """While stopped, replace the initial scene by that of `parameters`; objects keep present or former handles.
 
-        Without `rebuild`, what stands there stays until then. Raises ParameterError and UrdfError, where all is as it
-        was.
+        Without `rebuild`, world and objects change only at the next start. Raises ParameterError and UrdfError,
+        without a change.
         """
         if rebuild:
             self._handles = self.context.objects.handles().with_those_of(self._handles)
             self._rebuild(parameters, self._handles)
         self.parameters = parameters
-        self._is_arranged = True
+        self._is_edited = True
 
     def rearrange(self, parameters: Parameters) -> None:
-        """In flight: let floor, weather and vehicles be as these parameters say, until stop.
+        """While running, apply floor, weather and vehicles of `parameters`; stop reverts them.
 
-        Raises ParameterError, UrdfError and ScriptError, where all is as it was.
+        Raises ParameterError, UrdfError and ScriptError, without a change.
         """
-        self._before = self._before or self.parameters
+        self._original = self._original or self.parameters
         self.scene.is_changed = True
         if rearrange(self._setup, self.parameters, parameters, self.script):
             self.era += 1
@@ -256,9 +257,9 @@ class Simulation:
         self.parameters = parameters
 
     def load_scripts(self) -> None:
-        """Load the scripts and run their init, of a simulation that was built without. Raises ScriptError."""
+        """Load the scripts of a simulation that has none loaded, and run their init. Raises ScriptError."""
         self._handles = self.context.objects.handles()
-        self._document_began = self.document.save_state()
+        self._restore_document = self.document.save_state()
         self.running = True
         self._setup.load_scripts(self._setup.scripts.all(), self.script)
         self._stepper.list_scripts()
@@ -266,15 +267,15 @@ class Simulation:
     def stop(self) -> None:
         """Run the scripts' cleanup, and restore the initial scene, at time 0. Raises ScriptError.
 
-        What has been done to its objects in flight is undone; what was done while it was stopped is how it begins.
+        Changes of objects in flight are undone; changes made while stopped become the initial scene.
         """
         if self.scene.is_changed and not self.running:
-            self._handles, self._is_arranged = self.context.objects.handles(), True
+            self._handles, self._is_edited = self.context.objects.handles(), True
             before, scene = self.parameters, self.scene.parameters_now()
             self.parameters = before.varied(before.weather, scene, before.fleet)
         if self.running:
-            self._document_began()
-        self.parameters, self._before = self._before or self.parameters, None
+            self._restore_document()
+        self.parameters, self._original = self._original or self.parameters, None
         try:
             self._clean_up()
         finally:
@@ -282,20 +283,20 @@ class Simulation:
             is_changed, self.scene.is_changed = self.scene.is_changed, False
             if not is_changed or not self._undo_changes():
                 self._setup.begin_anew()
-                self._begin()
+                self._begin_run()
 
     def _undo_changes(self) -> bool:
-        """Rebuild the scene as it began; return whether that was possible: its files may be missing by now."""
-        self.clock.steps = 0  # whatever is made begins there
+        """Rebuild the initial scene; return whether that was possible, as its files may be missing now."""
+        self.clock.steps = 0  # the new setup must begin at time 0
         try:
             self._rebuild(self.parameters, self._handles)
         except ValueError as error:
-            LOG.error("the scene could not be restored and stays as it was flown; `start` tries again: %s", error)
+            LOG.error("the scene could not be restored and stays as the flight left it; `start` tries again: %s", error)
             return False
         return True
 
     def close(self) -> None:
-        """Run cleanup if it is due, and free the world; may be called twice. Raises ScriptError."""
+        """Run the scripts' cleanup if they are running, and free the world; may be called twice. Raises ScriptError."""
         try:
             self._clean_up()
         finally:
@@ -307,15 +308,15 @@ class Simulation:
         self._setup.end_scripts(clean_up=was_running)
 
     def read_at_start(self) -> None:
-        """Have the next start read the scene file, whatever was made of the scene while it was stopped."""
-        self._is_arranged = self.scene.is_changed = False
+        """Discard edits made while stopped: the next start reads the scene file again."""
+        self._is_edited = self.scene.is_changed = False
 
     # ---- stepping
 
     @property
     def failed_scripts(self) -> dict[str, ScriptError]:
-        """Errors of attached scripts that have failed and are not called any more, by their objects' names."""
-        errors = ((one.own_script, one.error()) for one in self._setup.scripts.attached)
+        """Errors of attached scripts that have failed and are no longer called, by object name."""
+        errors = ((script.own_script, script.error()) for script in self._setup.scripts.attached)
         return {name: error for name, error in errors if error is not None}
 
     @property
@@ -331,45 +332,45 @@ class Simulation:
     def step(self, watch: Callable[[int], None] | None = None) -> None:
         """Run one simulation step: threads, actuation, dynamics, vision, sensing. Raises ScriptError and Diverged.
 
-        `watch` is called like `between` of World.advance, to look and no more.
+        `watch` is called like `between` of World.advance, and must not change anything.
         """
         self._stepper.step(watch)
 
     def look(self) -> None:
-        """Let cameras that are watched show what is there now, between two steps."""
+        """Render a picture for every subscribed camera now, between two steps."""
         for vehicle in self.vehicles.values():
             vehicle.take_pictures(self.steps, now=True)
 
-    # ---- what scripts hold
+    # ---- debugging of scripts
 
     def set_breakpoints(self, lines: Mapping[str, frozenset[int]]) -> None:
-        """Have breakpoints at these lines of scripts, from 1, by the paths of their files, and at no others."""
+        """Replace all breakpoints of scripts by `lines` (from 1), by file path."""
         if self.breakpoints.set(lines):
-            for one in self._setup.scripts.all():
-                one.script.follow_breakpoints()
+            for hosted in self._setup.scripts.all():
+                hosted.script.follow_breakpoints()
 
     def variables(self) -> Iterator[tuple[str, str, list[Scope]]]:
-        """Yield the object and the file of every script that is loaded, and its variables as a person reads them."""
-        for one in self._setup.scripts.all():
-            if one.path:
-                yield one.own_script, one.path, one.script.variables()
+        """Yield the object, file and variables (as text for people) of every loaded script."""
+        for hosted in self._setup.scripts.all():
+            if hosted.path:
+                yield hosted.own_script, hosted.path, hosted.script.variables()
 
     # ---- snapshots and files
 
     def snapshot(self) -> Snapshot:
-        """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
+        """Save the exact dynamic state, including the scripts' variables; it is valid until the next start or stop."""
         number = self.world.saved_states.snapshot()
         return Snapshot(self.era, self._setup.scripts.changes, number, self._setup.save_state())
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Bring a snapshot back: the flight goes on as it did from there, to the last bit. May be repeated.
+        """Restore a snapshot: the flight then continues as before, to the last bit. May be repeated.
 
         Raises ValueError for a snapshot from before a start, a stop, or a change of vehicles, shapes or their scripts.
         """
-        is_same = snapshot.era == self.era and snapshot.scripts == self._setup.scripts.changes
-        if not is_same or not self.world.saved_states.has_snapshot(snapshot.world):
-            said = "it is dropped at start and stop, and when a vehicle, a shape or a script of one is added or removed"
-            raise ValueError(f"the snapshot is from an earlier run: {said}")
+        is_valid = snapshot.era == self.era and snapshot.scripts == self._setup.scripts.changes
+        if not is_valid or not self.world.saved_states.has_snapshot(snapshot.world):
+            reason = "start, stop, and adding or removing a vehicle, a shape or a script of one make a snapshot invalid"
+            raise ValueError(f"the snapshot is from an earlier run: {reason}")
         self.scene.drag.let_go_of_all()
         for vehicle in self.vehicles.values():
             vehicle.body.let_go()
@@ -378,7 +379,7 @@ class Simulation:
         self._stepper.feel_weather()
 
     def forget(self, snapshot: Snapshot) -> None:
-        """Free a snapshot; start and stop forget all of theirs."""
+        """Free a snapshot. Start and stop free all snapshots themselves."""
         if snapshot.era == self.era:
             self.world.saved_states.forget_snapshot(snapshot.world)
 
@@ -388,15 +389,15 @@ class Simulation:
         return self.context.objects.handles().by_name
 
     def content(self) -> SceneContent:
-        """Return what the scene is now; vehicles and weather as they begin."""
+        """Return the present content of the scene; vehicles and weather are those at the start."""
         scene = self.scene
-        entries = {scene.tree.handle(one.name): scene.entry_now(index) for index, one in scene.entries.items()}
+        entries = {scene.tree.handle(entry.name): scene.entry_now(index) for index, entry in scene.entries.items()}
         return SceneContent(entries, dict(scene.scripts), self.document.settings)
 
     def save_scene(self, path: Path) -> str:
-        """Write floor, objects, vehicles and weather as they are now: a scene file; return its text.
+        """Write a scene file with the present floor, objects, vehicles and weather; return its text.
 
-        Comments and order of the file that it was read from stay. Raises ParameterError and OSError, as
+        Comments and order of the file that the scene was read from are kept. Raises ParameterError and OSError, as
         SceneDocument.write does.
         """
         now = settings_now(self.document.settings, self.parameters, self.vehicles, self.context.weather.now)

@@ -1,4 +1,4 @@
-"""A scene and the vehicles in it, in a world of their own."""
+"""Construction of a scene and its vehicles in a new world."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 from drone_sim.world import World
 
-MAX_OVERLAPS = 500  # pairs of moving bodies, at the start: with more a step takes seconds
+MAX_OVERLAPS = 500  # pairs of moving bodies at the start; with more, a step takes seconds
 
 
 class SimulationSetup:
-    """Scene, vehicles, and the tree of their objects. Where it cannot be built, its world is closed again."""
+    """Scene, vehicles, and the tree of their objects. If they cannot be built, the world is closed."""
 
     def __init__(
         self,
@@ -44,9 +44,9 @@ class SimulationSetup:
         clock: Clock,
         **lasting: Any,
     ):
-        """Fill an empty world; objects whose names are among the `handles` get those.
+        """Fill an empty world. Objects whose names are in `handles` get these handles.
 
-        `lasting` has those fields of the context that outlast a start, as the clock does.
+        `lasting` has fields of the context that persist across starts, as the clock does.
         Raises ParameterError and UrdfError.
         """
         self.parameters, self._world = parameters, world
@@ -67,10 +67,10 @@ class SimulationSetup:
         )
         self.vehicles: dict[str, Vehicle] = {}
         try:
-            self._empty_tree()
+            self._clear_tree()
             self.scene = Scene(parameters.scene, context)
-            for one in parameters.fleet:
-                self._put(one)
+            for vehicle in parameters.fleet:
+                self._create_vehicle(vehicle)
             self._name_objects()
             self.scripts = ScriptScheduler(self.scene, parameters.scene_place, self.vehicles, context)
             self.scripts.begin_anew()
@@ -83,65 +83,65 @@ class SimulationSetup:
         self._world.keep_initial_poses()
 
     def begin_anew(self) -> None:
-        """Put everything where it began, at rest, without scripts."""
+        """Reset everything to its start pose, at rest, with no script loaded."""
         self._world.saved_states.begin_anew()
         self.context.weather.reset()
-        self._empty_tree()
+        self._clear_tree()
         for vehicle in self.vehicles.values():
             vehicle.reset()
         self._name_objects()
         self.scripts.begin_anew()
 
     def save_state(self) -> Restore:
-        """Return a function that brings back all but what the world itself does."""
-        own, scripts = self.context, self.scripts
-        left = (
-            own.signals,
-            own.graphs,
-            own.data,
-            own.tubes,
-            own.collections,
-            own.broadcasts,
-            own.drawings,
-            own.windows,
+        """Return a function that restores all state except the world's own."""
+        context, scripts = self.context, self.scripts
+        script_data = (
+            context.signals,
+            context.graphs,
+            context.data,
+            context.tubes,
+            context.collections,
+            context.broadcasts,
+            context.drawings,
+            context.windows,
         )
-        hosted = (*scripts.child_scripts.values(), *scripts.attached)
-        carried = (*self.vehicles.values(), self.scene, own.weather)
-        parts: list[Any] = [own.objects, own.velocities, *left, *hosted, *carried]
-        return in_turn(saved(own.clock, "steps"), *(one.save_state() for one in parts))
+        hosted_scripts = (*scripts.child_scripts.values(), *scripts.attached)
+        carried = (*self.vehicles.values(), self.scene, context.weather)
+        parts: list[Any] = [context.objects, context.velocities, *script_data, *hosted_scripts, *carried]
+        return in_turn(saved(context.clock, "steps"), *(part.save_state() for part in parts))
 
     def tune_as(self, before: SimulationSetup) -> None:
-        """Take over the values that were tuned for the vehicles of another setup."""
+        """Take over the tuned values of vehicles with the same name in another setup."""
         for name, script in self.scripts.child_scripts.items():
             if name in before.vehicles:
                 script.tuning.take_over(before.scripts.child_scripts[name].tuning)
 
     def end_scripts(self, clean_up: bool) -> None:
-        """Let go of every script; `clean_up`: end its thread and call its cleanup before, even if another's fails.
+        """Close every script; if `clean_up`, first end its thread and call its cleanup, even if another script fails.
 
         Raises the first ScriptError.
         """
         scripts = [*self.scripts.leaving, *self.scripts.all()]
         errors = self.scripts.clean_up(scripts) if clean_up else []
-        for one in scripts:
-            one.close()
+        for script in scripts:
+            script.close()
         raise_first(errors)
 
     def load_scripts(self, scripts: Iterable[AnyScript], script: str) -> None:
-        """Load some of the scripts, and run their init: `script` for vehicles without their own. Raises ScriptError."""
-        for one in scripts:
-            if isinstance(one, ChildScript):
-                path = script_of(one.vehicle.parameters, self.parameters, script)
+        """Load scripts and run their init; `script` is for vehicles without one of their own. Raises ScriptError."""
+        for hosted in scripts:
+            if isinstance(hosted, ChildScript):
+                path = script_of(hosted.vehicle.parameters, self.parameters, script)
             else:
-                path = one.file
-            one.load_script(path, self.operations)
+                path = hosted.file
+            hosted.load_script(path, self.operations)
 
     def add(self, parameters: VehicleParameters, running: bool, script: str) -> None:
-        """Put one more vehicle into the world; `running`: load its scripts, `script` where it names none of its own.
+        """Add a vehicle to the world; if `running`, load its scripts, with `script` if it names none of its own.
 
-        Where a script fails in init, the vehicle is removed again. Raises ParameterError, UrdfError and ScriptError.
+        If a script fails in init, the vehicle is removed again. Raises ParameterError, UrdfError and ScriptError.
         """
-        vehicle = self._put(parameters)
+        vehicle = self._create_vehicle(parameters)
         self.scripts.attach()
         self._world.saved_states.keep(vehicle.body.number)
         try:
@@ -151,16 +151,16 @@ class SimulationSetup:
             raise
 
     def remove(self, name: str, running: bool) -> None:
-        """Take a vehicle, and its objects, out of the world; `running`: call its scripts' cleanup before.
+        """Remove a vehicle and its objects from the world; if `running`, call its scripts' cleanup first.
 
-        Raises the first ScriptError of these.
+        Raises the first ScriptError of a cleanup.
         """
         errors = self.scripts.clean_up(self.scripts.of(name)) if running else []
         self.scripts.detach(name)
         self.vehicles.pop(name).leave()
         raise_first(errors)
 
-    def _put(self, parameters: VehicleParameters) -> Vehicle:
+    def _create_vehicle(self, parameters: VehicleParameters) -> Vehicle:
         vehicle = Vehicle(parameters, self._suffix(parameters), self.context)
         self.vehicles[vehicle.name] = vehicle
         if vehicle.instruments:
@@ -168,9 +168,9 @@ class SimulationSetup:
         return vehicle
 
     def _suffix(self, parameters: VehicleParameters) -> str:
-        """Return what the names of V-REP's copies end in: nothing for the first, then #0, #1, ..., or as it is given.
+        """Return the suffix of object names, as in V-REP's copies: '', then #0, #1, ..., or the configured one.
 
-        Raises ParameterError for one that another vehicle has.
+        Raises ParameterError if another vehicle has the configured suffix.
         """
         taken = {vehicle.suffix for vehicle in self.vehicles.values()}
         if parameters.suffix is not None:
@@ -180,9 +180,9 @@ class SimulationSetup:
                     f"vehicle {parameters.name}: suffix = {parameters.suffix}: another vehicle has the same suffix"
                 )
             return wanted
-        return next(one for one in itertools.chain([""], map("#{}".format, itertools.count())) if one not in taken)
+        return next(free for free in itertools.chain([""], map("#{}".format, itertools.count())) if free not in taken)
 
-    def _empty_tree(self) -> None:
+    def _clear_tree(self) -> None:
         self.context.clear()
         self.context.objects.add("Floor", also=("ResizableFloor_5_25",), kind="shape")
 
@@ -195,26 +195,26 @@ class SimulationSetup:
 
     def _check(self) -> None:
         if not self._world.is_finite():
-            raise ParameterError("the scene as it begins: a position or a velocity is not finite")
+            raise ParameterError("the scene at the start: a position or a velocity is not finite")
         overlaps = self._world.queries.overlaps()
         if overlaps > MAX_OVERLAPS:
-            said = (
+            problem = (
                 f"{overlaps} pairs of moving objects touch or overlap at the start; at most {MAX_OVERLAPS} are allowed"
             )
-            raise ParameterError(f"scene/objects: {said}")
+            raise ParameterError(f"scene/objects: {problem}")
 
 
 def script_of(vehicle: VehicleParameters, parameters: Parameters, script: str) -> str:
-    """Return the script that flies a vehicle: its own, where it names one, else `script`, or the parameters' one."""
+    """Return the script that flies a vehicle: its own if it names one, else `script`, else the parameters' script."""
     if vehicle.script not in (parameters.script, NO_SCRIPT):
         return vehicle.script
     return script or parameters.script or vehicle.script
 
 
 def give_back_memory() -> None:
-    """Return what was freed in between what is still used, where the C library can (glibc): it never does by itself.
+    """Return freed heap memory to the system with glibc's malloc_trim, if the C library has it.
 
-    After a script that held 300 MB the process would keep them.
+    glibc does not return free blocks between used ones by itself: 300 MB of a script would stay with the process.
     """
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:

@@ -1,4 +1,4 @@
-"""One step: threads, actuation, dynamics, vision, sensing; and whether every vehicle is somewhere after it."""
+"""Execution of one step (threads, actuation, dynamics, vision, sensing), and detection of divergence."""
 
 from __future__ import annotations
 
@@ -10,48 +10,48 @@ from drone_sim.scene.scene_parameters import FloorParameters
 from drone_sim.scripting.script_log import LOG
 from drone_sim.vehicles.vehicle import Vehicle
 
-_NOWHERE = 1e9  # m, m/s and rad/s, summed
+_MAX_SUM = 1e9  # of position (m), velocity (m/s) and angular velocity (rad/s)
 
 
 class Diverged(RuntimeError):
-    """The dynamics has ended in numbers that mean nothing; one line that says when."""
+    """The state of a vehicle became NaN or absurdly large. The message is one line with the time."""
 
 
 class DivergenceCheck:
-    """Looks after each step where the vehicles are."""
+    """Detector of vehicles whose state is not finite, or that left the floor."""
 
     def __init__(self, floor: FloorParameters, clock: Clock):
-        """Take the floor, and the simulation's clock.
+        """Use a floor and the simulation's clock.
 
-        Where the floor has an edge, the log says once who has gone past it.
+        If the floor has an edge, each vehicle that crosses it is logged once.
         """
         self._clock = clock
-        self._edge = floor.size / 2 if floor.edge else None  # m, of what a vehicle can stand on
-        self._past: set[str] = set()
+        self._edge = floor.size / 2 if floor.edge else None  # m, largest |x| and |y| on the floor
+        self._left_floor: set[str] = set()
 
     def check(self, vehicles: Iterable[Vehicle]) -> None:
-        """Raise Diverged where the position or velocity of a vehicle is not finite, or absurdly large."""
+        """Raise Diverged if the position or velocity of a vehicle is not finite, or absurdly large."""
         for vehicle in vehicles:
             (x, y, z), _, (vx, vy, vz), (wx, wy, wz) = vehicle.body.state
-            # Of a NaN no comparison is true. One sum, since this runs in every step.
-            if not -_NOWHERE < x + y + z + vx + vy + vz + wx + wy + wz < _NOWHERE:
+            # A NaN makes the comparison false. A single sum keeps this per-step check cheap.
+            if not -_MAX_SUM < x + y + z + vx + vy + vz + wx + wy + wz < _MAX_SUM:
                 where = f"position {x:g} {y:g} {z:g} m, velocity {vx:g} {vy:g} {vz:g} m/s"
-                who = "" if vehicle.parameters.is_alone else f"{vehicle.name}: "
+                name = "" if vehicle.parameters.is_alone else f"{vehicle.name}: "
                 raise Diverged(
-                    f"the simulation has diverged at t = {self._clock.time:.2f} s: {who}{where}; `start` begins again"
+                    f"the simulation has diverged at t = {self._clock.time:.2f} s: {name}{where}; `start` begins again"
                 )
             if self._edge is not None and max(abs(x), abs(y)) > self._edge:
-                self._tell(vehicle, x, y)
+                self._warn_once(vehicle, x, y)
 
-    def _tell(self, vehicle: Vehicle, x: float, y: float) -> None:
-        if vehicle.name not in self._past:
-            self._past.add(vehicle.name)
-            who = "the drone" if vehicle.parameters.is_alone else vehicle.name
-            LOG.warning("%s left the floor at x=%.2f y=%.2f m: nothing is below it", who, x, y)
+    def _warn_once(self, vehicle: Vehicle, x: float, y: float) -> None:
+        if vehicle.name not in self._left_floor:
+            self._left_floor.add(vehicle.name)
+            name = "the drone" if vehicle.parameters.is_alone else vehicle.name
+            LOG.warning("%s left the floor at x=%.2f y=%.2f m: nothing is below it", name, x, y)
 
 
 class Stepper:
-    """Steps what has been set up through one run. What it calls is listed when that changes, and not in every step."""
+    """Steps of a setup through one run. Lists of what to call are cached, and rebuilt only after a change."""
 
     def __init__(self, setup: SimulationSetup):
         """Begin a run at time 0."""
@@ -65,43 +65,44 @@ class Stepper:
         self.list_vehicles()
 
     def lay_floor(self, floor: FloorParameters) -> None:
-        """Take another floor: past its edge, vehicles fall."""
+        """Use another floor for the check whether vehicles left it."""
         self._divergence_check = DivergenceCheck(floor, self._clock)
 
     def list_vehicles(self) -> None:
-        """Know who flies: a vehicle has come or gone."""
+        """Refresh the vehicle lists after a vehicle was added or removed."""
         self.flying = tuple(self._vehicles.values())
         self._bodies = tuple(vehicle.body.number for vehicle in self.flying)
         self.feel_weather()
 
     def feel_weather(self) -> None:
-        """Give every vehicle the forces that the present weather needs."""
-        self._weather_felt = self._context.weather.changes
+        """Update the forces of every vehicle after a change of the weather."""
+        self._weather_change_seen = self._context.weather.changes
         for vehicle in self.flying:
             vehicle.feel_weather()
         self._context.tunings += 1
-        self._any_between = any(vehicle.sub_step_forces or vehicle.instruments for vehicle in self.flying)
+        self._has_sub_step_work = any(vehicle.sub_step_forces or vehicle.instruments for vehicle in self.flying)
         self.list_scripts()
 
     def list_scripts(self) -> None:
-        """Know which scripts there are: some have come or gone."""
+        """Refresh the script lists after scripts were added or removed."""
         scripts = self._scripts
-        self._alone = () if scripts.attached else tuple(scripts.child_scripts.values())  # they need no order
-        self._threaded = tuple(one for one in scripts.all() if one.script.threaded)
+        # The order of child scripts matters only if there are attached scripts.
+        self._unordered = () if scripts.attached else tuple(scripts.child_scripts.values())
+        self._threaded = tuple(hosted for hosted in scripts.all() if hosted.script.threaded)
 
     def step(self, watch: Callable[[int], None] | None = None) -> None:
-        """Do what Simulation.step says."""
+        """Run one step as Simulation.step documents."""
         vehicles, carried = self.flying, self._context.carried
-        if self._threaded or self._scripts.is_changed or self._weather_felt != self._context.weather.changes:
+        if self._threaded or self._scripts.is_changed or self._weather_change_seen != self._context.weather.changes:
             self._begin_step()
-        for script in self._alone or self._scripts.all():
+        for script in self._unordered or self._scripts.all():
             script.actuation()
         self._velocities.begin_step()
         wrenches = dict(zip(self._bodies, map(Vehicle.wrench, vehicles)))
         carries = carried.shapes or carried.bases
         if carries:
             carried.follow()
-        between = self._sub_steps_watched(watch) if self._any_between else watch
+        between = self._with_watch(watch) if self._has_sub_step_work else watch
         self._world.advance(wrenches, self._sub_steps, between)
         for vehicle in vehicles:
             vehicle.body.refresh()
@@ -118,39 +119,39 @@ class Stepper:
     def _sense(self) -> None:
         self._clock.is_sensing = True
         try:
-            for script in self._alone or self._scripts.all():
+            for script in self._unordered or self._scripts.all():
                 script.sensing()
         finally:
             self._clock.is_sensing = False
 
     def _follow_scripts(self) -> None:
-        """Begin and end the scripts of objects that have come and gone."""
+        """Start and end scripts of objects that were added or removed."""
         if self._scripts.is_changed:
             self._scripts.follow(self._operations)
             self.list_scripts()
 
     def _begin_step(self) -> None:
-        """Follow scripts that have come or gone and a change of the weather; let each thread run for its turn."""
+        """Apply changes of scripts and weather, then run each script thread until it yields."""
         self._follow_scripts()
-        if self._weather_felt != self._context.weather.changes:
+        if self._weather_change_seen != self._context.weather.changes:
             self.feel_weather()
         for thread in self._threaded:
             if thread.script.threaded:
                 thread.script.take_turn()
 
-    def _sub_steps_watched(self, watch: Callable[[int], None] | None) -> Callable[[int], None]:
-        """Return what is to be called before and after sub-steps, where anything is due there."""
+    def _with_watch(self, watch: Callable[[int], None] | None) -> Callable[[int], None]:
+        """Return the callback for World.advance: `watch`, if any, then _at_sub_step."""
         if watch is None:
-            return self._between
+            return self._at_sub_step
 
         def between(count: int) -> None:
             watch(count)
-            self._between(count)
+            self._at_sub_step(count)
 
         return between
 
-    def _between(self, count: int) -> None:
-        """Do what is due after so many sub-steps of the step: instruments look, and forces follow."""
+    def _at_sub_step(self, count: int) -> None:
+        """After `count` sub-steps of the step, update instruments and forces."""
         if count:
             for vehicle in self.flying:
                 vehicle.after_sub_step(self._clock.steps * self._sub_steps + count)

@@ -1,1 +1,1 @@
-"""Why does it not fly as expected? What is known of vehicles, pace, scripts and cameras, in one look."""
+"""Diagnosis of why a vehicle does not fly as expected: state of vehicles, pace, scripts and cameras."""

@@ -1,4 +1,4 @@
-"""Which commands a vehicle got from whom, and which were refused: for people who ask why it does not fly."""
+"""Log of the commands that a vehicle accepted and refused, by sender."""
 
 from __future__ import annotations
 
@@ -8,54 +8,54 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
-_ALTERNATING = 4  # changes of the sender within _RECENT, after which several senders send at the same time
+_RIVAL_CHANGES = 4  # changes of the sender within _RECENT that mean that several senders are active
 _RECENT = 3.0  # s
 
 
 class Taken(NamedTuple):
-    """The last good message of a topic."""
+    """Sender and time of the last accepted message on a topic."""
 
     sender: str
     at: float  # s, of the log's clock
 
 
 class Refusal(NamedTuple):
-    """The last message of a topic that was refused."""
+    """The last refused message on a topic."""
 
     topic: str
     sender: str
     at: float  # s, of the log's clock
     why: str
-    times: int  # of those refused by now
+    times: int  # number of refused messages so far
 
 
 class CommandLog:
-    """The messages received for one vehicle since it was added. Any thread may write, and any may read."""
+    """Log of the messages received for one vehicle since it was added. Thread-safe."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, senders: Callable[[], list[str]] = list):
-        """Begin empty; take a monotonic `clock` (s), and what returns the `senders` that are connected."""
+        """Begin empty. `clock` is monotonic (s); `senders` returns the connected senders."""
         self.clock, self.senders = clock, senders
         self.taken: dict[str, Taken] = {}  # by topic
         self.refused: dict[str, Refusal] = {}
-        self._changes: dict[str, deque[Taken]] = {}  # by topic: the last messages from another sender than before
+        self._changes: dict[str, deque[Taken]] = {}  # by topic: the last messages whose sender was not the previous one
         self._lock = threading.Lock()
 
     def take(self, topic: str, sender: str) -> None:
-        """Note a good message."""
+        """Log an accepted message."""
         before, now = self.taken.get(topic), Taken(sender, self.clock())
         self.taken[topic] = now
         if before is None or before.sender != sender:
-            self._changes.setdefault(topic, deque(maxlen=_ALTERNATING)).append(now)
+            self._changes.setdefault(topic, deque(maxlen=_RIVAL_CHANGES)).append(now)
 
     def rivals(self, topic: str) -> list[str]:
-        """Return the senders whose messages on a topic alternate; none, if one took over from the other just once."""
+        """Return the senders whose messages on a topic alternate; [] if one sender only took over from another."""
         changes = list(self._changes.get(topic, ()))
-        if len(changes) < _ALTERNATING or self.clock() - changes[0].at > _RECENT:
+        if len(changes) < _RIVAL_CHANGES or self.clock() - changes[0].at > _RECENT:
             return []
-        return sorted({one.sender for one in changes})
+        return sorted({change.sender for change in changes})
 
     def refuse(self, topic: str, sender: str, why: str) -> None:
-        """Note one that was refused."""
+        """Log a refused message and the reason `why`."""
         with self._lock:
             before = self.refused.get(topic)
             self.refused[topic] = Refusal(topic, sender, self.clock(), why, before.times + 1 if before else 1)
@@ -63,9 +63,9 @@ class CommandLog:
     def last_refusal(self) -> Refusal | None:
         """Return the latest refusal on any topic."""
         with self._lock:
-            return max(self.refused.values(), key=lambda one: one.at, default=None)
+            return max(self.refused.values(), key=lambda refusal: refusal.at, default=None)
 
     def is_refusing(self, topic: str) -> bool:
-        """Whether the last message of a topic was refused."""
+        """Return whether the last message on a topic was refused."""
         refused, taken = self.refused.get(topic), self.taken.get(topic)
         return refused is not None and (taken is None or taken.at < refused.at)

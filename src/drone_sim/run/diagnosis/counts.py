@@ -1,4 +1,4 @@
-"""What is counted all the time, read now and then: what happened in between is the difference."""
+"""Counters of the simulation, and their differences between two diagnoses."""
 
 from __future__ import annotations
 
@@ -8,40 +8,40 @@ from typing import NamedTuple
 from drone_sim.run.pacing import Pacer
 from drone_sim.run.player import Player
 
-_FRESH = 3.0  # s of real time; what is older says nothing of now
-Key = tuple[str, str]  # a vehicle, and one of its cameras
+_MAX_AGE = 3.0  # s of real time; older counts are not compared
+Key = tuple[str, str]  # vehicle, camera
 
 
 class Since(NamedTuple):
-    """Counts since a run began, or the differences between two looks, if the simulation was flying at both."""
+    """Counts since a run began, or differences between two diagnoses while the simulation was flying."""
 
     seconds: float  # of real time
     steps: int
     late: int  # steps
     pictures: int
     drawing: float  # s of real time
-    shown: Mapping[Key, int]  # pictures, of the cameras that somebody looks at
-    clipped: Mapping[str, int]  # steps in which a vehicle's propellers were at a limit
+    shown: Mapping[Key, int]  # number of pictures of each subscribed camera
+    clipped: Mapping[str, int]  # by vehicle, steps with a propeller at its limit
 
 
 class Counts(NamedTuple):
-    """What is counted, at a moment, and in which state."""
+    """Counts at one time, and the state in which they were taken."""
 
     run: int
     state: str
-    asked: float  # the real-time factor
-    since: Since  # any moment; seconds count from anywhere
+    asked: float  # real-time factor requested
+    since: Since  # since the run began; `seconds` has an arbitrary zero
 
 
 def count(player: Player, pacer: Pacer, at: float) -> Counts:
-    """Return the counts; `at` is the real time in s."""
+    """Return the present counts; `at` is the real time in s."""
     simulation = player.simulation
     vehicles = simulation.vehicles
     shown = {
-        (name, camera): one.shown
+        (name, key): camera.shown
         for name, vehicle in vehicles.items()
-        for camera, one in vehicle.cameras.items()
-        if one.watched()
+        for key, camera in vehicle.cameras.items()
+        if camera.watched()
     }
     vision = simulation.vision
     since = Since(
@@ -57,11 +57,11 @@ def count(player: Player, pacer: Pacer, at: float) -> Counts:
 
 
 def between(before: Counts | None, now: Counts) -> Since | None:
-    """Return the differences between two looks; None where they cannot be compared."""
+    """Return the differences between two counts; None if they cannot be compared."""
     if before is None or before[:3] != now[:3] or now.state != "flying":
         return None
     old, new = before.since, now.since
-    if not 0 < new.seconds - old.seconds < _FRESH or new.steps < old.steps:  # a snapshot came back
+    if not 0 < new.seconds - old.seconds < _MAX_AGE or new.steps < old.steps:  # a snapshot was restored
         return None
     return Since(
         seconds=new.seconds - old.seconds,

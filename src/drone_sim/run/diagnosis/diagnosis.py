@@ -1,4 +1,4 @@
-"""One look at everything: at the pace, at the cameras, at each vehicle."""
+"""Diagnosis of the simulation's pace, of the cameras, and of each vehicle."""
 
 from __future__ import annotations
 
@@ -16,46 +16,46 @@ from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.sensors.vision import TINY
 
-_ENOUGH = 0.9  # of the nominal rate, and of the pace that is asked for
-_FEW = 2  # pictures that fall into this look or the next
-_MOST_HOLES = 3  # of what an import has left out
-_LATE = 0.1  # of the steps; a few are late on any busy computer
+_ENOUGH = 0.9  # fraction of the nominal rate, and of the requested real-time factor
+_FEW = 2  # pictures that may be counted in this diagnosis or the next
+_MAX_HOLES = 3  # messages about what an import left out
+_LATE = 0.1  # fraction of the steps; a few are late on any busy computer
 
 
 def cameras(simulation: Simulation, since: Since | None) -> Finding:
-    """Look at what draws, at how long a picture takes, and at the rate of each camera that somebody looks at."""
+    """Check the renderer, the time per picture, and the rate of each subscribed camera."""
     renderer, values, problems = simulation.vision.renderer, {}, []
     values["renderer"] = f"PyBullet's {TINY}" if renderer == TINY else renderer or "none yet: no camera has been used"
     drawn = since.pictures if since else 0
     mean = f"{since.drawing / drawn * 1e3:.1f} ms" if since and drawn else "not known"
     values["frame time"] = mean
     if renderer == TINY:
-        said = f"PyBullet's slow {TINY} draws, because there is no EGL: run `rosrun drone_sim doctor`"
-        problems.append(Problem(WARN, said))
-    for (vehicle, name), count_shown in (since.shown if since else {}).items():
+        reason = f"PyBullet's slow {TINY} draws, because there is no EGL: run `rosrun drone_sim doctor`"
+        problems.append(Problem(WARN, reason))
+    for (vehicle, name), pictures in (since.shown if since else {}).items():
         assert since is not None
-        rate = count_shown / since.seconds
+        rate = pictures / since.seconds
         nominal = _nominal(simulation, vehicle, name, since)
         values[f"{vehicle}/{name}"] = f"{rate:.1f} of {nominal:.1f} Hz"
-        if count_shown + _FEW < _ENOUGH * nominal * since.seconds:
+        if pictures + _FEW < _ENOUGH * nominal * since.seconds:
             problems.append(Problem(WARN, f"{vehicle}/{name} publishes at {rate:.1f} instead of {nominal:.1f} Hz"))
-    watched = [key for vehicle in simulation.vehicles.values() for key, one in vehicle.cameras.items() if one.watched()]
-    values["looked at"] = f"{len(watched)} of {sum(len(one.cameras) for one in simulation.vehicles.values())} cameras"
+    watched = [key for each in simulation.vehicles.values() for key, camera in each.cameras.items() if camera.watched()]
+    values["looked at"] = f"{len(watched)} of {sum(len(each.cameras) for each in simulation.vehicles.values())} cameras"
     fine = f"{len(watched)} in use; time per picture: {mean}" if watched else "no camera is in use"
     return finding("cameras", fine, problems, values)
 
 
 def _nominal(simulation: Simulation, vehicle: str, name: str, since: Since) -> float:
-    """Return the pictures in a second of real time that there should be."""
+    """Return the expected rate of pictures in Hz of real time."""
     parameters = simulation.parameters
     every = simulation.vehicles[vehicle].parameters.cameras[name].every
-    if not parameters.real_time_factor:  # as fast as it can
+    if not parameters.real_time_factor:  # unpaced
         return since.steps / every / since.seconds
     return parameters.real_time_factor / (parameters.time_step * every)
 
 
 def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool, held: bool) -> Finding:
-    """Look at state, script errors, real-time factor and late steps; at `simulated_time`, whether /clock goes on.
+    """Check state, script errors, real-time factor and late steps; with `simulated_time`, also whether /clock runs.
 
     `held`: the next step waits for a client of the remote API.
     """
@@ -63,12 +63,12 @@ def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool
     asked = simulation.parameters.real_time_factor
     factor = since.steps * simulation.parameters.time_step / since.seconds if since else None
     problems = [Problem(ERROR, f"stopped: {player.why_stopped}")] if player.why_stopped and not player.playing else []
-    problems += [Problem(ERROR, f"script of {on} failed: {error}") for on, error in simulation.failed_scripts.items()]
-    problems += [Problem(WARN, f"will not work here: {one}") for one in simulation.holes[:_MOST_HOLES]]
+    problems += [Problem(ERROR, f"script of {n} failed: {error}") for n, error in simulation.failed_scripts.items()]
+    problems += [Problem(WARN, f"will not work here: {hole}") for hole in simulation.holes[:_MAX_HOLES]]
     if simulated_time and not player.playing:
         problems.append(Problem(WARN, f"{player.state}: /clock stands still, and nodes that use simulated time wait"))
     if held and since and not since.steps:
-        problems.append(Problem(WARN, "no step: a client of the remote API wants to trigger each step, and does not"))
+        problems.append(Problem(WARN, "no step: a client of the remote API asked to trigger each step, and does not"))
     elif factor is not None and asked and factor < _ENOUGH * asked:
         problems.append(Problem(WARN, f"too slow: {factor:.2f} times real time, {asked:g} is wanted"))
     if since and since.late > _LATE * since.steps:
@@ -102,7 +102,7 @@ _PYBULLET = _version("pybullet")
 
 
 class Diagnosis:
-    """Looks when it is asked, and keeps nothing but some counts; the thread that owns the simulation asks."""
+    """Diagnosis of the simulation. Only the thread that owns the simulation may call it."""
 
     def __init__(
         self,
@@ -115,10 +115,10 @@ class Diagnosis:
         held: Callable[[], bool] = lambda: False,
         unheard: Callable[[], Mapping[str, list[str]]] = dict,
     ):
-        """Take what plays and paces, what returns the commands that came in, by vehicle, and a monotonic clock (s).
+        """`logs` returns the command logs by vehicle; `clock` is monotonic (s).
 
-        The names of the vehicles' frames begin with `frames_below`; `held` tells whether a step waits for a client.
-        `unheard` returns the topics on which Twists are published and nobody listens, with the publishers' names.
+        `frames_below` is the prefix of the vehicles' frames; `held` returns whether a step waits for a client.
+        `unheard` returns the topics with Twist publishers and no subscriber, with the publishers' names.
         """
         self._unheard = unheard
         self._frames_below, self._held = frames_below, held
@@ -126,10 +126,10 @@ class Diagnosis:
         self._simulated_time = simulated_time
         self._clock = clock
         self._before: Counts | None = None
-        self._unmoved: dict[str, float] = {}  # s of simulated time during which a vehicle's commands have moved nothing
+        self._unmoved: dict[str, float] = {}  # by vehicle, s of simulated time without any effect of commands
 
     def look(self) -> list[Finding]:
-        """Return what is found: the simulation's, the cameras', and each vehicle's."""
+        """Return the findings for the simulation, the cameras, and each vehicle."""
         now = count(self._player, self._pacer, self._clock())
         since, self._before = between(self._before, now), now
         logs, unheard = self._logs(), self._unheard()

@@ -1,22 +1,22 @@
-"""What a look at one thing found."""
+"""Result of the diagnosis of one item: a vehicle, the cameras, or the simulation."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-OK, WARN, ERROR = 0, 1, 2  # as diagnostic_msgs/DiagnosticStatus counts
+OK, WARN, ERROR = 0, 1, 2  # levels of diagnostic_msgs/DiagnosticStatus
 
 
 class Problem(NamedTuple):
-    """One thing that is not as a user expects, in words that say what to do about it."""
+    """Unexpected condition, with a text that also says what to do about it."""
 
     level: int
     what: str
 
 
 class Finding(NamedTuple):
-    """A name, the worst of the levels, one line, and the values that are known, by name."""
+    """Name, worst level, one-line message, and values by name, as in DiagnosticStatus."""
 
     name: str
     level: int
@@ -25,12 +25,12 @@ class Finding(NamedTuple):
 
 
 def finding(name: str, fine: str, problems: Sequence[Problem], values: Mapping[str, str]) -> Finding:
-    """Return what was found: `fine` where there are no problems."""
-    level = max((one.level for one in problems), default=OK)
-    worst_first = sorted(problems, key=lambda one: -one.level)
-    return Finding(name, level, "; ".join(one.what for one in worst_first) or fine, values)
+    """Return a finding with the worst problem first; its message is `fine` if there are no problems."""
+    level = max((problem.level for problem in problems), default=OK)
+    worst_first = sorted(problems, key=lambda problem: -problem.level)
+    return Finding(name, level, "; ".join(problem.what for problem in worst_first) or fine, values)
 
 
 def numbers(values: Sequence[float], digits: int = 2) -> str:
-    """Return numbers in a row, with so many digits behind the point; no minus before a zero."""
+    """Return numbers separated by spaces, with `digits` decimals and no minus sign before a zero."""
     return " ".join(f"{round(value, digits) + 0.0:.{digits}f}" for value in values)

@@ -1,4 +1,4 @@
-"""Why a vehicle does not fly as its pilot expects."""
+"""Diagnosis of a vehicle that does not fly as its pilot expects."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from drone_sim.vehicles.vehicle import Vehicle
 
 COMMAND = "cmd_vel"
 _RECENT = 5.0  # s of real time
-_LEANING = math.radians(60)  # no flight of the tutorial's needs half as much
-_SHARE = 0.5  # of the steps with a propeller at its limit, after which it is a problem
-_SLOW = 0.1  # of the speed that is commanded
-_MOVES = 0.1  # m/s, of a command that means to
-_IGNORED_FOR = 3.0  # s of simulated time
-_DEAF = "this script does not subscribe to commands: the tutorial's scripts do from stage 6 on, and `pilot` does"
+_MAX_TILT = math.radians(60)  # more than twice what any flight of the tutorial needs
+_CLIPPED_SHARE = 0.5  # fraction of the steps with a propeller at its limit that is a problem
+_SLOW_SHARE = 0.1  # fraction of the commanded speed
+_MIN_COMMAND = 0.1  # m/s and rad/s, smallest command that should move the vehicle
+_IGNORED_TIME = 3.0  # s of simulated time
+_NO_INPUT = "this script does not subscribe to commands: the tutorial's scripts do from stage 6 on, and `pilot` does"
 
 
 class VehicleDiagnosis:
-    """Looks at one vehicle, between two steps."""
+    """Diagnosis of one vehicle, between two steps."""
 
     def __init__(
         self,
@@ -40,38 +40,38 @@ class VehicleDiagnosis:
         unmoved: float = 0.0,
         unheard: Mapping[str, Sequence[str]] = MappingProxyType({}),
     ):
-        """Take what is to be looked at; `since` is what was counted since the last look, None where nothing was.
+        """`since` has the counts since the last diagnosis, or None.
 
-        The names of the vehicles' frames begin with `frames_below`; `is_unmoved` has been true for `unmoved` s.
-        `unheard` has the topics on which Twists are published and that have no subscriber, with the publishers' names.
+        `frames_below` is the prefix of the vehicles' frames; `is_unmoved` has been true for `unmoved` s.
+        `unheard` has the topics with Twist publishers and no subscriber, with the publishers' names.
         """
         self._frames_below, self._unmoved, self._unheard = frames_below, unmoved, unheard
         self._vehicle, self._player, self._log, self._since = vehicle, player, log, since
         self._now = log.clock()
         self._tilt = tilt(vehicle.body)
-        self._doing = doing(vehicle)
+        self._situation = doing(vehicle)
         self._contacts = vehicle.body.contacts()
 
     def finding(self) -> Finding:
-        """Return what was found."""
+        """Return the finding."""
         problems = [
-            *self._stands(),
-            *self._has_failed(),
-            *self._rests(),
-            *self._refuses(),
-            *self._leans(),
-            *self._lies(),
-            *self._cannot(),
-            *self._is_on_its_own(),
-            *self._has_rivals(),
-            *self._misses(),
-            *self._ignores(),
+            *self._check_running(),
+            *self._check_script(),
+            *self._check_landed(),
+            *self._check_refusals(),
+            *self._check_tilt(),
+            *self._check_situation(),
+            *self._check_limits(),
+            *self._check_sender(),
+            *self._check_rivals(),
+            *self._check_topics(),
+            *self._check_response(),
         ]
         return finding(f"vehicle {self._vehicle.name}", self._fine(), problems, self._values())
 
-    # ---- what may be wrong
+    # ---- checks
 
-    def _stands(self) -> list[Problem]:
+    def _check_running(self) -> list[Problem]:
         player = self._player
         if player.playing:
             return []
@@ -83,13 +83,13 @@ class VehicleDiagnosis:
             return [Problem(WARN, f"{taken.sender} sends commands, but the simulation is {player.state}: {cure}")]
         return []
 
-    def _has_failed(self) -> list[Problem]:
-        """Report a script on an object of the vehicle that has failed, while the simulation goes on."""
+    def _check_script(self) -> list[Problem]:
+        """Report a failed script on an object of the vehicle, while the simulation continues."""
         error = self._vehicle.flight_state.script_error
         return [Problem(ERROR, f"script failed: {error}")] if error and not self._player.why_stopped else []
 
-    def _rests(self) -> list[Problem]:
-        """Tell of commands that do not move it, for it has landed or crashed."""
+    def _check_landed(self) -> list[Problem]:
+        """Report commands that have no effect because the vehicle has landed or crashed."""
         taken, state = self._log.taken.get(COMMAND), str(self._vehicle.flight_state)
         if state == CRASHED:
             return [Problem(WARN, "crashed: `reset` puts it back at its start")]
@@ -97,90 +97,92 @@ class VehicleDiagnosis:
             return [Problem(WARN, f"landed: commands of {taken.sender} do not move it; send `takeoff` first")]
         return []
 
-    def _refuses(self) -> list[Problem]:
+    def _check_refusals(self) -> list[Problem]:
         refused = self._log.last_refusal()
         if refused is None or not self._log.is_refusing(refused.topic):
             return []
         kept = ", and keeps the last valid one" if refused.topic == COMMAND else ""
         return [Problem(WARN, f"refused a message of {refused.sender} on {refused.topic}{kept}: {refused.why}")]
 
-    def _leans(self) -> list[Problem]:
-        if self._tilt < _LEANING or str(self._vehicle.flight_state) == CRASHED:
+    def _check_tilt(self) -> list[Problem]:
+        if self._tilt < _MAX_TILT or str(self._vehicle.flight_state) == CRASHED:
             return []
         how = "lies on its back" if self._tilt > math.pi / 2 and self._contacts else "leans"
         return [Problem(WARN, f"{how} ({math.degrees(self._tilt):.0f} degrees): `restart` puts it upright")]
 
-    def _lies(self) -> list[Problem]:
-        """Tell that it lies, slides or hangs somewhere, where its script has not said so itself."""
-        said = self._doing
-        if not self._player.playing or said in (FLYING, HELD, UPSIDE_DOWN) or said != situation(self._vehicle.body):
+    def _check_situation(self) -> list[Problem]:
+        """Report that the vehicle lies, slides or hangs somewhere, unless its script reports it."""
+        state = self._situation
+        if not self._player.playing or state in (FLYING, HELD, UPSIDE_DOWN) or state != situation(self._vehicle.body):
             return []
-        is_touched = said.startswith("touches")
-        return [Problem(WARN, said if is_touched else f"{said}: nothing is below it; `restart` puts it back")]
+        is_touched = state.startswith("touches")
+        return [Problem(WARN, state if is_touched else f"{state}: nothing is below it; `restart` puts it back")]
 
-    def _cannot(self) -> list[Problem]:
+    def _check_limits(self) -> list[Problem]:
         problems = []
         since, command = self._since, self._vehicle.commands.now
-        if since and since.steps and since.clipped[self._vehicle.name] > _SHARE * since.steps:
+        if since and since.steps and since.clipped[self._vehicle.name] > _CLIPPED_SHARE * since.steps:
             problems.append(Problem(WARN, f"propellers are at their limit in {self._clipped()}"))
         wanted = math.hypot(*command.linear)
-        if since and self._contacts and wanted > _MOVES and self._speed() < _SLOW * wanted:
-            met = ", ".join(_names(self._contacts))
+        if since and self._contacts and wanted > _MIN_COMMAND and self._speed() < _SLOW_SHARE * wanted:
+            names = ", ".join(_names(self._contacts))
             problems.append(
-                Problem(WARN, f"blocked by {met}: the command is {wanted:.2f} m/s, the speed {self._speed():.2f} m/s")
+                Problem(WARN, f"blocked by {names}: the command is {wanted:.2f} m/s, the speed {self._speed():.2f} m/s")
             )
         return problems
 
-    def _is_on_its_own(self) -> list[Problem]:
-        """Tell that no script listens to commands, or that the sender of the present command is gone."""
+    def _check_sender(self) -> list[Problem]:
+        """Report that no script subscribes to commands, or that the sender of the present command has exited."""
         vehicle, taken = self._vehicle, self._log.taken.get(COMMAND)
         if taken is None or not self._player.playing or str(vehicle.flight_state) in (LANDED, CRASHED):
             return []
         if not hears_commands(vehicle):
-            return [Problem(WARN, _DEAF)]
-        gone = taken.sender not in self._log.senders()
-        if gone and vehicle.commands.now != Twist() and not vehicle.parameters.cmd_vel_timeout:
-            said = f"still obeys the last command of {taken.sender}, which has exited"
-            return [Problem(WARN, f"{said}: publish a zero Twist, or set cmd_vel_timeout")]
+            return [Problem(WARN, _NO_INPUT)]
+        has_exited = taken.sender not in self._log.senders()
+        if has_exited and vehicle.commands.now != Twist() and not vehicle.parameters.cmd_vel_timeout:
+            problem = f"still obeys the last command of {taken.sender}, which has exited"
+            return [Problem(WARN, f"{problem}: publish a zero Twist, or set cmd_vel_timeout")]
         return []
 
-    def _has_rivals(self) -> list[Problem]:
+    def _check_rivals(self) -> list[Problem]:
         """Report several nodes that send commands at the same time: the drone obeys the last one before each step."""
         rivals = self._log.rivals(COMMAND)
-        said = f"{' and '.join(rivals)} send {COMMAND} at the same time, and each overrides the other: stop all but one"
-        return [Problem(WARN, said)] if rivals else []
+        text = f"{' and '.join(rivals)} send {COMMAND} at the same time, and each overrides the other: stop all but one"
+        return [Problem(WARN, text)] if rivals else []
 
-    def _misses(self) -> list[Problem]:
+    def _check_topics(self) -> list[Problem]:
         """Report Twists on topics without a subscriber, while no command reaches the vehicle."""
         taken = self._log.taken.get(COMMAND)
         if taken is not None and self._now - taken.at < _RECENT:
             return []
         own = f"{self._vehicle.name}/{COMMAND}"
         return [
-            Problem(WARN, f"no command comes: {', '.join(nodes)} publishes {topic}, which nobody receives, not {own}")
+            Problem(WARN, f"no command arrives: {', '.join(nodes)} publishes {topic}, without a subscriber, not {own}")
             for topic, nodes in self._unheard.items()
         ]
 
-    def _ignores(self) -> list[Problem]:
-        """Return a problem if the script hears commands, but the vehicle has not followed them for some time."""
-        if self._unmoved < _IGNORED_FOR or not hears_commands(self._vehicle):
+    def _check_response(self) -> list[Problem]:
+        """Report that the script subscribes to commands, but the vehicle has not followed them for some time."""
+        if self._unmoved < _IGNORED_TIME or not hears_commands(self._vehicle):
             return []
-        said = f"receives {_shown(self._vehicle.commands.now)}, but its velocity has not followed for"
+        problem = f"receives {_shown(self._vehicle.commands.now)}, but its velocity has not followed for"
         cure = "does the script use the command, or overwrite it in each step (twist[1] = 0)?"
-        return [Problem(WARN, f"{said} {self._unmoved:.0f} s: {cure}")]
+        return [Problem(WARN, f"{problem} {self._unmoved:.0f} s: {cure}")]
 
-    # ---- what is so
+    # ---- values
 
     def _fine(self) -> str:
         taken = self._log.taken.get(COMMAND)
         state = self._player.state
         if not self._player.playing:
             return state
-        if self._doing != FLYING:
-            return self._doing
+        if self._situation != FLYING:
+            return self._situation
         if taken is None:
             return (
-                f"{state}; no command has been received yet" if hears_commands(self._vehicle) else f"{state}; {_DEAF}"
+                f"{state}; no command has been received yet"
+                if hears_commands(self._vehicle)
+                else f"{state}; {_NO_INPUT}"
             )
         return f"{state} as {taken.sender} commands"
 
@@ -191,14 +193,14 @@ class VehicleDiagnosis:
         return {
             "state": self._player.state,
             "flight state": str(vehicle.flight_state),
-            "does": self._doing,
+            "does": self._situation,
             "listens to commands": "yes" if hears_commands(vehicle) else "no",
             "command": _shown(vehicle.commands.now),
             "command came": self._ago(taken.at) if taken else "never",
             "command sender": taken.sender if taken else "nobody",
             "connected commanders": ", ".join(log.senders()) or "nobody",
             "command held for": f"{timeout:g} s" if timeout > 0 else "ever",
-            "refused": f"{sum(one.times for one in log.refused.values())}",
+            "refused": f"{sum(refusal.times for refusal in log.refused.values())}",
             "last refused": f"{refused.topic} of {refused.sender}, {self._ago(refused.at)}" if refused else "",
             "why refused": refused.why if refused else "",
             "propellers": f"{numbers(vehicle.propulsion.particle_velocities)} m/s",
@@ -225,21 +227,21 @@ class VehicleDiagnosis:
 
 
 def is_unmoved(vehicle: Vehicle) -> bool:
-    """Return whether a vehicle that flies freely neither moves nor turns, though its command says so."""
+    """Return whether a vehicle in free flight neither moves nor turns, although its command requires it."""
     command, state = vehicle.commands.now, vehicle.body.state
-    wanted, turn = math.hypot(*command.linear), abs(command.angular.z)
-    if max(wanted, turn) < _MOVES or doing(vehicle) != FLYING or vehicle.body.contacts():
+    wanted, yaw_rate = math.hypot(*command.linear), abs(command.angular.z)
+    if max(wanted, yaw_rate) < _MIN_COMMAND or doing(vehicle) != FLYING or vehicle.body.contacts():
         return False
-    asked_and_done = (wanted, math.hypot(*state.linear_velocity)), (turn, abs(state.angular_velocity[2]))
-    return all(asked < _MOVES or done <= _SLOW * asked for asked, done in asked_and_done)
+    pairs = (wanted, math.hypot(*state.linear_velocity)), (yaw_rate, abs(state.angular_velocity[2]))
+    return all(commanded < _MIN_COMMAND or actual <= _SLOW_SHARE * commanded for commanded, actual in pairs)
 
 
 def _names(contacts: list[Contact]) -> list[str]:
-    """Return what is touched, and with how many newtons in all, the hardest first."""
+    """Return the names of touched objects with the total force in N, the largest force first."""
     newtons: dict[str, float] = {}
-    for one in contacts:
-        newtons[one.what] = newtons.get(one.what, 0.0) + math.hypot(*one.force)
-    return [f"{what or 'something'} ({newtons[what]:.2g} N)" for what in sorted(newtons, key=lambda one: -newtons[one])]
+    for contact in contacts:
+        newtons[contact.what] = newtons.get(contact.what, 0.0) + math.hypot(*contact.force)
+    return [f"{name or 'something'} ({newtons[name]:.2g} N)" for name in sorted(newtons, key=lambda key: -newtons[key])]
 
 
 def _shown(command: Twist) -> str:
