@@ -1,1 +1,1 @@
-"""Runs scripts: those that fly vehicles, and those on other objects; in which order, with which parameters."""
+"""Child scripts of vehicles and of other objects: loading, order of calls, parameters and tuning."""

@@ -1,4 +1,4 @@
-"""Child scripts: that of a vehicle, which flies it, and those of other objects; how they are loaded, what they find."""
+"""Child scripts, which fly vehicles, and scripts attached to other objects: loading, calls and API access."""
 
 from __future__ import annotations
 
@@ -29,75 +29,75 @@ from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.propulsion import Propulsion, particles
 from drone_sim.vehicles.vehicle import Vehicle
 
-_LOG = logging.getLogger(__name__)  # not the script's own words
-_EVERYWHERE = ""  # namespace of the topics of what belongs to no vehicle
+_LOG = logging.getLogger(__name__)  # for messages about scripts, not from scripts
+_NO_NAMESPACE = ""  # namespace of the topics of scripts that belong to no vehicle
 _Value = TypeVar("_Value")
-_Parameters = dict[str, dict[str, Any]]  # by the object of the script that has them
+_Parameters = dict[str, dict[str, Any]]  # by the object of the script
 
 
 class HostedScript(ABC):
-    """A script on an object, as the simulation calls it, and what it finds there (scripting.api.host.Host)."""
+    """Script on an object, as the simulation calls it, and its access to the scene (scripting.api.host.Host)."""
 
     def __init__(self, own_script: str, bus: MessageBus, context: SimulationContext):
-        """Take the name of the object, what carries its messages, and what the simulation shares; load nothing."""
+        """Create it without loading a script. `own_script`: name of the object; `bus` carries the script's messages."""
         self.own_script = own_script
         self.bus = bus
         bus.backend = context.backend
         self.context = context
         self.script: load.Script = load.no_script()
-        self.path = ""  # of the script that is loaded
-        self.flat_names: Collection[str] = ()  # functions that it calls by their names of 3.x
-        self._filters = False  # whether its script is to see every picture of the vision sensor that it is on
+        self.path = ""  # of the loaded script
+        self.flat_names: Collection[str] = ()  # functions that it calls by their V-REP 3.x names
+        self._filters_pictures = False  # whether the script filters each picture of its vision sensor
 
     @abstractmethod
     def seen(self) -> Sequence[Vehicle]:
-        """Return the vehicles whose sensors, cameras and masses it finds."""
+        """Return the vehicles whose sensors, cameras and masses the script can access."""
 
     @abstractmethod
     def script_parameters(self) -> _Parameters:
-        """Return the parameters of scripts that go with it, its own first."""
+        """Return the parameters of this script, then of the scripts that belong to it."""
 
     @abstractmethod
     def reached(self) -> Iterable[Vehicle]:
-        """Return the vehicles that it may push, and whose blades it may turn."""
+        """Return the vehicles on which it may exert forces, and whose blades it may turn."""
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
-        """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m, world).
+        """Apply a force (N, world) at a point (m, frame of the shape) and a torque (N m, world) in the next step.
 
-        Raises ValueError for what is no dynamic shape of a vehicle that it may push.
+        Raises ValueError if the shape is no dynamic shape of a reachable vehicle.
         """
-        self._owner(shape, lambda one: shape in one.shapes).add_force(shape, force, torque, offset)
+        self._propulsion(shape, lambda propulsion: shape in propulsion.shapes).add_force(shape, force, torque, offset)
 
     def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
-        """Forget the forces on a shape, or the torques, or both, that were added since the last step.
+        """Remove the forces on a shape, the torques, or both, that were added since the last step.
 
-        Raises ValueError for what is no dynamic shape of a vehicle that it may push.
+        Raises ValueError if the shape is no dynamic shape of a reachable vehicle.
         """
-        self._owner(shape, lambda one: shape in one.shapes).drop_forces(shape, forces, torques)
+        self._propulsion(shape, lambda propulsion: shape in propulsion.shapes).drop_forces(shape, forces, torques)
 
     def turn_joint(self, joint: str, angle: float | None = None) -> float:
-        """Turn a propeller's blades to an angle (rad), unless None; return it. Raises ValueError for what is none."""
-        return self._owner(joint, lambda one: one.blades.has(joint)).blades.turn(joint, angle)
+        """Turn a propeller's blades to an angle (rad), unless None; return it. Raises ValueError for other joints."""
+        return self._propulsion(joint, lambda each: each.blades.has(joint)).blades.turn(joint, angle)
 
-    def _owner(self, name: str, has: Callable[[Propulsion], bool]) -> Propulsion:
-        """Return the propulsion of the vehicle that has an object; if none has it, the first, which raises an error.
+    def _propulsion(self, name: str, has: Callable[[Propulsion], bool]) -> Propulsion:
+        """Return the propulsion of the vehicle with the object, or else the first one, whose methods then raise.
 
-        Raises ValueError if no vehicle flies.
+        Raises ValueError if there is no vehicle.
         """
-        reached = [one.propulsion for one in self.reached()]
+        reached = [vehicle.propulsion for vehicle in self.reached()]
         if not reached:
             raise ValueError(f"'{name}' is not a part of a vehicle: the scene has no vehicle")
         return next(filter(has, reached), reached[0])
 
     @property
     def sensors(self) -> Mapping[str, Instrument]:
-        """The sensors that it finds, by the name of their object."""
-        return ChainMap(*(one.instruments.by_object for one in self.seen()))
+        """The sensors that the script can access, by object name."""
+        return ChainMap(*(vehicle.instruments.by_object for vehicle in self.seen()))
 
     def _load(
         self, path: str, operations: Operations, guarded: Callable[[load.Script], load.Script] = lambda script: script
     ) -> None:
-        """Load a script ('' for the pilot), with what it may do to objects; `guarded` wraps it. Raises ScriptError."""
+        """Load a script ('' for the pilot), with operations on objects; `guarded` wraps it. Raises ScriptError."""
         self.close()
         context = self.context
         limit, turns = TimeLimit(context.script_time_limit), Turns()
@@ -110,55 +110,55 @@ class HostedScript(ABC):
         }
         script = context.load_script(path, modules, limit, turns, context.breakpoints)
         self.flat_names = script.flat_names
-        self._filters = filters_pictures(context, self.own_script, script)
+        self._filters_pictures = filters_pictures(context, self.own_script, script)
         self.script, self.path = guarded(script), load.script_path(path)
         context.scripts.attached_to(self.own_script).loaded(self.script, context.clock.time)
 
     def _call_init(self) -> None:
-        """Call init. Raises ScriptError, also if it lacks one of its callbacks."""
+        """Call init. Raises ScriptError, also if a subscribed callback does not exist."""
         self.script.call("init")
         self._check_callbacks()
 
     def _check_callbacks(self) -> None:
-        """Raise ScriptError if it has subscribed with a function that it does not have."""
+        """Raise ScriptError if the script has subscribed with the name of a function that does not exist."""
         for callback in self.bus.new_callbacks():
             self.script.check(callback)
 
     def actuation(self) -> None:
-        """Hand waiting messages to the script, then let it act."""
+        """Deliver waiting messages to the script, then call its actuation."""
         self._check_callbacks()
         self.bus.deliver(self.script)
         self.script.call("actuation")
 
     def sensing(self) -> None:
-        """Let the script sense; one of a vision sensor filters its picture first."""
-        if self._filters:
+        """Filter the picture of a vision sensor, if the script does so, then call its sensing."""
+        if self._filters_pictures:
             filter_picture(self.context, self.own_script, self.script)
         self.script.call("sensing")
 
     def close(self) -> None:
-        """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""
-        self._filters, self.path = False, ""
+        """Unload the script, without calling cleanup, and end its subscriptions; may be called twice."""
+        self._filters_pictures, self.path = False, ""
         self.script.close()
         self.script = load.no_script()
         self.bus.close()
 
     def leave(self) -> None:
-        """Be attached no longer."""
+        """Unload the script and remove it from the simulation."""
         self.close()
         for name in self.script_parameters():
             self.context.scripts.remove(name)
 
     def save_state(self) -> Restore:
-        """Return a function that brings back script, messages and parameters."""
+        """Return a function that restores script, messages and parameters."""
         parts = [self.bus.save_state(), self.script.save_state()]
         kept = copy.deepcopy(self.script_parameters())
 
         def restore() -> None:
             values = self.script_parameters()
-            for name, one in copy.deepcopy(kept).items():
+            for name, old in copy.deepcopy(kept).items():
                 values[name].clear()
-                values[name].update(one)
+                values[name].update(old)
             for part in parts:
                 part()
 
@@ -166,17 +166,17 @@ class HostedScript(ABC):
 
 
 class ChildScript(HostedScript):
-    """The script that flies a vehicle: where it fails, the flight ends."""
+    """The script that flies a vehicle. Its failure ends the flight."""
 
     def __init__(self, vehicle: Vehicle):
-        """Take the vehicle; `begin` comes before anything else."""
+        """Create it for a vehicle; `begin` must be called before anything else."""
         super().__init__(vehicle.object_name, vehicle.bus, vehicle.context)
         self.vehicle = vehicle
         self.parameters: dict[str, Any] = {}
         self.tuning = Tuning(vehicle, self.parameters)
 
     def begin(self) -> None:
-        """Unload the script, reset its parameters to those of a start, and register it in the simulation."""
+        """Unload the script, reset its parameters to their initial values, and register it in the simulation."""
         self.close()
         self.parameters.clear()
         self.parameters.update(_script_parameters(self.vehicle.parameters))
@@ -184,20 +184,20 @@ class ChildScript(HostedScript):
             self.context.scripts.add(name, values, is_law=values is not self.parameters)
 
     def seen(self) -> Sequence[Vehicle]:
-        """Return the vehicle."""
+        """Return only its vehicle."""
         return [self.vehicle]
 
     reached = seen
 
     def script_parameters(self) -> _Parameters:
-        """Return its own, and those of its propellers, which a law or a script of theirs reads."""
+        """Return its own parameters, and those of the propellers, which their thrust model or script reads."""
         return {self.own_script: self.parameters, **self.vehicle.propulsion.script_parameters}
 
     def load_script(self, path: str, operations: Operations) -> None:
-        """Load a script ('' for the pilot), with what it may do to objects, and call its init. Raises ScriptError."""
+        """Load a script ('' for the pilot), with operations on objects, and call its init. Raises ScriptError."""
         self._load(path, operations)
         self.vehicle.flight_state.is_flown = True
-        if self.script.idle and not self.bus.is_subscribed:  # nothing would ever call it
+        if self.script.idle and not self.bus.is_subscribed:  # it would never be called
             if not self.script.is_empty:
                 raise ScriptError("load", load.script_path(path), 0, self.script.idle)
             _LOG.warning("%s: %s", path, self.script.idle)
@@ -206,24 +206,24 @@ class ChildScript(HostedScript):
         self.tuning.begin(before)
 
     def actuation(self) -> None:
-        """Let the vehicle take its commands, hand waiting messages to the script, and let it command propellers."""
+        """Apply the vehicle's commands, deliver waiting messages to the script, and call its actuation."""
         self.vehicle.begin_step()
         super().actuation()
 
     def close(self) -> None:
-        """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""
+        """Unload the script, without calling cleanup, and end its subscriptions; may be called twice."""
         if self.vehicle.flight_state.is_flown:
             self.tuning.keep_read()
         super().close()
         self.vehicle.flight_state.is_flown = False
 
     def save_state(self) -> Restore:
-        """Return a function that brings back script, messages, parameters, and what was tuned."""
+        """Return a function that restores script, messages, parameters, and tuned values."""
         return in_turn(super().save_state(), self.tuning.save_state())
 
 
 class AttachedScript(HostedScript):
-    """The script of any object but a vehicle itself: its target, propellers, sensors, and what stands around."""
+    """Script of an object other than a vehicle's body: its target, propellers and sensors, and scene objects."""
 
     def __init__(
         self,
@@ -232,21 +232,21 @@ class AttachedScript(HostedScript):
         vehicles: Mapping[str, Vehicle],
         context: SimulationContext,
     ):
-        """Attach it to the object of a handle, without loading it. The vehicles are those of the simulation."""
+        """Attach it to the object with a handle, without loading it. `vehicles`: all vehicles of the simulation."""
         self._vehicles = vehicles
         self.file = parameters.script
-        here = context.objects[handle]
-        self.vehicle = next((one for one in vehicles.values() if here.is_part_of(one.object)), None)
-        bus = MessageBus(self.vehicle.name) if self.vehicle else MessageBus(_EVERYWHERE, {})
-        super().__init__(here.name, bus, context)
+        scene_object = context.objects[handle]
+        self.vehicle = next((owner for owner in vehicles.values() if scene_object.is_part_of(owner.object)), None)
+        bus = MessageBus(self.vehicle.name) if self.vehicle else MessageBus(_NO_NAMESPACE, {})
+        super().__init__(scene_object.name, bus, context)
         self.goes_with = self.vehicle.name if self.vehicle and handle in self.vehicle.handles else ""
-        self.failure: ScriptError | None = None  # of its top level
-        self._has_left = False
-        self._heard = bus
+        self.failure: ScriptError | None = None  # raised by the script's top level
+        self._is_removed = False
+        self._first_bus = bus
         if self.vehicle:
             self.vehicle.commands.listening.append(bus)
             self.vehicle.flight_state.script_errors.append(self.error)
-        # The parameters that V-REP's script has there; a propeller's built-in law gives way to it.
+        # Parameters of V-REP's script there; a propeller's built-in thrust model is replaced by the script.
         law = self.vehicle.propulsion.give_way(self.own_script) if self.vehicle else None
         self.parameters: dict[str, Any] = {} if law is None else law
         self.parameters.update({} if law is None else {**_PROPELLER_SCRIPT, **law})
@@ -254,23 +254,23 @@ class AttachedScript(HostedScript):
         context.scripts.add(self.own_script, self.parameters).is_embedded = parameters.embedded
 
     def seen(self) -> Sequence[Vehicle]:
-        """Return its vehicle, or all."""
+        """Return its vehicle, or all vehicles if it belongs to none."""
         return [self.vehicle] if self.vehicle else list(self._vehicles.values())
 
     def reached(self) -> Iterable[Vehicle]:
-        """Return all vehicles."""
+        """Return all vehicles of the simulation."""
         return self._vehicles.values()
 
     def script_parameters(self) -> _Parameters:
-        """Return its own."""
+        """Return its own parameters."""
         return {self.own_script: self.parameters}
 
     def load_script(self, path: str, operations: Operations) -> None:
-        """Load its script, with what it may do to objects, and call its init.
+        """Load its script, with operations on objects, and call its init.
 
-        Where it fails, now or later, that is told, and the others go on.
+        A failure, now or later, is logged, and the other scripts continue.
         """
-        if self._has_left:  # another one's init has removed its object
+        if self._is_removed:  # the init of another script has removed its object
             return
         try:
             self._load(path, operations, GuardedScript)
@@ -283,35 +283,35 @@ class AttachedScript(HostedScript):
         self._call_init()
 
     def error(self) -> ScriptError | None:
-        """Return the error after which its script is not called any more; None while it is called."""
+        """Return the error after which the script is no longer called; None while it is called."""
         return self.failure or (self.script.failure if isinstance(self.script, GuardedScript) else None)
 
     @property
     def is_loaded(self) -> bool:
-        """Whether it has begun, even if it has failed."""
+        """Whether the script was loaded, even if it has failed."""
         return self.failure is not None or isinstance(self.script, GuardedScript)
 
     @property
     def is_busy(self) -> bool:
-        """Whether it is being called now, or has a thread that has not ended."""
+        """Whether the script is being called, or has a thread that has not ended."""
         return isinstance(self.script, GuardedScript) and self.script.is_busy
 
     def leave(self) -> None:
-        """Be attached no longer."""
+        """Unload the script and remove it from the simulation."""
         super().leave()
-        self._has_left = True
-        if self.vehicle and self._heard in self.vehicle.commands.listening:
-            self.vehicle.commands.listening.remove(self._heard)
+        self._is_removed = True
+        if self.vehicle and self._first_bus in self.vehicle.commands.listening:
+            self.vehicle.commands.listening.remove(self._first_bus)
             self.vehicle.flight_state.script_errors.remove(self.error)
 
     def split_off(self) -> AttachedScript:
-        """Return what still runs of it, with its messages, to be ended later; this one calls nothing any more."""
+        """Return a copy with the running script and its messages, to be ended later; this one is then empty."""
         running = copy.copy(self)
-        self.script, self.path, self.bus = load.no_script(), "", MessageBus(_EVERYWHERE, {})
+        self.script, self.path, self.bus = load.no_script(), "", MessageBus(_NO_NAMESPACE, {})
         return running
 
     def close(self) -> None:
-        """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""
+        """Unload the script, without calling cleanup, and end its subscriptions; may be called twice."""
         super().close()
         self.failure = None
 
@@ -319,34 +319,34 @@ class AttachedScript(HostedScript):
 def surroundings(
     seen: Sequence[Vehicle], context: SimulationContext, operations: Operations, limit: TimeLimit, turns: Turns
 ) -> Surroundings:
-    """Return what the API finds around a script that is called within a limit, and sees some vehicles."""
+    """Return the scene services for a script with a time limit, which can access the vehicles `seen`."""
     cameras = [
-        (one.object + vehicle.suffix, one, vehicle.cameras[name])
+        (camera.object + vehicle.suffix, camera, vehicle.cameras[name])
         for vehicle in seen
-        for name, one in vehicle.parameters.cameras.items()
+        for name, camera in vehicle.parameters.cameras.items()
     ]
     return Surroundings(
         pictures={name: eye_of(context, camera) for name, _, camera in cameras},
-        planes={name: (own.near, own.far) for name, own, _ in cameras},
+        planes={name: (camera.near, camera.far) for name, camera, _ in cameras},
         operations=operations,
         outside=limit.outside,
         inside=limit.inside,
         turns=turns,
-        masses=lambda: _merged(one.propulsion.masses() for one in seen),
-        inertias=lambda: _merged(one.propulsion.inertias() for one in seen),
+        masses=lambda: _merged(vehicle.propulsion.masses() for vehicle in seen),
+        inertias=lambda: _merged(vehicle.propulsion.inertias() for vehicle in seen),
         nearest=Distances(context).nearest,
     )
 
 
 def _merged(mappings: Iterable[Mapping[str, _Value]]) -> dict[str, _Value]:
-    return {name: value for one in mappings for name, value in one.items()}
+    return {name: value for mapping in mappings for name, value in mapping.items()}
 
 
-# ---- the simulation parameters of scripts, as V-REP's have them
+# ---- simulation parameters of scripts, as in V-REP
 
-_SEEN = {"particlesAreVisible": True, "simulateParticles": True}
-_PROPELLER_SCRIPT = {  # what V-REP's own script of a propeller reads besides what the built-in law does
-    **_SEEN,
+_SHOWN = {"particlesAreVisible": True, "simulateParticles": True}
+_PROPELLER_SCRIPT = {  # read by V-REP's propeller script, in addition to those of the built-in thrust model
+    **_SHOWN,
     "particleScatteringAngle": 30.0,
     "particleLifeTime": 0.5,
     "maxParticleCount": 50.0,
@@ -354,8 +354,8 @@ _PROPELLER_SCRIPT = {  # what V-REP's own script of a propeller reads besides wh
 
 
 def _script_parameters(vehicle: VehicleParameters) -> dict[str, Any]:
-    """Return those of a vehicle's child script: V-REP's, the gains of control, and the user's own."""
+    """Return the parameters of a vehicle's child script: V-REP's, the controller gains, and the user's."""
     law = vehicle.propellers
-    own = {**vehicle.control.model_dump(), **_SEEN, "fakeShadow": True, **particles(law), "propeller_law": law.law}
-    own.update(start=vehicle.start, takeoff_height=vehicle.takeoff_height)
-    return {**own, **vehicle.script_parameters}
+    base = {**vehicle.control.model_dump(), **_SHOWN, "fakeShadow": True, **particles(law), "propeller_law": law.law}
+    base.update(start=vehicle.start, takeoff_height=vehicle.takeoff_height)
+    return {**base, **vehicle.script_parameters}

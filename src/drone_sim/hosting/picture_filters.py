@@ -1,4 +1,4 @@
-"""Pictures for scripts: of a vehicle's cameras, and of a vision sensor for its own script (sysCall_vision)."""
+"""Pictures for scripts: a vehicle's cameras, and the vision sensor that a script is on (sysCall_vision)."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from drone_sim.scripting.load import Script
 from drone_sim.scripting.phase_names import VISION
 from drone_sim.sensors.camera import Camera
 
-_MOST = 100  # packets
+_MAX_PACKETS = 100
 
 
 def eye_of(context: SimulationContext, camera: Camera) -> Callable[..., np.ndarray]:
-    """Return a function that takes a camera's picture: of a kind or its own kind, of `only` some objects or all."""
+    """Return a function that renders a camera's picture: of a `kind` ('': the camera's), with `only` some objects."""
 
     def look(kind: str = "", only: Collection[str] | None = None) -> np.ndarray:
         if only is None or camera.failure == "silent":
@@ -32,7 +32,7 @@ def eye_of(context: SimulationContext, camera: Camera) -> Callable[..., np.ndarr
 
 
 def filters_pictures(context: SimulationContext, name: str, script: Script) -> bool:
-    """Tell whether a script is on a vision sensor of the scene, and has the function for its pictures."""
+    """Return whether a script is on a vision sensor of the scene, and defines sysCall_vision."""
     if name not in context.objects or not isinstance(_object(context, name), Eye):
         return False
     try:
@@ -43,9 +43,9 @@ def filters_pictures(context: SimulationContext, name: str, script: Script) -> b
 
 
 def filter_picture(context: SimulationContext, name: str, script: Script) -> None:
-    """Let a script see a new picture, and keep what it finds."""
+    """Call the script's sysCall_vision for a new picture, and store the result in the sensor."""
     eye = _object(context, name)
-    told = {
+    arguments = {
         "handle": context.objects.handle(name),
         "resolution": [eye.width, eye.height],
         "clippingPlanes": [eye.near, eye.far],
@@ -54,14 +54,14 @@ def filter_picture(context: SimulationContext, name: str, script: Script) -> Non
         "perspectiveOperation": eye.orthographic_size is None,
     }
     try:
-        found = script.answer(VISION, told)
-    except Unanswered:  # it has failed, which has been told
+        result = script.answer(VISION, arguments)
+    except Unanswered:  # the script has failed, which is already logged
         return
-    found = found if isinstance(found, dict) else {}
-    given = found.get("packedPackets")
-    texts = [one for one in given[:_MOST] if isinstance(one, (str, bytes))] if isinstance(given, list) else []
-    packets = (as_bytes(one) for one in texts)
-    eye.detected = Detected(bool(found.get("trigger")), tuple(one[: len(one) // 4 * 4] for one in packets))
+    result = result if isinstance(result, dict) else {}
+    raw = result.get("packedPackets")
+    texts = [text for text in raw[:_MAX_PACKETS] if isinstance(text, (str, bytes))] if isinstance(raw, list) else []
+    packets = (as_bytes(text) for text in texts)
+    eye.detected = Detected(bool(result.get("trigger")), tuple(packet[: len(packet) // 4 * 4] for packet in packets))
 
 
 def _object(context: SimulationContext, name: str) -> Any:

@@ -1,4 +1,4 @@
-"""In which order scripts are called: those of the vehicles, and of the objects that the scene attaches one to."""
+"""Order of the calls of all scripts: those of the vehicles, and those that the scene attaches to objects."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from drone_sim.scripting.script_log import LOG
 from drone_sim.vehicles.vehicle import Vehicle
 
 _LOG = logging.getLogger(__name__)
-_LAST_TURNS = 10  # that a thread has for its end, once the simulation is about to stop
+_LAST_TURNS = 10  # turns for each thread to end, once the simulation is about to stop
 
 AnyScript = ChildScript | AttachedScript
 _Script = TypeVar("_Script", bound=HostedScript)
 
 
 class ScriptScheduler:
-    """Has all scripts, in V-REP's order: from the root of the tree to its leaves, each branch in turn."""
+    """All scripts in V-REP's order: depth first, from the root of the object tree to its leaves."""
 
     def __init__(
         self,
@@ -34,14 +34,14 @@ class ScriptScheduler:
         vehicles: Mapping[str, Vehicle],
         context: SimulationContext,
     ):
-        """Take the scene, whose scripts may come and go, and the vehicles, which may, too.
+        """Use a scene and vehicles; scripts and vehicles may be added and removed later.
 
-        `place` returns where a key of the scene stands, for a message.
+        `place` returns the position of a key of the scene (file and line) for a message.
         """
         self.child_scripts: dict[str, ChildScript] = {}  # by vehicle
         self.attached: list[AttachedScript] = []
-        self.leaving: list[AttachedScript] = []  # those that ran when their objects went
-        self.changes = 0  # how many have come, or gone, or changed their names, on objects
+        self.leaving: list[AttachedScript] = []  # those that were running when their objects were removed
+        self.changes = 0  # number of attached scripts added, removed or renamed so far
         self.is_changed = False  # whether `follow` is due
         self._scene = scene
         self._place = place
@@ -49,14 +49,14 @@ class ScriptScheduler:
         self._context = context
 
     def begin_anew(self) -> None:
-        """Have every script anew where its object is, without loading it. Raises ParameterError."""
+        """Attach every script again, without loading it. Raises ParameterError."""
         self.attached, self.leaving = [], []
-        for one in self.child_scripts.values():
-            one.begin()
+        for script in self.child_scripts.values():
+            script.begin()
         self.attach()
 
     def attach(self, objects: Collection[str] | None = None) -> list[AttachedScript]:
-        """Attach the scripts whose objects are there by now, or those of some; return those of the scene.
+        """Attach the scripts of new vehicles and objects, or only of `objects`; return the new scripts of the scene.
 
         Raises ParameterError.
         """
@@ -64,25 +64,25 @@ class ScriptScheduler:
             if name not in self.child_scripts:
                 self.child_scripts[name] = ChildScript(vehicle)
                 self.child_scripts[name].begin()
-        there = {one.own_script for one in self.attached}
-        found: list[AttachedScript] = []
-        for index, one in enumerate(self._scene.scripts.values()):
-            if objects is not None and one.object not in objects:
+        names = {script.own_script for script in self.attached}
+        added: list[AttachedScript] = []
+        for index, entry in enumerate(self._scene.scripts.values()):
+            if objects is not None and entry.object not in objects:
                 continue
-            handle = self._handle(one.object, index)
-            if handle is not None and self._context.objects[handle].name not in there:
-                found.append(AttachedScript(one, handle, self._vehicles, self._context))
-                there.add(found[-1].own_script)
-        self.attached += found
-        self._count(len(found))
-        return found
+            handle = self._handle(entry.object, index)
+            if handle is not None and self._context.objects[handle].name not in names:
+                added.append(AttachedScript(entry, handle, self._vehicles, self._context))
+                names.add(added[-1].own_script)
+        self.attached += added
+        self._note_changes(len(added))
+        return added
 
-    def _count(self, changes: int) -> None:
+    def _note_changes(self, changes: int) -> None:
         self.changes += changes
         self.is_changed = bool(changes) or self.is_changed
 
     def _handle(self, name: str, index: int) -> int | None:
-        """Return the object of a script; None for one of a vehicle that may still come. Raises ParameterError."""
+        """Return the handle of a script's object; None if a vehicle added later may have it. Raises ParameterError."""
         objects = self._context.objects
         if name not in objects and (objects.is_copied(plain(name)) or (plain(name) != name and plain(name) in objects)):
             _LOG.warning(
@@ -91,7 +91,7 @@ class ScriptScheduler:
             return None
         try:
             handle = objects.handle(name)
-            if any(objects[handle] is one.object for one in self._vehicles.values()):
+            if any(objects[handle] is vehicle.object for vehicle in self._vehicles.values()):
                 raise ValueError(f"'{name}' already has a script, which the key `script` of its vehicle names")
         except ValueError as error:
             place = self._place(("scripts", index, "object"))
@@ -99,86 +99,86 @@ class ScriptScheduler:
         return handle
 
     def detach(self, vehicle: str) -> None:
-        """Let go of the scripts of a vehicle."""
-        for one in self.attached[:]:
-            if one.goes_with == vehicle:
-                self.attached.remove(one)
-                one.leave()
+        """Unload and remove the scripts of a vehicle."""
+        for script in self.attached[:]:
+            if script.goes_with == vehicle:
+                self.attached.remove(script)
+                script.leave()
         self.child_scripts.pop(vehicle).leave()
 
-    # ---- objects that come and go
+    # ---- changes of objects
 
     def rename(self, name: str, new: str) -> None:
-        """Know the script of an object, if it has one, by the object's new name."""
-        for one in self.attached:
-            if one.own_script == name:
-                one.own_script = new
+        """Change the object name of a script, if the object has one."""
+        for script in self.attached:
+            if script.own_script == name:
+                script.own_script = new
                 self._context.scripts.rename(name, new)
-                self._count(1)
+                self._note_changes(1)
 
     def end(self, objects: Collection[str]) -> None:
-        """Call the cleanup of scripts whose objects are about to go, and let go of them; one that runs ends later."""
-        for one in [script for script in self.attached if script.own_script in objects]:
-            self.attached.remove(one)
-            self._count(1)
-            if one.is_busy:
-                self.leaving.append(one.split_off())
+        """Clean up and unload the scripts of objects about to be removed; a running one ends in `follow`."""
+        for script in [script for script in self.attached if script.own_script in objects]:
+            self.attached.remove(script)
+            self._note_changes(1)
+            if script.is_busy:
+                self.leaving.append(script.split_off())
             else:
-                self.clean_up([one])
-            one.leave()
+                self.clean_up([script])
+            script.leave()
 
     def follow(self, operations: Operations) -> None:
-        """End the scripts that ran when their objects went, and begin those that have come; called between phases.
+        """Between phases, end the scripts of removed objects that were running, and load those of new objects.
 
-        `operations` is what these may do to objects.
+        `operations`: the new scripts' operations on objects.
         """
         self.is_changed = False
         self.clean_up(self.leaving)
         while self.leaving:
             self.leaving.pop().close()
-        for one in self.in_order([script for script in self.attached if not script.is_loaded]):
-            one.load_script(one.file, operations)
+        for new in self.in_order([script for script in self.attached if not script.is_loaded]):
+            new.load_script(new.file, operations)
 
     def of(self, vehicle: str) -> list[AnyScript]:
-        """Return the scripts of a vehicle, in order: that on itself, and those on its own objects."""
+        """Return the scripts of a vehicle and of its objects, in V-REP's order."""
         return self.in_order([self.child_scripts[vehicle], *(one for one in self.attached if one.goes_with == vehicle)])
 
-    # ---- in the order of the tree
+    # ---- order of calls
 
     def all(self) -> Sequence[AnyScript]:
-        """Return all of them, in order."""
-        own = tuple(self.child_scripts.values())
-        return self.in_order((*own, *self.attached)) if self.attached else own
+        """Return all scripts in V-REP's order."""
+        of_vehicles = tuple(self.child_scripts.values())
+        return self.in_order((*of_vehicles, *self.attached)) if self.attached else of_vehicles
 
     def in_order(self, scripts: Sequence[_Script]) -> list[_Script]:
-        """Return some of them, in order."""
-        return sorted(scripts, key=lambda one: self._way(one.own_script))
+        """Return the scripts sorted into V-REP's order."""
+        return sorted(scripts, key=lambda script: self._path_to(script.own_script))
 
-    def _way(self, name: str) -> list[int]:
-        """Return the handles on the way from the root to an object."""
-        objects, way = self._context.objects, []
-        here: SceneObject | None = objects[objects.handle(name)]
-        while here is not None:
-            way.append(objects.handle_of(here))
-            here = here.parent
-        return way[::-1]
+    def _path_to(self, name: str) -> list[int]:
+        """Return the handles on the path from the root to an object."""
+        objects, path = self._context.objects, []
+        current: SceneObject | None = objects[objects.handle(name)]
+        while current is not None:
+            path.append(objects.handle_of(current))
+            current = current.parent
+        return path[::-1]
 
-    # ---- the end
+    # ---- cleanup
 
     def clean_up(self, scripts: Sequence[AnyScript]) -> list[ScriptError]:
-        """Let threads end, and call every cleanup, whatever the others do; return what went wrong."""
+        """Let threads end, then call every script's cleanup, even if others fail; return the errors."""
         errors: list[ScriptError] = []
         control = self._context.control
         before = control.is_stopping, control.is_ending
         try:
             control.is_stopping = True
             for _ in range(_LAST_TURNS):
-                for one in scripts:
-                    if one.script.threaded:
-                        _attempt(one.script.take_turn, errors)
+                for hosted in scripts:
+                    if hosted.script.threaded:
+                        _attempt(hosted.script.take_turn, errors)
             control.is_ending = True
-            for one in scripts:
-                _attempt(lambda script=one.script: script.call("cleanup"), errors)  # type: ignore[misc]
+            for hosted in scripts:
+                _attempt(lambda script=hosted.script: script.call("cleanup"), errors)  # type: ignore[misc]
         finally:
             control.is_stopping, control.is_ending = before
         return errors
@@ -192,7 +192,7 @@ def _attempt(action: Callable[[], None], errors: list[ScriptError]) -> None:
 
 
 def raise_first(errors: Sequence[ScriptError]) -> None:
-    """Raise the first error, after a line on each of the others."""
+    """Raise the first error, if any, after logging each of the others."""
     for second in errors[1:]:
         LOG.error("%s", second)
     if errors:

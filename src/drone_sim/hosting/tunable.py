@@ -1,7 +1,7 @@
-"""What may be changed of a vehicle while it flies, and what it is called.
+"""Parameters of a vehicle that can be tuned in flight (with dynamic_reconfigure), and their names.
 
-The names are the keys of the YAML files with slashes, a part of a list by a name of its own: weather/wind/x. Gains,
-which are changed most often, go without their key: Kzref.
+The names are the keys of the YAML files joined by slashes; elements of a list have names, too: weather/wind/x. Gains,
+which are tuned most often, are named without their key: Kzref.
 """
 
 from __future__ import annotations
@@ -23,75 +23,75 @@ from drone_sim.vehicles.types.quadricopter import Quadricopter
 
 CONTROL, SCRIPT = "control", "script_parameters"
 _PROPELLERS = "faults", "propellers"
-LONGEST = 1000  # characters of a text
+LONGEST = 1000  # characters of a string
 _LIMITS = ("takeoff_height", "cmd_vel_timeout", "cmd_vel_limits", "push", "position_limit")
-_OF_CAMERAS = ("every", "horizontal_fov")
-_LEFT_OUT = ("seed", "variance")  # the one is of a whole flight, the other only said
-_EXPLAINED_CAMERA = "front"  # in config/drone.yaml: the others have the same keys
+_CAMERA_KEYS = ("every", "horizontal_fov")
+_EXCLUDED = ("seed", "variance")  # `seed` is for a whole flight, `variance` is only reported
+_DOCUMENTED_CAMERA = "front"  # in config/drone.yaml; other cameras have the same keys
 
 
 def tunables(vehicle: VehicleParameters, declared: Mapping[str, Any]) -> dict[str, ParameterField]:
-    """Return what may be changed, by name. `declared` has the parameters that its script has beside the vehicle's."""
-    found = [
-        _explained(one)
+    """Return the tunable parameters by name. `declared`: parameters that only the vehicle's script defines."""
+    fields = [
+        _with_comment(field)
         for name, camera in vehicle.cameras.items()
-        for one in fields_of(CameraParameters, ("cameras", name))
-        if one.location[-1] in _OF_CAMERAS or (camera.kind == "color" and _is_imperfection(one))
+        for field in fields_of(CameraParameters, ("cameras", name))
+        if field.location[-1] in _CAMERA_KEYS or (camera.kind == "color" and _is_imperfection(field))
     ]
     for name, sensor in vehicle.sensors.items():
         kind: type[Checked] = type(sensor)
-        for one in fields_of(kind, ("sensors", name)):
-            if one.location[2] == "noise" and one.location[-1] not in _LEFT_OUT:
-                found.append(one)
+        for field in fields_of(kind, ("sensors", name)):
+            if field.location[2] == "noise" and field.location[-1] not in _EXCLUDED:
+                fields.append(field)
     for name in (*vehicle.sensors, *vehicle.cameras):
         location = "faults", "sensors", name
-        found.append(ParameterField(location, str, choices=get_args(Failure), said="whether and how it fails"))
-    script = _of_script({**vehicle.script_parameters, **declared})
-    return {**common(vehicle.type), **{one.name: one for one in found}, **script}
+        fields.append(ParameterField(location, str, choices=get_args(Failure), said="failure of the sensor, if any"))
+    of_script = _script_fields({**vehicle.script_parameters, **declared})
+    return {**common(vehicle.type), **{field.name: field for field in fields}, **of_script}
 
 
 def _is_imperfection(field: ParameterField) -> bool:
-    return field.location[2] in Imperfections.model_fields and field.location[-1] not in _LEFT_OUT
+    return field.location[2] in Imperfections.model_fields and field.location[-1] not in _EXCLUDED
 
 
 @lru_cache(maxsize=16)
 def common(type_name: str = Quadricopter.name) -> dict[str, ParameterField]:
-    """Return what every vehicle of a type has, by name."""
-    own = (*fields_of(ControlParameters, (CONTROL,)), *fields_of(EquipmentParameters))
+    """Return the tunable parameters of every vehicle of a type, by name."""
+    vehicle = (*fields_of(ControlParameters, (CONTROL,)), *fields_of(EquipmentParameters))
     around = (*fields_of(WeatherParameters, ("weather",)), *fields_of(FaultParameters, ("faults",)))
     keys = (CONTROL, *_LIMITS, "weather", "faults")
-    chosen = (one for one in (*own, *around) if one.location[0] in keys and one.location[-1] not in _LEFT_OUT)
-    return {one.name.removeprefix(f"{CONTROL}/"): _explained(one) for one in _of_type(type_name, chosen)}
+    chosen = (leaf for leaf in (*vehicle, *around) if leaf.location[0] in keys and leaf.location[-1] not in _EXCLUDED)
+    return {field.name.removeprefix(f"{CONTROL}/"): _with_comment(field) for field in _for_type(type_name, chosen)}
 
 
-def _of_type(type_name: str, fields: Iterable[ParameterField]) -> Iterator[ParameterField]:
-    """Yield the fields with one effectiveness for each propeller that the type has, in place of a quadricopter's."""
-    for one in fields:
-        if one.location[:2] != _PROPELLERS:
-            yield one
-        elif one.location[2] == 0:
+def _for_type(type_name: str, fields: Iterable[ParameterField]) -> Iterator[ParameterField]:
+    """Yield the fields, with an effectiveness for each propeller of the type instead of a quadricopter's four."""
+    for field in fields:
+        if field.location[:2] != _PROPELLERS:
+            yield field
+        elif field.location[2] == 0:
             for index, place in enumerate(propeller_places(type_name)):
-                yield one._replace(location=(*_PROPELLERS, index), part=place)
+                yield field._replace(location=(*_PROPELLERS, index), part=place)
 
 
-def _of_script(parameters: Mapping[str, Any]) -> dict[str, ParameterField]:
-    """Return those that dynamic_reconfigure has a type for: numbers, switches, texts that are not too long."""
+def _script_fields(parameters: Mapping[str, Any]) -> dict[str, ParameterField]:
+    """Return the parameters with a type of dynamic_reconfigure: numbers, bools, strings up to LONGEST."""
     bounds: dict[type, tuple[Any, Any]] = {float: (-math.inf, math.inf), bool: (False, True), str: (0.0, 0.0)}
-    found = {}
+    fields = {}
     for key, value in parameters.items():
         kind = float if type(value) is int else type(value)
         if kind in bounds and not (isinstance(value, str) and len(value) > LONGEST):
             low, high = bounds[kind]
-            one = ParameterField((SCRIPT, key), kind, low=low, high=high, said="of the child script")
-            found[one.name] = one
-    return found
+            field = ParameterField((SCRIPT, key), kind, low=low, high=high, said="of the child script")
+            fields[field.name] = field
+    return fields
 
 
-def _explained(leaf: ParameterField) -> ParameterField:
-    """Return it with what config/drone.yaml says."""
-    keys: list[Key] = [one for one in leaf.location if isinstance(one, str)]
+def _with_comment(leaf: ParameterField) -> ParameterField:
+    """Return the field with its comment in config/drone.yaml as description."""
+    keys: list[Key] = [key for key in leaf.location if isinstance(key, str)]
     if keys[0] == "cameras":
-        keys[1] = _EXPLAINED_CAMERA
+        keys[1] = _DOCUMENTED_CAMERA
     return leaf._replace(said=comments().get("/".join(map(str, keys))) or leaf.said)
 
 
@@ -99,7 +99,7 @@ def _explained(leaf: ParameterField) -> ParameterField:
 
 
 def value_at(tree: Any, location: Sequence[Key]) -> Any:
-    """Return what stands at a location of models, mappings and lists; None where nothing does."""
+    """Return the value at a location in nested models, mappings and lists; None if there is none."""
     for key in location:
         if isinstance(tree, Mapping):
             tree = tree.get(key)
@@ -111,22 +111,22 @@ def value_at(tree: Any, location: Sequence[Key]) -> Any:
 
 
 def nested(known: Mapping[str, ParameterField], now: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return changes by name as YAML has them; parts of a list that they leave out are as they are `now`.
+    """Return changes, given by name, as nested mappings; missing elements of a list are taken from `now`.
 
-    Raises KeyError for such a part that is not there either.
+    Raises KeyError if an element is missing there, too.
     """
-    made: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for name, value in changes.items():
         leaf = known[name]
-        whole, given = leaf.location, value
+        location, new_value = leaf.location, value
         if leaf.part:
-            whole = leaf.location[:-1]
-            parts = [other for other, one in known.items() if one.part and one.location[:-1] == whole]
-            given = [changes[other] if other in changes else now[other] for other in parts]
+            location = leaf.location[:-1]
+            parts = [other for other, field in known.items() if field.part and field.location[:-1] == location]
+            new_value = [changes[other] if other in changes else now[other] for other in parts]
         elif leaf.none is not None and value == leaf.none:
-            given = "none"
-        here = made
-        for key in whole[:-1]:
-            here = here.setdefault(str(key), {})
-        here[str(whole[-1])] = given
-    return made
+            new_value = "none"
+        mapping = result
+        for key in location[:-1]:
+            mapping = mapping.setdefault(str(key), {})
+        mapping[str(location[-1])] = new_value
+    return result
