@@ -1,1 +1,1 @@
-"""What a value in a YAML file may be, and the one-line message for a wrong one."""
+"""Types of the values in YAML files, and one-line messages for invalid values."""

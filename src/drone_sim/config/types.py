@@ -1,4 +1,4 @@
-"""What a value in a YAML file may be, and the one-line message for a wrong one."""
+"""Types of values in YAML files, and the error with its one-line message for invalid values."""
 
 from __future__ import annotations
 
@@ -30,77 +30,77 @@ from drone_sim.files.resources import resolve
 from drone_sim.message_text import MAX_NAME, shown
 
 MAX_FILE_NAME = 4096  # characters
-MOST = 8  # problems that are told
-LONG = 900  # characters after which no other is
+MOST = 8  # problems in a message
+LONG = 900  # characters in a message after which no further problem is added
 _EXPONENT = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+$")
 
 
 Key = int | str
-Location = tuple[Key, ...]  # the keys and indices on the way to a value
+Location = tuple[Key, ...]  # path of keys and indices to a value
 
 
 class ParameterProblem(NamedTuple):
-    """A wrong value: the keys above it, what is wrong, and the value as messages show it, if it is one."""
+    """Invalid value: its location, the reason, and the value as messages show it ('' if there is none)."""
 
     location: Location
     reason: str
     value: str = ""
-    or_above: bool = False  # whether the key may be left out, and what is around it is as wrong
+    or_above: bool = False  # whether the enclosing mapping may be at fault instead of the key
 
     @property
     def text(self) -> str:
-        """What a message says of it."""
+        """Location, value and reason."""
         words = [" = ".join(filter(None, (readable_key(self.location), self.value))), self.reason]
         return ": ".join(filter(None, words))
 
     @property
     def sentence(self) -> str:
-        """The text, with what it speaks of."""
+        """The text, beginning with `parameter` if it has a location."""
         return f"parameter {self.text}" if self.location else self.text
 
 
 class ParameterError(ValueError):
-    """Parameters are wrong: where, and why. As a text it is one line that names key, value and what is allowed."""
+    """Error of invalid parameters. Its text is one line with key, value and what is allowed, for each problem."""
 
     def __init__(self, reason: str, location: Location = (), value: str = ""):
-        """Take what is wrong; for a wrong value also the keys above it, and the value as messages show it."""
-        self._take([ParameterProblem(location, reason, value)], "")
+        """Create the error of one problem: a reason, the location of the value, and the value as messages show it."""
+        self._set_problems([ParameterProblem(location, reason, value)], "")
 
     @classmethod
     def of(cls, problems: Sequence[ParameterProblem], line: str = "") -> ParameterError:
-        """Return the error of several problems, for which one line may be ready that says where they stand."""
+        """Return the error of several problems; `line` replaces the default message, such as one with line numbers."""
         error = cls("")
-        error._take(problems, line)
+        error._set_problems(problems, line)
         return error
 
-    def _take(self, problems: Sequence[ParameterProblem], line: str) -> None:
+    def _set_problems(self, problems: Sequence[ParameterProblem], line: str) -> None:
         self.problems = tuple(problems)
-        self.text = line or one_line([(None, one.text) for one in problems])  # where it is plain that it is a parameter
-        self.args = (line or one_line([(None, one.sentence) for one in problems]),)
+        self.text = line or one_line([(None, problem.text) for problem in problems])  # without the word `parameter`
+        self.args = (line or one_line([(None, problem.sentence) for problem in problems]),)
 
     @property
     def location(self) -> Location:
-        """The keys above the first wrong value; none where it is not one."""
+        """Location of the first invalid value; () if there is none."""
         return self.problems[0].location if self.problems else ()
 
     def below(self, *keys: Key) -> ParameterError:
-        """Return the same error, with these keys in front of the location of every problem."""
-        return self.of([one._replace(location=(*keys, *one.location)) for one in self.problems])
+        """Return the same error with these keys prepended to the location of every problem."""
+        return self.of([problem._replace(location=(*keys, *problem.location)) for problem in self.problems])
 
 
 def one_line(placed: Sequence[tuple[int | None, str]], file: str = "") -> str:
-    """Return what is wrong in one line: what has a line of a file with it, then the rest."""
-    inside = sorted(((line, text) for line, text in placed if line is not None), key=lambda one: one[0])
+    """Return one line with the problems: those with a line number, sorted by it, then the others."""
+    inside = sorted(((line, text) for line, text in placed if line is not None), key=lambda pair: pair[0])
     words = [f"line {line}: {text}" for line, text in inside]
     words += [text for line, text in placed if line is None]
-    lengths = itertools.accumulate(map(len, words), initial=0)  # of all that comes before
+    lengths = itertools.accumulate(map(len, words), initial=0)  # characters before each problem
     first = [word for word, before in zip(words, lengths) if before < LONG][:MOST]
     more = f"; and {len(words) - len(first)} more" if len(first) < len(words) else ""
     return (f"{file}: " if file else "") + "; ".join(first) + more
 
 
 def readable_key(location: Location) -> str:
-    """Return the path to a value as a message shows it: cut, and on one line."""
+    """Return the path to a value for a message, on one line; long parts are shortened."""
     return "/".join(part if part.isprintable() and len(part) < 80 else shown(part) for part in map(str, location))
 
 
@@ -108,7 +108,7 @@ def readable_key(location: Location) -> str:
 
 
 def numeric(value: Any) -> Any:
-    """Accept only a number, or a text such as `1e3`: YAML 1.1, which rosparam reads, takes that for a text."""
+    """Accept only a number, or a string such as `1e3`, which YAML 1.1 (rosparam) does not read as a number."""
     if isinstance(value, str) and len(value) < MAX_NAME and _EXPONENT.match(value):
         return float(value)
     if isinstance(value, (bool, str)):
@@ -120,14 +120,14 @@ def numeric(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Within(GroupedMetadata):
-    """Beside `float` or `int` in Annotated: a finite number from `low` to `high`, or also 0."""
+    """Constraint on a `float` or `int` in Annotated: finite, from `low` to `high`, or also 0 if `or_zero`."""
 
     low: float
     high: float
     or_zero: bool = False
 
     def __iter__(self) -> Iterator[Any]:
-        """Give what pydantic is to check."""
+        """Yield the validators for pydantic."""
         if self.or_zero:
             yield Ge(0)
             yield AfterValidator(self._check)
@@ -144,14 +144,14 @@ class Within(GroupedMetadata):
 
 @dataclass(frozen=True)
 class Parts:
-    """Beside a tuple in Annotated: what its numbers are called where each stands alone."""
+    """Names of a tuple's elements, in Annotated, for uses that treat each element as a parameter."""
 
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Unit:
-    """Beside a number in Annotated: its unit, for windows that show it."""
+    """Unit of a number, in Annotated, for user interfaces."""
 
     word: str
 
@@ -174,7 +174,7 @@ def _opaque(color: Any) -> Any:
 Finite = Annotated[float, AllowInfNan(False)]
 Coordinate = Annotated[Finite, Within(-1e5, 1e5)]  # m
 Angle = Annotated[Finite, Within(-1e3, 1e3)]  # rad
-Length = Annotated[Finite, Within(1e-4, 1e4)]  # m, of a thing
+Length = Annotated[Finite, Within(1e-4, 1e4)]  # m, size of an object
 Mass = Annotated[Finite, Within(1e-6, 1e6, or_zero=True)]  # kg
 Gain = Annotated[Finite, Within(0, 1e4)]
 Velocity = Annotated[Finite, Within(-1e4, 1e4)]  # m/s
@@ -196,7 +196,7 @@ Limits = Annotated[
 ]
 Switch = Annotated[bool, Field(strict=True)]
 
-# ---- words
+# ---- strings
 
 NAME = r"^[A-Za-z][A-Za-z0-9_]*$"
 TOPIC = r"^[A-Za-z][A-Za-z0-9_]*(/[A-Za-z0-9_]+)*$"
@@ -219,34 +219,34 @@ Label = Annotated[str, Field(max_length=MAX_NAME), AfterValidator(_printable)]
 
 
 class FoundFile(str):
-    """The absolute path of a file that is there; `given` is its name as the user wrote it, seen from `folder`."""
+    """Absolute path of an existing file; `given` is its name as the user wrote it, relative to `folder`."""
 
     given: str
     folder: str
 
     def seen_from(self, folder: Path | None) -> str:
-        """Return the name of this file for a file in `folder` (None: any folder): as given, where that leads to it."""
+        """Return a name for use in a file in `folder` (None: any folder): `given` if that resolves to this file."""
         absolute = self.given.startswith(("package://", "~", "/"))
         is_beside = folder is not None and Path(self.folder or ".").resolve() == folder.resolve()
         return self.given if absolute or is_beside else str(self)
 
 
-def _as_found(value: Any, check: Callable[[Any], str]) -> str:
+def _keep_found(value: Any, check: Callable[[Any], str]) -> str:
     checked = check(value)
-    return value if isinstance(value, FoundFile) else checked  # which knows how it was given
+    return value if isinstance(value, FoundFile) else checked  # it also holds the name as given
 
 
 FileName = Annotated[
-    str, Field(max_length=MAX_FILE_NAME), AfterValidator(_printable), WrapValidator(_as_found), PlainSerializer(str)
+    str, Field(max_length=MAX_FILE_NAME), AfterValidator(_printable), WrapValidator(_keep_found), PlainSerializer(str)
 ]
 
 
 def named_in(folder: Path, name: str) -> FoundFile:
-    """Return a file as a file in `folder` names it, without looking whether it is there."""
+    """Return the file that a file in `folder` calls `name`, without checking that it exists."""
     absolute = name.startswith(("package://", "~", "/"))
-    found = FoundFile(name if absolute else folder / name)
-    found.given, found.folder = name, str(folder)
-    return found
+    file = FoundFile(name if absolute else folder / name)
+    file.given, file.folder = name, str(folder)
+    return file
 
 
 def _existing_file(allow_none: bool) -> Callable[[Any], str]:
@@ -258,11 +258,11 @@ def _existing_file(allow_none: bool) -> Callable[[Any], str]:
         if allow_none and not value:
             return ""
         try:
-            found = FoundFile(resolve(value))
+            file = FoundFile(resolve(value))
         except FileNotFoundError as error:
             raise ValueError(str(error)) from None
-        found.given, found.folder = getattr(value, "given", str(value)), getattr(value, "folder", "")
-        return found
+        file.given, file.folder = getattr(value, "given", str(value)), getattr(value, "folder", "")
+        return file
 
     return check
 
@@ -271,16 +271,16 @@ File = Annotated[str, PlainValidator(_existing_file(False)), PlainSerializer(str
 OptionalFile = Annotated[str, PlainValidator(_existing_file(True)), PlainSerializer(str)]
 
 
-# ---- what a script is given
+# ---- script parameters
 
 
 def _script_value(value: Any) -> Any:
-    """Accept a number, true or false, a text, or a list of numbers."""
+    """Accept a number, a bool, a string, or a list of numbers."""
     if isinstance(value, (bool, str)):
         return value
-    several = value if isinstance(value, (list, tuple)) else [value]
-    if not all(isinstance(one, (int, float)) and not isinstance(one, bool) and math.isfinite(one) for one in several):
-        raise ValueError("must be a finite number, true, false, a text, or a list of numbers")
+    items = value if isinstance(value, (list, tuple)) else [value]
+    if not all(isinstance(each, (int, float)) and not isinstance(each, bool) and math.isfinite(each) for each in items):
+        raise ValueError("must be a finite number, true, false, a string, or a list of numbers")
     return tuple(map(float, value)) if isinstance(value, (list, tuple)) else float(value)
 
 
@@ -291,31 +291,31 @@ ScriptValue = Annotated[Any, PlainValidator(_script_value)]
 
 
 def merged(base: Any, overrides: Any) -> Any:
-    """Return nested mappings with other values laid over them."""
+    """Return nested mappings in which `overrides` replace the values of `base`."""
     if not (isinstance(base, Mapping) and isinstance(overrides, Mapping)):
         return overrides
-    laid = dict(base)
+    result = dict(base)
     for key, value in overrides.items():
-        laid[key] = merged(base[key], value) if key in base else value
-    return laid
+        result[key] = merged(base[key], value) if key in base else value
+    return result
 
 
 def nested(values: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a nested mapping of keys with dots between their parts; of several for one key the last one counts."""
-    made: dict[str, Any] = {}
+    """Return a nested mapping from values with dotted keys. The last value of a repeated key is used."""
+    result: dict[str, Any] = {}
     for key, value in values:
         *parents, last = key.split(".")
-        place = made
+        mapping = result
         for parent in parents:
-            if not isinstance(place.get(parent), dict):
-                place[parent] = {}
-            place = place[parent]
-        place[last] = value
-    return made
+            if not isinstance(mapping.get(parent), dict):
+                mapping[parent] = {}
+            mapping = mapping[parent]
+        mapping[last] = value
+    return result
 
 
 def flattened(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield what `nested` makes a nested mapping of."""
+    """Yield the values of a nested mapping with dotted keys: the inverse of `nested`."""
     for key, value in values.items():
         if isinstance(value, Mapping) and value:
             yield from flattened(value, f"{above}{key}.")
@@ -324,49 +324,49 @@ def flattened(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str,
 
 
 class Checked(BaseModel):
-    """Every key is known, every value checked, and nothing changes after that."""
+    """Base of parameter models: unknown keys are refused, values validated, instances frozen."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)  # of most kinds none is ever made
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)  # most models are never instantiated
 
 
 @dataclass(frozen=True)
 class Word:
-    """Which of several models a value is one of: the word that stands under a key, or under another one."""
+    """Discriminator of a union of models: the word under `key`, or under the alternative `or_key`."""
 
     key: str
     or_key: str
-    __name__: ClassVar[str] = "word"  # by which pydantic speaks of it
+    __name__: ClassVar[str] = "word"  # name in pydantic's messages
 
     def __call__(self, value: Any) -> str | None:
-        """Return the word; None where there is none."""
+        """Return the word in a mapping or model; None if there is none."""
         if not isinstance(value, Mapping):
             return next((str(getattr(value, key)) for key in (self.key, self.or_key) if hasattr(value, key)), None)
         word = value.get(self.used_in(value))
         return word if isinstance(word, str) else None
 
     def used_in(self, value: Any) -> str:
-        """Return the key under which a value has its word, or should have."""
+        """Return the key under which a value has, or should have, its word."""
         return self.or_key if isinstance(value, Mapping) and self.or_key in value else self.key
 
 
 def one_of(*models: type[Checked], key: str = "kind", or_key: str = "") -> Any:
-    """Return the type of a value that is one of these, which the word under `key`, or `or_key`, tells apart."""
+    """Return the union of models, which the word under `key`, or `or_key`, tells apart."""
     if len(models) == 1:
         return models[0]
     if not or_key:
-        return Annotated[Union[models], Field(discriminator=key)]  # noqa: UP007 -- of a tuple
-    tagged = tuple(Annotated[one, Tag(word_of(one, key, or_key))] for one in models)
+        return Annotated[Union[models], Field(discriminator=key)]  # noqa: UP007 -- it is built from a tuple
+    tagged = tuple(Annotated[model, Tag(word_of(model, key, or_key))] for model in models)
     return Annotated[Union[tagged], Discriminator(Word(key, or_key))]  # noqa: UP007
 
 
 def word_of(model: type[Checked], *keys: str) -> str:
-    """Return the word under the first of some keys that a model has, by which it is chosen."""
+    """Return the word that selects a model: that of the first of `keys` that the model has."""
     (key, *_) = (key for key in keys if key in model.model_fields)
     return str(get_args(model.model_fields[key].annotation)[0])
 
 
 def read_yaml(path: str | Path) -> dict[str, Any]:
-    """Return the mapping in a YAML file; raises ParameterError, in one line, where there is none."""
+    """Return the mapping in a YAML file. Raises ParameterError, in one line, if it contains none."""
     try:
         values = yaml_files.read(path)
     except yaml_files.YamlError as error:
@@ -383,7 +383,7 @@ MagneticField = Annotated[
 
 
 class DatumParameters(Checked):
-    """The world's origin in WGS 84; the world's x is east there, y north, z up (REP-103)."""
+    """Origin of the world in WGS 84; the world's x axis points east there, y north, z up (REP-103)."""
 
     latitude: Annotated[Finite, Within(-90, 90)]  # degrees, as in sensor_msgs/NavSatFix
     longitude: Annotated[Finite, Within(-180, 180)]  # degrees
