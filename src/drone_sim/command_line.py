@@ -1,4 +1,4 @@
-"""What the programs share: every mistake of a user is reported in one line, whatever part of the code finds it."""
+"""Command-line helpers of all programs: a user's mistake is reported in one line, wherever it is detected."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from drone_sim.message_text import printable
 from drone_sim.scripting.errors import ScriptError
 
 FAILED, SIGNALLED = 1, 128  # exit statuses; shells add the signal's number: 130 after Ctrl-C
-EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
-# What single commands import, and only when they are asked for it: `./dev.sh setup` leaves it out.
+EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # errors whose message is one line for the user
+# Packages that only some commands import, when they need them; `./dev.sh setup` does not install them.
 SEPARATE = ("av", "distributed", "jinja2", "matplotlib", "scipy")
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that says what is wrong in one line, instead of the usage; `--seed` is not `--seeds`."""
+    """Argument parser that reports errors in one line, without the usage; options cannot be abbreviated."""
 
     wrong = FAILED  # the exit status for wrong arguments
 
     def __init__(self, **options: Any):
-        """Take what argparse's own takes; options are not abbreviated."""
+        """Take the options of argparse.ArgumentParser."""
         super().__init__(allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
-        """End the program, with that line on stderr."""
+        """Exit with status `wrong`, after one line on stderr."""
         self.exit(self.wrong, f"{self.prog}: {' '.join(message.split())} (see {self.prog} --help)\n")
 
 
@@ -38,7 +38,7 @@ def status_of(
     wrong: int = FAILED,
     passed_on: type[Exception] | tuple[()] = (),
 ) -> int:
-    """Return the exit status of an action, 0 for None; 130 after Ctrl-C; `wrong` after a line for a user's mistake.
+    """Return the exit status of an action: 0 for None, 130 after Ctrl-C, `wrong` after reporting a user's mistake.
 
     Exceptions of the types in `passed_on` are raised again, for a caller that can say more about them.
     """
@@ -52,23 +52,23 @@ def status_of(
         package = (error.name or "").partition(".")[0]
         if package not in SEPARATE:
             raise
-        said = f"this needs the Python package {package}: {installation_of(package)}"
+        message = f"this needs the Python package {package}: {installation_of(package)}"
     except EXPECTED as error:
-        said = printable(format_error(error))
-    print(f"{program}: {said}", file=sys.stderr, flush=True)
+        message = printable(format_error(error))
+    print(f"{program}: {message}", file=sys.stderr, flush=True)
     return wrong
 
 
 def installation_of(separate: str) -> str:
-    """Return how a package of SEPARATE is installed, in words."""
+    """Return a sentence on how to install a package of SEPARATE."""
     if (package_path() / "dev.sh").is_file():
         return "`./dev.sh setup --all` installs it"
     return f"`apt install python3-{separate}` installs it"
 
 
 def format_error(error: BaseException) -> str:
-    """Return what is wrong, in one line; of an OSError its file, too."""
-    said = str(error)
+    """Return the message of an error in one line; for an OSError with its file name."""
+    message = str(error)
     if isinstance(error, OSError) and error.filename is not None:
-        said = f"{error.filename}: {error.strerror}"
-    return " ".join(said.split())
+        message = f"{error.filename}: {error.strerror}"
+    return " ".join(message.split())

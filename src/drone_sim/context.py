@@ -1,4 +1,4 @@
-"""What the parts of one simulation share: each part that needs some of it gets all of it in its constructor."""
+"""Context shared by the parts of one simulation. Each part that needs any of it gets it in its constructor."""
 
 from __future__ import annotations
 
@@ -23,31 +23,31 @@ NOBODY = ("", "")
 
 
 class FollowingBody(Protocol):
-    """A body that goes where something else goes."""
+    """A kinematic body that follows an object."""
 
     def follow(self) -> None:
-        """Put it where what carries it has gone."""
+        """Set the pose of the body to that of the object that carries it."""
 
 
 @dataclass
 class CarriedBodies:
-    """The bodies without mass that something carries, by their numbers in the world."""
+    """Massless bodies carried by other objects, by body number in the world."""
 
-    bases: dict[int, FollowingBody] = field(default_factory=dict)  # of chains, before what hangs on their links
+    bases: dict[int, FollowingBody] = field(default_factory=dict)  # of chains; moved before bodies on their links
     shapes: dict[int, FollowingBody] = field(default_factory=dict)
 
     def follow(self) -> None:
-        """Put every one where what carries it has gone."""
-        for one in (*self.bases.values(), *self.shapes.values()):
-            one.follow()
+        """Set the pose of every carried body to that of its carrier."""
+        for body in (*self.bases.values(), *self.shapes.values()):
+            body.follow()
 
 
 @dataclass(kw_only=True)
 class SimulationContext(ScriptContext):
-    """World, weather, renderer, names and limits, beside what scripts share; it lasts from one start to the next.
+    """World, weather, renderer, names and limits, in addition to what scripts share. Each start creates a new one.
 
-    `sub_step` in s; `script_time_limit` in s of real time; `magnetic_field` in T. `names` has for each body the name
-    that people read, and the name that scripts use ('' for none); `link_names` has the latter for single links.
+    `sub_step` in s; `script_time_limit` in s of real time; `magnetic_field` in T. `names` has for each body its display
+    name and its name in scripts ('' for none); `link_names` has the names of single links in scripts.
     """
 
     world: World
@@ -63,19 +63,19 @@ class SimulationContext(ScriptContext):
     link_names: dict[tuple[int, int], str] = field(default_factory=dict)
     carried: CarriedBodies = field(default_factory=CarriedBodies)
     blades: list[TurningBlades] = field(default_factory=list)  # of all vehicles
-    tunings: int = 0  # grows whenever something is other than it was that may be tuned
+    tunings: int = 0  # incremented when a tunable value changes
 
     def change_weather(self, changes: Mapping[str, Any]) -> None:
-        """Change the weather of all vehicles: keys of `weather`, as in YAML. Raises ParameterError."""
+        """Change the weather for all vehicles; `changes` has keys of `weather`, as in YAML. Raises ParameterError."""
         self.weather.change(changes)
         self.tunings += 1
 
     def picture(self, kind: str, lens: Lens, pose: np.ndarray, only: Collection[str] | None = None) -> np.ndarray:
-        """Return what is seen from a pose (4, 4), world from optical frame: "color" or "depth", as of Vision.picture.
+        """Return the picture from a camera pose (4, 4), world from optical frame: "color" or "depth" as Vision.picture.
 
-        Or "handles": (height, width) uint32, the handle of the object that each pixel shows, NO_OBJECT for what scripts
-        do not know. `only`: names of the objects to draw; None draws all. Raises ValueError where OpenGL is needed and
-        not available.
+        For "handles": (height, width) uint32, the handle of the object at each pixel; NO_OBJECT if it has no name in
+        scripts. `only`: names of the objects to draw; None draws all. Raises ValueError if OpenGL is needed and not
+        available.
         """
         if kind != "handles" and only is None:
             return self.vision.picture(kind, lens, pose)
@@ -84,19 +84,19 @@ class SimulationContext(ScriptContext):
         if kind != "handles":
             return self.vision.picture(kind, lens, pose, shown)
         numbers = {name: number for number, name in enumerate(dict.fromkeys(names), 1)}
-        handles = [NO_OBJECT, *(self.objects.handle(one) if one in self.objects else NO_OBJECT for one in numbers)]
-        whose = np.array([numbers[name] for name in names], dtype=np.uint16)
-        return np.array(handles, dtype=np.uint32)[self.vision.numbers(lens, pose, whose, shown)]
+        handles = [NO_OBJECT, *(self.objects.handle(name) if name in self.objects else NO_OBJECT for name in numbers)]
+        object_numbers = np.array([numbers[name] for name in names], dtype=np.uint16)
+        return np.array(handles, dtype=np.uint32)[self.vision.numbers(lens, pose, object_numbers, shown)]
 
     def name_of(self, body: int, link: int = -1) -> str:
-        """Return what scripts call a body's link (-1: its root), '' for what they do not know."""
+        """Return the script name of a body or link (-1: the body's root link); '' if it has none."""
         name = self.link_names.get((body, link))
         return self.names.get(body, NOBODY)[1] if name is None else name
 
     def person_name_of(self, place: tuple[int, int]) -> str:
-        """Return what a person calls a body's link, '' for what has no name."""
+        """Return the display name of a body's link; '' if it has none."""
         return self.link_names.get(place) or self.names.get(place[0], NOBODY)[0]
 
     def body_of(self, name: str) -> int:
         """Return the body with this script name. Raises LookupError."""
-        return next(body for body, (_, one) in self.names.items() if one == name)
+        return next(body for body, (_, script_name) in self.names.items() if script_name == name)
