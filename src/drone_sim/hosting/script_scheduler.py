@@ -141,7 +141,7 @@ class ScriptScheduler:
 
     def of(self, vehicle: str) -> list[AnyScript]:
         """Return the scripts of a vehicle and of its objects, in V-REP's order."""
-        return self.in_order([self.child_scripts[vehicle], *(one for one in self.attached if one.goes_with == vehicle)])
+        return self.in_order([self.child_scripts[vehicle], *(it for it in self.attached if it.goes_with == vehicle)])
 
     # ---- order of calls
 
@@ -166,7 +166,7 @@ class ScriptScheduler:
     # ---- cleanup
 
     def clean_up(self, scripts: Sequence[AnyScript]) -> list[ScriptError]:
-        """Let threads end, then call every script's cleanup, even if others fail; return the errors."""
+        """End threads, then call every script's cleanup, even if others fail; return the errors."""
         errors: list[ScriptError] = []
         control = self._context.control
         before = control.is_stopping, control.is_ending

@@ -123,9 +123,9 @@ class Pace:
     def __init__(self, simulation: Simulation, pacer: Pacer):
         """`pacer` times the steps of `simulation`."""
         self._simulation, self._pacer = simulation, pacer
-        comment = comments()[FACTOR]
+        text = comments()[FACTOR]
         self.known: dict[str, ParameterField] = {
-            field.name: field._replace(said=comment) for field in fields_of(PaceParameters)
+            leaf.name: leaf._replace(said=text) for leaf in fields_of(PaceParameters)
         }
 
     def values(self) -> dict[str, Any]:

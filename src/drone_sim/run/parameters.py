@@ -302,8 +302,8 @@ def _checked(
         wrong = problems(error, Parameters)
         # A wrong value that a vehicle inherits is reported at the top level.
         own = [problem for problem in wrong if _is_in(problem, values, scene)]
-        told = own or list(dict.fromkeys(problem._replace(location=problem.location[2:]) for problem in wrong))
-        raise ParameterError.of(told, _line_in_file(told, named, bool(scene), lines)) from None
+        reported = own or list(dict.fromkeys(problem._replace(location=problem.location[2:]) for problem in wrong))
+        raise ParameterError.of(reported, _line_in_file(reported, named, bool(scene), lines)) from None
     parameters._values = values
     parameters._in_scene_file = {key: scene[key] for key in scene_parameters.BESIDE if key in scene}
     if is_empty and not parameters.vehicles:

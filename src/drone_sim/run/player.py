@@ -23,10 +23,7 @@ class Player:
     def __init__(
         self, simulation: Simulation, step: Callable[[], None], tell: Callable[[str], None], simulated_time: bool
     ):
-        """Use a simulation. `step` runs one step and publishes it.
-
-        `simulated_time`: other nodes use the simulation's clock, and wait while it stands still.
-        """
+        """`step` runs and publishes one step. With `simulated_time`, other nodes wait while the clock stands still."""
         self.simulation = simulation
         self._step = step
         self.paused = False
@@ -121,7 +118,6 @@ class Player:
         return not request or self._execute_request(request)
 
     def _pause_at_breakpoint(self) -> None:
-        """Pause if a script has reached a breakpoint in the step or in its init."""
         reached = self.simulation.breakpoints.reached
         if reached is not None and self.playing:
             _LOG.info(f"breakpoint at {reached.file}:{reached.line}, t = {reached.time:.2f} s")

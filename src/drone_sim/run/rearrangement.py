@@ -58,9 +58,9 @@ def _replace_vehicles(setup: SimulationSetup, before: Parameters, after: Paramet
     """Add, remove and replace vehicles; return the names of the new ones."""
     old, wanted = ({vehicle.name: vehicle for vehicle in parameters.fleet} for parameters in (before, after))
     new = {
-        name: vehicle
-        for name, vehicle in wanted.items()
-        if name not in old or not _can_stay(setup.vehicles[name], old[name], vehicle)
+        key: entry
+        for key, entry in wanted.items()
+        if key not in old or not _can_stay(setup.vehicles[key], old[key], entry)
     }
     removed = [vehicle for name, vehicle in setup.vehicles.items() if name in new or name not in wanted]
     if not new and not removed:
@@ -69,7 +69,7 @@ def _replace_vehicles(setup: SimulationSetup, before: Parameters, after: Paramet
         load.script_path(script_of(vehicle, after, script))
     added = [_as_successor(vehicle, _predecessor(vehicle, old, wanted), setup.vehicles) for vehicle in new.values()]
     attached_objects = [attached for vehicle in removed for attached in _attached_objects(vehicle)]
-    _remove_and_add(setup, removed, added, script)
+    _exchange(setup, removed, added, script)
     for attached in attached_objects:
         tree = setup.context.objects
         if attached.parent in tree:
@@ -118,15 +118,10 @@ def _attached_objects(vehicle: Vehicle) -> Iterable[AttachedObject]:
                 yield AttachedObject(child, tree[parent].name, tree.matrix(child, PARENT))
 
 
-def _remove_and_add(
-    setup: SimulationSetup, removed: list[Vehicle], added: list[VehicleParameters], script: str
-) -> None:
+def _exchange(setup: SimulationSetup, removed: list[Vehicle], added: list[VehicleParameters], script: str) -> None:
     """Remove vehicles and add others; if one cannot be added, restore the removed ones and raise."""
     handles: Mapping[str, int] = {
-        name: handle
-        for vehicle in removed
-        for handle in vehicle.handles
-        for name in vehicle.context.objects[handle].names
+        name: handle for each in removed for handle in each.handles for name in each.context.objects[handle].names
     }
     for vehicle in removed:
         _remove(setup, vehicle.name)

@@ -133,11 +133,8 @@ class SceneDocument:
         settings = with_files_seen_from(now.settings, here, folder)
         lists = {"objects": [*items, *new], "scripts": new_scripts}
         needed = {"objects"} if not before.content else before.content.keys()
-        content: dict[str, Any] = {
-            **settings,
-            **{key: values for key, values in lists.items() if values or key in needed},
-        }
-        ordered = {key: content[key] for key in (*before.content, *content) if key in content}
+        result: dict[str, Any] = {**settings, **{key: items for key, items in lists.items() if items or key in needed}}
+        ordered = {key: result[key] for key in (*before.content, *result) if key in result}
         return ordered, {"objects": [*kept, *[None] * len(new)], "scripts": kept_scripts}
 
     def _script_items(

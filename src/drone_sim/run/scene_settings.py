@@ -107,10 +107,7 @@ def vehicles_in(settings: Settings, parameters: Parameters) -> _VehicleSettings:
     drone = settings.get("drone") if not entries else None
     default = {key: value for key, value in drone.items() if key != "name"} if isinstance(drone, Mapping) else {}
     own = {vehicle.name: entries.get(vehicle.name, default) or {} for vehicle in parameters.fleet}
-    return {
-        vehicle.name: {**_place(vehicle, own[vehicle.name]), **copy.deepcopy(own[vehicle.name])}
-        for vehicle in parameters.fleet
-    }
+    return {each.name: {**_place(each, own[each.name]), **copy.deepcopy(own[each.name])} for each in parameters.fleet}
 
 
 def _place(vehicle: VehicleParameters, entry: Mapping[str, Any]) -> dict[str, Any]:

@@ -147,7 +147,6 @@ class Simulation:
         ]
 
     def _begin_run(self) -> None:
-        """Begin a new run at time 0."""
         self._stepper = Stepper(self._setup)
         self.run += 1
         self.era += 1
@@ -234,8 +233,7 @@ class Simulation:
     def arrange(self, parameters: Parameters, rebuild: bool = True) -> None:
         """While stopped, replace the initial scene by that of `parameters`; objects keep present or former handles.
 
-        Without `rebuild`, world and objects change only at the next start. Raises ParameterError and UrdfError,
-        without a change.
+        Without `rebuild`, the world changes at the next start. Raises ParameterError and UrdfError, without a change.
         """
         if rebuild:
             self._handles = self.context.objects.handles().with_those_of(self._handles)

@@ -51,7 +51,7 @@ class DivergenceCheck:
 
 
 class Stepper:
-    """Steps of a setup through one run. Lists of what to call are cached, and rebuilt only after a change."""
+    """Execution of the steps of one run. Lists of vehicles and scripts are cached, and rebuilt only after a change."""
 
     def __init__(self, setup: SimulationSetup):
         """Begin a run at time 0."""

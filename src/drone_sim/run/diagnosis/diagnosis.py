@@ -60,17 +60,17 @@ def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool
     `held`: the next step waits for a client of the remote API.
     """
     simulation = player.simulation
-    asked = simulation.parameters.real_time_factor
+    target = simulation.parameters.real_time_factor
     factor = since.steps * simulation.parameters.time_step / since.seconds if since else None
     problems = [Problem(ERROR, f"stopped: {player.why_stopped}")] if player.why_stopped and not player.playing else []
-    problems += [Problem(ERROR, f"script of {n} failed: {error}") for n, error in simulation.failed_scripts.items()]
+    problems += [Problem(ERROR, f"script of {key} failed: {error}") for key, error in simulation.failed_scripts.items()]
     problems += [Problem(WARN, f"will not work here: {hole}") for hole in simulation.holes[:_MAX_HOLES]]
     if simulated_time and not player.playing:
         problems.append(Problem(WARN, f"{player.state}: /clock stands still, and nodes that use simulated time wait"))
     if held and since and not since.steps:
         problems.append(Problem(WARN, "no step: a client of the remote API asked to trigger each step, and does not"))
-    elif factor is not None and asked and factor < _ENOUGH * asked:
-        problems.append(Problem(WARN, f"too slow: {factor:.2f} times real time, {asked:g} is wanted"))
+    elif factor is not None and target and factor < _ENOUGH * target:
+        problems.append(Problem(WARN, f"too slow: {factor:.2f} times real time, {target:g} is wanted"))
     if since and since.late > _LATE * since.steps:
         problems.append(Problem(WARN, f"{since.late} of the last {since.steps} steps were late"))
     late = f"{since.late} of the last {since.steps}, " if since else ""
@@ -81,7 +81,7 @@ def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool
         "run": f"number {simulation.run}; every start and every stop begins a new run",
         "vehicles": ", ".join(simulation.vehicles),
         "real-time factor": f"{factor:.2f}" if factor is not None else "not known",
-        "real-time factor asked for": f"{asked:g}" if asked else "as fast as it can",
+        "real-time factor asked for": f"{target:g}" if target else "as fast as it can",
         "late steps": f"{late}{pacer.overruns} in all, by {pacer.worst * 1e3:.0f} ms at most",
         "stamps": "simulated time, from /clock" if simulated_time else "real time",
         "scene": shown(simulation.parameters.scene_file) if simulation.parameters.scene_file else "of the parameters",

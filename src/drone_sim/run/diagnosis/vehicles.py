@@ -24,7 +24,7 @@ _CLIPPED_SHARE = 0.5  # fraction of the steps with a propeller at its limit that
 _SLOW_SHARE = 0.1  # fraction of the commanded speed
 _MIN_COMMAND = 0.1  # m/s and rad/s, smallest command that should move the vehicle
 _IGNORED_TIME = 3.0  # s of simulated time
-_NO_INPUT = "this script does not subscribe to commands: the tutorial's scripts do from stage 6 on, and `pilot` does"
+_DEAF = "this script does not subscribe to commands: the tutorial's scripts do from stage 6 on, and `pilot` does"
 
 
 class VehicleDiagnosis:
@@ -137,7 +137,7 @@ class VehicleDiagnosis:
         if taken is None or not self._player.playing or str(vehicle.flight_state) in (LANDED, CRASHED):
             return []
         if not hears_commands(vehicle):
-            return [Problem(WARN, _NO_INPUT)]
+            return [Problem(WARN, _DEAF)]
         has_exited = taken.sender not in self._log.senders()
         if has_exited and vehicle.commands.now != Twist() and not vehicle.parameters.cmd_vel_timeout:
             problem = f"still obeys the last command of {taken.sender}, which has exited"
@@ -180,9 +180,7 @@ class VehicleDiagnosis:
             return self._situation
         if taken is None:
             return (
-                f"{state}; no command has been received yet"
-                if hears_commands(self._vehicle)
-                else f"{state}; {_NO_INPUT}"
+                f"{state}; no command has been received yet" if hears_commands(self._vehicle) else f"{state}; {_DEAF}"
             )
         return f"{state} as {taken.sender} commands"
 
