@@ -53,7 +53,7 @@ class SceneDocument:
         self._settings: Settings | None = None
         is_imported = file is not None and cache_path() in file.parents  # from a V-REP file
         self.file = None if is_imported else file
-        self._mtime: int | None = None  # ns, modification time of the file when it was written here
+        self._mtime: int | None = None  # ns, of the file when it was last written here
 
     def _in_text(self) -> Settings:
         return settings_of(self._text.content)

@@ -65,7 +65,7 @@ def settings_now(
 
 
 def _current_pose(vehicle: Vehicle) -> Matrix:
-    """Return a vehicle's pose; before it moves, that of its entry, which its start on the floor may differ from."""
+    """Return a vehicle's pose; at its start, its entry's pose, from which it may have been lowered to the floor."""
     body = vehicle.body
     return vehicle.parameters.matrix if are_same(body.matrix, body.start.matrix) else body.matrix
 

@@ -111,7 +111,7 @@ class VehicleDiagnosis:
         return [Problem(WARN, f"{how} ({math.degrees(self._tilt):.0f} degrees): `restart` puts it upright")]
 
     def _check_situation(self) -> list[Problem]:
-        """Report that the vehicle lies, slides or hangs somewhere, unless its script reports it."""
+        """Report that the vehicle lies, slides or hangs somewhere, unless its script reports another state."""
         state = self._situation
         if not self._player.playing or state in (FLYING, HELD, UPSIDE_DOWN) or state != situation(self._vehicle.body):
             return []
