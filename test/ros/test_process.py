@@ -160,7 +160,7 @@ class Process(unittest.TestCase):
 
     def test_parameters_that_are_none_end_it_with_one_line(self):
         for name, value, expected in (
-            ("/drone_sim", 5, "parameter /drone_sim = 5: must hold parameters"),
+            ("/drone_sim", 5, "parameter /drone_sim = 5: must be a namespace"),
             ("/use_sim_time", "foo", "parameter /use_sim_time = foo: must be true or false"),
             ("/drone_sim/script", "/" + "x" * 300 + ".py", "ile"),  # too long for a file, or just not there
             ("/drone_sim/script", "/no/such.py", "/no/such.py: no such file"),
@@ -177,9 +177,9 @@ class Process(unittest.TestCase):
             ("ROS_MASTER_URI", "garbage", "ROS_MASTER_URI = 'garbage': must be like http://localhost:11311"),
             ("ROS_MASTER_URI", "http://localhost:99999", "must be like http://localhost:11311"),
             ("ROS_MASTER_URI", "http://localhost:1", "no ROS master at http://localhost:1"),
-            ("ROS_MASTER_URI", "http://no.such.host.invalid:11311", "the host 'no.such.host.invalid' is not known"),
-            ("ROS_HOSTNAME", "no.such.host.invalid", "ROS_HOSTNAME = 'no.such.host.invalid': is not known here"),
-            ("ROS_IP", "300.1.1.1", "ROS_IP = '300.1.1.1': is not known here"),
+            ("ROS_MASTER_URI", "http://no.such.host.invalid:11311", "the host 'no.such.host.invalid' cannot be resolved"),
+            ("ROS_HOSTNAME", "no.such.host.invalid", "ROS_HOSTNAME = 'no.such.host.invalid': cannot be resolved"),
+            ("ROS_IP", "300.1.1.1", "ROS_IP = '300.1.1.1': cannot be resolved"),
         ):
             with self.subTest(value), mock.patch.dict(os.environ):
                 os.environ.pop("ROS_HOSTNAME", None)

@@ -141,7 +141,7 @@ def _make_room(files: Iterable[Path], used: Collection[str]) -> None:
     for count, (stat, file) in enumerate(sorted(entries, key=lambda entry: -entry[0].st_mtime_ns)):
         size += stat.st_size
         if (count >= _MAX_MESHES or size > _MAX_MESH_BYTES) and str(file) not in used:
-            remove(file, within=_made_meshes())
+            remove(file, within=_mesh_folder())
 
 
 def plain(values: Checked, folder: Path | None) -> dict[str, Any]:
