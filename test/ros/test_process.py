@@ -177,7 +177,11 @@ class Process(unittest.TestCase):
             ("ROS_MASTER_URI", "garbage", "ROS_MASTER_URI = 'garbage': must be like http://localhost:11311"),
             ("ROS_MASTER_URI", "http://localhost:99999", "must be like http://localhost:11311"),
             ("ROS_MASTER_URI", "http://localhost:1", "no ROS master at http://localhost:1"),
-            ("ROS_MASTER_URI", "http://no.such.host.invalid:11311", "the host 'no.such.host.invalid' cannot be resolved"),
+            (
+                "ROS_MASTER_URI",
+                "http://no.such.host.invalid:11311",
+                "the host 'no.such.host.invalid' cannot be resolved",
+            ),
             ("ROS_HOSTNAME", "no.such.host.invalid", "ROS_HOSTNAME = 'no.such.host.invalid': cannot be resolved"),
             ("ROS_IP", "300.1.1.1", "ROS_IP = '300.1.1.1': cannot be resolved"),
         ):
