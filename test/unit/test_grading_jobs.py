@@ -13,12 +13,13 @@ import threading
 import time
 import zipfile
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
 from drone_sim.grading import grade, sweep, tasks
 from drone_sim.grading import plan as plans
-from drone_sim.grading.jobs import files, pool, sandbox, settings
+from drone_sim.grading.jobs import files, judge_server, pool, sandbox, settings
 from drone_sim.grading.jobs.flyer import Flyer
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.jobs.pool import FlightOptions, PoolError
@@ -90,6 +91,7 @@ LOOKS = {
 LOOKING = """
 import os, socket, stat, sys
 from pathlib import Path
+from unittest import mock
 
 HERE = Path(__file__).parent
 
@@ -261,6 +263,18 @@ def test_the_table_is_that_of_fly(server, plan):
     flight = server.fly(job_of(plan, "", 0), table=True)
     lines = flight.table.decode().splitlines()
     assert lines[0].startswith("t [s],x [m]") and len(lines) == 1 + 5
+
+
+def test_a_warm_up_flight_that_fails_leaves_a_traceback_and_the_plan(folder, monkeypatch, caplog):
+    def fail(*_):
+        raise KeyError("ours")
+
+    monkeypatch.setattr(judge_server, "grade", fail)
+    for name in ("permissions", "gc"):
+        monkeypatch.setattr(judge_server, name, mock.Mock())
+    monkeypatch.setattr(judge_server, "connect_ahead", mock.Mock())
+    read = judge_server._read_plan(str(folder / "hold.yaml"))
+    assert read.value.name == "hold" and "warm-up" in caplog.text and "KeyError: 'ours'" in caplog.text
 
 
 def test_a_plan_that_is_replaced_is_flown_as_it_is_by_then(server, folder, tmp_path):

@@ -10,6 +10,7 @@ import functools
 import gc
 import importlib
 import json
+import logging
 import socket
 import sys
 from collections.abc import Mapping
@@ -26,6 +27,7 @@ from drone_sim.grading.plan import Plan, PlanError
 from drone_sim.scripting.door.simulation_end import SimulationEnd
 from drone_sim.world import connect_ahead
 
+_LOG = logging.getLogger(__name__)
 _MOST = {"result": 2**22, "table": 2**28}  # bytes
 _MOST_PLANS = 8  # kept in memory
 _BESIDE = ("cv2", "drone_sim.scripting.lua.script", "drone_sim.render.renderer")  # imported where they are needed
@@ -83,8 +85,10 @@ def _judge(plan: Plan, request: dict[str, Any], door: socket.socket, outputs: Ma
 def _read_plan(path: str) -> ReadFile:
     """Return a plan, once all that a flight of it needs has been read and compiled. Raises OSError and PlanError."""
     plan = plans.read(path)
-    with contextlib.suppress(Exception):
-        grade(plan.model_copy(update={"duration": 0.1}), "pilot")  # what this reads and compiles, forks have
+    try:
+        grade(plan.model_copy(update={"duration": 0.1}), "pilot")  # forks inherit what this reads and compiles
+    except Exception:  # an error of ours; every flight then reads and compiles for itself
+        _LOG.warning("a warm-up flight failed: flights will be slower", exc_info=True)
     permissions.free()
     connect_ahead()  # which forks need not do, either
     gc.collect()
