@@ -366,6 +366,8 @@ def test_the_simulation_knows_a_renamed_script_that_flies(ask, own):
     assert ask("rename", script="mine/x.py", name="y.py")["script"] == "mine/y.py"
     assert ask.node.parameters["script"] == str(own / "y.py")
     assert ask("locate", file=str(own / "y.py")) == {"script": "mine/y.py"} and ask("locate", file=1) == {"script": ""}
+    assert ask("locate", file="pilot") == {"script": "built-in/pilot.py"}
+    assert ask("locate", file="tutorial_v3") == {"script": "built-in/tutorial_v3.lua"}
     ask("delete", script="mine/y.py")
     assert ask("bring back", script="mine/y.py")["script"] == "mine/y.py"
     assert ask("check", text="x = = 1", lua=False)["found"][0]["line"] == 1

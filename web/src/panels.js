@@ -30,8 +30,7 @@ export class Panels {
     this.tune = new Tune(this.board, this.ask, this.notice);
     this.log = new Log(this.board);
     this.view = new View(scene());
-    const openScript = (file) => (file.includes("/") ? goTo(file, 1) : open(`built-in/${file}.py`));
-    const ofScript = { openScript, showScript: (is) => this.showScript(is) };
+    const ofScript = { openScript: (file) => goTo(file, 1), showScript: (is) => this.showScript(is) };
     this.build = new Build(scene(), this.ask, this.notice, ofScript);
     this.side = new Side((panel) => {
       this.plots.show(panel === "plots");

@@ -140,9 +140,13 @@ class EditorBackend:
         return {}
 
     def _locate(self, message: _Message) -> dict[str, Any]:
-        """Return the name of the script in a file, '' if that is not on the lists."""
-        found = self._store.of_file(str(message.get("file")))
-        return {"script": found.name if found else ""}
+        """Return the listed name of a script, given its file or a built-in script's name; '' if it is not listed."""
+        file = str(message.get("file"))
+        if "/" not in file:
+            with contextlib.suppress(ScriptError):
+                file = script_path(file)
+        script = self._store.of_file(file)
+        return {"script": script.name if script else ""}
 
     # ---- texts, and flights
 
