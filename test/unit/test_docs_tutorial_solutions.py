@@ -117,7 +117,7 @@ def test_solution_every_fourth_picture_has_no_red():
         fly(simulation, 0.6)
         seen = simulation.drone.cameras["front"].take()
     assert len(backend.published) == 3
-    picture = np.frombuffer(backend.published[-1].message.data, np.uint8).reshape(seen.shape)
+    picture = backend.published[-1].message.pixels
     assert not picture[..., 0].any()
     assert np.array_equal(picture[..., 1:], seen[..., 1:])
 
