@@ -19,7 +19,7 @@ from drone_sim.vehicles.commands import Empty, request
 ROOT = Path(__file__).resolve().parents[2]
 PLAN = """
 duration: 4.0
-config: {sensors: {imu: {kind: imu, rate: 20}}, script_time_limit: 2.0}
+config: {sensors: {imu: {kind: imu, rate: 20}}, script_time_limit: 30.0}
 timeline:
   - {at: 0.5, twist: {linear: [1, 0, 0]}}
   - {at: 1.5, twist: {linear: [0, 0.5, 0.2], angular: [0, 0, 0.5]}}
@@ -127,7 +127,7 @@ def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("door")
     (made / "scene.yaml").write_text(SCENE)
     (made / "plan.yaml").write_text(PLAN)
-    (made / "quick.yaml").write_text(PLAN.replace("limit: 2.0", "limit: 0.2"))
+    (made / "quick.yaml").write_text(PLAN.replace("limit: 30.0", "limit: 0.2"))
     return made
 
 
