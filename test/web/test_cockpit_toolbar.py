@@ -129,7 +129,7 @@ def test_landing_and_takeoff(cockpit, panel):
 def test_a_script_that_cannot_land_is_said_so(cockpit, panel):
     rospy.set_param("/drone_sim/script", "tutorial")
     assert cockpit.call("restart").startswith("started")
-    panel.press("Land", "land: no effect: the child script does not subscribe to it")
+    panel.press("Land", "land: no effect: the child script does not subscribe")
 
 
 def test_another_scene(cockpit, panel):
