@@ -265,6 +265,7 @@ check_home() {
 
 setup() { # setup [ON], with the tests
   check_home
+  grep -qsw localhost /etc/hosts || fail "ROS needs the line '127.0.0.1 localhost' in /etc/hosts"
   if [ -n "$ros" ]; then say "using the ROS in $ros"; fi
   install_packages python3-venv
   if compiles_nothing; then
@@ -276,7 +277,6 @@ setup() { # setup [ON], with the tests
     install_packages $(packages)
     make_venv requirements.txt
   fi
-  grep -qw localhost /etc/hosts || fail "ROS needs the line '127.0.0.1 localhost' in /etc/hosts"
   build "${1:-OFF}"
   source devel/setup.bash
 }
