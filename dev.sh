@@ -42,7 +42,6 @@ cache=${XDG_CACHE_HOME:-$HOME/.cache}/drone_sim
 wheels=$cache/wheels
 PYTHONS="3.10 3.11 3.12 3.13"
 at_once=$(($(nproc) + 1)) # tests, which wait a third of their time, for a master of their own or for a limit
-FEW=4 FEW_SUITES=2 # tests in a browser, and suites of the others, that may fail once
 ALL=(requirements.txt requirements-all.txt requirements-dev.txt)
 
 COMPILERS=(build-essential python3-dev)
@@ -326,33 +325,12 @@ hint_at_the_browser() { # hint_at_the_browser ROSLAUNCH-ARGS...
 }
 
 run_tests() {
+  local build=$root/build/Testing/Temporary
   make_venv "${ALL[@]}"
   say "left out: the tests in a browser (./dev.sh test-web), the commands of README and docs (./dev.sh docs-commands)"
-  local failed=()
-  run_suites "-j$at_once" "-n $at_once --dist worksteal" && return
-  # Nodes, limits and clients share the cores: where but a few suites fail, they are named, and what failed is run once more.
-  mapfile -t failed < <(sed 's/^[0-9]*://' build/Testing/Temporary/LastTestsFailed.log)
-  [ ${#failed[@]} -gt 0 ] && [ ${#failed[@]} -le $FEW_SUITES ] || return 1
-  say "${#failed[@]} of the suites failed: once more" "${failed[@]}"
-  run_suites --rerun-failed "-n $at_once --dist worksteal --last-failed"
-}
-
-run_suites() { # run_suites CTEST-OPTIONS PYTEST-OPTIONS
-  PYTEST_ADDOPTS=$2 CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS="$1"
-}
-
-# A browser on two busy cores is not deterministic: where but a few tests fail, they are named, and run once more.
-test_in_browser() { # test_in_browser PYTEST-OPTIONS...
-  local failed=() status=0
-  "$venv/bin/python" -m pytest test/web "$@" || status=$?
-  if [ $status = 1 ]; then # pytest's word for tests that have failed
-    mapfile -t failed < <("$venv/bin/python" -m pytest test/web "$@" --last-failed --collect-only -q -o addopts= | grep ::)
-    if [ ${#failed[@]} -gt 0 ] && [ ${#failed[@]} -le $FEW ]; then
-      say "${#failed[@]} failed: once more" "${failed[@]}"
-      "$venv/bin/python" -m pytest test/web "$@" --last-failed && status=0
-    fi
-  fi
-  return $status
+  rm -f "$build/LastTestsFailed.log"
+  PYTEST_ADDOPTS="-n $at_once --dist worksteal" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS="-j$at_once" ||
+    fail "failed; the output is in $build/LastTest.log:" "$(sed 's/^[0-9]*://' "$build/LastTestsFailed.log" 2>/dev/null)"
 }
 
 # A python of that version which can make an environment. pyenv's are found where it has put them: its shims on the
@@ -408,7 +386,7 @@ case "$command" in
     install_packages chromium
     setup
     make_venv "${ALL[@]}" requirements-web.txt
-    test_in_browser "$@" ;;
+    exec "$venv/bin/python" -m pytest test/web "$@" ;;
   lint) install_packages git; setup; lint ;;
   docs) install_packages python3-venv; make_docs ;;
   bench) setup; make_venv "${ALL[@]}"; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;

@@ -28,8 +28,6 @@ case "$*" in
   *--dry-run*) [ -z "$NO_WHEEL" ] && echo "$WHEEL" ;; # whether the index has one
   *"pip wheel"*) touch "$TMPDIR/pybullet-1-cp311-cp311-linux_$(uname -m).whl" ;;
   "-m venv"*) mkdir -p "${@: -1}/bin"; cp "$0" "${@: -1}/bin/python" ;;
-  *--collect-only*) seq -f "test_page.py::test_%g" "$FAILED" ;;
-  *--last-failed*) exit "$AGAIN" ;;
   "-m pytest"*) exit "$STATUS" ;;
 esac
 """
@@ -315,43 +313,30 @@ def test_an_interrupted_compilation_leaves_nothing(machine, how):
         os.kill(int((machine.folder / "pid").read_text(encoding="utf-8")), 0)
 
 
-@pytest.mark.parametrize(
-    "status, failed, again, runs, code",
-    [(0, 0, 0, 1, 0), (1, 2, 0, 2, 0), (1, 2, 1, 2, 1), (1, 5, 0, 1, 1), (2, 2, 0, 1, 2)],
-    ids=["all well", "well the second time", "twice", "too many", "cannot be collected"],
-)
-def test_a_few_tests_in_the_browser_that_fail_are_run_once_more(machine, status, failed, again, runs, code):
+@pytest.mark.parametrize("status", [0, 1])
+def test_the_tests_in_a_browser_are_run_once(machine, status):
     (machine.checkout / "requirements-web.txt").write_text("playwright==1\n", encoding="utf-8")
-    results = {"STATUS": str(status), "FAILED": str(failed), "AGAIN": str(again)}
-    ended, said = machine.run("test-web", "-k", "page", env=results)
-    assert (ended, machine.asked("-m pytest test/web -k page") - machine.asked("--collect-only")) == (code, runs)
-    once_more = f"{failed} failed: once more test_page.py::test_1 test_page.py::test_2\n"
-    assert (once_more in said) == (runs == 2)
+    ended, _ = machine.run("test-web", "-k", "page", env={"STATUS": str(status)})
+    assert (ended, machine.asked("-m pytest test/web -k page")) == (status, 1)
 
 
 MAKE = """#!/bin/bash
-echo "make $PYTEST_ADDOPTS $*" >>"$STUBS/made"
 [[ "$* " == *" test "* ]] || exit 0
-[[ $* == *--rerun-failed* ]] && exit "$AGAIN"
+echo "$*" >>"$STUBS/made"
 mkdir -p build/Testing/Temporary
-for ((i = 1; i <= FAILED; i++)); do echo "$i:suite_$i"; done >build/Testing/Temporary/LastTestsFailed.log
-exit "$STATUS"
+for name in $FAILED; do echo "1:$name"; done >build/Testing/Temporary/LastTestsFailed.log
+[ -z "$FAILED" ]
 """
 
 
-@pytest.mark.parametrize(
-    "status, failed, again, runs, code",
-    [(0, 0, 0, 1, 0), (2, 2, 0, 2, 0), (2, 2, 2, 2, 2), (2, 3, 0, 1, 1), (2, 0, 0, 1, 1)],
-    ids=["all well", "well the second time", "twice", "too many", "not a suite"],
-)
-def test_a_few_suites_that_fail_are_run_once_more(machine, status, failed, again, runs, code):
+@pytest.mark.parametrize("failed", ["", "flight.test", "flight.test fleet.test"])
+def test_failed_suites_are_named_and_not_run_again(machine, failed):
     machine.stub("bin/make", MAKE)
-    results = {"STATUS": str(status), "FAILED": str(failed), "AGAIN": str(again)}
-    ended, said = machine.run("test", env=results)
-    made = [one for one in (machine.folder / "made").read_text(encoding="utf-8").splitlines() if " test " in one]
-    assert (ended, len(made)) == (code, runs), said
-    assert ("2 of the suites failed: once more suite_1 suite_2\n" in said) == (runs == 2)
-    assert runs == 1 or "--last-failed" in made[1]
+    ended, said = machine.run("test", env={"FAILED": failed})
+    assert ended == bool(failed), said
+    assert len((machine.folder / "made").read_text(encoding="utf-8").splitlines()) == 1
+    log = machine.checkout / "build/Testing/Temporary/LastTest.log"
+    assert (" ".join(said.split()).endswith(f"the output is in {log}: {failed}")) == bool(failed)
 
 
 def test_what_a_change_must_pass_leaves_no_suite_out(machine):
