@@ -89,7 +89,6 @@ class Parameters(PaceParameters, EquipmentParameters):
     samples: Annotated[Literal[0, 2, 4, 8], BeforeValidator(numeric)]
     _values: dict[str, Any] = PrivateAttr(default_factory=dict)  # the parameters without the scene file
     _in_scene_file: dict[str, Any] = PrivateAttr(default_factory=dict)
-    _fleet: tuple[VehicleParameters, ...] = PrivateAttr(default=())
 
     @model_validator(mode="before")
     @classmethod
@@ -106,20 +105,18 @@ class Parameters(PaceParameters, EquipmentParameters):
 
     @property
     def fleet(self) -> tuple[VehicleParameters, ...]:
-        """The vehicles that fly: those of `vehicles`, or the drone alone if there are none or only one with its name.
-
-        Empty if the scene file has `vehicles: {}` and no other source adds vehicles.
-        """
-        return self._fleet
+        """The vehicles that fly. Empty if the scene file has `vehicles: {}` and no other source adds vehicles."""
+        fleet = tuple(self.vehicles.values())
+        return (fleet[0].alone(),) if [*self.vehicles] == [self.drone.name] else fleet
 
     @property
     def first(self) -> VehicleParameters:
         """The first vehicle, usually the only one. Raises ParameterError if there is none."""
-        if not self._fleet:
+        if not self.vehicles:
             raise ParameterError(
                 f"{self.scene_file}: the scene has no vehicle (vehicles: {{}}); add one, such as vehicles: 1"
             )
-        return self._fleet[0]
+        return self.fleet[0]
 
     @property
     def vehicle_entries(self) -> dict[str, dict[str, Any]]:
@@ -127,7 +124,7 @@ class Parameters(PaceParameters, EquipmentParameters):
         if "vehicles" in self._in_scene_file:
             return {}
         configured = self._values.get("vehicles")
-        poses = {vehicle.name: {"position": list(vehicle.position), "yaw": vehicle.yaw} for vehicle in self._fleet}
+        poses = {vehicle.name: {"position": list(vehicle.position), "yaw": vehicle.yaw} for vehicle in self.fleet}
         entries = configured if isinstance(configured, Mapping) else {}
         return {name: {**pose, **entries.get(name, {})} for name, pose in poses.items()}
 
@@ -184,9 +181,8 @@ class Parameters(PaceParameters, EquipmentParameters):
 
         The arguments are already validated. Reading a scene file again discards them.
         """
-        parameters = self.model_copy(update={"weather": weather, "scene": scene})
-        parameters._fleet = fleet
-        return parameters
+        vehicles = {vehicle.name: vehicle for vehicle in fleet}
+        return self.model_copy(update={"weather": weather, "scene": scene, "vehicles": vehicles})
 
     def scene_place(self, location: Location) -> str:
         """Return the position of a key of the scene for a message: file and line, or `scene` without a file."""
@@ -195,7 +191,7 @@ class Parameters(PaceParameters, EquipmentParameters):
         return f"{self.scene_file}: line {yaml_files.lines(resolve(self.scene_file)).find(location).line}"
 
     def model_post_init(self, _context: Any) -> None:
-        """Check conditions on several keys, and set the fleet."""
+        """Check conditions on several keys."""
         steps = self.sub_steps
         if steps < 1 or abs(steps * self.sub_step - self.time_step) > 1e-9 * self.time_step:
             raise ParameterError(
@@ -211,15 +207,17 @@ class Parameters(PaceParameters, EquipmentParameters):
         check_rates(self.sensors, self.sub_step)
         for name, vehicle in self.vehicles.items():
             check_rates(vehicle.sensors, self.sub_step, ("vehicles", name))
-        fleet = tuple(self.vehicles.values()) or (VehicleParameters.only(self.drone, self),)
-        self._fleet = (fleet[0].alone(),) if [vehicle.name for vehicle in fleet] == [self.drone.name] else fleet
 
 
 def _vehicle_entries(value: Any, drone: Any) -> Any:
-    """Return the entries of `vehicles`; a number n becomes drone1 ... drone<n>, in a row centred on the drone."""
-    if isinstance(value, Mapping):
-        return value
+    """Return the entries of `vehicles`: the drone's if there are no others.
+
+    A number n becomes drone1 ... drone<n>, in a row centred on the drone.
+    """
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if isinstance(value, Mapping) or (is_number and value == 0):
+        name = drone.get("name") if isinstance(drone, Mapping) else None
+        return value or ({name: {}} if isinstance(name, str) else {})
     if not (is_number and 0 <= value <= MAX_VEHICLES and value == int(value)):
         allowed = f"a whole number from 0 to {MAX_VEHICLES}, or entries such as drone1: {{position: [0, 0, 0.8]}}"
         raise ParameterError(f"must be {allowed}", ("vehicles",), shown(value))
@@ -306,22 +304,21 @@ def _checked(
         raise ParameterError.of(reported, _line_in_file(reported, named, bool(scene), lines)) from None
     parameters._values = values
     parameters._in_scene_file = {key: scene[key] for key in scene_parameters.BESIDE if key in scene}
-    if is_empty and not parameters.vehicles:
-        parameters._fleet = ()
-    return parameters
+    return parameters.model_copy(update={"vehicles": {}}) if is_empty and not values.get("vehicles") else parameters
 
 
 def _is_in(problem: ParameterProblem, *sources: Mapping[str, Any]) -> bool:
     """Return whether a wrong value stands in the vehicle's entry; inherited values are reported at the top level."""
-    if problem.location[:1] != ("vehicles",) or len(problem.location) < 3:
-        return True
-    for source in sources:
-        value: Any = source
-        for key in problem.location[:3]:
-            value = value.get(key) if isinstance(value, Mapping) else None
-        if value is not None:
-            return True
-    return False
+    return problem.location[:1] != ("vehicles",) or any(_has(source, problem.location[:3]) for source in sources)
+
+
+def _has(value: Any, location: Location) -> bool:
+    """Return whether a nested mapping has a key."""
+    for key in location:
+        if not (isinstance(value, Mapping) and key in value):
+            return False
+        value = value[key]
+    return True
 
 
 def _line_in_file(wrong: Sequence[ParameterProblem], file: str, is_scene: bool, lines: YamlLines | None) -> str:

@@ -185,19 +185,10 @@ class EquipmentParameters(Checked):
 
 
 class VehicleParameters(EquipmentParameters, PlaceParameters):
-    """One vehicle: an entry of `vehicles`, or a single one from `drone` and the keys at the top level."""
+    """One vehicle: an entry of `vehicles`, completed from `drone` and the keys at the top level."""
 
     name: Name
     _is_alone: bool = PrivateAttr(default=False)
-
-    @classmethod
-    def only(cls, drone: DroneParameters, equipment: EquipmentParameters) -> VehicleParameters:
-        """Return the parameters of a simulation's single vehicle."""
-        place_values = {key: getattr(drone, key) for key in DroneParameters.model_fields}
-        equipment_values = {key: getattr(equipment, key) for key in EquipmentParameters.model_fields}
-        vehicle = cls.model_construct(**place_values, **equipment_values).alone()
-        vehicle.check_faults()
-        return vehicle
 
     def alone(self) -> VehicleParameters:
         """Return a copy marked as the simulation's single vehicle."""

@@ -61,7 +61,7 @@ class GradedSimulator(Simulator):
             raise Mismatch("grading goes by simulated time: start the simulator with use_sim_time:=true")
         wanted = plan.parameters()
         running = parameters_of(self.node, scene_file=wanted.scene_file)
-        if list(running.vehicles) == [wanted.drone.name] and not wanted.vehicles:
+        if [*running.vehicles] == [*wanted.vehicles] == [wanted.drone.name]:
             # Who flies is told there, with its place in the scene that is flown in now: the plan's may have another.
             running = parameters_of(self.node, scene_file=wanted.scene_file, vehicles=0)
         if plan.timeline and not self._factor():
