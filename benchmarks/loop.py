@@ -13,7 +13,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.vehicles.types.quadricopter import Quadricopter
+from drone_sim.vehicles.types import QUADRICOPTER
 from drone_sim.world import World
 
 Row = dict[str, Any]
@@ -61,7 +61,7 @@ def bare() -> Callable[[], None]:
     simulation = Simulation(settings)
     body = world.add_rigid_body(simulation.drone.body.rigid, Pose(settings.drone.position))
     places = [
-        frames.position(simulation.drone.body.rigid.links[f"propeller_{place}"]) for place, _ in Quadricopter.rotors
+        frames.position(simulation.drone.body.rigid.links[f"propeller_{place}"]) for place, _ in QUADRICOPTER.rotors
     ]
     simulation.close()
     client = world._client  # the bare loop is the one thing that goes behind the world's back
@@ -69,7 +69,7 @@ def bare() -> Callable[[], None]:
 
     def step() -> None:
         for _ in range(SUB_STEPS):
-            for place, (_, turn) in zip(places, Quadricopter.rotors):
+            for place, (_, turn) in zip(places, QUADRICOPTER.rotors):
                 pybullet.applyExternalForce(body, -1, thrust, place, pybullet.LINK_FRAME, client)
                 pybullet.applyExternalTorque(body, -1, [0, 0, turn * 0.01], pybullet.LINK_FRAME, client)
             pybullet.stepSimulation(client)

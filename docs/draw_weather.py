@@ -16,7 +16,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.vehicles.types.quadricopter import Quadricopter
+from drone_sim.vehicles.types import QUADRICOPTER
 
 DOCS = Path(__file__).resolve().parent
 BLUE, ORANGE, GREEN, RED, GREY = "#1f5fa8", "#d9730d", "#2c8a57", "#a8325e", "#707070"
@@ -184,7 +184,7 @@ def _torque(drone):
     """Return the torque (N m, body) of the propellers: r × f of each, and its reaction."""
     torque = np.zeros(3)
     blown = zip(_points(drone), drone.body.thrusts, drone.faults.now.propellers, drone.propulsion.particle_velocities)
-    for (_, sense), (point, thrust, share, velocity) in zip(Quadricopter.rotors, blown):
+    for (_, sense), (point, thrust, share, velocity) in zip(QUADRICOPTER.rotors, blown):
         torque += np.cross(point, (0, 0, thrust))
         torque[2] += sense * 0.002 * share * velocity
     return torque

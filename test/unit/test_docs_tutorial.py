@@ -17,7 +17,7 @@ from tutorial_flights import CONTROLLERS, DOCS, STAGES, TEXT, at, fly, fly_timel
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline.fly import main as fly_main
 from drone_sim.sensors.truth import described
-from drone_sim.vehicles.types.quadricopter import Quadricopter
+from drone_sim.vehicles.types import QUADRICOPTER
 
 FORWARD_TURNING = Twist(Vector3(1, -0.3, 0.2), Vector3(0, 0, 0.5))
 RIPPLE = 0.01  # m/s, of vz: particles come whole
@@ -204,7 +204,7 @@ def test_the_propellers_are_drawn_as_they_are():
     source = (DOCS / "draw_diagrams.py").read_text()
     drawn = ast.literal_eval(re.search(r"^PROPELLERS = (\(.*?^\))", source, re.MULTILINE | re.DOTALL).group(1))
     script = STAGES["1_thrust"].read_text()
-    for (_, name, _, _, clockwise, signs), (known, rotation) in zip(drawn, Quadricopter.rotors):
+    for (_, name, _, _, clockwise, signs), (known, rotation) in zip(drawn, QUADRICOPTER.rotors):
         assert name == known.replace("_", " ")
         assert clockwise == (rotation > 0)  # the blades turn against the torque that they leave
         mixing = " ".join(f"{sign} self.{what}_corr" for sign, what in zip(signs, ("pitch", "roll", "yaw")))

@@ -14,7 +14,7 @@ from drone_sim.offline import timeline
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
 from drone_sim.run.simulation import Simulation
-from drone_sim.vehicles.types.quadricopter import Quadricopter
+from drone_sim.vehicles.types import QUADRICOPTER
 
 FORWARD = Twist(Vector3(0.5, 0.0, 0.0))
 SMALL = {name: {"width": 16, "height": 12} for name in ("front", "depth")}
@@ -62,7 +62,7 @@ def test_a_weak_propeller_turns_the_drone_as_its_lever_and_inertia_say(simulate,
     drone.change_faults({"propellers": shares})
     fly(simulation, 1)
     torque = np.zeros(3)
-    for one, (_, sense), link in zip(range(4), Quadricopter.rotors, drone.propulsion.rotors.links):
+    for one, (_, sense), link in zip(range(4), QUADRICOPTER.rotors, drone.propulsion.rotors.links):
         velocity = shares[one] * drone.propulsion.particle_velocities[one]
         thrust = drone.body.thrusts[one]
         point = frames.position(frames.multiply(drone.body.inertial_from_root, link))

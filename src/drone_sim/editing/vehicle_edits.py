@@ -18,18 +18,10 @@ from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.run.rearrangement import put
 from drone_sim.run.scene_settings import keep_names, say_place, vehicles_in, with_floor, with_vehicles
 from drone_sim.vehicles.quadricopter_objects import REMOVABLE
+from drone_sim.vehicles.types import TYPES
 from drone_sim.vehicles.vehicle import Vehicle
 
 FLOOR = "Floor"
-TYPES: dict[str, dict[str, Any]] = {  # keys of a new vehicle's entry, by type
-    "quadricopter": {},
-    "hexacopter": {
-        "type": "hexacopter",
-        "urdf": "package://drone_sim/urdf/hexacopter.urdf",
-        "script": "hexacopter",
-        "control": {"thrust_gravity": 4.92},
-    },
-}
 
 
 class VehicleEdits:
@@ -54,7 +46,7 @@ class VehicleEdits:
         name = _unused_name(op.name or op.type, entries)
         x, y, z = op.position
         place = {"position": _rounded([x, y, z + op.height]), **({"yaw": op.yaw} if op.yaw else {})}
-        self._apply({**entries, name: merged({**TYPES[op.type], **place}, op.values)})
+        self._apply({**entries, name: merged({**TYPES[op.type].entry(), **place}, op.values)})
         return [self.root(self._scene.simulation.vehicles[name])]
 
     def copy(self, handle: int, places: Sequence[Vector]) -> list[int]:

@@ -18,8 +18,7 @@ from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.imperfections import Imperfections
 from drone_sim.sensors.sensor import Failure
 from drone_sim.vehicles.parameters import ControlParameters, EquipmentParameters, FaultParameters, VehicleParameters
-from drone_sim.vehicles.types import propeller_places
-from drone_sim.vehicles.types.quadricopter import Quadricopter
+from drone_sim.vehicles.types import QUADRICOPTER, propeller_places
 
 CONTROL, SCRIPT = "control", "script_parameters"
 _PROPELLERS = "faults", "propellers"
@@ -55,7 +54,7 @@ def _is_imperfection(field: ParameterField) -> bool:
 
 
 @lru_cache(maxsize=16)
-def common(type_name: str = Quadricopter.name) -> dict[str, ParameterField]:
+def common(type_name: str = QUADRICOPTER.name) -> dict[str, ParameterField]:
     """Return the tunable parameters of every vehicle of a type, by name."""
     vehicle = (*fields_of(ControlParameters, (CONTROL,)), *fields_of(EquipmentParameters))
     around = (*fields_of(WeatherParameters, ("weather",)), *fields_of(FaultParameters, ("faults",)))

@@ -37,8 +37,7 @@ from drone_sim.sensors.sensor import Failure
 from drone_sim.sensors.validation import check_sensors
 from drone_sim.vehicles.quadricopter_objects import REMOVABLE, ObjectPlace, own_names
 from drone_sim.vehicles.radio_link import LinkParameters
-from drone_sim.vehicles.types import TYPES, propeller_places
-from drone_sim.vehicles.types.quadricopter import Quadricopter
+from drone_sim.vehicles.types import QUADRICOPTER, TYPES, propeller_places
 
 UNPREFIXED = "drone"  # a single vehicle of this name has frames without a prefix
 MAX_FORCES = 16
@@ -85,7 +84,7 @@ class FaultParameters(Checked):
 
     propellers: Annotated[
         tuple[Fraction, ...],
-        Parts(propeller_places(Quadricopter.name)),
+        Parts(QUADRICOPTER.places),
         Field(description="numbers from 0 to 1, the fraction of its thrust that each propeller still has"),
     ]
     commands: LinkParameters
@@ -98,7 +97,7 @@ class FaultParameters(Checked):
 
         A quadricopter's number of propellers, as in config/drone.yaml, is allowed for every vehicle.
         """
-        if len(self.propellers) not in (propellers, len(Quadricopter.rotors)):
+        if len(self.propellers) not in (propellers, len(QUADRICOPTER.rotors)):
             value = f"[{', '.join(f'{share:g}' for share in self.propellers)}]"
             expected = f"must be {propellers} numbers from 0 to 1, the fraction of its thrust that each propeller has"
             raise ParameterError(expected, ("faults", "propellers"), value)
@@ -109,7 +108,7 @@ class FaultParameters(Checked):
 
 
 def _check_names(places: Mapping[str, ObjectPlace | None], info: ValidationInfo) -> Mapping[str, ObjectPlace | None]:
-    known = own_names(len(propeller_places(info.data.get("type", Quadricopter.name))))
+    known = own_names(len(propeller_places(info.data.get("type", QUADRICOPTER.name))))
     for name, place in places.items():
         if name not in known:
             raise ValueError(f"'{name}' is not an object of a vehicle; {near_names(name, known)}")

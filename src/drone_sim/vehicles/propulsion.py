@@ -15,7 +15,7 @@ from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.message_text import near_names
 from drone_sim.vehicles.body import Body, Pushed
 from drone_sim.vehicles.quadricopter_objects import DRONE, joint, respondable
-from drone_sim.vehicles.types.vehicle_type import VehicleType
+from drone_sim.vehicles.types import VehicleType
 from drone_sim.world.pictures import Place
 
 PARTICLE_VELOCITY = "particleVelocity"
@@ -25,10 +25,10 @@ _BLADE_TURN = 3.0  # rad per metre of air; slow enough that 20 images/s show the
 class Rotors:
     """The links and blades of the propellers of one body."""
 
-    def __init__(self, rigid: RigidBody, urdf_name: str, type_of_vehicle: type[VehicleType]):
+    def __init__(self, rigid: RigidBody, urdf_name: str, type_of_vehicle: VehicleType):
         """Read them from the URDF. Raises UrdfError if a link is missing."""
         self._type = type_of_vehicle
-        names = [f"propeller_{place}" for place, _ in type_of_vehicle.rotors]
+        names = [f"propeller_{place}" for place in type_of_vehicle.places]
         for name in names:
             if name not in rigid.links:
                 raise urdf.UrdfError(f"{urdf_name}: no link {name}")
@@ -47,7 +47,7 @@ class Rotors:
         """Return the thrust model of the propellers; `commanded` returns the particle velocities (m/s)."""
         points = [frames.position(frames.multiply(inertial_from_root, link)) for link in self.links]
         axes = [(link[2], link[6], link[10]) for link in self.links]
-        return self._type.propellers(law, axes, points, time_step, commanded)
+        return self._type.thrust_model(law, axes, points, self._type.senses, time_step, commanded)
 
     def angle(self, number: int, air: float) -> float:
         """Return the angle (rad) of a propeller's blades after `air` metres of air; opposite to the reaction torque."""
@@ -55,7 +55,7 @@ class Rotors:
 
     def by_joint(self, values: Sequence[float]) -> dict[str, float]:
         """Return the propellers' values by the name of their blades' joint in the URDF."""
-        return {f"blades_{place}_joint": value for (place, _), value in zip(self._type.rotors, values)}
+        return {f"blades_{place}_joint": value for place, value in zip(self._type.places, values)}
 
     def visuals(self, angles: dict[str, float], speeds: dict[str, float]) -> dict[int, Place]:
         """Return the places of the blades' visuals, by index; `angles` (rad) and `speeds` (rad/s) are by joint."""

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from drone_sim.editing.library import KINDS
-from drone_sim.editing.vehicle_edits import TYPES
 from drone_sim.files.resources import package_path
 from drone_sim.ros.cockpit.server.access_control import Content
+from drone_sim.vehicles.types import TYPES
 
 PICTURES = "config/models/pictures"
 _WEB = "/models/"
