@@ -214,7 +214,7 @@ STAYS = {  # what would outlive the flight
     " os.write(1, b'20 of 20'); os.write(2, b'20 of 20')",
     "other criteria": "import drone_sim.grading.criteria.reach as reach\n    reach.Reach._judged = lambda *_: 1 / 0",
     "another clock": "import drone_sim.mechanics.clock as clock\n    clock.Clock.time = 99.0",
-    "another door": "import drone_sim.scripting.door.simulation_end as end\n    end.SimulationEnd.permit = None",
+    "another door": "import drone_sim.scripting.rpc.connection as end\n    end.ScriptConnection.permit = None",
 }
 LUA = {  # the same in Lua, as far as it goes there, and what is said of it
     "moves itself": ("sim.setObjectPosition(drone, -1, {3, 0, 1})", "tried to move Drone"),

@@ -25,7 +25,8 @@ from drone_sim.scripting import load
 from drone_sim.scripting.api.calls import Api
 from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.breakpoints import Breakpoints
-from drone_sim.scripting.door.simulation_end import SimulationEnd
+from drone_sim.scripting.rpc.connection import ScriptConnection
+from drone_sim.scripting.rpc.script_proxy import ScriptProxy
 from drone_sim.scripting.time_limit import TimeLimit
 
 
@@ -66,12 +67,12 @@ class Flight:
         script: str | None = None,
         seed: int = 0,
         changes: Mapping[str, Any] | None = None,
-        door: SimulationEnd | None = None,
+        connection: ScriptConnection | None = None,
     ):
         """Build it; `plan`, `script`, `seed` and `changes` are as in `grade`. Raises one of EXPECTED.
 
-        Through a `door` the script runs in another process, and may call what the plan allows; what belongs to the
-        scene runs here.
+        With a `connection`, the script runs in another process, and may call what the plan allows; the scene's scripts
+        run here.
         """
         self._plan, self._seed, self._changes = plan, seed, changes or {}
         parameters = plan.parameters(seed, "" if script == "" else None, changes)
@@ -85,15 +86,15 @@ class Flight:
             script=self._script,
             backend=backend if backend.wanted else None,
             started=False,
-            load_script=_loader(door, self._script, watch),
+            load_script=_loader(connection, self._script, watch),
         )
         backend.clock, backend.is_scene = lambda: self._simulation.time, lambda: watch.is_scene
         try:
             self._recorder = FlightRecorder(plan, self._simulation, backend)
             self._permissions = Permissions(plan, self._simulation, self._script, self._recorder.goals)
             self._rules = Rules(plan, self._simulation, watch)
-            if door is not None:
-                door.begin(self._simulation.context.objects, self._is_quiet, self._permissions)
+            if connection is not None:
+                connection.begin(self._simulation.context.objects, self._is_quiet, self._permissions)
         except BaseException:
             self._simulation.close()
             raise
@@ -166,14 +167,14 @@ def random_of(seed: int) -> int:
     return int.from_bytes(hashlib.sha256(b"what scripts draw, %d" % seed).digest()[:8], "little")
 
 
-def _loader(door: SimulationEnd | None, submission: str, watch: ScriptWatch) -> load.Loader:
-    """Return a function that loads the submission through a door, if there is one, and other scripts here."""
+def _loader(connection: ScriptConnection | None, submission: str, watch: ScriptWatch) -> load.Loader:
+    """Return a function that loads the submission through a connection, if there is one, and other scripts here."""
 
     def load_script(
         path: str, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns, breakpoints: Breakpoints | None = None
     ) -> load.Script:
-        if path == submission and door is not None:
-            return watch.watched(door.load(path, modules, limit, turns), False)
+        if path == submission and connection is not None:
+            return watch.watched(ScriptProxy(connection, path, modules, limit), False)
         is_scene = path != submission
         loaded = watch.run(is_scene, load.load, path, modules, limit, turns, breakpoints)
         return watch.watched(loaded, is_scene)

@@ -10,7 +10,7 @@ from typing import Any
 
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.api import modules
+from drone_sim.scripting.api import listing
 from drone_sim.scripting.api.calls import declaration_of
 from drone_sim.scripting.api.constants import bare
 from drone_sim.scripting.api.image_filters import ImageFilters
@@ -69,7 +69,7 @@ def _entities(function: str, arguments: list[Any]) -> Iterator[Any]:
 def _places() -> dict[str, tuple[tuple[int, Any], ...]]:
     """Return for each function, as module.name, which arguments are handles, and the default where one is left out."""
     found = {}
-    for kind in (*modules.SIM, Objects, Sensors, ImageFilters):
+    for kind in (*listing.classes_of_sim(), Objects, Sensors, ImageFilters):
         for attribute in vars(kind).values():
             declaration = declaration_of(attribute)
             if declaration:

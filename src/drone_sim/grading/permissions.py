@@ -27,8 +27,8 @@ from drone_sim.scripting.api import (
     drawings,
     graphs,
     image_filters,
+    listing,
     matrices,
-    modules,
     names,
     object_collections,
     packing,
@@ -383,7 +383,7 @@ def free() -> frozenset[str]:
     """Return the functions that are free, each as module.name."""
     found = {f"{module}.{name}" for module, groups in MODULES.items() for one in groups for name in one.functions}
     own = {f"sim.{name}" for name in _FREE}
-    for kind in (*_FREE_CLASSES, *modules.SIM, ClientControl):
+    for kind in (*_FREE_CLASSES, *listing.classes_of_sim(), ClientControl):
         names = _names_of(kind)
         found.update(
             name
@@ -396,7 +396,7 @@ def free() -> frozenset[str]:
 @functools.cache
 def _own_names() -> dict[str, str]:
     """Return the name under which each function of the API is written, by all of its names; each as module.name."""
-    return {name: own for kind in (*modules.SIM, *_FREE_CLASSES) for name, own in _names_of(kind).items()}
+    return {name: own for kind in (*listing.classes_of_sim(), *_FREE_CLASSES) for name, own in _names_of(kind).items()}
 
 
 def _names_of(kind: type) -> dict[str, str]:

@@ -1,6 +1,6 @@
 """The program that judges: it forks a process for each flight, which holds the world and everything that is judged.
 
-The script that flies is in another process, behind a door (scripting.door); none of its lines ever runs here.
+The script that flies is in another process, behind a door (scripting.rpc); none of its lines ever runs here.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from drone_sim.grading.flight import Flight, grade, ungraded, write_to
 from drone_sim.grading.jobs.limited_process import LimitedProcess, stay_on_one_processor
 from drone_sim.grading.jobs.server import GONE, Requests
 from drone_sim.grading.plan import Plan, PlanError
-from drone_sim.scripting.door.simulation_end import SimulationEnd
+from drone_sim.scripting.rpc.connection import ScriptConnection
 from drone_sim.world import connect_ahead
 
 _LOG = logging.getLogger(__name__)
@@ -67,7 +67,7 @@ def _answer(
 def _judge(plan: Plan, request: dict[str, Any], door: socket.socket, outputs: Mapping[str, int]) -> None:
     """Fly once, in a process of its own, and write what came of it."""
     script, seed, changes = request["script"], request["seed"], request["changes"]
-    end = SimulationEnd(door, processor=stay_on_one_processor())
+    end = ScriptConnection(door, processor=stay_on_one_processor())
     rows, is_gone = None, False
     try:
         flight = Flight(plan, script, seed, changes, end)

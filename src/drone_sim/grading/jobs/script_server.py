@@ -23,8 +23,8 @@ from drone_sim.files.containment import remove
 from drone_sim.grading.jobs import system_calls
 from drone_sim.grading.jobs.limited_process import LimitedProcess, open_to_itself
 from drone_sim.grading.jobs.server import GONE, HANDED_IN, HUNG_UP, Requests
-from drone_sim.scripting.door import script_process
-from drone_sim.scripting.door.script_process import ScriptEnd
+from drone_sim.scripting.rpc import script_process
+from drone_sim.scripting.rpc.script_process import ScriptWorker
 
 DOOR = 3  # its descriptor, beside which nothing is open
 
@@ -35,7 +35,7 @@ def main() -> None:
     A message ends the process, whatever it does; HUNG_UP says that it has closed its door, and may be ending already.
     """
     is_alone = sys.argv[1:] == ["alone"]  # in a sandbox, where it sees its own processes only
-    script_end = script_process.prepared()
+    worker = script_process.prepared()
     try:
         system_calls.forbid()
     except OSError as error:
@@ -46,7 +46,7 @@ def main() -> None:
         for request, door in requests:
             for path in request["handed_in"]:
                 _lay(f"{HANDED_IN}{path}", requests.receive())
-            run = functools.partial(_run, script_end, request, door)
+            run = functools.partial(_run, worker, request, door)
             process = LimitedProcess(request["limits"], run, {}, [door.fileno()], folders if is_alone else ())
             door.close()
             end = _end_of(process, requests)
@@ -66,7 +66,7 @@ def _end_of(process: LimitedProcess, requests: Requests) -> str:
     return process.end if has_ended else ""
 
 
-def _run(script_end: ScriptEnd, request: dict[str, Any], door: socket.socket, _outputs: Mapping[str, int]) -> None:
+def _run(worker: ScriptWorker, request: dict[str, Any], door: socket.socket, _outputs: Mapping[str, int]) -> None:
     """Serve the script's end of the door, in a process of its own."""
     given = door.detach()
     if given != DOOR:
@@ -75,7 +75,7 @@ def _run(script_end: ScriptEnd, request: dict[str, Any], door: socket.socket, _o
     open_to_itself()
     random.seed(request["random"])
     np.random.seed(request["random"] % 2**32)
-    script_process.serve(script_end, socket.socket(fileno=DOOR), request["script"])
+    script_process.serve(worker, socket.socket(fileno=DOOR), request["script"])
 
 
 def _lay(path: str, content: bytes) -> None:

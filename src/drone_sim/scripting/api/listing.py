@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -44,6 +45,13 @@ def apis() -> dict[str, Api]:
     ros = make_sim_ros(MessageBus("drone"), host.context.clock)
     vision = make_sim_vision(host, Surroundings())
     return {"sim": make_sim(host, Surroundings()), "simROS": ros, "simVision": vision, **make_plugins(host)}
+
+
+@functools.cache
+def classes_of_sim() -> tuple[type, ...]:
+    """Return the classes whose methods are the functions of `sim`."""
+    functions = contents(apis()["sim"])[1].values()
+    return tuple(dict.fromkeys(type(one.__self__) for one in functions if inspect.ismethod(one)))
 
 
 def declared(api: Api) -> Iterator[tuple[Declaration, Any]]:

@@ -44,46 +44,6 @@ from drone_sim.scripting.api.vision import VisionSensors
 from drone_sim.scripting.api.windows import Dialogs, Views
 from drone_sim.scripting.api.wireless import Wireless
 
-SIM: tuple[type, ...] = (
-    Sensors,
-    Objects,
-    JointFunctions,
-    ProximitySensors,
-    DistanceFunctions,
-    CollectionFunctions,
-    Paths,
-    ObjectKinds,
-    SceneObjects,
-    Shapes,
-    Dynamics,
-    ShapeMasses,
-    Matrices,
-    Poses,
-    Bits,
-    ScriptFunctions,
-    ScriptCalls,
-    SimulationFunctions,
-    Dialogs,
-    Views,
-    VisionSensors,
-    NameFunctions,
-    SignalFunctions,
-    GraphFunctions,
-    TubeFunctions,
-    Wireless,
-    CustomDataFunctions,
-    Packing,
-    Tables,
-    Threads,
-    TrajectoryFunctions,
-    MotionFunctions,
-    OlderMotions,
-    DrawingFunctions,
-    OlderRemotePortFunctions,
-)  # whose functions `sim` has, beside those that are ignored
-SIM_REMOTE_API: tuple[type, ...] = (RemotePortFunctions,)
-SIM_ROS: tuple[type, ...] = (TopicFunctions, ServiceFunctions, RosFunctions)
-
 
 def make_sim(host: Host, surroundings: Surroundings) -> Api:
     """Return `sim` for a script, on what it is attached to."""

@@ -19,9 +19,11 @@ from typing import Any
 
 import numpy as np
 
+from drone_sim.scripting.api.calls import UnknownName
+from drone_sim.scripting.api.control import NoThread
 from drone_sim.scripting.api.script_values import DEEPEST
 from drone_sim.scripting.api.scripts import FunctionsOfScript, handle_of
-from drone_sim.scripting.door.functions import ScriptFunction
+from drone_sim.scripting.api.types import WrongValue
 from drone_sim.scripting.lua.values import fields
 
 _PLAIN = frozenset((float, int, bool, str, type(None)))
@@ -32,9 +34,35 @@ _ALL_MARSHALLED = _MARSHALLED.issuperset
 _encode = json.JSONEncoder(check_circular=False, separators=(",", ":")).encode
 _decode = json.JSONDecoder().raw_decode
 
+ERRORS: dict[str, Any] = {
+    error.__name__: error
+    for error in (
+        *(TypeError, ValueError, KeyError, IndexError, AttributeError, OverflowError, ZeroDivisionError, RuntimeError),
+        *(OSError, RecursionError, MemoryError, WrongValue, UnknownName, NoThread),
+    )
+}
+
+
+def kind_of(error: Exception) -> str:
+    """Return the name of an error's class, or of its nearest base class in ERRORS."""
+    return next((base.__name__ for base in type(error).__mro__ if base.__name__ in ERRORS), RuntimeError.__name__)
+
 
 class NoMessage(ValueError):
     """The script's process has sent an invalid message."""
+
+
+class ScriptFunction:
+    """A function in a script's process, identified by a number; it can be passed on, but not called here."""
+
+    def __init__(self, number: int):
+        """Use the number that the function has in the script's process."""
+        self.number = number
+        self.__name__ = "callback"
+
+    def __call__(self, *_values: Any) -> Any:
+        """Raise ValueError: a function whose result is needed at once cannot be called in another process."""
+        raise ValueError("a function of the script cannot be called from here")
 
 
 # ---- to the script

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from drone_sim.scripting.api.calls import Function
-from drone_sim.scripting.door import effects, values
-from drone_sim.scripting.door.places import Place, place_of
-from drone_sim.scripting.door.values import NoMessage
-
-if TYPE_CHECKING:
-    from drone_sim.scripting.door.simulation_end import SimulationEnd
+from drone_sim.scripting.rpc import effects, values
+from drone_sim.scripting.rpc.connection import ScriptConnection
+from drone_sim.scripting.rpc.places import Place, place_of
+from drone_sim.scripting.rpc.values import NoMessage
 
 _LOG = logging.getLogger(__name__)
 _MAX_READS = 200  # in a list, and lists
@@ -24,9 +22,9 @@ _NOTHING: tuple[list[Any], list[int]] = ([], [])
 class ExpectedReads:
     """The expected reads of a script, by phase and segment."""
 
-    def __init__(self, door: SimulationEnd, functions: Mapping[str, Function], value: Callable[[Any], Any]):
+    def __init__(self, connection: ScriptConnection, functions: Mapping[str, Function], value: Callable[[Any], Any]):
         """Create empty lists; `functions` are the script's API, `value` decodes an argument."""
-        self._door, self._functions, self._value = door, functions, value
+        self._connection, self._functions, self._value = connection, functions, value
         self._expected: dict[tuple[str, int], tuple[list[tuple[Function, list[Any]]], list[int]]] = {}
 
     def note(self, item: list[Any]) -> None:
@@ -52,7 +50,7 @@ class ExpectedReads:
 
     def _is_permitted(self, name: str, arguments: list[Any]) -> bool:
         try:
-            self._door.permit(name, arguments)
+            self._connection.permit(name, arguments)
         except ValueError:
             return False
         return True
@@ -67,7 +65,7 @@ class ExpectedReads:
             except Exception:  # raised again if the script makes the call
                 _LOG.debug("an expected read failed:", exc_info=True)
                 results.append(...)
-        objects = self._door.objects
+        objects = self._connection.objects
         if objects is None:
             return results, []
         return results, [place for handle in handles if (place := place_of(objects, handle)) is not None]

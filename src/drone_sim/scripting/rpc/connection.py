@@ -1,21 +1,17 @@
-"""The simulation's end of the RPC, through which scripts are loaded and their requests are received."""
+"""Connection of the simulation to a script's process."""
 
 from __future__ import annotations
 
 import marshal
 import socket
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from time import monotonic
 from typing import Any
 
 from drone_sim.mechanics.object_tree import ObjectTree
-from drone_sim.scripting.api.calls import Api
-from drone_sim.scripting.api.control import Turns
-from drone_sim.scripting.door import values
-from drone_sim.scripting.door.channel import Channel
-from drone_sim.scripting.door.script_there import ScriptThere
-from drone_sim.scripting.time_limit import TimeLimit
+from drone_sim.scripting.rpc import values
+from drone_sim.scripting.rpc.channel import Channel
 
 _CHECK_INTERVAL = 0.5  # s between checks of the deadline, while no message arrives
 Permit = Callable[[str, list[Any]], Callable[[Any], None] | None]
@@ -25,8 +21,8 @@ def _all_permitted(_function: str, _arguments: list[Any]) -> None:
     pass
 
 
-class SimulationEnd:
-    """The simulation's end of the RPC; it loads scripts from a single file."""
+class ScriptConnection:
+    """The simulation's end of the RPC: sends commands to a script's process and receives its requests."""
 
     def __init__(self, end: socket.socket, processor: int | None = None):
         """Use the socket `end`.
@@ -55,12 +51,10 @@ class SimulationEnd:
         self.objects, self.is_quiet = objects, is_quiet
         self.permit = permit or _all_permitted
 
-    def load(self, path: str, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns | None = None) -> ScriptThere:
-        """Load the script with the API `modules`; parameters as in load.load. Raises ScriptError."""
+    def new_number(self) -> int:
+        """Return a number that identifies another script in the script's process."""
         self._numbers += 1
-        script = ScriptThere(self, self._numbers, path, modules, limit)
-        script.load()
-        return script
+        return self._numbers
 
     def close(self, why: str) -> None:
         """Close the channel; later calls fail with `why`."""

@@ -6,14 +6,14 @@ import math
 import struct
 from pathlib import Path
 
-import behind_door
 import pytest
+import remote_script
 
 from drone_sim.grading import flight, tasks
 from drone_sim.grading import plan as plans
 from drone_sim.mechanics.state import Pose, Twist
 from drone_sim.scripting.api.control import Turns
-from drone_sim.scripting.door import effects, script_there, simulation_end, stand_ins, values
+from drone_sim.scripting.rpc import api_stubs, connection, effects, script_proxy, values
 from drone_sim.vehicles.commands import Empty, request
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -124,7 +124,7 @@ end
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("door")
+    made = tmp_path_factory.mktemp("rpc")
     (made / "scene.yaml").write_text(SCENE)
     (made / "plan.yaml").write_text(PLAN)
     (made / "quick.yaml").write_text(PLAN.replace("limit: 30.0", "limit: 0.2"))
@@ -143,7 +143,7 @@ def quick(folder):
 
 def same(plan, script, seed=0):
     """Return the result, which is the same with and without a door."""
-    elsewhere, why_closed = behind_door.flown(plan, str(script), seed)
+    elsewhere, why_closed = remote_script.flown(plan, str(script), seed)
     assert elsewhere == flight.grade(plan, str(script), seed) and not why_closed
     return elsewhere
 
@@ -223,10 +223,10 @@ def test_what_fails_says_the_same_behind_a_door(quick, tmp_path, body):
 
 def test_a_controller_asks_nothing_that_can_be_told_before(plan, monkeypatch):
     came = []
-    receive = simulation_end.Channel.receive
-    monkeypatch.setattr(simulation_end.Channel, "receive", lambda self: came.append(receive(self)) or came[-1])
+    receive = connection.Channel.receive
+    monkeypatch.setattr(connection.Channel, "receive", lambda self: came.append(receive(self)) or came[-1])
     longer = plan.model_copy(update={"timeline": [], "duration": 10.0})
-    behind_door.flown(longer, "pilot")
+    remote_script.flown(longer, "pilot")
     assert len([one for one in came if one]) < 1.5 * 200 + 100  # messages of 200 steps, and the beginning
 
 
@@ -263,10 +263,10 @@ def test_values_come_through_as_they_are(value):
 
 
 def test_all_that_is_said_of_functions_is_of_functions_that_there_are():
-    known = {f"{name}.{key}" for name, functions, _ in stand_ins.declared() for key in functions}
+    known = {f"{name}.{key}" for name, functions, _ in api_stubs.declared() for key in functions}
     named = {*effects.READS, *effects.CHANGES, *(f"sim.{one}" for one in (*effects.PLACED, *effects.PUT))}
     assert named <= known and set(effects.OWN_THREADS) <= {one.partition(".")[2] for one in known}
-    assert stand_ins.StandIns(None, None, Turns()).modules.keys() == {name for name, _, _ in stand_ins.declared()}
+    assert api_stubs.ApiStubs(None, None, Turns()).modules.keys() == {name for name, _, _ in api_stubs.declared()}
 
 
 # ---- what comes from a process that has been taken over
@@ -304,29 +304,29 @@ def test_what_is_no_message_ends_the_flight_in_one_line(plan, what):
         end.sendall(struct.pack("<I", len(message)) + message)
         end.recv(2**20)
 
-    result, why_closed = behind_door.flown(plan, "pilot", serve=serve)
+    result, why_closed = remote_script.flown(plan, "pilot", serve=serve)
     assert not result.passed and result.points == 0
     assert said in result.error and said in why_closed and "\n" not in result.error
 
 
 def test_a_message_without_end_is_not_waited_for(plan):
-    result, _ = behind_door.flown(plan, "pilot", serve=lambda end: end.sendall(struct.pack("<I", 2**32 - 1)))
+    result, _ = remote_script.flown(plan, "pilot", serve=lambda end: end.sendall(struct.pack("<I", 2**32 - 1)))
     assert result.error.endswith("its process has ended")
 
 
 def test_a_process_that_is_silent_is_not_waited_for(quick, monkeypatch):
-    monkeypatch.setattr(script_there, "GRACE", 0.2)
-    result, _ = behind_door.flown(quick, "pilot", serve=lambda end: end.recv(1) and end.recv(2**20) and end.recv(1))
+    monkeypatch.setattr(script_proxy, "GRACE", 0.2)
+    result, _ = remote_script.flown(quick, "pilot", serve=lambda end: end.recv(1) and end.recv(2**20) and end.recv(1))
     assert "did not return after 0.2 s (script_time_limit)" in result.error
 
 
 def test_a_process_that_floods_is_not_heard_out(quick, monkeypatch):
-    monkeypatch.setattr(script_there, "GRACE", 0.2)
+    monkeypatch.setattr(script_proxy, "GRACE", 0.2)
     message = json.dumps([["set", "sim.setInt32Signal", "said", 1]]).encode()
 
     def serve(end):
         while True:
             end.sendall(struct.pack("<I", len(message)) + message)
 
-    result, _ = behind_door.flown(quick, "pilot", serve=serve)
+    result, _ = remote_script.flown(quick, "pilot", serve=serve)
     assert "did not return after 0.2 s (script_time_limit)" in result.error

@@ -10,49 +10,48 @@ import contextlib
 import inspect
 from collections.abc import Callable, Collection, Mapping
 from time import monotonic
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from drone_sim.scripting.api.calls import Api, Function, contents, mistake, save_state
+from drone_sim.scripting.api.control import Wait
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.breakpoints import Scope
-from drone_sim.scripting.door import effects, values
-from drone_sim.scripting.door.channel import Disconnected
-from drone_sim.scripting.door.expected_reads import ExpectedReads
-from drone_sim.scripting.door.functions import ScriptFunction, kind_of
-from drone_sim.scripting.door.kept_waits import KeptWaits
-from drone_sim.scripting.door.places import Place
-from drone_sim.scripting.door.values import NoMessage
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.rpc import effects, values
+from drone_sim.scripting.rpc.channel import Disconnected
+from drone_sim.scripting.rpc.connection import ScriptConnection
+from drone_sim.scripting.rpc.expected_reads import ExpectedReads
+from drone_sim.scripting.rpc.places import Place
+from drone_sim.scripting.rpc.values import NoMessage, ScriptFunction, kind_of
 from drone_sim.scripting.time_limit import TimeLimit
-
-if TYPE_CHECKING:
-    from drone_sim.scripting.door.simulation_end import SimulationEnd
 
 GRACE = 5.0  # s beyond the time limit, which the script's process should enforce itself
 _MAX_FUNCTIONS = 100_000
+_MAX_WAITS = 1000
 _PLAIN = frozenset((float, int, bool, str, type(None)))
 _ALL_PLAIN = _PLAIN.issuperset
 _MAX_TEXT = 1000  # characters of an error text
 
 
-class DoorClosed(ScriptError):
+class ConnectionClosed(ScriptError):
     """The script's process has ended or violated the protocol; its scripts are not called any more."""
 
 
-class ScriptThere:
+class ScriptProxy:
     """A script in another process, with the interface of scripting.load.Script."""
 
-    def __init__(self, door: SimulationEnd, number: int, path: str, modules: Mapping[str, Api], limit: TimeLimit):
-        """`number` identifies the script in its process, `modules` is its API; `load` must be called next."""
-        self._door, self._number, self._path = door, number, path
+    def __init__(self, connection: ScriptConnection, path: str, modules: Mapping[str, Api], limit: TimeLimit):
+        """Load the script file at `path` with the API `modules`, in the process of `connection`. Raises ScriptError."""
+        self._connection, self._path = connection, path
+        self._number = connection.new_number()  # identifies the script in its process
         self._modules, self._limit = modules, limit
         self._functions = {
             f"{name}.{key}": function for name, api in modules.items() for key, function in contents(api)[1].items()
         }
         self._changes = {name: function for name, function in self._functions.items() if name in effects.CHANGES}
         self._handed: dict[int, ScriptFunction] = {}
-        self._expected = ExpectedReads(door, self._functions, self._value)
-        self._waits = KeptWaits()
+        self._expected = ExpectedReads(connection, self._functions, self._value)
+        self._waits = PendingWaits()
         self._failure: tuple[str, Exception] | None = None  # of a call whose reply the script did not wait for
         self._deadline = 0.0
         self._phase = ""  # the current one
@@ -60,10 +59,7 @@ class ScriptThere:
         self.language = "python" if path.endswith(".py") else "lua"
         self.idle, self.is_empty, self.threaded = "", False, False
         self.flat_names: Collection[str] = ()
-
-    def load(self) -> None:
-        """Load the script. Raises ScriptError."""
-        result = self._do("load", [self._limit.seconds, self._door.processor])
+        result = self._do("load", [self._limit.seconds, self._connection.processor])
         self.idle, self.is_empty = str(result[0])[:_MAX_TEXT], bool(result[1])
 
     # ---- interface of a script
@@ -72,8 +68,8 @@ class ScriptThere:
         """Run a phase: init, actuation, sensing or cleanup. Raises ScriptError."""
         if self._has_gone_on and phase == "actuation":
             self._finish()
-        elif not self._door.why_closed or phase != "cleanup":
-            self._do("call", [phase], phase == "sensing" and self._door.is_quiet())
+        elif not self._connection.why_closed or phase != "cleanup":
+            self._do("call", [phase], phase == "sensing" and self._connection.is_quiet())
 
     def take_turn(self) -> None:
         """Resume its thread until it yields. Raises ScriptError."""
@@ -132,7 +128,7 @@ class ScriptThere:
 
     def close(self) -> None:
         """Free the script's resources; a second call does nothing."""
-        if not self._door.why_closed:
+        if not self._connection.why_closed:
             self._do("close", [])
 
     # ---- messages
@@ -155,8 +151,8 @@ class ScriptThere:
         name = arguments[0] if arguments and isinstance(arguments[0], str) and not is_text else ""
         phase = f"{command} {name}"
         shown = str(arguments[0]) if command not in ("load", "take_turn") and arguments and not is_text else command
-        if self._door.why_closed:
-            raise DoorClosed(shown, self._path, 0, self._door.why_closed)
+        if self._connection.why_closed:
+            raise ConnectionClosed(shown, self._path, 0, self._connection.why_closed)
         encoded = [values.outgoing(argument) for argument in arguments]
         message = "go", self._number, command, encoded, self._reads(phase, 0), may_go_on
         return self._guarded(shown, message)
@@ -167,12 +163,12 @@ class ScriptThere:
         outer, self._deadline = self._deadline, monotonic() + (limit + GRACE if limit else 1e9)
         try:
             if message is not None:
-                self._door.send(message)
+                self._connection.send(message)
             return self._until_end(phase)
         except TimeoutError:
             self._end(phase, f"did not return after {self._limit.seconds:g} s (script_time_limit)")
         except Disconnected:
-            self._door.is_gone = True
+            self._connection.is_gone = True
             self._end(phase, "its process has ended")
         except NoMessage as error:
             self._end(phase, f"its process sent an invalid message: {error}")
@@ -180,16 +176,16 @@ class ScriptThere:
             self._deadline = outer
 
     def _end(self, phase: str, why: str) -> NoReturn:
-        self._door.close(why)
-        raise DoorClosed(phase, self._path, 0, why) from None
+        self._connection.close(why)
+        raise ConnectionClosed(phase, self._path, 0, why) from None
 
     def _until_end(self, phase: str) -> Any:
         """Handle the script's items until it has returned."""
         self._failure, outer = None, self._failure
-        door, items = self._door, self._door.items
+        connection, items = self._connection, self._connection.items
         try:
             while True:
-                item = items.popleft() if items else door.next_item(self._deadline)
+                item = items.popleft() if items else connection.next_item(self._deadline)
                 kind = item[0]
                 if kind == "set" and len(item) > 1:
                     self._set(item)
@@ -235,7 +231,7 @@ class ScriptThere:
         if not _ALL_PLAIN(map(type, arguments)):
             arguments = [value if type(value) in _PLAIN else self._value(value) for value in arguments]
         try:
-            on_result = self._door.permit(name, arguments)
+            on_result = self._connection.permit(name, arguments)
             function(*arguments)
             if on_result is not None:
                 on_result(None)
@@ -254,13 +250,13 @@ class ScriptThere:
                 raise failure
             result = self._called(item[1], item[4:], _named_arguments(item[3]))
             answer: tuple[Any, ...] = "is", values.outgoing(self._waits.kept(result)), self._reads(phase, item[2])
-        except (NoMessage, DoorClosed):
+        except (NoMessage, ConnectionClosed):
             raise
         except Exception as error:
             answer = "no", kind_of(error), _text(error), self._explained(item[1], error)
         self._phase = phase
         self._deadline += monotonic() - began
-        self._door.send(answer)
+        self._connection.send(answer)
 
     def _called(self, name: Any, arguments: list[Any], named: Mapping[str, Any]) -> Any:
         function = self._functions.get(name) if type(name) is str else None
@@ -270,7 +266,7 @@ class ScriptThere:
             return self._waits.step(*in_order)
         if function is None:
             raise NoMessage("unknown function of the API")
-        on_result = self._door.permit(name, _in_order(function, in_order, by_name))
+        on_result = self._connection.permit(name, _in_order(function, in_order, by_name))
         result = function(*in_order, **by_name)
         if on_result is not None:
             on_result(result)
@@ -316,3 +312,40 @@ def _in_order(function: Function, positional: list[Any], by_name: Mapping[str, A
 def _text(error: Exception) -> str:
     text = error.args[0] if isinstance(error, KeyError) and error.args else error
     return str(text)[:_MAX_TEXT]
+
+
+class PendingWaits:
+    """The waits of a script's coroutines; the script's process identifies each by a number."""
+
+    def __init__(self) -> None:
+        """Create an empty table."""
+        self._waits: dict[int, tuple[Any, Wait]] = {}
+        self._last = 0
+
+    def kept(self, value: Any) -> Any:
+        """Return `value`, or for a Wait the number that it is stored under. Raises ValueError for too many waits."""
+        if not isinstance(value, Wait):
+            return value
+        if len(self._waits) >= _MAX_WAITS:
+            raise ValueError(f"at most {_MAX_WAITS} coroutines of a script may wait at once")
+        self._last += 1
+        self._waits[self._last] = iter(value), value
+        return self._last
+
+    def step(self, number: Any = None, answer: Any = None, *_: Any) -> Any:
+        """Advance a wait: return ("wait",), ("call", function, arguments) or ("over", value).
+
+        Raises ValueError for an unknown number, and any error of the wait.
+        """
+        if number not in self._waits:
+            raise ValueError("there is no wait with this number")
+        steps, wait = self._waits[number]
+        try:
+            call = steps.send(answer)
+        except StopIteration:
+            del self._waits[number]
+            return "over", wait.value()
+        except BaseException:
+            self._waits.pop(number, None)
+            raise
+        return ("call", call.callback, call.arguments) if call else ("wait",)

@@ -15,17 +15,15 @@ from math import isfinite
 from typing import Any, NamedTuple, Protocol
 
 from drone_sim.mechanics.object_tree import WORLD
-from drone_sim.scripting.api import modules
-from drone_sim.scripting.api.calls import Api, Function, functions_of
-from drone_sim.scripting.api.constants import CONSTANTS, bare
+from drone_sim.scripting.api import listing
+from drone_sim.scripting.api.calls import Api, Function, contents
+from drone_sim.scripting.api.constants import bare
 from drone_sim.scripting.api.control import Call, Steps, Turns, Wait, waits
 from drone_sim.scripting.api.host import Surroundings
-from drone_sim.scripting.api.ignored import PLUGINS, Ignored
-from drone_sim.scripting.api.image_filters import ImageFilters
 from drone_sim.scripting.api.scripts import ScriptFunctions
 from drone_sim.scripting.api.threads import Threads
-from drone_sim.scripting.door import effects
-from drone_sim.scripting.door.places import Place, Places
+from drone_sim.scripting.rpc import effects
+from drone_sim.scripting.rpc.places import Place, Places
 
 MOST_EXPECTED = 200  # reads of a segment
 _MAX_STRETCHES = 50  # of a phase; more are not remembered
@@ -81,7 +79,7 @@ class Stretch:
             self.known = {read: value for read, value in self.known.items() if effects.READS[read[0]] != kind}
 
 
-class StandIns:
+class ApiStubs:
     """The API modules of a script."""
 
     def __init__(self, end: Asking, called: Callable[[Callable[[], Any]], Any], turns: Turns):
@@ -94,10 +92,11 @@ class StandIns:
         self._expected: dict[tuple[str, int], Expected] = {}
         self._succeeded: set[Any] = set()
         self._places = Places()
-        local = _local_functions(turns)
+        self._threads = Threads.__new__(Threads)
+        self._threads._surroundings = Surroundings(turns=turns)
         self.modules = {
             name: Api(
-                name, {key: local.get(func) or self._stub(name, func) for key, func in functions.items()}, constants
+                name, {key: self._local(func) or self._stub(name, func) for key, func in functions.items()}, constants
             )
             for name, functions, constants in declared()
         }
@@ -128,6 +127,16 @@ class StandIns:
             self._end.leave(["reads", stretch.phase, stretch.number, reads, list(stretch.handles)])
 
     # ---- calls
+
+    def _local(self, function: Function) -> Function | None:
+        """Return the function that is called in this process; None for one that is called in the simulation's."""
+        kind, name = type(getattr(function, "__self__", None)), function.__name__
+        if kind is Threads and name in effects.OWN_THREADS:
+            own: Function = getattr(self._threads, name)
+            return own
+        return (
+            function if kind in effects.OWN_CLASSES or (kind is ScriptFunctions and name in effects.OWN_LOG) else None
+        )
 
     def _stub(self, module: str, function: Function) -> Function:
         name = f"{module}.{function.__name__}"
@@ -260,7 +269,7 @@ class StandIns:
 
     def _waiting_stub(self, name: str) -> Function:
         def call(*arguments: Any, **named: Any) -> Wait:
-            return _WaitThere(self._ask(name, arguments, named), self._step)
+            return _RemoteWait(self._ask(name, arguments, named), self._step)
 
         return call
 
@@ -268,7 +277,7 @@ class StandIns:
         return self._ask("wait", (number, answer), {})
 
 
-class _WaitThere(Wait):
+class _RemoteWait(Wait):
     """A wait in the simulation's process."""
 
     def __init__(self, number: int, step: Callable[[int, Any], Any]):
@@ -313,43 +322,12 @@ def _copied(value: Any) -> Any:
     return value
 
 
-# ---- the declared API
-
-
 @functools.cache
 def declared() -> list[tuple[str, dict[str, Function], dict[str, Any]]]:
-    """Return each module's name, functions (bound to empty objects: not to be called) and constants."""
-    ignored = Ignored("", int)
-    return [
-        ("sim", {**ignored.functions("sim"), **_functions_of(modules.SIM)}, CONSTANTS),
-        ("simROS", _functions_of(modules.SIM_ROS), {}),
-        ("simVision", _functions_of((ImageFilters,)), {}),
-        *((name, ignored.functions(name), {}) for name in PLUGINS),
-        ("simRemoteApi", _functions_of(modules.SIM_REMOTE_API), {}),
-    ]
+    """Return each module's name, functions (without a simulation: not to be called) and constants."""
+    return [contents(api) for api in listing.apis().values()]
 
 
 @functools.cache
 def _signature(function: Function) -> inspect.Signature:
     return inspect.signature(function)
-
-
-@functools.cache
-def _empty(kind: type) -> Any:
-    return object.__new__(kind)
-
-
-def _functions_of(kinds: tuple[type, ...]) -> dict[str, Function]:
-    return functions_of(*map(_empty, kinds))
-
-
-def _local_functions(turns: Turns) -> dict[Function, Function]:
-    """Return the functions that are called in this process, by the declared functions that they replace."""
-    threads = Threads.__new__(Threads)
-    threads._surroundings = Surroundings(turns=turns)
-    log = _empty(ScriptFunctions)
-    functions = {getattr(_empty(Threads), name): getattr(threads, name) for name in effects.OWN_THREADS}
-    functions.update((function, function) for name in effects.OWN_LOG if (function := getattr(log, name)))
-    for kind in effects.OWN_CLASSES:
-        functions.update((function, function) for function in functions_of(_empty(kind)).values())
-    return functions

@@ -9,8 +9,8 @@ import socket
 import numpy as np
 
 from drone_sim.grading.flight import Flight, random_of
-from drone_sim.scripting.door import script_process
-from drone_sim.scripting.door.simulation_end import SimulationEnd
+from drone_sim.scripting.rpc import script_process
+from drone_sim.scripting.rpc.connection import ScriptConnection
 
 
 @contextlib.contextmanager
@@ -39,9 +39,9 @@ def flown(plan, script, seed=0, serve=None):
     def serve_script(end):
         random.seed(random_of(seed))
         np.random.seed(random_of(seed) % 2**32)
-        script_process.serve(script_process.ScriptEnd(), end, script)
+        script_process.serve(script_process.ScriptWorker(), end, script)
 
     with process_of(serve or serve_script) as end:
-        door = SimulationEnd(end)
+        door = ScriptConnection(end)
         result = Flight(plan, script, seed, {}, door).grade()
         return result, door.why_closed
