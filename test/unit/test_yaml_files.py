@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drone_sim.files import yaml_files, yaml_text
+from drone_sim.files import yaml_files, yaml_text, yaml_writing
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
 
@@ -140,6 +140,14 @@ def test_a_text_says_what_it_is_to_say_whatever_that_is(keys, floor, stay, chang
         one.update(changes)
         one.pop(gone, None)
     new = {**said, "floor": {**said["floor"], **floor}, **keys, "objects": [*items, *[ITEM] * added]}
-    made = yaml_text.YamlText(WRITTEN).rewritten(new, {"objects": [*stay, *[None] * added]})
-    assert yaml_text.says(made, new), made
+    made = yaml_text.YamlText(WRITTEN).rewrite(new, {"objects": [*stay, *[None] * added]})
+    assert yaml_text.has_values(made, new), made
     assert "# above\n" in made
+
+
+@pytest.mark.parametrize("layout", ["block", "compact", "line", "scene"])
+def test_what_is_written_in_any_layout_is_read_as_it_was(layout):
+    strings = {text: text for text in ("1e3", "1:30", "010", "0x1F", "yes", "~", ".inf", "2001-01-01", "a: b", "å", "")}
+    long = {f"key {number}": "word " * number for number in range(9)}
+    values = {**strings, "numbers": [1, -2.5, 1e300, 1e15, float("inf")], "long": [long], "inner": {"a": {"b": [long]}}}
+    assert yaml_files.parse(yaml_writing.dump(values, layout)) == values

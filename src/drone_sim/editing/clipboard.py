@@ -10,7 +10,7 @@ from typing import Any
 
 from drone_sim.config.types import FoundFile, ParameterError
 from drone_sim.files import yaml_files
-from drone_sim.files.yaml_text import dumped
+from drone_sim.files.yaml_writing import dump
 from drone_sim.message_text import near_names, shown
 from drone_sim.scene import models, scene_parameters
 from drone_sim.scene.attached_scripts import AttachedScriptParameters
@@ -39,7 +39,7 @@ def written(
     }
     scene_parameters.find_files_beside(folder, {"vehicles": plain["vehicles"]})
     content = _rename_files(plain, lambda file: file.seen_from(None))
-    return dumped({key: section for key, section in content.items() if section})
+    return dump({key: section for key, section in content.items() if section}, "scene")
 
 
 def read(text: str, folder: Path) -> _Content:

@@ -1,7 +1,7 @@
-"""YAML as this package reads it: of what YAML 1.1 allows, only what cannot surprise.
+"""Reading of YAML, with limits and without the surprises of YAML 1.1.
 
-Refused are keys that come twice or are no text, and aliases, depths and sizes beyond the limits below; numbers are
-those of YAML 1.2: `1e3` is one, `1:30` is none (YAML 1.1 takes it for 90), `010` is ten.
+Duplicate keys, keys that are not strings, tags, and sizes, depths and aliases beyond the limits below are refused.
+Numbers are those of YAML 1.2: `1e3` is 1000, `010` is 10, and `1:30` is a string (in YAML 1.1 it is 90).
 """
 
 from __future__ import annotations
@@ -17,23 +17,25 @@ from drone_sim.files.resources import MEBIBYTE, read_bytes
 from drone_sim.message_text import shown
 
 MAX_SIZE = MEBIBYTE  # bytes of a file
-MAX_DEPTH = 32  # lists and mappings within each other
-MAX_VALUES = 100_000  # keys and values, each alias counted with all that it stands for
+MAX_DEPTH = 32  # of nested lists and mappings
+MAX_VALUES = 100_000  # keys and values; an alias counts as everything that it refers to
 _MAX_DIGITS = 400  # of a number
 _TOO_DEEP = f"lists and mappings are nested more than {MAX_DEPTH} deep"
-_OTHER = ("int", "float", "timestamp")  # what YAML 1.1 reads in ways of its own
-_INT = re.compile(r"[-+]?(?:[0-9]+|0x[0-9a-fA-F]+)$")
-_FLOAT = re.compile(
-    r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$"
-)
+_YAML_1_1_TYPES = ("int", "float", "timestamp")  # PyYAML's patterns for these are not used
+NUMBER_PATTERNS = {
+    "int": re.compile(r"[-+]?(?:[0-9]+|0x[0-9a-fA-F]+)$"),
+    "float": re.compile(
+        r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$"
+    ),
+}
 
 
 class YamlError(ValueError):
-    """A YAML text is refused; one line that says where and why."""
+    """A YAML text is refused. The message is one line, with the reason and the place."""
 
 
 def read(path: str | Path) -> Any:
-    """Return what a YAML file holds; raises YamlError, which names the file."""
+    """Return the value of a YAML file. Raises YamlError with the file's name."""
     try:
         content = read_bytes(path, MAX_SIZE)
     except OSError as error:
@@ -50,7 +52,7 @@ def read(path: str | Path) -> Any:
 
 
 def parse(text: str) -> Any:
-    """Return what a YAML text holds; raises YamlError."""
+    """Return the value of a YAML text. Raises YamlError."""
     if len(text) > MAX_SIZE:
         raise YamlError(f"larger than {MAX_SIZE / MEBIBYTE:g} MiB")
     try:
@@ -65,63 +67,59 @@ def parse(text: str) -> Any:
         finally:
             loader.dispose()
     except yaml.MarkedYAMLError as error:
-        said = " ".join(filter(None, (error.context, error.problem)))
-        if "maximum nesting depth" in said:  # libyaml's own limit, which it may meet first, for it reads ahead
-            said = _TOO_DEEP
+        problem = " ".join(filter(None, (error.context, error.problem)))
+        if "maximum nesting depth" in problem:  # libyaml reads ahead, so its own limit may be reached first
+            problem = _TOO_DEEP
         mark = error.problem_mark or error.context_mark
-        raise YamlError(f"{' '.join(said.split())}{_at(mark)}") from None
+        place = f" (line {mark.line + 1}, column {mark.column + 1})" if mark else ""
+        raise YamlError(f"{' '.join(problem.split())}{place}") from None
     except yaml.YAMLError as error:
         raise YamlError(f"{' '.join(str(error).split()):.200}") from None
 
 
-def dump(value: Any, **style: Any) -> str:
-    """Return a YAML text that `parse` reads as this, keys in their order; `style` is as for yaml.dump."""
-    return str(yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, **style))
-
-
 def compose(text: str) -> Any:
-    """Return the nodes of a text that `parse` reads, with where they begin and end; None for an empty one."""
+    """Return the root node of a text that `parse` accepts, with the positions of all nodes; None for an empty text."""
     return yaml.compose(text, Loader=_Loader)
 
 
 class Depth(NamedTuple):
-    """How far the way to a value leads in a file, and the line (from 1) where it ends."""
+    """Number of keys and indices of a location that exist in a file, and the line (from 1) of the last of them."""
 
     depth: int
     line: int
 
 
 class YamlLines:
-    """Where the values of a YAML text stand."""
+    """Line numbers of the values in a YAML text."""
 
     def __init__(self, text: str):
-        """Take a text that `parse` reads; of any other nothing is found."""
+        """Compose the text. If `parse` refuses it, no value is found in it."""
         try:
             self._root = compose(text)
         except (yaml.YAMLError, RecursionError):
             self._root = None
 
     def find(self, location: Sequence[int | str]) -> Depth:
-        """Return how many of these keys and indices lead to a value, and the line of the last that does."""
+        """Return how many keys and indices of `location` exist, and the line of the last that does."""
         node, line = self._root, 1
         for depth, part in enumerate(location):
-            inner = _inner(node, part)
-            if inner is None:
+            child = _child(node, part)
+            if child is None:
                 return Depth(depth, line)
-            node, line = inner
+            node, line = child
         return Depth(len(location), line)
 
 
 def lines(path: str | Path) -> YamlLines:
-    """Return where the values of a YAML file stand, as far as it can be read."""
+    """Return the line numbers of a YAML file's values; none if the file cannot be read."""
     try:
         return YamlLines(read_bytes(path, MAX_SIZE).decode("utf-8-sig"))
     except (OSError, ValueError):
         return YamlLines("")
 
 
-def _inner(node: Any, part: int | str) -> tuple[Any, int] | None:
-    """Return the node of a key or index, and its line."""
+def _child(node: Any, part: int | str) -> tuple[Any, int] | None:
+    """Return the node of a key or index, and its line. A key may be in a mapping that is merged with `<<`."""
     if isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
         return node.value[part], node.value[part].start_mark.line + 1
     merged = []
@@ -130,19 +128,15 @@ def _inner(node: Any, part: int | str) -> tuple[Any, int] | None:
         if key.value == part:
             return value, line
         if key.tag == "tag:yaml.org,2002:merge":
-            merged += [(one, line) for one in (value.value if isinstance(value, yaml.SequenceNode) else [value])]
-    for one, line in merged:
-        inner = _inner(one, part)
-        if inner is not None:
-            return inner[0], line
+            merged += [(source, line) for source in (value.value if isinstance(value, yaml.SequenceNode) else [value])]
+    for source, line in merged:
+        child = _child(source, part)
+        if child is not None:
+            return child[0], line
     return None
 
 
-def _at(mark: Any) -> str:
-    return f" (line {mark.line + 1}, column {mark.column + 1})" if mark else ""
-
-
-# The C parser is ten times as fast; where PyYAML comes without it, its own one reads the same.
+# The C parser is ten times as fast. PyYAML may be installed without it; the Python parser gives the same result.
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -150,75 +144,69 @@ class _Loader(_Base):
     """PyYAML's safe loader with YAML 1.2's numbers."""
 
     yaml_implicit_resolvers: ClassVar = {
-        first: [(tag, pattern) for tag, pattern in resolvers if tag.rpartition(":")[2] not in _OTHER]
+        first: [(tag, pattern) for tag, pattern in resolvers if tag.rpartition(":")[2] not in _YAML_1_1_TYPES]
         for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
     }
 
 
-def _refused(node: Any, problem: str) -> yaml.MarkedYAMLError:
+def _error(node: Any, problem: str) -> yaml.MarkedYAMLError:
     return yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
-
-
-def _too_deep(node: Any) -> yaml.MarkedYAMLError:
-    return _refused(node, _TOO_DEEP)
-
-
-def _too_much(node: Any) -> yaml.MarkedYAMLError:
-    return _refused(node, f"holds more than {MAX_VALUES} values once its aliases are expanded")
 
 
 def _number(loader: _Loader, node: Any) -> float:
     text = str(loader.construct_scalar(node))
     if len(text) > _MAX_DIGITS:
-        raise _refused(node, f"a number of {len(text)} characters")
-    if _INT.match(text):
+        raise _error(node, f"a number of {len(text)} characters")
+    if NUMBER_PATTERNS["int"].match(text):
         return int(text, 16 if "x" in text else 10)
-    if not _FLOAT.match(text):
-        raise _refused(node, f"{shown(text)} is not a number")
+    if not NUMBER_PATTERNS["float"].match(text):
+        raise _error(node, f"{shown(text)} is not a number")
     return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
 
 
 def _refuse_tag(_loader: _Loader, node: Any) -> Any:
-    raise _refused(node, f"the tag {shown(node.tag)} is not allowed")
+    raise _error(node, f"the tag {shown(node.tag)} is not allowed")
 
 
-class _Dumper(yaml.SafeDumper):
-    """PyYAML's safe dumper, which puts quotes around a text that either version of YAML takes for something else."""
-
-
-for _tag, _pattern in (("int", _INT), ("float", _FLOAT)):
-    for _kind in (_Loader, _Dumper):
-        _kind.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", _pattern, list("-+0123456789."))
-    _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}", _number)
-for _tag in ("binary", "timestamp", "omap", "pairs", "set"):
-    _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}", _refuse_tag)
+for _type, _pattern in NUMBER_PATTERNS.items():
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_type}", _pattern, list("-+0123456789."))
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_type}", _number)
+for _type in ("binary", "timestamp", "omap", "pairs", "set"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_type}", _refuse_tag)
 _Loader.add_constructor(None, _refuse_tag)
 
 
+# ---- limits
+
+
+def _too_many(node: Any) -> yaml.MarkedYAMLError:
+    return _error(node, f"holds more than {MAX_VALUES} values once its aliases are expanded")
+
+
 def _check_events(text: str) -> None:
-    """Refuse what is nested too deeply or too much before anything is made of it."""
+    """Raise MarkedYAMLError for a text that is too deep or too large, before nodes are made of it."""
     depth = 0
     for number, event in enumerate(yaml.parse(text, Loader=_Base)):
         if isinstance(event, yaml.CollectionStartEvent):
             depth += 1
             if depth > MAX_DEPTH:
-                raise _too_deep(event)
+                raise _error(event, _TOO_DEEP)
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
         if number > 2 * MAX_VALUES:
-            raise _too_much(event)
+            raise _too_many(event)
 
 
 def _check_keys(node: yaml.MappingNode) -> None:
-    seen = set()
+    keys = set()
     for key, _ in node.value:
         if key.tag == "tag:yaml.org,2002:merge":
             continue
         if key.tag != "tag:yaml.org,2002:str":
-            raise _refused(key, f"key {shown(key.value) if isinstance(key, yaml.ScalarNode) else '?'} must be a string")
-        if key.value in seen:
-            raise _refused(key, f"key {shown(key.value)} is given twice")
-        seen.add(key.value)
+            raise _error(key, f"key {shown(key.value) if isinstance(key, yaml.ScalarNode) else '?'} must be a string")
+        if key.value in keys:
+            raise _error(key, f"key {shown(key.value)} is given twice")
+        keys.add(key.value)
 
 
 class _Size(NamedTuple):
@@ -227,7 +215,10 @@ class _Size(NamedTuple):
 
 
 def _measure(node: Any, known: dict[int, _Size], depth: int) -> _Size:
-    """Return how much a node stands for once its aliases are followed; raises where that is too much."""
+    """Return a node's size with its aliases expanded. Raises MarkedYAMLError if it is too large, or for its keys.
+
+    `known` has the sizes of nodes that have been measured, by id; `depth` is the node's own.
+    """
     size = known.get(id(node))
     if size is None:
         values, deepest = 1, 0
@@ -235,14 +226,14 @@ def _measure(node: Any, known: dict[int, _Size], depth: int) -> _Size:
         if isinstance(node, yaml.MappingNode):
             _check_keys(node)
         if depth > MAX_DEPTH + 1:
-            raise _too_deep(node)
+            raise _error(node, _TOO_DEEP)
         for child in children:
-            for one in child if isinstance(child, tuple) else (child,):
-                part = _measure(one, known, depth + 1)
-                values, deepest = values + part.values, max(deepest, part.depth)
+            for part in child if isinstance(child, tuple) else (child,):
+                inner = _measure(part, known, depth + 1)
+                values, deepest = values + inner.values, max(deepest, inner.depth)
         size = known[id(node)] = _Size(values, deepest + 1)
     if size.values > MAX_VALUES:
-        raise _too_much(node)
+        raise _too_many(node)
     if depth + size.depth > MAX_DEPTH + 2:
-        raise _too_deep(node)
+        raise _error(node, _TOO_DEEP)
     return size

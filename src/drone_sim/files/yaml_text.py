@@ -1,214 +1,200 @@
-"""A YAML text that says something else, otherwise as its author wrote it: comments, order, spelling, lines stay."""
+"""Changes of a YAML text that leave the rest as its author wrote it: comments, order, spelling and line breaks."""
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 import yaml
 
 from drone_sim.files import yaml_files
+from drone_sim.files.yaml_writing import dump, format_inline, format_item, format_key
 
-_WIDTH = 120
-_MERGE = "<<"  # the key of what is merged from elsewhere
-_LONG = 1e15  # with which a number gets an exponent
-_MOST_LINES = 4  # of an entry in braces
+_MERGE = "<<"  # the key that merges another mapping
 _ALIAS = re.compile(r"\s*\*[^\s,\]}]+")
 _ANCHOR = re.compile(r"&([^\s,\[\]{}]+)\s")
-_Kept = Mapping[str, Sequence[int | None]]
+_OldIndices = Mapping[str, Sequence[int | None]]
 
 
 class YamlText:
-    """A text of a mapping, or an empty one."""
+    """A YAML text that is a mapping, or empty."""
 
     def __init__(self, text: str):
-        """Read it. Raises YamlError."""
-        found = yaml_files.parse(text)
+        """Parse the text. Raises YamlError."""
+        values = yaml_files.parse(text)
         self.text = text
-        self.is_mapping = isinstance(found, dict)
-        self.values: Mapping[str, Any] = found if self.is_mapping else {}
+        self.is_mapping = isinstance(values, dict)
+        self.values: Mapping[str, Any] = values if self.is_mapping else {}
 
     @cached_property
     def _root(self) -> Any:
         return yaml_files.compose(self.text) if self.values else None
 
-    def rewritten(self, new: Mapping[str, Any], kept: _Kept) -> str:
-        """Return a text that says something new.
+    def rewrite(self, values: Mapping[str, Any], old_indices: _OldIndices) -> str:
+        """Return the text changed so that it has these values.
 
-        `kept` has for lists under the mapping's keys the index that each new item had before, None for one that is new.
+        `old_indices` has, for lists under top-level keys, each item's index in the old list; None for a new item.
+        Raises YamlError if items that stay are in another order.
         """
         if self._root is None or self._root.flow_style:
-            return dumped(new)
-        return _Rewriting(self.text, self._root, kept).rewrite(self.values, new)
+            return dump(values, "scene")
+        return _Rewriter(self.text, self._root, old_indices).rewrite(self.values, values)
 
 
-def says(text: str, wanted: Mapping[str, Any]) -> bool:
-    """Tell whether a text says that: with anchors and aliases in odd places one may not."""
+def has_values(text: str, values: Mapping[str, Any]) -> bool:
+    """Return whether a text is read as these values; a rewritten text may not be, if its aliases are in odd places."""
     try:
-        return bool(yaml_files.parse(text) == wanted)
+        return bool(yaml_files.parse(text) == values)
     except yaml_files.YamlError:
         return False
 
 
-def dumped(values: Mapping[str, Any]) -> str:
-    """Return a mapping as a person would write it."""
-    return "".join(_line(key, value, "") for key, value in values.items())
+class _Rewriter:
+    """Collects replacements (start, end, new text) of parts of a text, and applies them at the end."""
 
-
-class _Rewriting:
-    """Collects what takes the place of what, by positions in the text."""
-
-    def __init__(self, text: str, root: Any, kept: _Kept):
+    def __init__(self, text: str, root: Any, old_indices: _OldIndices):
         self._text = text if text.endswith("\n") else text + "\n"
         self._root = root
-        self._kept = kept
-        self._parts: list[tuple[int, int, str]] = []
+        self._old_indices = old_indices
+        self._replacements: list[tuple[int, int, str]] = []
 
     def rewrite(self, old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
-        self._update(self._root, old, new, top=True)
-        self._keep_anchors()
-        made, at = [], 0
-        for start, end, words in sorted(self._parts, key=lambda one: one[:2]):
-            made += [self._text[at:start], words]
-            at = end
-        return "".join([*made, self._text[at:]])
+        self._update_mapping(self._root, old, new, is_top=True)
+        self._expand_aliases()
+        pieces, position = [], 0
+        for start, end, text in sorted(self._replacements, key=lambda replacement: replacement[:2]):
+            pieces += [self._text[position:start], text]
+            position = end
+        return "".join([*pieces, self._text[position:]])
 
-    # ---- what is otherwise
+    # ---- mappings and lists
 
-    def _update(
-        self, node: yaml.MappingNode, old: Mapping[str, Any], new: Mapping[str, Any], top: bool = False
+    def _update_mapping(
+        self, node: yaml.MappingNode, old: Mapping[str, Any], new: Mapping[str, Any], is_top: bool = False
     ) -> None:
-        """Let a mapping say something else."""
-        values = {key.value: (key, value) for key, value in node.value}
-        for key, value in self._gone(node, new):
-            self._remove_key(node, key, value)
+        pairs = {key.value: (key, value) for key, value in node.value}
+        self._remove_keys(node, new)
         last = None
-        for key, value in new.items():
-            if key not in values:  # new, or merged from elsewhere
-                if key not in old or old[key] != value:
-                    self._add_key(node, key, value, last)
-                continue
-            last = values[key]
-            if old[key] != value:
-                self._change(node, *last, old[key], value, key if top else "")
+        for name, value in new.items():
+            if name in pairs:
+                last = pairs[name]
+                if old[name] != value:
+                    self._update_value(node, *last, old[name], value, name if is_top else "")
+            elif name not in old or old[name] != value:  # otherwise, the value is merged from another mapping
+                self._add_key(node, name, value, last)
 
-    def _gone(self, node: Any, new: Collection[str]) -> list[tuple[Any, Any]]:
-        """Return keys that are to be taken out, with their values; those behind the dash of an item are taken out."""
-        pairs, new = list(node.value), {*new, _MERGE}
-        if node.flow_style or self._is_first_of_line(pairs[0][0].start_mark.index):
-            return [pair for pair in pairs if pair[0].value not in new]
-        first = next(index for index, (key, _) in enumerate(pairs) if key.value in new)
-        if first:
-            self._parts.append((pairs[0][0].start_mark.index, pairs[first][0].start_mark.index, ""))
-        return [pair for pair in pairs[first:] if pair[0].value not in new]
-
-    def _change(self, above: Any, key: Any, node: Any, old: Any, new: Any, name: str) -> None:
-        start, end = self._span(key, node)
-        is_own = start == node.start_mark.index
-        if is_own and isinstance(node, yaml.MappingNode) and _have_common_keys(old, new):
-            self._update(node, old, new)
-        elif is_own and name in self._kept and not node.flow_style and new:
-            self._update_list(node, old, new, self._kept[name])
-        elif not above.flow_style:
-            self._parts.append(
-                (key.start_mark.index, self._line_end(end), _line(key.value, new, _indent(key)).lstrip())
-            )
+    def _update_value(self, mapping: Any, key: Any, node: Any, old: Any, new: Any, name: str) -> None:
+        start, end = self._value_span(key, node)
+        is_alias = start != node.start_mark.index
+        if not is_alias and isinstance(node, yaml.MappingNode) and _have_common_keys(old, new):
+            self._update_mapping(node, old, new)
+        elif not is_alias and name in self._old_indices and not node.flow_style and new:
+            self._update_list(node, old, new, self._old_indices[name])
+        elif mapping.flow_style:
+            self._replacements.append((start, end, format_inline(new)))
         else:
-            self._parts.append((start, end, _flow(new)))
+            lines = format_key(key.value, new, _indent(key)).lstrip()
+            self._replacements.append((key.start_mark.index, self._next_line(end), lines))
 
     def _update_list(
-        self, node: yaml.SequenceNode, old: Sequence[Any], new: Sequence[Any], kept: Sequence[Any]
+        self, node: yaml.SequenceNode, old: Sequence[Any], new: Sequence[Any], old_indices: Sequence[int | None]
     ) -> None:
-        """Let a list of entries have others."""
-        there = [index for index in kept if index is not None]
-        if there != sorted(there):
+        remaining = [index for index in old_indices if index is not None]
+        if remaining != sorted(remaining):
             raise yaml_files.YamlError("a list in another order")
-        for index in {*range(len(old))} - {*there}:
-            self._parts.append((*self._item_lines(node.value[index]), ""))
+        for index in {*range(len(old))} - {*remaining}:
+            item = node.value[index]
+            span = self._line_start(self._dash(item)), self._next_line(_end(item))
+            self._replacements.append((*span, ""))
         added = ""
-        for index, value in zip(kept, new):
+        for index, value in zip(old_indices, new):
             if index is None:
-                added += _item(value, " " * self._dash(node.value[0])[1])
+                dash = self._dash(node.value[0])
+                added += format_item(value, " " * (dash - self._line_start(dash)))
             elif old[index] != value:
-                self._update_item(node.value[index], old[index], value)
+                item = node.value[index]
+                if isinstance(item, yaml.MappingNode) and _have_common_keys(old[index], value):
+                    self._update_mapping(item, old[index], value)
+                else:
+                    self._replacements.append((item.start_mark.index, _end(item), format_inline(value)))
         if added:
-            end = self._line_end(_end(node.value[-1]))
-            self._parts.append((end, end, added))
+            end = self._next_line(_end(node.value[-1]))
+            self._replacements.append((end, end, added))
 
-    def _update_item(self, node: Any, old: Any, new: Any) -> None:
-        if isinstance(node, yaml.MappingNode) and _have_common_keys(old, new):
-            self._update(node, old, new)
-        else:
-            self._parts.append((node.start_mark.index, _end(node), _flow(new)))
+    # ---- keys
 
-    def _remove_key(self, node: yaml.MappingNode, key: Any, value: Any) -> None:
-        start, end = key.start_mark.index, self._span(key, value)[1]
+    def _remove_keys(self, node: yaml.MappingNode, new: Collection[str]) -> None:
+        """Remove the keys that are not in `new`, with their values."""
+        pairs, names = list(node.value), {*new, _MERGE}
+        begin = pairs[0][0].start_mark.index
+        if not node.flow_style and self._text[self._line_start(begin) : begin].strip():
+            # The first key stands behind the dash of a list item: the next key that stays moves there.
+            first = next(index for index, (key, _) in enumerate(pairs) if key.value in names)
+            if first:
+                self._replacements.append((begin, pairs[first][0].start_mark.index, ""))
+            pairs = pairs[first:]
+        for key, value in pairs:
+            if key.value not in names:
+                self._replacements.append((*self._pair_span(node, key, value), ""))
+
+    def _pair_span(self, node: yaml.MappingNode, key: Any, value: Any) -> tuple[int, int]:
+        """Return where a key and its value begin and end: whole lines, or, in braces, with one comma."""
+        start, end = key.start_mark.index, self._value_span(key, value)[1]
         if not node.flow_style:
-            self._parts.append((self._line_start(start), self._line_end(end), ""))
-            return
-        behind = re.match(r"\s*,\s*", self._text[end:])
-        if behind:
-            self._parts.append((start, end + behind.end(), ""))
-            return
-        before = re.search(r",\s*$", self._text[:start])
-        self._parts.append((before.start() if before else start, end, ""))
+            return self._line_start(start), self._next_line(end)
+        comma = re.match(r"\s*,\s*", self._text[end:])
+        if comma:
+            return start, end + comma.end()
+        comma = re.search(r",\s*$", self._text[:start])
+        return (comma.start() if comma else start), end
 
-    def _add_key(self, node: yaml.MappingNode, key: str, value: Any, last: tuple[Any, Any] | None) -> None:
-        """Put a key behind another one, or at the end."""
-        after = last or node.value[-1]
-        end = self._span(*after)[1]
+    def _add_key(self, node: yaml.MappingNode, key: str, value: Any, previous: tuple[Any, Any] | None) -> None:
+        """Add a key after `previous`, a pair of nodes, or at the end."""
+        end = self._value_span(*(previous or node.value[-1]))[1]
         if node.flow_style:
-            self._parts.append((end, end, f", {key}: {_flow(value)}"))
+            self._replacements.append((end, end, f", {key}: {format_inline(value)}"))
         else:
-            end = self._line_end(end)
-            self._parts.append((end, end, _line(key, value, _indent(node.value[0][0]))))
+            end = self._next_line(end)
+            self._replacements.append((end, end, format_key(key, value, _indent(node.value[0][0]))))
 
     # ---- anchors
 
-    def _keep_anchors(self) -> None:
-        """Where an anchored value is replaced, write it out at the first alias that is kept and stands after it."""
-        for start, end, _ in [*self._parts]:
-            for found in _ANCHOR.finditer(self._text, start, end):
-                node = _node_at(self._root, found.start())
-                alias = re.compile(rf"\*{re.escape(found[1])}(?![^\s,\]}}])")
+    def _expand_aliases(self) -> None:
+        """Replace the first remaining alias of each anchor that is removed by the value and its anchor."""
+        for start, end, _ in [*self._replacements]:
+            for anchor in _ANCHOR.finditer(self._text, start, end):
+                node = next((node for node in _all_nodes(self._root) if node.start_mark.index == anchor.start()), None)
                 if node is None:
                     continue
-                for other in alias.finditer(self._text, end):
-                    if not any(one <= other.start() < two for one, two, _ in self._parts):
-                        self._parts.append((*other.span(), self._text[found.start() : _end(node)]))
+                for alias in re.compile(rf"\*{re.escape(anchor[1])}(?![^\s,\]}}])").finditer(self._text, end):
+                    if not any(begin <= alias.start() < stop for begin, stop, _ in self._replacements):
+                        self._replacements.append((*alias.span(), self._text[anchor.start() : _end(node)]))
                         break
 
-    # ---- where it stands
+    # ---- positions in the text
 
-    def _span(self, key: Any, node: Any) -> tuple[int, int]:
-        """Return where a value begins and ends; an alias stands elsewhere than what it stands for."""
+    def _value_span(self, key: Any, node: Any) -> tuple[int, int]:
+        """Return where the value of a key begins and ends; for an alias, not the value that it refers to."""
         begin = key.end_mark.index + 1
         alias = _ALIAS.match(self._text, begin)
         if alias:
             return begin + len(alias[0]) - len(alias[0].lstrip()), alias.end()
         return node.start_mark.index, _end(node)
 
-    def _dash(self, node: Any) -> tuple[int, int]:
-        """Return where the dash of an item is, and in which column."""
-        at = self._text.rindex("-", 0, node.start_mark.index)
-        return at, at - self._line_start(at)
+    def _dash(self, item: Any) -> int:
+        return self._text.rindex("-", 0, item.start_mark.index)
 
-    def _item_lines(self, node: Any) -> tuple[int, int]:
-        return self._line_start(self._dash(node)[0]), self._line_end(_end(node))
+    def _line_start(self, position: int) -> int:
+        return self._text.rfind("\n", 0, position) + 1
 
-    def _line_start(self, at: int) -> int:
-        return self._text.rfind("\n", 0, at) + 1
-
-    def _line_end(self, at: int) -> int:
-        """Return where the line after a position begins."""
-        found = self._text.find("\n", max(at - 1, 0) if self._text[at - 1 : at] == "\n" else at)
-        return len(self._text) if found == -1 else found + 1
-
-    def _is_first_of_line(self, at: int) -> bool:
-        return not self._text[self._line_start(at) : at].strip()
+    def _next_line(self, position: int) -> int:
+        """Return where the next line begins; `position` itself if it is the beginning of a line."""
+        if self._text[position - 1 : position] == "\n":
+            return position
+        newline = self._text.find("\n", position)
+        return len(self._text) if newline == -1 else newline + 1
 
 
 def _have_common_keys(old: Any, new: Any) -> bool:
@@ -216,92 +202,22 @@ def _have_common_keys(old: Any, new: Any) -> bool:
 
 
 def _end(node: Any) -> int:
-    """Return where a node's last character is, comments behind it not counted."""
+    """Return where a node's last character is; comments after it do not count."""
     if isinstance(node, yaml.ScalarNode) or node.flow_style or not node.value:
         return int(node.end_mark.index)
     last = node.value[-1]
-    ends = [_end(one) for one in (last if isinstance(last, tuple) else (last,))]
-    inside = [one for one in ends if one <= node.end_mark.index]  # not what an alias stands for
+    ends = [_end(child) for child in (last if isinstance(last, tuple) else (last,))]
+    inside = [end for end in ends if end <= node.end_mark.index]  # the target of an alias may be outside
     return max(inside, default=int(node.end_mark.index))
 
 
-def _node_at(node: Any, index: int) -> Any:
-    """Return the node that begins at a position."""
-    for one in _all(node):
-        if one.start_mark.index == index:
-            return one
-    return None
-
-
-def _all(node: Any) -> Iterator[Any]:
+def _all_nodes(node: Any) -> Iterator[Any]:
     yield node
     if not isinstance(node, yaml.ScalarNode):
-        for one in node.value:
-            for inner in one if isinstance(one, tuple) else (one,):
-                yield from _all(inner)
+        for child in node.value:
+            for part in child if isinstance(child, tuple) else (child,):
+                yield from _all_nodes(part)
 
 
 def _indent(key: Any) -> str:
     return " " * int(key.start_mark.column)
-
-
-# ---- as a person would write it
-
-
-def _line(key: str, value: Any, indent: str) -> str:
-    """Return a key with its value, in lines."""
-    if _is_list_of_entries(value):
-        return f"{indent}{_flow(key)}:\n" + "".join(_item(one, indent + "  ") for one in value)
-    if isinstance(value, Mapping) and any(isinstance(one, Mapping) for one in value.values()):
-        return f"{indent}{_flow(key)}:\n" + "".join(_line(one, inner, indent + "  ") for one, inner in value.items())
-    return _wrapped(f"{indent}{_flow(key)}: ", value, indent + "  ") + "\n"
-
-
-def _is_list_of_entries(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) for one in value)
-
-
-def _item(value: Any, indent: str) -> str:
-    """Return an item of a list: in braces, or, where that is long, in lines."""
-    text = _wrapped(f"{indent}- ", value, indent + "   ")
-    is_flat = not isinstance(value, Mapping) or not any(map(_is_list_of_entries, value.values()))
-    if is_flat and text.count("\n") < _MOST_LINES:
-        return text + "\n"
-    lines = "".join(_line(key, one, indent + "  ") for key, one in value.items())
-    return f"{indent}- {lines[len(indent) + 2 :]}"
-
-
-def _wrapped(begin: str, value: Any, indent: str) -> str:
-    """Return a value behind something, in lines of no more than 120 characters where commas allow it."""
-    if not isinstance(value, Mapping) or not value:
-        return begin + _flow(value)
-    lines, line = [], begin + "{"
-    words = [f"{_flow(key)}: {_flow(one)}" for key, one in value.items()]
-    for number, word in enumerate(words):
-        word += "}" if number == len(words) - 1 else ", "
-        if len(line) + len(word.rstrip()) > _WIDTH and number:
-            lines.append(line.rstrip())
-            line = indent
-        line += word
-    return "\n".join([*lines, line])
-
-
-def _flow(value: Any) -> str:
-    """Return a value on one line."""
-    kinds: list[tuple[Any, Callable[[Any], str]]] = [
-        (bool, lambda one: "true" if one else "false"),
-        (float, _number),
-        (Mapping, lambda one: "{" + ", ".join(f"{_flow(key)}: {_flow(inner)}" for key, inner in one.items()) + "}"),
-        ((list, tuple), lambda one: "[" + ", ".join(map(_flow, one)) + "]"),
-    ]
-    for kind, write in kinds:
-        if isinstance(value, kind):
-            return write(value)
-    dumped_value = yaml_files.dump([value], default_flow_style=True, width=10**6)
-    return dumped_value.strip()[1:-1]
-
-
-def _number(value: float) -> str:
-    if math.isfinite(value) and value.is_integer() and abs(value) < _LONG:
-        return str(int(value))
-    return yaml_files.dump(value).split("\n")[0]

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from drone_sim.files import yaml_files
+from drone_sim.files.yaml_writing import dump
 from drone_sim.importing import object_collections
 from drone_sim.importing.entries import Entries
 from drone_sim.importing.folder import LIST, Folder, Report, label, number, pose_keys
@@ -350,5 +350,4 @@ class _Import:
             self._folder.write(LIST, "\n".join([origin, "", *lines, ""]))
         header = f"# {origin}{f' Differences from the file: see {LIST}.' if lines else ''}\n"
         header += "".join(f"# {note}.\n" for note in self._report.notes)
-        text = yaml_files.dump(content, default_flow_style=None, width=120)
-        self._folder.write(SCENE, header + text)
+        self._folder.write(SCENE, header + dump(content, "compact"))

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 from drone_sim.config.types import ParameterError
 from drone_sim.files import writing, yaml_files
 from drone_sim.files.resources import cache_path, resolve
-from drone_sim.files.yaml_text import YamlText, dumped, says
+from drone_sim.files.yaml_text import YamlText, has_values
+from drone_sim.files.yaml_writing import dump
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.run.parameters import Parameters
@@ -93,8 +94,8 @@ class SceneDocument:
     def text(self, now: SceneContent, folder: Path | None = None) -> str:
         """Return the text of a scene file in `folder` (default: the present folder) for a scene."""
         content, kept = self._content(now, folder or self.folder)
-        text = self._text.yaml.rewritten(content, kept)
-        return text if says(text, content) else dumped(content)
+        text = self._text.yaml.rewrite(content, kept)
+        return text if has_values(text, content) else dump(content, "scene")
 
     def write(self, path: Path, now: SceneContent, parameters: Parameters) -> str:
         """Write a scene to a file and return the text. Another file that is overwritten is kept as FILE.bak.

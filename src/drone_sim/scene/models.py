@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drone_sim.config.types import Checked, FoundFile, ParameterError, read_yaml
-from drone_sim.files import mesh_files, writing, yaml_files
+from drone_sim.files import mesh_files, writing
 from drone_sim.files.containment import remove
 from drone_sim.files.resources import MEBIBYTE, cache_path
+from drone_sim.files.yaml_writing import dump
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.scene import scene_parameters
@@ -186,8 +187,7 @@ def write(path: Path, entries: Sequence[EntryParameters], scripts: Sequence[Atta
     sections = {"objects": entries, "scripts": scripts}
     try:
         content = {key: [plain(item, path.parent) for item in items] for key, items in sections.items() if items}
-        text = _HEAD + yaml_files.dump(content, default_flow_style=None, width=120)
-        writing.write(path, text)
+        writing.write(path, _HEAD + dump(content, "compact"))
     except OSError as error:
         raise ParameterError(f"{path}: cannot be written ({error.strerror or error})") from None
 

@@ -18,10 +18,10 @@ from pathlib import Path
 
 import rosgraph
 import rospy
-import yaml
 
 from drone_sim.command_line import FAILED, Parser, status_of
 from drone_sim.files import writing
+from drone_sim.files.yaml_writing import dump
 from drone_sim.grading import flight
 from drone_sim.grading import plan as plans
 from drone_sim.grading.flight_record import FlightRecord
@@ -68,7 +68,7 @@ def _write_config(file: str, path: str) -> None:
         raise ValueError(f"{file}: its config is a file already: {plan.config}")
     config = copy.deepcopy(dict(plan.config))
     find_files_beside(plan.folder, config)
-    writing.write(path, yaml.safe_dump(config, sort_keys=False))
+    writing.write(path, dump(config))
 
 
 def _graded(options: argparse.Namespace) -> Result:

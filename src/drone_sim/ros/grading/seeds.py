@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from drone_sim.files import writing, yaml_files
+from drone_sim.files import writing
 from drone_sim.files.resources import cache_path
+from drone_sim.files.yaml_writing import dump
 from drone_sim.grading.plan import Plan
 from drone_sim.run.parameters import Parameters
 
@@ -18,7 +19,7 @@ def scene_file(plan: Plan, seed: int) -> str:
     folder = cache_path() / "grading" / "seeds"
     folder.mkdir(parents=True, exist_ok=True)
     path = Path(folder, f"{plan.name}-{seed}.yaml")  # stays: the simulator may be started in it once more
-    writing.write(path, yaml_files.dump(_content(plan.parameters(seed))))
+    writing.write(path, dump(_content(plan.parameters(seed))))
     return str(path)
 
 

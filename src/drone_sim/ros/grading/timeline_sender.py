@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import rospy
-import yaml
 from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import (
     Point,
@@ -22,6 +21,7 @@ from geometry_msgs.msg import (
 from geometry_msgs.msg import Pose as PoseMessage
 from std_msgs.msg import Empty, Header
 
+from drone_sim.files.yaml_writing import dump
 from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.frames import from_rpy, to_quaternion
 from drone_sim.mechanics.state import Pose, Twist
@@ -123,7 +123,7 @@ def _messages(entry: Entry, push: float) -> Iterator[tuple[str, Any]]:
     else:
         topic = next(name for name, kind in CHANGES.items() if isinstance(action, kind))
         for key, value in _flat(action.changes):
-            yield topic, KeyValue(key, yaml.safe_dump(value, default_flow_style=True).removesuffix("\n...\n"))
+            yield topic, KeyValue(key, dump(value, "line").removesuffix("\n...\n"))
 
 
 def _flat(changes: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

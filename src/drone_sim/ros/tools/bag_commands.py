@@ -9,11 +9,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from typing import Any, NamedTuple
 
-import yaml
-
 from drone_sim.command_line import Parser, status_of
 from drone_sim.config.types import Checked
 from drone_sim.files import writing
+from drone_sim.files.yaml_writing import dump
 from drone_sim.mechanics import frames
 from drone_sim.ros.core.message_conversion import WORLD_FRAME, xyz, xyzw
 from drone_sim.ros.core.validation import read_changes
@@ -49,7 +48,7 @@ def _write(options: argparse.Namespace) -> None:
     if not entries:
         raise BagError(f"{options.bag}: it has no commands on {flight.namespace}/cmd_vel or another command topic")
     landed = " --set start=landed" if begins == "landed" else ""
-    lines = [yaml.safe_dump(one, default_flow_style=True, sort_keys=False, width=math.inf) for one in entries]
+    lines = [dump(entry, "line") for entry in entries]
     writing.write(options.timeline, f"# fly --commands{landed}\n{''.join(f'- {line}' for line in lines)}")
     print(f"{_NAME}: wrote {options.timeline}, {len(entries)} commands: fly --commands {options.timeline}{landed}")
 

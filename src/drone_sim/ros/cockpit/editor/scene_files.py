@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from drone_sim.config.types import merged, named_in, read_yaml
-from drone_sim.files import writing, yaml_files
+from drone_sim.files import writing
 from drone_sim.files.resources import package_path, resolve
+from drone_sim.files.yaml_writing import dump
 from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
 from drone_sim.grading.plan import Plan
@@ -44,8 +45,7 @@ def scene_of(plan: Plan, folder: Path | None = None) -> str:
     content = _content(config, scene_parameters.read(scene) if scene else {})
     file = (folder or _TASK_SCENES.expanduser()) / f"{plan.name}.yaml"
     file.parent.mkdir(parents=True, exist_ok=True)
-    # Through JSON: what is a special kind of text to us is none to YAML.
-    text = yaml_files.dump(json.loads(json.dumps(content)))
+    text = dump(json.loads(json.dumps(content)))  # JSON turns FoundFile into str, which PyYAML can write
     writing.write(file, f"# Made of {plan.path}\n{text}", through_links=False)
     return str(file)
 
