@@ -9,18 +9,18 @@ from typing import Any
 
 from drone_sim.config.errors import changed
 from drone_sim.config.types import ParameterError
-from drone_sim.editing import records, scripts
+from drone_sim.editing import records
 from drone_sim.editing.library import model_said
 from drone_sim.editing.scene_access import SceneAccess
+from drone_sim.editing.scripts import set_parameters
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
-from drone_sim.mechanics.object_names import numbered
+from drone_sim.mechanics.object_names import first_free, numbered
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.scene import models, scene_parameters
 from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters, placed
 from drone_sim.scene.object_parameters import ObjectParameters
-from drone_sim.scene.scene_parameters import entry_from, name_shapes, script_from
 
 _DESCRIPTION_KEYS = ("alias", "category", "model")
 _OPERATION_FOR = {"name": "rename", "parent": "reparent", "position": "move", "rpy": "move"}
@@ -37,13 +37,12 @@ class ObjectEdits:
 
     def add(self, op: records.Add) -> list[int]:
         """Add entries under unused names."""
-        content = {"scene": {"objects": copy.deepcopy(op.objects), "scripts": copy.deepcopy(op.scripts)}}
-        scene_parameters.find_files_beside(self._scene.folder, content)
-        entries = [entry_from(entry) for entry in content["scene"]["objects"]]
-        name_shapes(entries)
+        content = {"objects": copy.deepcopy(op.objects), "scripts": copy.deepcopy(op.scripts)}
+        scene_parameters.find_files_beside(self._scene.folder, {"scene": content})
+        entries, scripts = models.Model(**content).checked()
         if op.position is not None:
             entries[0] = _set_down(entries[0], op.position, op.yaw)
-        return self._add_renamed(entries, [script_from(script) for script in content["scene"]["scripts"]])
+        return self._add_renamed(entries, scripts)
 
     def _add_renamed(
         self, entries: Sequence[EntryParameters], scripts: Sequence[AttachedScriptParameters]
@@ -51,9 +50,7 @@ class ObjectEdits:
         tree = self._scene.tree
         renames: dict[str, str] = {}
         for entry in entries:
-            renames[entry.name] = next(
-                name for name in numbered(entry.name) if name not in tree and name not in renames.values()
-            )
+            renames[entry.name] = first_free(numbered(entry.name), tree, renames.values())
         renamed = [
             entry.model_copy(update={"name": renames[entry.name], "parent": renames.get(entry.parent, entry.parent)})
             for entry in entries
@@ -63,14 +60,12 @@ class ObjectEdits:
 
     def add_model(self, op: records.AddModel) -> list[int]:
         """Add the objects of a model, with its origin at `position`."""
-        model = model_said(op.model, self._scene.folder, self._scene.operations.imported)
-        entries = [entry_from(entry) for entry in model.objects]
-        name_shapes(entries)
+        entries, scripts = model_said(op.model, self._scene.folder, self._scene.operations.imported).checked()
         at = frames.from_rpy(op.position, (0.0, 0.0, op.yaw))
         moved = [entry if entry.parent else placed(entry, "", frames.multiply(at, entry.local)) for entry in entries]
         if len(entries) == 1 and not op.model.endswith(".yaml") and isinstance(entries[0], ObjectParameters):
             moved = [_set_down(entries[0], op.position, op.yaw)]
-        return self._scene.operations.add_named_anew(moved, [script_from(script) for script in model.scripts])
+        return self._scene.operations.add_named_anew(moved, scripts)
 
     def remove(self, handles: Sequence[int], below: bool) -> list[int]:
         """Remove objects; a model, or with `below` every object, is removed with its descendants except vehicles."""
@@ -162,7 +157,7 @@ class ObjectEdits:
         operations, values = self._scene.operations, dict(values)
         parameters = values.pop("script_parameters", None)
         if parameters is not None:
-            scripts.set_parameters(self._scene, handle, parameters)
+            set_parameters(self._scene, handle, parameters)
         entry = operations.entry(handle)
         values = {key: _default(entry, key) if value is None else value for key, value in values.items()}
         self._find_files(values)

@@ -11,8 +11,6 @@ from drone_sim.files.resources import locate, package_path
 from drone_sim.files.yaml_text import YamlText
 from drone_sim.run.scene_document import SceneContent, home
 from drone_sim.run.scene_settings import settings_of
-from drone_sim.scene import models
-from drone_sim.scene.entry import placed
 
 _NEW = "# Metres, radians, kilograms.\nfloor: {size: 5}\nvehicles: {}\nobjects: []\n"
 
@@ -85,13 +83,11 @@ class SceneFiles:
         """Write an object and its descendants as a model. Raises ValueError and OSError."""
         operations, tree = self._scene.operations, self._scene.tree
         path = self._path(name)
-        scripts = self._scene.simulation.scene.scripts
-        entries = [operations.entry(key) for key in operations.model(handle) if self._scene.vehicle_of(key) is None]
-        if not entries:
+        members = [member for member in operations.model(handle) if self._scene.vehicle_of(member) is None]
+        if not members:
             raise ValueError(f"'{tree[handle].name}' is part of a vehicle, which cannot be saved as a model")
-        base = placed(entries[0], "", tree.matrix(handle))
         path.parent.mkdir(parents=True, exist_ok=True)
-        models.write(path, [base, *entries[1:]], [scripts[entry.name] for entry in entries if entry.name in scripts])
+        operations.write_model(members, path)
         return path
 
     def _path(self, name: str | None) -> Path:

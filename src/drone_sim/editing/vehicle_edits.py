@@ -13,10 +13,11 @@ from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.editing.vehicle_parts import Part, part_named, parts_of, with_part
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
-from drone_sim.mechanics.object_names import plain
+from drone_sim.mechanics.object_names import first_free, plain
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.run.rearrangement import put
 from drone_sim.run.scene_settings import keep_names, say_place, vehicles_in, with_floor, with_vehicles
+from drone_sim.scene.entry import pose_keys, rounded
 from drone_sim.vehicles.quadricopter_objects import REMOVABLE
 from drone_sim.vehicles.types import TYPES
 from drone_sim.vehicles.vehicle import Vehicle
@@ -45,7 +46,7 @@ class VehicleEdits:
         entries = self._entries()
         name = _unused_name(op.name or op.type, entries)
         x, y, z = op.position
-        place = {"position": _rounded([x, y, z + op.height]), **({"yaw": op.yaw} if op.yaw else {})}
+        place = {"position": rounded([x, y, z + op.height]), **({"yaw": op.yaw} if op.yaw else {})}
         self._apply({**entries, name: merged({**TYPES[op.type].entry(), **place}, op.values)})
         return [self.root(self._scene.simulation.vehicles[name])]
 
@@ -56,7 +57,7 @@ class VehicleEdits:
         for place in places:
             new = _unused_name(name, entries)
             position = [value + offset for value, offset in zip(original["position"], place)]
-            entries[new] = {**copy.deepcopy(original), "position": _rounded(position)}
+            entries[new] = {**copy.deepcopy(original), "position": rounded(position)}
             names.append(new)
         self._apply(entries)
         return [self.root(self._scene.simulation.vehicles[name]) for name in names]
@@ -136,7 +137,7 @@ class VehicleEdits:
             return
         local = tree.matrix(handle, PARENT)
         tree.set_matrix(handle, WORLD, before)
-        self._set_part(handle, position=_rounded(frames.position(local)), rpy=_rounded(frames.to_rpy(local)))
+        self._set_part(handle, **pose_keys(local))
 
     def reparent(self, handle: int, parent: int, keep: str) -> None:
         """Set the parent of a vehicle's part; `keep`: the pose in the world, or relative to the parent."""
@@ -148,12 +149,7 @@ class VehicleEdits:
         local = tree.matrix(handle, PARENT)
         if keep == "pose":
             local = tree.matrix(handle) if above is None else frames.relative(above.below(), tree.matrix(handle))
-        self._set_part(
-            handle,
-            parent="" if above is None else above.name,
-            position=_rounded(frames.position(local)),
-            rpy=_rounded(frames.to_rpy(local)),
-        )
+        self._set_part(handle, parent="" if above is None else above.name, **pose_keys(local))
 
     def _set_part(self, handle: int, **values: Any) -> None:
         vehicle, entries = self._vehicle(handle), self._entries()
@@ -216,8 +212,4 @@ def _unused_name(wanted: str, entries: Mapping[str, Any]) -> str:
     """Return an unused vehicle name: drone, drone2, drone3, ..."""
     bare = wanted.rstrip("0123456789") or wanted
     names = itertools.chain([wanted], (f"{bare}{number}" for number in itertools.count(2)))
-    return next(name for name in names if name not in entries)
-
-
-def _rounded(numbers: Sequence[float]) -> list[float]:
-    return [round(number, 9) + 0.0 for number in numbers]
+    return first_free(names, entries)

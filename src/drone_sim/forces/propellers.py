@@ -14,11 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Annotated, Literal
 
 from drone_sim.config.types import Checked, Finite, Limits, Within
 from drone_sim.forces.force import Force, PushedBody
 from drone_sim.mechanics.frames import Vector, rotate
+from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.wrench import Wrench
 
 
@@ -136,14 +138,7 @@ class Propellers(Force):
         """Thrust of each propeller in N, in the last step."""
         return [self._newtons * velocity for velocity in self._emitted]
 
-    def save_state(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that restores the carry, the last emission, the air moved, and the effectiveness."""
-        carry, air, effectiveness = self._law.carry, list(self.air), self.effectiveness
-        emitted, newtons = list(self._emitted), self._newtons
-
-        def restore() -> None:
-            self._law.carry, self.air = carry, list(air)
-            self._emitted, self._newtons = emitted, newtons
-            self.weaken(effectiveness)
-
-        return restore
+        emission = saved(self, "air", "_emitted", "_newtons")
+        return in_turn(saved(self._law, "carry"), emission, partial(self.weaken, self.effectiveness))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from drone_sim.forces.force import Force, PushedBody
 from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.mechanics.wrench import Wrench
 
 
@@ -36,11 +36,6 @@ class Pushes(Force):
             wrench.add(push.force, push.torque, (0.0, 0.0, 0.0))
         self.lasting = [(push, steps - 1) for push, steps in self.lasting if steps > 1]
 
-    def save_state(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that restores the present pushes."""
-        pushes = list(self.lasting)
-
-        def restore() -> None:
-            self.lasting = list(pushes)
-
-        return restore
+        return saved(self, "lasting")

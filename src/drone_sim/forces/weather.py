@@ -8,7 +8,8 @@ divided by V; across the wind and upwards a gust has no limits.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -18,6 +19,7 @@ from drone_sim.config.types import Checked, Finite, Parts, Within
 from drone_sim.forces.dryden import Gusts
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 
 _PASSED_AT_START = 100.0  # m of gusts, so that vehicles somewhat downwind meet gusts from the start
 _STILL: Vector = (0.0, 0.0, 0.0)
@@ -106,13 +108,10 @@ class Weather:
         along, across, up = self._gusts.at(way, gusts.deviation, gusts.length)
         return wx + ex * along - ey * across, wy + ey * along + ex * across, wz + up
 
-    def save_state(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that restores the weather; gusts depend on seed, time and place alone."""
-        now, felt, passed, since = self.now, self.is_felt, self._passed, self._since
+        return in_turn(saved(self, "is_felt", "_passed", "_since"), partial(self._restore, self.now))
 
-        def restore() -> None:
-            self.is_felt, self._passed, self._since = felt, passed, since
-            self._apply(now)
-            self.changes += 1
-
-        return restore
+    def _restore(self, now: WeatherParameters) -> None:
+        self._apply(now)
+        self.changes += 1

@@ -9,8 +9,8 @@ from typing import Any
 
 from drone_sim.files import writing
 from drone_sim.files.resources import read_bytes, resolve
-from drone_sim.mechanics import frames
 from drone_sim.message_text import MAX_NAME
+from drone_sim.scene import entry
 
 _DECIMALS = 6  # micrometres and microradians
 _ZEROS = [0.0, 0.0, 0.0]
@@ -18,24 +18,23 @@ _ZEROS = [0.0, 0.0, 0.0]
 
 def number(value: float, digits: int = _DECIMALS) -> float:
     """Return `value` rounded to `digits` decimals, and 0 instead of -0."""
-    return round(float(value), digits) + 0.0
+    return entry.rounded([value], digits)[0]
 
 
 def numbers(values: Iterable[float]) -> list[float]:
     """Return the values rounded by `number`."""
-    return [number(value) for value in values]
+    return entry.rounded(values, _DECIMALS)
 
 
 def shade(color: Iterable[float]) -> list[float]:
     """Return a rounded RGBA colour as a list, without the opacity if it is 1."""
-    red, green, blue, opacity = (number(value, 3) for value in color)
+    red, green, blue, opacity = entry.rounded(color, 3)
     return [red, green, blue] if opacity == 1 else [red, green, blue, opacity]
 
 
 def pose_keys(matrix: Sequence[float]) -> dict[str, Any]:
     """Return the keys `position` (m) and `rpy` (rad) of a transform; a key with only zeros is omitted."""
-    keys = {"position": numbers(frames.position(matrix)), "rpy": numbers(frames.to_rpy(matrix))}
-    return {key: value for key, value in keys.items() if value != _ZEROS}
+    return {key: value for key, value in entry.pose_keys(matrix, _DECIMALS).items() if value != _ZEROS}
 
 
 def label(text: str) -> str:

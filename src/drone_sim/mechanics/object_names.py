@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 
 NO_SUFFIX = -1  # suffix of a name without one
 _SUFFIXED = re.compile(r"(.+)#(\d+)", re.DOTALL)
@@ -30,6 +30,16 @@ def shifted(names: Sequence[str], taken: Container[str]) -> list[str]:
 def numbered(name: str) -> Iterator[str]:
     """Return an iterator over a name without and with numbers: Cuboid, Cuboid0, Cuboid1, ..."""
     return itertools.chain([name], (f"{name}{number}" for number in itertools.count()))
+
+
+def suffixes() -> Iterator[str]:
+    """Return an iterator over the suffixes of a model's copies: '', #0, #1, ..."""
+    return itertools.chain([""], map("#{}".format, itertools.count()))
+
+
+def first_free(names: Iterable[str], *taken: Container[str]) -> str:
+    """Return the first of `names` that is in none of the containers."""
+    return next(name for name in names if not any(name in container for container in taken))
 
 
 def plain(name: str) -> str:

@@ -177,7 +177,7 @@ class ObjectTree:
         """Iterate over the handles."""
         return iter(self._objects)
 
-    def __contains__(self, name: str) -> bool:
+    def __contains__(self, name: object) -> bool:
         """Return whether an object has that name."""
         return name in self._handles
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import itertools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,10 @@ from drone_sim.config.types import FoundFile, merged
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
-from drone_sim.mechanics.object_names import split
+from drone_sim.mechanics.object_names import first_free, split, suffixes
 from drone_sim.run.parameters import Parameters, load
 from drone_sim.scene import models, scene_parameters
+from drone_sim.scene.entry import pose_keys
 from drone_sim.vehicles.parameters import PlaceParameters, VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -117,10 +117,9 @@ def _place(vehicle: VehicleParameters, entry: Mapping[str, Any]) -> dict[str, An
 
 def say_place(entry: dict[str, Any], matrix: Matrix, leans: bool = True) -> None:
     """Set the start pose in a vehicle's entry; roll and pitch only if `leans`."""
-    (roll, pitch, yaw), position = (
-        [round(value, 9) + 0.0 for value in values] for values in (frames.to_rpy(matrix), frames.position(matrix))
-    )
-    entry["position"] = position
+    keys = pose_keys(matrix)
+    roll, pitch, yaw = keys["rpy"]
+    entry["position"] = keys["position"]
     if yaw or "yaw" in entry:
         entry["yaw"] = yaw
     if leans and (roll or pitch or "tilt" in entry):
@@ -139,13 +138,13 @@ def with_vehicles(settings: Settings, fleet: _VehicleSettings, parameters: Param
 
 def keep_names(entries: _VehicleSettings, vehicles: Mapping[str, Vehicle]) -> None:
     """Keep the object names of existing vehicles: write an explicit suffix where the default would differ."""
-    free = itertools.chain([""], map("#{}".format, itertools.count()))
+    free = suffixes()
     taken = {vehicles[name].suffix for name, entry in entries.items() if name in vehicles and "suffix" in entry}
     for name, entry in entries.items():
         if "suffix" in entry or name not in vehicles:
             continue
         present = vehicles[name].suffix
-        if next(suffix for suffix in free if suffix not in taken) != present:
+        if first_free(free, taken) != present:
             entry["suffix"] = split(f"_{present}")[1]
 
 

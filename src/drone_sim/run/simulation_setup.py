@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import itertools
 from collections.abc import Iterable
 from typing import Any
 
@@ -15,7 +14,7 @@ from drone_sim.hosting.child_scripts import ChildScript
 from drone_sim.hosting.script_scheduler import AnyScript, ScriptScheduler, raise_first
 from drone_sim.importing.cache import imported_scene
 from drone_sim.mechanics.clock import Clock
-from drone_sim.mechanics.object_names import suffixed
+from drone_sim.mechanics.object_names import first_free, suffixed, suffixes
 from drone_sim.mechanics.object_tree import NO_HANDLES, Handles, ObjectTree
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.velocity_meter import VelocityMeter
@@ -180,7 +179,7 @@ class SimulationSetup:
                     f"vehicle {parameters.name}: suffix = {parameters.suffix}: another vehicle has the same suffix"
                 )
             return wanted
-        return next(free for free in itertools.chain([""], map("#{}".format, itertools.count())) if free not in taken)
+        return first_free(suffixes(), taken)
 
     def _clear_tree(self) -> None:
         self.context.clear()

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector, cross
 from drone_sim.mechanics.inertia import Inertia
+from drone_sim.mechanics.saved_state import Restore, in_turn
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose, State
 from drone_sim.scene.entry import Place
@@ -223,15 +225,9 @@ class ShapeObject(SceneObject):
             self.set_static(False)
         self.parent = None
 
-    def save_state(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that restores its place in the tree and whether it is static."""
-        restore_place, static = super().save_state(), self.is_static
-
-        def restore() -> None:
-            self.set_static(static)
-            restore_place()
-
-        return restore
+        return in_turn(partial(self.set_static, self.is_static), super().save_state())
 
     def forget_body(self, number: int) -> None:
         """Forget a removed body from the set of those with which it does not collide."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
 from drone_sim.config.types import Angles, Checked, Finite, Label, ParameterError, Point, Switch, Within
@@ -73,16 +73,18 @@ def place_of(item: SceneObject) -> dict[str, Any]:
     """Return the present values of an entry's keys for pose, parent and the state of a joint."""
     parent = item.parent
     matrix = item.matrix() if parent is None else frames.relative(parent.below(), item.matrix())
-    values = place_at(matrix, "" if parent is None else parent.name)
+    values = {**pose_keys(matrix), "parent": "" if parent is None else parent.name}
     return {**values, **_joint(item)} if isinstance(item, Joint) else values
 
 
-def place_at(matrix: Matrix, parent: str) -> dict[str, Any]:
-    """Return the keys of an entry for a pose in the frame of its parent, rounded to 1e-9 m and rad."""
-    position, rpy = (  # adding 0.0 turns -0.0 into 0.0
-        [round(value, 9) + 0.0 for value in values] for values in (frames.position(matrix), frames.to_rpy(matrix))
-    )
-    return {"position": position, "rpy": rpy, "parent": parent}
+def rounded(values: Iterable[float], decimals: int = 9) -> list[float]:
+    """Return values as files have them: rounded, and 0 instead of -0."""
+    return [round(float(value), decimals) + 0.0 for value in values]
+
+
+def pose_keys(matrix: Sequence[float], decimals: int = 9) -> dict[str, list[float]]:
+    """Return the keys `position` (m) and `rpy` (rad) of a transform."""
+    return {"position": rounded(frames.position(matrix), decimals), "rpy": rounded(frames.to_rpy(matrix), decimals)}
 
 
 def stands_at(entry: EntryParameters, place: Mapping[str, Any]) -> bool:
@@ -95,8 +97,8 @@ def stands_at(entry: EntryParameters, place: Mapping[str, Any]) -> bool:
 
 def placed(entry: EntryParameters, parent: str, matrix: Matrix) -> EntryParameters:
     """Return the entry with another parent and pose in the parent's frame."""
-    place = place_at(matrix, parent)
-    return entry.model_copy(update={"parent": parent, **{key: tuple(place[key]) for key in ("position", "rpy")}})
+    place = {key: tuple(values) for key, values in pose_keys(matrix).items()}
+    return entry.model_copy(update={"parent": parent, **place})
 
 
 def _joint(joint: Joint) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.attached_scripts import AttachedScriptParameters
-from drone_sim.scene.entry import EntryParameters, place_at
+from drone_sim.scene.entry import EntryParameters, pose_keys
 from drone_sim.scene.object_parameters import CompoundParameters, ObjectParameters, PartParameters
 from drone_sim.shapes import SCENE_SHAPES
 from drone_sim.shapes.compound import parts_of
@@ -46,7 +46,7 @@ def grouped(entries: Sequence[EntryParameters], frames_of: Sequence[Matrix]) -> 
         members = entry.parts if isinstance(entry, CompoundParameters) else [entry]
         for member in members:
             pose = local if member is entry else frames.multiply(local, frames.from_rpy(member.position, member.rpy))
-            parts.append({**_shape_keys(member), **_pose_keys(pose)})
+            parts.append({**_shape_keys(member), **pose_keys(pose)})
         mass += entry.mass
     first = entries[0]
     assert isinstance(first, ObjectParameters), "checked above"
@@ -66,7 +66,7 @@ def parted(entry: EntryParameters, matrix: Matrix) -> list[dict[str, Any]]:
         {
             **common,
             **_shape_keys(part),
-            **_pose_keys(frames.multiply(matrix, frames.from_rpy(part.position, part.rpy))),
+            **pose_keys(frames.multiply(matrix, frames.from_rpy(part.position, part.rpy))),
             "mass": entry.mass * volume / sum(volumes),
         }
         for part, volume in zip(entry.parts, volumes)
@@ -76,10 +76,6 @@ def parted(entry: EntryParameters, matrix: Matrix) -> list[dict[str, Any]]:
 def _shape_keys(parameters: ObjectParameters | PartParameters) -> dict[str, Any]:
     keys = [field.name for field in fields(SCENE_SHAPES[parameters.shape])]
     return {"shape": parameters.shape, "color": parameters.color, **{key: getattr(parameters, key) for key in keys}}
-
-
-def _pose_keys(matrix: Matrix) -> dict[str, Any]:
-    return {key: value for key, value in place_at(matrix, "").items() if key != "parent"}
 
 
 def _volume(part: PartParameters) -> float:
@@ -197,6 +193,12 @@ class Model(NamedTuple):
 
     objects: list[dict[str, Any]]
     scripts: list[dict[str, Any]]
+
+    def checked(self) -> tuple[list[EntryParameters], list[AttachedScriptParameters]]:
+        """Return entries and scripts; unnamed shapes get names. Raises ParameterError."""
+        entries = [scene_parameters.entry_from(values) for values in self.objects]
+        scene_parameters.name_shapes(entries)
+        return entries, [scene_parameters.script_from(values) for values in self.scripts]
 
 
 def read(path: Path, imported: Callable[[Path], Path]) -> Model:

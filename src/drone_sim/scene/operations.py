@@ -15,7 +15,7 @@ from typing import Any
 from drone_sim.config.errors import changed
 from drone_sim.config.types import ParameterError
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.object_names import numbered, plain, shifted, suffixed
+from drone_sim.mechanics.object_names import first_free, numbered, plain, shifted, suffixes
 from drone_sim.mechanics.object_tree import PARENT, WORLD, levels
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.scene import models
@@ -32,8 +32,6 @@ from drone_sim.scene.scene_parameters import (
     check_files,
     check_parents,
     entry_from,
-    name_shapes,
-    script_from,
 )
 
 _IN_DYNAMICS = (ObjectParameters, JointParameters, ForceSensorParameters)
@@ -67,7 +65,7 @@ class SceneOperations:
 
     def free_name(self, wanted: str) -> str:
         """Return an unused name: the wanted one, or the first free one with a number: Cuboid, Cuboid0, Cuboid1, ..."""
-        return next(name for name in numbered(wanted) if name not in self._scene.tree and plain(name) == name)
+        return first_free((name for name in numbered(wanted) if plain(name) == name), self._scene.tree)
 
     def _index(self, handle: int) -> int:
         item = self._scene.tree[handle]
@@ -159,10 +157,11 @@ class SceneOperations:
         self, entries: Sequence[EntryParameters], scripts: Sequence[AttachedScriptParameters] = ()
     ) -> list[int]:
         """Add entries and their scripts under their names or, if one is taken, all of them with names of copies."""
-        tree, renames, names = self._scene.tree, {"": ""}, []
+        tree, renames = self._scene.tree, {"": ""}
+        names: list[str] = []
         for entry, wanted in zip(entries, shifted([entry.name for entry in entries], {*tree.names})):
-            free = itertools.chain([wanted], (suffixed(plain(wanted), number) for number in itertools.count()))
-            names.append(next(name for name in free if name not in tree and name not in names))
+            copies = (plain(wanted) + suffix for suffix in suffixes() if suffix)
+            names.append(first_free(itertools.chain([wanted], copies), tree, names))
             renames.setdefault(entry.name, names[-1])
         renamed = [
             entry.model_copy(update={"name": name, "alias": alias, "parent": renames.get(entry.parent, entry.parent)})
@@ -215,18 +214,17 @@ class SceneOperations:
 
         Raises ValueError.
         """
-        model = models.read(models.inside(self.folder, name, ".ttm"), self.imported)
-        scripts = [script_from(script) for script in model.scripts]
-        entries = [entry_from(entry) for entry in model.objects]
-        name_shapes(entries)
-        return self.add_named_anew(entries, scripts)[0]
+        return self.add_named_anew(*models.read(models.inside(self.folder, name, ".ttm"), self.imported).checked())[0]
 
     def save_model(self, handle: int, name: str) -> None:
-        """Write an object and its descendants to a file. Raises ValueError."""
-        path = models.inside(self.folder, name)
-        entries = [self.entry(member) for member in self.model(handle)]
+        """Write an object and its descendants to a file in the folder of the scene. Raises ValueError."""
+        self.write_model(self.model(handle), models.inside(self.folder, name))
+
+    def write_model(self, members: Sequence[int], path: Path) -> None:
+        """Write objects with their scripts to a file, the base first. Raises ValueError."""
+        entries = [self.entry(member) for member in members]
         scripts = [self._scene.scripts[entry.name] for entry in entries if entry.name in self._scene.scripts]
-        models.write(path, [placed(entries[0], "", self._scene.tree.matrix(handle)), *entries[1:]], scripts)
+        models.write(path, [placed(entries[0], "", self._scene.tree.matrix(members[0])), *entries[1:]], scripts)
 
     # ---- names and parents
 

@@ -27,7 +27,7 @@ from drone_sim.config.types import (
 )
 from drone_sim.files import images, mesh_files
 from drone_sim.files.resources import resolve
-from drone_sim.mechanics.object_names import numbered
+from drone_sim.mechanics.object_names import first_free, numbered
 from drone_sim.mechanics.object_tree import DEEPEST
 from drone_sim.message_text import near_names, shown
 from drone_sim.scene import attached_scripts, object_collections
@@ -114,8 +114,7 @@ def name_shapes(objects: list[EntryChoice]) -> None:
     for index, entry in enumerate(objects):
         if not entry.name and isinstance(entry, ObjectParameters):
             word = _VREP_NAMES.get(entry.shape, entry.shape.capitalize())
-            names = free.setdefault(word, (candidate for candidate in numbered(word) if candidate not in taken))
-            name = next(names)
+            name = first_free(free.setdefault(word, numbered(word)), taken)
             objects[index] = entry.model_copy(update={"name": name, "alias": word if name != word else ""})
 
 
