@@ -148,7 +148,7 @@ def listen(topic: str, kind: Any, callback: Any = lambda message: None) -> Any:
 # The node with a clock at its ear: a command says, in a field that the drone does not use, when it was sent.
 PROBE = """
 import sys, time
-from drone_sim.run.guardian import Guardian
+from drone_sim.run.watchdog import Watchdog
 from drone_sim.ros.node import node
 from drone_sim.ros.vehicle import inputs
 delays = []
@@ -158,7 +158,7 @@ def probe(self, message):
     return heard(self, message)
 inputs.VehicleInputs._twist = probe
 path, sys.argv[1:] = sys.argv[1], sys.argv[2:]
-node.main(Guardian("drone_sim"))
+node.main(Watchdog("drone_sim"))
 open(path, "w").write("\\n".join(map(repr, delays)))
 """
 

@@ -32,15 +32,15 @@ HANGS = 90.0  # s; nothing here takes nearly as long unless it hangs
 # The simulator with a call into PyBullet that does not return.
 STUCK = """
 import sys, time
-from drone_sim.run.guardian import Guardian
-guardian = Guardian("drone_sim")
+from drone_sim.run.watchdog import Watchdog
+watchdog = Watchdog("drone_sim")
 from drone_sim.ros.node import node
 from drone_sim.world import World
 def stuck(*_arguments, **_options):
     print("flying into it", flush=True)
     {call}
 World.{function} = stuck
-sys.exit(node.main(guardian))
+sys.exit(node.main(watchdog))
 """
 HOLDS_THE_LOCK, LETS_GO_OF_IT = "sum(range(10**13))", "time.sleep(1000)"
 

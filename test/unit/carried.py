@@ -8,7 +8,7 @@ from drone_sim.mechanics import frames, urdf
 from drone_sim.mechanics.frames import IDENTITY
 from drone_sim.mechanics.state import Pose, State
 from drone_sim.mechanics.wrench import Wrench
-from drone_sim.sensors.sensor import Contact, Fitting, Hit
+from drone_sim.sensors.sensor import Contact, Hit, Mounting
 from drone_sim.world import World
 
 SUB_STEP = 0.005
@@ -23,7 +23,7 @@ FIELD = (1.334e-6, 21.523e-6, -43.290e-6)
 class Carried:
     """Something with sensors; `state` is what a test makes of it."""
 
-    mass, gravity, jumps = BODY.mass, GRAVITY, 0
+    mass, gravity, teleports = BODY.mass, GRAVITY, 0
     datum, magnetic_field = ZURICH, FIELD
     thrusts = (0.0, 0.0, 0.0, 0.0)
 
@@ -37,7 +37,7 @@ class Carried:
         def pose():
             return frames.multiply(self.state.matrix, mount)
 
-        sensor = parameters.make(Fitting(name, self, pose, SUB_STEP))
+        sensor = parameters.make(Mounting(name, self, pose, SUB_STEP))
         sensor.reset()
         self.sensors.append(sensor)
         return sensor
@@ -101,7 +101,7 @@ class Flown(Carried):
         return [Contact(self.names[one.body], *one[1:]) for one in self.world.queries.contacts(self.body)]
 
     def move(self, pose):
-        self.jumps += 1
+        self.teleports += 1
         self.world.set_pose(self.body, pose)
         self.state = self.world.state(self.body)
 

@@ -8,7 +8,7 @@ from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.velocity_meter import VelocityMeter
 from drone_sim.scripting import load
 from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.host import ScriptContext, Surroundings
+from drone_sim.scripting.api.host import SceneServices, ScriptContext
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_sim, make_sim_ros
 from drone_sim.scripting.api.windows import Windows
@@ -70,7 +70,7 @@ class Drone:
         return 0.0
 
     def sim(self):
-        return make_sim(self, Surroundings())
+        return make_sim(self, SceneServices())
 
     def load(self, path):
         return load.load(

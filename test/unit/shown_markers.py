@@ -69,7 +69,7 @@ class _Always:
 
 def _now(simulation):
     scene = simulation.scene
-    return [scene.entry_now(index) for index in scene.entries]
+    return [scene.current_entry(index) for index in scene.entries]
 
 
 def _looks(simulation, entry):

@@ -16,7 +16,7 @@ from drone_sim.scripting import load
 from drone_sim.scripting.api import ignored
 from drone_sim.scripting.api.calls import Api, flat_name
 from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
 from drone_sim.scripting.errors import ScriptError
@@ -114,7 +114,7 @@ def _modules(simulation):
     for one in (shared.control, shared.data, shared.tubes, shared.collections):
         one.clear()
     weights = {"masses": drone.masses, "inertias": drone.inertias, "nearest": Distances(shared).nearest}
-    around = Surroundings(PICTURES, planes={"TrackCam": (1.0, 5.0)}, operations=simulation.operations, **weights)
+    around = SceneServices(PICTURES, planes={"TrackCam": (1.0, 5.0)}, operations=simulation.operations, **weights)
     before = set(shared.objects)
     yield {
         "sim": make_sim(own, around),

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from drone_sim.hosting.child_scripts import surroundings
+from drone_sim.hosting.child_scripts import services
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
@@ -43,7 +43,7 @@ def _sim(simulation):
     simulation.drone.body.move(Pose((0.0, 0.0, 1.0)))
     own = simulation.child_scripts["drone"]
     return make_sim(
-        own, surroundings([simulation.drone], simulation.context, simulation.operations, TimeLimit(0.0), Turns())
+        own, services([simulation.drone], simulation.context, simulation.operations, TimeLimit(0.0), Turns())
     )
 
 

@@ -15,7 +15,7 @@ from drone_sim.shapes.compound import Part
 from drone_sim.shapes.mass import inertia_of
 from drone_sim.shapes.shape import WHITE
 from drone_sim.world import World
-from drone_sim.world.assemblies import Hinge, Link
+from drone_sim.world.assemblies import Link, LinkJoint
 
 SUB_STEP = 0.005  # s
 TUMBLE = (4.0, 7.0, 4.0)  # rad/s, 9 in all
@@ -44,7 +44,7 @@ def add_box_on_a_hinge(world):
     """Add a small ball's mass with the box as its second link, about the same centre."""
     parts = [Part(BOX, IDENTITY, WHITE)]
     small = [Part(Box((0.01, 0.01, 0.01)), IDENTITY, WHITE)]
-    hinge = Hinge(0, IDENTITY, "fixed", None, 0.0)
+    hinge = LinkJoint(0, IDENTITY, "fixed", None, 0.0)
     links = [
         Link(small, mass=0.01, inertia=inertia_of(small, 0.01)),
         Link(parts, mass=MASS, inertia=inertia_of(parts, MASS), hinge=hinge),

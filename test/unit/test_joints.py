@@ -11,7 +11,7 @@ from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.modules import make_sim
 
 SCENE = """
@@ -62,7 +62,7 @@ def found(simulation, name):
 
 
 def sim_of(simulation):
-    return make_sim(simulation.child_scripts["drone"], Surroundings(operations=simulation.operations))
+    return make_sim(simulation.child_scripts["drone"], SceneServices(operations=simulation.operations))
 
 
 def run(simulation, seconds):

@@ -6,7 +6,7 @@ import pytest
 
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.modules import make_sim
 
 DOWN = "kind: proximity_sensor, rpy: [3.141592653589793, 0, 0]"
@@ -41,7 +41,7 @@ def _simulation(tmp_path_factory):
 
 @pytest.fixture(name="sim")
 def _sim(simulation):
-    return make_sim(simulation.child_scripts["drone"], Surroundings(operations=simulation.operations))
+    return make_sim(simulation.child_scripts["drone"], SceneServices(operations=simulation.operations))
 
 
 def test_a_ray_is_exact(simulation, sim):

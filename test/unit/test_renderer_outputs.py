@@ -6,7 +6,7 @@ import pytest
 from drawing import AHEAD, CAMERA, FLOOR, GREY, RED, at, box, looking
 
 from drone_sim.render.intrinsics import Intrinsics
-from drone_sim.render.renderer import Moment
+from drone_sim.render.renderer import FrameState
 from drone_sim.shapes.box import Box
 from drone_sim.shapes.cylinder import Cylinder
 from drone_sim.shapes.sphere import Sphere
@@ -142,7 +142,7 @@ def test_where_a_point_was_before_is_known_to_the_picture(renderer):
     then, now = np.array([at(3, 0.1, 1), at(5, 0, 1)]), np.array([at(2.9, -0.1, 1.1), at(5, 0, 1)])
     turned = looking((0.05, 0.1, 1.02), (3, 0.3, 1.0))
     renderer.set_visuals(visuals)
-    before = Moment(AHEAD, then)
+    before = FrameState(AHEAD, then)
     drawn = renderer.render_outputs(EVERYTHING, CAMERA, turned, now, instances=np.array([1, 2]), before=before)
     there = np.isfinite(drawn["depth"])
     points = flat(CAMERA) * np.nan_to_num(drawn["depth"])[..., None] @ turned[:3, :3].T + turned[:3, 3]
@@ -158,7 +158,7 @@ def test_outputs_are_the_same_alone_and_together(renderer):
     glass = box("glass", (0.1, 0.5, 2), (1, 1, 1, 0.3))
     renderer.set_visuals([box("a", (0.5, 0.5, 0.5)), glass, FLOOR, ground])
     poses = np.array([at(3, 0, 1), at(2, 0.6, 1), at(0, 0, 0.01), at(0, 0, -0.1)])
-    given = {"instances": np.array([7, 60000, 8, 9]), "before": Moment(AHEAD, poses)}
+    given = {"instances": np.array([7, 60000, 8, 9]), "before": FrameState(AHEAD, poses)}
     together = renderer.render_outputs(EVERYTHING, CAMERA, AHEAD, poses, **given)
     colored = renderer.render_outputs((*EVERYTHING, "color"), CAMERA, AHEAD, poses, **given)
     np.testing.assert_array_equal(colored["color"], renderer.render(CAMERA, AHEAD, poses))

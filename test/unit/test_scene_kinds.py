@@ -14,7 +14,7 @@ from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.modules import make_sim
 
 SCENE = """
@@ -66,7 +66,7 @@ def found(simulation, name):
 
 
 def sim_of(simulation):
-    return make_sim(simulation.child_scripts["drone"], Surroundings(operations=simulation.operations))
+    return make_sim(simulation.child_scripts["drone"], SceneServices(operations=simulation.operations))
 
 
 def place(simulation, name):

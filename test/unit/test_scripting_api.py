@@ -11,7 +11,7 @@ from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.calls import UnknownName
 from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.modules import make_sim
 
 SMALL = {"front": {"width": 8, "height": 6}}
@@ -31,7 +31,7 @@ def _simulation(tmp_path):
 def _sim(simulation):
     return make_sim(
         simulation.child_scripts["drone"],
-        Surroundings({"FrontVision": lambda *_: PICTURE}, operations=simulation.operations),
+        SceneServices({"FrontVision": lambda *_: PICTURE}, operations=simulation.operations),
     )
 
 

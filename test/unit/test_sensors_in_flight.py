@@ -12,7 +12,7 @@ from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.run.stepping import Diverged
-from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.modules import make_sim
 
 ALL = {"config": str(package_path() / "config" / "sensors.yaml")}
@@ -194,7 +194,7 @@ def test_the_stock_range_sensor_of_a_landed_drone_is_above_the_floor(simulate):
     fly(simulation, 2)
     sensor = simulation.drone.instruments.by_name["range"]
     reading = sensor.latest.value
-    assert 0 < frames.position(sensor.fitting.pose())[2] < sensor.parameters.min_range
+    assert 0 < frames.position(sensor.mounting.pose())[2] < sensor.parameters.min_range
     assert reading.distance == -math.inf  # nearer than it can measure, for REP-117
     assert (reading.hit.what, reading.hit.distance) == ("Floor", pytest.approx(0, abs=2e-3))
     assert reading.hit.normal == pytest.approx((0, 0, 1), abs=1e-9)
@@ -209,7 +209,7 @@ def _sim(simulate):
     box = {"name": "Box", "shape": "box", "size": [1, 1, 0.3], "position": [0, 0, 0.15]}
     sensors = {"down": {"kind": "range", "rate": 20, "min_range": 0.05, "max_range": 2.0}, **EXACT}
     simulation = simulate({"sensors": sensors, "scene": {"objects": [box]}})
-    sim = make_sim(simulation.child_scripts["drone"], Surroundings(operations=simulation.operations))
+    sim = make_sim(simulation.child_scripts["drone"], SceneServices(operations=simulation.operations))
     return simulation, sim
 
 

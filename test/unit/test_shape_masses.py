@@ -8,7 +8,7 @@ import pytest
 from drone_sim.mechanics import frames
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.modules import make_sim
 
 SCENE = """
@@ -38,7 +38,7 @@ def _simulation(tmp_path):
 
 @pytest.fixture(name="sim")
 def _sim(simulation):
-    return make_sim(simulation.child_scripts["drone"], Surroundings(operations=simulation.operations))
+    return make_sim(simulation.child_scripts["drone"], SceneServices(operations=simulation.operations))
 
 
 def test_mass_and_inertia_are_told_in_the_world(simulation, sim):

@@ -18,7 +18,7 @@ HANGS = 90.0  # s; nothing here takes nearly as long unless it hangs
 NODE = """
 import signal, sys, threading
 import rospy
-from drone_sim.run.guardian import Guardian
+from drone_sim.run.watchdog import Watchdog
 class Lock:
     def __init__(self):
         self.lock, self.armed = threading.Lock(), True
@@ -34,7 +34,7 @@ lock = Lock()
 def shut(reason):
     with lock:
         pass
-guardian = Guardian("node") if {guarded} else None
+watchdog = Watchdog("node") if {guarded} else None
 from drone_sim.ros.core.shutdown import Shutdown, end_on_signals
 rospy.core.add_shutdown_hook(shut)
 {install}
@@ -48,7 +48,7 @@ print("ended")
 WAYS = {
     "shut down": ("end_on_signals()", "rospy.is_shutdown()", "", False),
     "asked": ("shutdown = Shutdown()", "shutdown.asked()", "shutdown.complete()", False),
-    "guarded": ("shutdown = Shutdown(guardian)", "shutdown.asked()", "shutdown.complete()", True),
+    "guarded": ("shutdown = Shutdown(watchdog)", "shutdown.asked()", "shutdown.complete()", True),
 }
 
 

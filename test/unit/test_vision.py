@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drone_sim.files.resources import package_path
-from drone_sim.hosting.child_scripts import surroundings
+from drone_sim.hosting.child_scripts import services
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
@@ -198,7 +198,7 @@ def test_every_sensor_gives_colours_and_depths():
     simulation = Simulation(parameters.load(scene))
     try:
         script = simulation.child_scripts["drone"]
-        around = surroundings([simulation.drone], simulation.context, simulation.operations, TimeLimit(0.0), Turns())
+        around = services([simulation.drone], simulation.context, simulation.operations, TimeLimit(0.0), Turns())
         sim = make_sim(script, around)
         for name in ("FrontVision", "DepthVision", "Eye"):
             handle = sim.getObjectHandle(name)

@@ -73,12 +73,12 @@ def _combined(first: Mapping[_Key, _Pair[_Value]], second: Mapping[_Key, _Pair[_
     return {key: pair for key, pair in pairs.items() if pair[0] != pair[1]}
 
 
-def carry_out(simulation: Simulation, change: SceneChange, arrange: Callable[[Settings], None]) -> None:
+def apply_change(simulation: Simulation, change: SceneChange, arrange: Callable[[Settings], None]) -> None:
     """Apply a change to a scene that is in the state before it; `arrange` applies changed settings.
 
     Raises ValueError; a part of the change may then be applied already.
     """
-    _ChangeApplier(simulation, change).carry_out(arrange)
+    _ChangeApplier(simulation, change).apply_change(arrange)
 
 
 class _ChangeApplier:
@@ -90,7 +90,7 @@ class _ChangeApplier:
         self._added = {handle: after for handle, (before, after) in pairs if before is None and after is not None}
         self._changed = {handle: (old, new) for handle, (old, new) in pairs if old is not None and new is not None}
 
-    def carry_out(self, arrange: Callable[[Settings], None]) -> None:
+    def apply_change(self, arrange: Callable[[Settings], None]) -> None:
         self._remove()
         before, after = self._change.settings
         if before != after:
@@ -136,7 +136,7 @@ class _ChangeApplier:
                 now = operations.entry(handle)
                 entries[handle] = new.model_copy(update={"name": now.name, "parent": now.parent})
         if entries:
-            operations.exchange(entries)
+            operations.replace_entries(entries)
         for handle, (old, new) in self._changed.items():
             described = {key: getattr(new, key) for key in _DESCRIPTION_KEYS if key in _different_keys(old, new)}
             if described and type(old) is type(new):

@@ -10,7 +10,7 @@ from typing import Any
 from drone_sim.config.errors import checked
 from drone_sim.config.types import Checked
 from drone_sim.editing import records
-from drone_sim.editing.changes import SceneChange, carry_out, change_between
+from drone_sim.editing.changes import SceneChange, apply_change, change_between
 from drone_sim.editing.drafts import Drafts
 from drone_sim.editing.edit_operations import EditOperations
 from drone_sim.editing.history import History, Step
@@ -144,7 +144,7 @@ class SceneEditor:
 
     def _apply(self, change: SceneChange) -> None:
         if not change.is_empty:
-            carry_out(self.simulation, change, self.scene.arrange)
+            apply_change(self.simulation, change, self.scene.apply_settings)
 
     def _answer(self, message: str, **more: Any) -> dict[str, Any]:
         return {"revision": self.revision, "said": message, "until_stop": self.simulation.running, **more}

@@ -147,7 +147,7 @@ class ObjectEdits:
         rest = {handle: self._set_simple(handle, values) for handle, values in values_by_handle.items()}
         entries = {handle: operations.entry_with(handle, values) for handle, values in rest.items() if values}
         if entries:
-            operations.exchange(entries)
+            operations.replace_entries(entries)
 
     def _set_simple(self, handle: int, values: Mapping[str, Any]) -> dict[str, Any]:
         """Set the keys that do not need a new body in the world; return the others."""

@@ -53,7 +53,7 @@ class SceneRows:
             if self._known.get(handle) != state:
                 self._known[handle] = state
                 if entry is not None:
-                    content = scene.simulation.scene.entry_now(index)
+                    content = scene.simulation.scene.current_entry(index)
                 self.rows[handle] = row = _row(handle, item, parent, content, script)
                 row["vehicle"] = vehicle.name if vehicle else ""
                 row["of"] = "vehicle" if vehicle else "scene" if entry is not None else "floor"

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.run.flight_changes import put
 from drone_sim.run.parameters import Parameters
-from drone_sim.run.rearrangement import put
 from drone_sim.run.scene_document import SceneContent, SceneDocument
 from drone_sim.run.scene_settings import PLACE, Settings
 from drone_sim.run.simulation import Simulation
@@ -75,7 +75,9 @@ class SceneAccess:
     def tops(self, handles: Sequence[int]) -> list[int]:
         """Return the handles of the objects that are not descendants of any other."""
         tree = self.tree
-        return [handle for handle in handles if not any(tree[handle].hangs_on(tree[other]) for other in handles)]
+        return [
+            handle for handle in handles if not any(tree[handle].is_descendant_of(tree[other]) for other in handles)
+        ]
 
     # ---- settings
 
@@ -87,7 +89,7 @@ class SceneAccess:
         scene = result.scene.model_copy(update={"objects": present.objects, "scripts": present.scripts})
         return result.varied(result.weather, scene, result.fleet)
 
-    def arrange(self, settings: Settings) -> None:
+    def apply_settings(self, settings: Settings) -> None:
         """Apply other settings to the scene. Raises ParameterError and UrdfError; then nothing has changed."""
         if settings == self.settings:
             return
@@ -96,14 +98,14 @@ class SceneAccess:
             self._check_flight(settings)
         parameters = self.checked(settings)
         if simulation.running:
-            simulation.rearrange(parameters)
+            simulation.apply_in_flight(parameters)
         elif self._only_moves(settings, parameters):
             for vehicle in parameters.fleet:
                 put(simulation.vehicles[vehicle.name], vehicle.matrix)
-            simulation.arrange(parameters, rebuild=False)
+            simulation.replace_scene(parameters, rebuild=False)
             simulation.scene.is_changed = True
         else:
-            simulation.arrange(parameters)
+            simulation.replace_scene(parameters)
         self.document.settings = settings
 
     def _check_flight(self, settings: Settings) -> None:

@@ -62,7 +62,7 @@ class SceneFiles:
             simulation.load_scene(file)
             return
         simulation.stop()
-        simulation.arrange(simulation.parameters.with_content(yaml_files.parse(_NEW), home()).in_file(""))
+        simulation.replace_scene(simulation.parameters.with_content(yaml_files.parse(_NEW), home()).in_file(""))
         simulation.document.belong_to(None, home(), _NEW, simulation.object_handles)
 
     def save(self, name: str | None) -> Path:
@@ -75,7 +75,7 @@ class SceneFiles:
         text = simulation.save_scene(path)
         if not simulation.running:
             simulation.operations.folder = path.parent
-            simulation.arrange(simulation.parameters.in_file(str(path)), rebuild=False)
+            simulation.replace_scene(simulation.parameters.in_file(str(path)), rebuild=False)
             simulation.document.belong_to(path, path.parent, text, simulation.object_handles)
         return path
 

@@ -15,7 +15,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.object_names import first_free, plain
 from drone_sim.mechanics.object_tree import PARENT, WORLD
-from drone_sim.run.rearrangement import put
+from drone_sim.run.flight_changes import put
 from drone_sim.run.scene_settings import keep_names, say_place, vehicles_in, with_floor, with_vehicles
 from drone_sim.scene.entry import pose_keys, rounded
 from drone_sim.vehicles.quadricopter_objects import REMOVABLE
@@ -34,7 +34,7 @@ class VehicleEdits:
 
     def _apply(self, entries: dict[str, dict[str, Any]]) -> None:
         scene = self._scene
-        scene.arrange(with_vehicles(scene.settings, entries, scene.simulation.parameters))
+        scene.apply_settings(with_vehicles(scene.settings, entries, scene.simulation.parameters))
 
     def _entries(self) -> dict[str, dict[str, Any]]:
         return vehicles_in(self._scene.settings, self._scene.simulation.parameters)
@@ -167,7 +167,7 @@ class VehicleEdits:
         """Set keys of the floor, of a vehicle's entry, or of a camera or sensor."""
         scene = self._scene
         if scene.tree[handle].name == FLOOR:
-            scene.arrange(with_floor(scene.settings, values))
+            scene.apply_settings(with_floor(scene.settings, values))
             return
         vehicle, entries = self._vehicle(handle), self._entries()
         part = self._part(handle)

@@ -110,7 +110,7 @@ def _in_package(name: str) -> Path:
 
 
 T = TypeVar("T")
-Identity = tuple[int, int, int] | None  # modification time (ns), size (bytes), inode
+ObjectLabel = tuple[int, int, int] | None  # modification time (ns), size (bytes), inode
 
 
 class ReadFile(NamedTuple):
@@ -128,7 +128,7 @@ class FileCache(Generic[T]):
         """Take what reads a file."""
         self._read = read
         self._limit = limit
-        self._kept: OrderedDict[str, tuple[ReadFile, dict[str, Identity]]] = OrderedDict()
+        self._kept: OrderedDict[str, tuple[ReadFile, dict[str, ObjectLabel]]] = OrderedDict()
 
     def get(self, path: str) -> T:
         """Return what is in a file now. Raises what `read` raises."""
@@ -145,7 +145,7 @@ class FileCache(Generic[T]):
         return value
 
 
-def identity_of(path: str) -> Identity:
+def identity_of(path: str) -> ObjectLabel:
     """Return what changes when a file is written anew; None where there is no such file."""
     try:
         status = os.stat(path)

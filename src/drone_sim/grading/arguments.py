@@ -23,7 +23,7 @@ from drone_sim.grading.jobs.sandbox import NoSandbox
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 from drone_sim.message_text import printable, shown
-from drone_sim.run.guardian import Guardian
+from drone_sim.run.watchdog import Watchdog
 
 WRONG = 2  # exit status
 _MOST_JOBS = 1024
@@ -150,12 +150,12 @@ def all_done(program: str, actions: Iterable[Callable[[], None]]) -> bool:
     return not any([status_of_action(program, action, WRONG) for action in actions])
 
 
-def status_of(program: str, action: Callable[[], int], guardian: Guardian | None) -> int:
+def status_of(program: str, action: Callable[[], int], watchdog: Watchdog | None) -> int:
     """Return an action's exit status: 2 after one line for what cannot be done, 130 after Ctrl-C."""
-    if guardian is not None:
-        guardian.ready(_interrupt)
+    if watchdog is not None:
+        watchdog.ready(_interrupt)
     status = status_of_action(program, action, WRONG)
-    return SIGNALLED + guardian.asked if status > SIGNALLED and guardian is not None and guardian.asked else status
+    return SIGNALLED + watchdog.asked if status > SIGNALLED and watchdog is not None and watchdog.asked else status
 
 
 def _interrupt() -> NoReturn:

@@ -40,7 +40,7 @@ from drone_sim.grading.submissions.folders import submissions_of
 from drone_sim.grading.submissions.similarity import source_of
 from drone_sim.grading.submissions.submission import Submission, names_of
 from drone_sim.message_text import printable, shown
-from drone_sim.run.guardian import Guardian
+from drone_sim.run.watchdog import Watchdog
 
 PROGRAM = "grade"
 FAILED = 1
@@ -49,19 +49,19 @@ _LARGEST_SEED = 10**12
 _WRITERS: dict[str, Callable[..., None]] = {"junit": junit.write, "json": as_json.write, "gradescope": gradescope.write}
 
 
-def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = None) -> int:
+def main(arguments: Sequence[str] | None = None, watchdog: Watchdog | None = None) -> int:
     """Grade; return 0 where every flight passes, 1 where one does not, 2 after a line for what cannot be done.
 
-    With a guardian, a signal ends the program: the flights so far are kept, shown and written, and the exit status is
+    With a watchdog, a signal ends the program: the flights so far are kept, shown and written, and the exit status is
     128 + the signal's number.
     """
     given = sys.argv[1:] if arguments is None else arguments
     if verify.asks_for_it(given):
-        return verify.main(given, guardian)
+        return verify.main(given, watchdog)
     options = _parser().parse_intermixed_args(given)
     if options.autograder:
         return status_of(PROGRAM, lambda: _write_autograder(options), None)
-    return status_of(PROGRAM, lambda: _Grading(options, guardian).run(), guardian)
+    return status_of(PROGRAM, lambda: _Grading(options, watchdog).run(), watchdog)
 
 
 def _write_autograder(options: argparse.Namespace) -> int:
@@ -75,10 +75,10 @@ def _write_autograder(options: argparse.Namespace) -> int:
 class _Grading:
     """One run of the program."""
 
-    def __init__(self, options: argparse.Namespace, guardian: Guardian | None):
-        """Read and check what `options` say; a `guardian` stands by. Raises what status_of expects."""
+    def __init__(self, options: argparse.Namespace, watchdog: Watchdog | None):
+        """Read and check what `options` say; a `watchdog` stands by. Raises what status_of expects."""
         self._options = options
-        self._guardian = guardian
+        self._watchdog = watchdog
         self._plan = plans.read(tasks.find(options.plan))
         store = unpacked(results_folder(options))
         given = [one for name in options.script for one in submissions_of(name, store)]
@@ -97,16 +97,16 @@ class _Grading:
             with self._runner:
                 self._fly()
         except KeyboardInterrupt:
-            if self._guardian is not None:
-                self._guardian.stand_down()  # what follows takes its time
+            if self._watchdog is not None:
+                self._watchdog.stand_down()  # what follows takes its time
             self._report()
             print(
                 f"{PROGRAM}: {len(self._results)} of {len(self._jobs)} flights were flown, and are kept",
                 file=sys.stderr,
             )
             raise
-        if self._guardian is not None:
-            self._guardian.stand_down()
+        if self._watchdog is not None:
+            self._watchdog.stand_down()
         if not (self._report() and self._runner.all_kept):
             return WRONG
         return 0 if all(result.passed for result in self._results.values()) else FAILED
@@ -239,4 +239,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    sys.exit(main(guardian=Guardian(PROGRAM)))
+    sys.exit(main(watchdog=Watchdog(PROGRAM)))

@@ -33,7 +33,7 @@ class OwnObjects:
         self.handles = {  # of the vehicles' objects
             handle
             for handle, one in ((handle, self._objects[handle]) for handle in self._objects)
-            if any(one is root or one.hangs_on(root) for root in roots)
+            if any(one is root or one.is_descendant_of(root) for root in roots)
         }
 
     def other_in(self, function: str, arguments: list[Any]) -> str | None:

@@ -208,7 +208,11 @@ class Actions:
         """Tell whether an object is a frame for a script's own use: it is not solid and carries nothing solid."""
         if one.kind not in ("dummy", "path") or one.body is not None:
             return False
-        below = (other for other in map(self._objects.get, self._objects) if other is not None and other.hangs_on(one))
+        below = (
+            other
+            for other in map(self._objects.get, self._objects)
+            if other is not None and other.is_descendant_of(one)
+        )
         return all(other.kind in _FRAMES for other in below)
 
     def _of_joint(self, arguments: list[Any]) -> str | None:
@@ -341,7 +345,7 @@ class Permissions(Actions):
     def _goals_at(self, one: SceneObject) -> Iterator[SceneObject]:
         """Yield the goals that are an object, or that it carries."""
         goals = filter(None, map(self._objects.get, self._goals))
-        return (goal for goal in goals if goal is one or goal.hangs_on(one))
+        return (goal for goal in goals if goal is one or goal.is_descendant_of(one))
 
 
 def _handles(values: Iterable[Any]) -> Iterator[int]:

@@ -92,7 +92,7 @@ class Rules:
 
     def accept(self) -> None:
         """Accept everything that has been done so far as not done by a script, except a change of the scene."""
-        self._jumps = {name: one.jumps for name, one in self._bodies.items()}
+        self._teleports = {name: one.teleports for name, one in self._bodies.items()}
         self._began = {**self._done(), "": self._began[""]}
 
     def check(self) -> None:
@@ -102,7 +102,7 @@ class Rules:
             self._refuse("changed", "the scene", "change")
         for name, body in self._bodies.items():
             vehicle = self._simulation.vehicles.get(name)
-            is_moved = body.jumps != self._jumps[name] or vehicle is None or vehicle.body is not body
+            is_moved = body.teleports != self._teleports[name] or vehicle is None or vehicle.body is not body
             if is_moved and not self._may_move:
                 self._refuse("moved", name, "move")
             if done[name] != self._began[name] and not self._may_push:

@@ -24,7 +24,7 @@ from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.outputs.by_script import in_columns
 from drone_sim.grading.result import Result
 from drone_sim.message_text import near_names, shown
-from drone_sim.run.guardian import Guardian
+from drone_sim.run.watchdog import Watchdog
 from drone_sim.scripting.load import script_path
 
 PROGRAM = "sweep"
@@ -57,19 +57,19 @@ class Trial:
         return -self.points + _A_FIGURE * (2 / math.pi * math.atan(abs(figure)) if figure is not None else 1.0)
 
 
-def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = None) -> int:
+def main(arguments: Sequence[str] | None = None, watchdog: Watchdog | None = None) -> int:
     """Sweep; return 0, or 2 after a line for what cannot be done, or 130 after Ctrl-C: what was flown is kept."""
     options = _parser().parse_intermixed_args(arguments)
-    return status_of(PROGRAM, lambda: _Sweep(options, guardian).run(), guardian)
+    return status_of(PROGRAM, lambda: _Sweep(options, watchdog).run(), watchdog)
 
 
 class _Sweep:
     """One run of the program."""
 
-    def __init__(self, options: argparse.Namespace, guardian: Guardian | None):
-        """Read and check what `options` say; a `guardian` stands by. Raises what status_of expects."""
+    def __init__(self, options: argparse.Namespace, watchdog: Watchdog | None):
+        """Read and check what `options` say; a `watchdog` stands by. Raises what status_of expects."""
         self._options = options
-        self._guardian = guardian
+        self._watchdog = watchdog
         self._plan = plans.read(tasks.find(options.plan))
         script = self._plan.default_script if options.script is None else options.script
         self._script = script and script_path(script)
@@ -83,8 +83,8 @@ class _Sweep:
         """Fly, and tell."""
         with self._runner:
             trials = list(self._optimized() if self._options.optimize else self._all())
-        if self._guardian is not None:
-            self._guardian.stand_down()
+        if self._watchdog is not None:
+            self._watchdog.stand_down()
         trials.sort(key=lambda one: one.cost(self._options.smallest))
         outputs = [lambda: self._show(trials)]
         if self._options.csv:
@@ -351,4 +351,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    sys.exit(main(guardian=Guardian(PROGRAM)))
+    sys.exit(main(watchdog=Watchdog(PROGRAM)))

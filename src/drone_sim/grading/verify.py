@@ -22,7 +22,7 @@ from drone_sim.grading.outputs import as_json
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 from drone_sim.message_text import printable, shown
-from drone_sim.run.guardian import Guardian
+from drone_sim.run.watchdog import Watchdog
 from drone_sim.scripting.errors import ScriptError
 
 PROGRAM = "grade"
@@ -30,7 +30,7 @@ DIFFERENT = 1
 _LARGEST = 2**28  # bytes
 
 
-def main(arguments: Sequence[str], guardian: Guardian | None = None) -> int:
+def main(arguments: Sequence[str], watchdog: Watchdog | None = None) -> int:
     """Verify; return 0 where every flight comes out as the file says, 1 where one does not, 2 for what cannot be."""
     parser = GradingParser(prog=PROGRAM, description=__doc__)
     parser.add_argument("--verify", metavar="RESULTS.json", required=True, help="a file of --json")
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str], guardian: Guardian | None = None) -> int:
     parser.add_argument("--jobs", metavar="N", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--sandbox", choices=("auto", "on", "off"), default="auto")
     options = parser.parse_args(arguments)
-    return status_of(PROGRAM, lambda: _verify(options), guardian)
+    return status_of(PROGRAM, lambda: _verify(options), watchdog)
 
 
 def _verify(options: argparse.Namespace) -> int:

@@ -18,7 +18,7 @@ from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.distances import Distances
 from drone_sim.scripting import load
 from drone_sim.scripting.api.control import Turns
-from drone_sim.scripting.api.host import Operations, Surroundings
+from drone_sim.scripting.api.host import Operations, SceneServices
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
 from drone_sim.scripting.errors import ScriptError
@@ -101,7 +101,7 @@ class HostedScript(ABC):
         self.close()
         context = self.context
         limit, turns = TimeLimit(context.script_time_limit), Turns()
-        around = surroundings(self.seen(), context, operations, limit, turns)
+        around = services(self.seen(), context, operations, limit, turns)
         modules = {
             "sim": make_sim(self, around),
             "simROS": make_sim_ros(self.bus, context.clock),
@@ -247,7 +247,7 @@ class AttachedScript(HostedScript):
             self.vehicle.commands.listening.append(bus)
             self.vehicle.flight_state.script_errors.append(self.error)
         # Parameters of V-REP's script there; a propeller's built-in thrust model is replaced by the script.
-        law = self.vehicle.propulsion.give_way(self.own_script) if self.vehicle else None
+        law = self.vehicle.propulsion.disable_thrust_model(self.own_script) if self.vehicle else None
         self.parameters: dict[str, Any] = {} if law is None else law
         self.parameters.update({} if law is None else {**_PROPELLER_SCRIPT, **law})
         self.parameters.update(copy.deepcopy(parameters.parameters))
@@ -316,16 +316,16 @@ class AttachedScript(HostedScript):
         self.failure = None
 
 
-def surroundings(
+def services(
     seen: Sequence[Vehicle], context: SimulationContext, operations: Operations, limit: TimeLimit, turns: Turns
-) -> Surroundings:
+) -> SceneServices:
     """Return the scene services for a script with a time limit, which can access the vehicles `seen`."""
     cameras = [
         (camera.object + vehicle.suffix, camera, vehicle.cameras[name])
         for vehicle in seen
         for name, camera in vehicle.parameters.cameras.items()
     ]
-    return Surroundings(
+    return SceneServices(
         pictures={name: eye_of(context, camera) for name, _, camera in cameras},
         planes={name: (camera.near, camera.far) for name, camera, _ in cameras},
         operations=operations,

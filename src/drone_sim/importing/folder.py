@@ -78,17 +78,19 @@ class Folder:
 
 
 LIST = "IMPORT.txt"
-_HOLE_PREFIX = "WILL NOT WORK: "
+_UNSUPPORTED_PREFIX = "WILL NOT WORK: "
 _MAX_LIST_SIZE = 1 << 20  # bytes
 
 
-def holes(scene_file: str) -> list[str]:
+def unsupported_features(scene_file: str) -> list[str]:
     """Return what will not work in an imported scene, from its import report; [] if the scene was not imported."""
     try:
         text = read_bytes(resolve(scene_file).with_name(LIST), _MAX_LIST_SIZE).decode("utf-8", "replace")
     except (OSError, ValueError):
         return []
-    return [line.removeprefix(_HOLE_PREFIX) for line in text.splitlines() if line.startswith(_HOLE_PREFIX)]
+    return [
+        line.removeprefix(_UNSUPPORTED_PREFIX) for line in text.splitlines() if line.startswith(_UNSUPPORTED_PREFIX)
+    ]
 
 
 class Report:
@@ -97,7 +99,7 @@ class Report:
     def __init__(self) -> None:
         """Create an empty report."""
         self.notes: list[str] = []  # what works the same in another way
-        self.holes: list[str] = []  # what will not work in the scene
+        self.unsupported: list[str] = []  # what will not work in the scene
         self._names: dict[str, list[str]] = {}
 
     def add(self, name: str, what: str) -> None:
@@ -108,11 +110,11 @@ class Report:
 
     def __len__(self) -> int:
         """Return the number of lines, without notes."""
-        return len(self._names) + len(self.holes)
+        return len(self._names) + len(self.unsupported)
 
     def lines(self, most: int | None = None) -> Iterator[str]:
-        """Yield the lines, holes first, each with its object names, at most `most` of them."""
-        yield from (f"{_HOLE_PREFIX}{hole}" for hole in self.holes)
+        """Yield the lines, unsupported features first, each with its object names, at most `most` of them."""
+        yield from (f"{_UNSUPPORTED_PREFIX}{feature}" for feature in self.unsupported)
         for what, names in self._names.items():
             more = f" and {len(names) - most} more" if most is not None and len(names) > most else ""
             yield f"{', '.join(names[:most])}{more}: {what}" if names != [""] else what

@@ -202,17 +202,17 @@ class _Import:
             code = without_comments(script)
             if script.kind == "customization" and _SIMULATION_CALLBACK.search(code):
                 problem = "its customization script acts in flight, and is not imported: nothing that it drives moves"
-                self._report.holes.append(f"{owner.name}: {problem}")
+                self._report.unsupported.append(f"{owner.name}: {problem}")
             if script.kind in ("child", "customization") and _LINKS_DUMMIES.search(code):
                 problem = "its script links dummies (setLinkDummy): links hold nothing here, so the bodies stay apart"
-                self._report.holes.append(f"{owner.name}: {problem}")
+                self._report.unsupported.append(f"{owner.name}: {problem}")
         for node in self._objects:
             content = node.object.of
             other = self._by_handle.get(content.linked) if isinstance(content, VrepDummy) and content.holds else None
             is_reported = other is not None and other.object.handle < node.object.handle
             if other is not None and not is_reported and (_has_dynamic_parent(node) or _has_dynamic_parent(other)):
                 problem = "this link of dummies holds two bodies together; it is not imported, so they come apart"
-                self._report.holes.append(f"{node.name}, {other.name}: {problem}")
+                self._report.unsupported.append(f"{node.name}, {other.name}: {problem}")
 
     # ---- scripts
 

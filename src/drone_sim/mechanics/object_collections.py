@@ -122,9 +122,9 @@ def _selected_objects(item: Item, tree: ObjectTree) -> dict[int, None]:
     origin = tree[item.handle]
     selected = {} if item.without else {item.handle: None}
     if item.what == "tree":
-        selected |= {handle: None for handle in tree if tree[handle].hangs_on(origin)}
+        selected |= {handle: None for handle in tree if tree[handle].is_descendant_of(origin)}
     elif item.what == "chain":
-        selected |= {handle: None for handle in tree if origin.hangs_on(tree[handle])}
+        selected |= {handle: None for handle in tree if origin.is_descendant_of(tree[handle])}
     return selected if item.what != "single" else {item.handle: None}
 
 

@@ -97,7 +97,7 @@ class ObjectTree:
             self._objects = dict(sorted(self._objects.items()))
         self._handles.update((name, handle) for name in added.names)
         self._suffixed_names.update(plain(name) for name in added.names if plain(name) != name)
-        if added.is_loose:
+        if added.is_free_child:
             self._free_children.append(added)
         return handle
 
@@ -128,7 +128,7 @@ class ObjectTree:
         if plain(name) != name:
             self._suffixed_names.add(plain(name))
 
-    def exchange(self, handle: int, other: SceneObject) -> None:
+    def replace(self, handle: int, other: SceneObject) -> None:
         """Replace an object by `other`, which has its names and parent; its children get `other` as parent."""
         before, self._objects[handle] = self._objects[handle], other
         for child in self._objects.values():
@@ -142,7 +142,7 @@ class ObjectTree:
 
     def look_for_loose_ones(self) -> None:
         """Update the list of bodies that follow their parent only when a script moves that."""
-        self._free_children = [body for body in self._objects.values() if body.is_loose]
+        self._free_children = [body for body in self._objects.values() if body.is_free_child]
 
     def is_copied(self, name: str) -> bool:
         """Return whether any object has, or had, that name with a suffix."""
@@ -254,7 +254,11 @@ class ObjectTree:
             moved.put(matrix)
             return
         before = moved.matrix()
-        below = [(body, frames.relative(before, body.matrix())) for body in self._free_children if body.hangs_on(moved)]
+        below = [
+            (body, frames.relative(before, body.matrix()))
+            for body in self._free_children
+            if body.is_descendant_of(moved)
+        ]
         moved.put(matrix)
         for body, local in below:
             body.put(frames.multiply(matrix, local))
@@ -290,8 +294,10 @@ class ObjectTree:
         """Raise ValueError if a new parent would make a loop, or give an object more than DEEPEST ancestors."""
         moved = self[handle]
         new = None if parent == WORLD else self[parent]
-        if new is moved or (new is not None and new.hangs_on(moved)):
+        if new is moved or (new is not None and new.is_descendant_of(moved)):
             raise ValueError(f"'{moved.name}' cannot be its own ancestor")
-        depth = max(levels(item, moved) for item in self._objects.values() if item is moved or item.hangs_on(moved))
+        depth = max(
+            levels(item, moved) for item in self._objects.values() if item is moved or item.is_descendant_of(moved)
+        )
         if new is not None and levels(new) + 1 + depth > DEEPEST:
             raise ValueError(f"'{moved.name}' cannot be attached there: more than {DEEPEST} ancestors of an object")

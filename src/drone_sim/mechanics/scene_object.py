@@ -69,7 +69,7 @@ class SceneObject:
         return name == self.alias or any(name in (full, plain(full)) for full in self.names)
 
     @property
-    def is_loose(self) -> bool:
+    def is_free_child(self) -> bool:
         """Whether the object is a body with a parent, which it follows only when a script moves the parent."""
         return self.body is not None and self.parent is not None
 
@@ -87,7 +87,7 @@ class SceneObject:
             ancestor = ancestor.parent
         return ancestor
 
-    def hangs_on(self, other: SceneObject) -> bool:
+    def is_descendant_of(self, other: SceneObject) -> bool:
         """Return whether `other` is the object's parent or another ancestor."""
         ancestor = self.parent
         while ancestor is not None and ancestor is not other:

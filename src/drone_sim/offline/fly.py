@@ -28,9 +28,9 @@ from drone_sim.offline import timeline as timeline_module
 from drone_sim.offline.recording import OutputError, Recording
 from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
 from drone_sim.run import parameters as parameters_module
-from drone_sim.run.guardian import Guardian
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.simulation import Simulation
+from drone_sim.run.watchdog import Watchdog
 from drone_sim.scripting.api.control import STOP
 from drone_sim.scripting.script_log import LOG as SCRIPT_LOG
 from drone_sim.vehicles.parameters import EquipmentParameters
@@ -56,16 +56,16 @@ _ENDINGS = {
 }
 
 
-def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = None) -> int:
+def main(arguments: Sequence[str] | None = None, watchdog: Watchdog | None = None) -> int:
     """Fly; return 0, 1 after an error line on stderr for a wrong input or script, or 130 after Ctrl-C.
 
-    With a guardian, a signal ends the flight between two steps; without one, signals are left to the caller.
+    With a watchdog, a signal ends the flight between two steps; without one, signals are left to the caller.
     """
     options = _parser().parse_args(arguments)
-    if guardian is not None:
-        guardian.ready()
+    if watchdog is not None:
+        watchdog.ready()
     with _shown_on_stdout(SCRIPT_LOG):
-        return status_of("fly", lambda: _run(options, guardian))
+        return status_of("fly", lambda: _run(options, watchdog))
 
 
 def settings(assignments: Sequence[str]) -> dict[str, Any]:
@@ -89,7 +89,7 @@ def _shown(assignment: str) -> str:
     return assignment if assignment.isprintable() and len(assignment) < 200 else shown(assignment)
 
 
-def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
+def _run(options: argparse.Namespace, watchdog: Watchdog | None) -> int:
     _check_names(options)
     files = {"config": options.config, "scene_file": options.scene}
     parameters = parameters_module.load({**settings(options.set), **{key: name for key, name in files.items() if name}})
@@ -110,7 +110,7 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
             recording = Recording(file, keep=bool(options.plot), vehicle=vehicle)
             status = status_of(
                 "fly",
-                lambda: _fly(simulation, timeline, steps, (recording, *writers.values()), guardian),
+                lambda: _fly(simulation, timeline, steps, (recording, *writers.values()), watchdog),
                 passed_on=OutputError,  # handled by the context manager that writes the file
             )
             wall_time = time.perf_counter() - start
@@ -118,8 +118,8 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
     finally:
         # The part flown before a failure is useful, too: cleanup, summary and plot follow in any case.
         close_status = status_of("fly", simulation.close)
-    if guardian is not None:
-        guardian.stand_down()  # no script runs any more, and drawing a plot takes long
+    if watchdog is not None:
+        watchdog.stand_down()  # no script runs any more, and drawing a plot takes long
     print(_summary(recording, wall_time), flush=True)
     for name, writer in writers.items():
         print(f"wrote {name}: {writer}", flush=True)
@@ -235,15 +235,15 @@ def _fly(
     timeline: Timeline,
     steps: int,
     observers: Iterable[Recording | _CameraWriter],
-    guardian: Guardian | None,
+    watchdog: Watchdog | None,
 ) -> int:
     for observer in observers:
         observer.add(simulation)
     # disable=None: no bar where stderr is not a terminal.
     with tqdm(total=steps, unit=" steps", delay=_BAR_DELAY, disable=None, leave=False) as bar:
         for step in range(steps):
-            if guardian is not None and guardian.asked:
-                return SIGNALLED + guardian.asked
+            if watchdog is not None and watchdog.asked:
+                return SIGNALLED + watchdog.asked
             timeline.apply(step, simulation.vehicles)
             simulation.step()
             for observer in observers:
@@ -320,5 +320,5 @@ def _seconds(text: str) -> float:
 
 
 if __name__ == "__main__":
-    asked_to_end = Guardian("fly")
-    asked_to_end.end(main(guardian=asked_to_end))
+    asked_to_end = Watchdog("fly")
+    asked_to_end.end(main(watchdog=asked_to_end))

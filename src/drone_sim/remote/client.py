@@ -56,7 +56,7 @@ class Client:
         self._control = ClientControl(player, moved, self.stepping, everybody, clock)
         self._bus = MessageBus(next(iter(self._simulation.vehicles), ""), {})
         self._bus.backend = backend
-        self._run = self._era = -1
+        self._run = self._topology_version = -1
         self._drawn: set[int] = set()
         self._modules: dict[str, Api] = {}
         self._functions: dict[str, Function] = {}
@@ -108,8 +108,8 @@ class Client:
             self._run = simulation.run
             self._drawn.clear()
             self._bus.close()
-        if self._era != simulation.era:
-            self._era = simulation.era
+        if self._topology_version != simulation.topology_version:
+            self._topology_version = simulation.topology_version
             host = ClientHost(simulation)
             ros = make_sim_ros(self._bus, simulation.clock)
             self._modules = {"sim": self._sim(host), "simROS": ros, **make_plugins(host)}
@@ -120,7 +120,7 @@ class Client:
             }
 
     def _sim(self, host: ClientHost) -> Api:
-        name, functions, constants = contents(make_sim(host, host.surroundings()))
+        name, functions, constants = contents(make_sim(host, host.services()))
         draw = functions["addDrawingObject"]
 
         @functools.wraps(draw)

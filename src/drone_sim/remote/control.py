@@ -45,13 +45,13 @@ class MovedObjects:
     def __init__(self, simulation: Simulation):
         """Record the changes of `simulation`."""
         self._simulation = simulation
-        self._era = -1
+        self._topology_version = -1
         self._initial: Arrangements = {}
 
     def watch(self) -> None:
-        """Save the arrangement at the beginning of an era; to be called before any change."""
-        if self._era != self._simulation.era:
-            self._era = self._simulation.era
+        """Save the arrangement at the first change after a start or stop; to be called before any change."""
+        if self._topology_version != self._simulation.topology_version:
+            self._topology_version = self._simulation.topology_version
             self._initial = {} if self._simulation.running else self._all()
 
     def changed(self) -> Arrangements:

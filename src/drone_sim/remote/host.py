@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from drone_sim.hosting.child_scripts import surroundings
+from drone_sim.hosting.child_scripts import services
 from drone_sim.mechanics.frames import Vector
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.control import Turns
-from drone_sim.scripting.api.host import Readable, Surroundings
+from drone_sim.scripting.api.host import Readable, SceneServices
 from drone_sim.scripting.api.registry import Attachment, Callee, Scripts
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.vehicles.quadricopter_objects import DRONE
@@ -21,14 +21,14 @@ class ClientHost:
     """Host of remote clients. Names without a suffix mean the first vehicle's objects, as in its script."""
 
     def __init__(self, simulation: Simulation):
-        """Use the simulation's current context; to be created again in the next era."""
+        """Use the simulation's current context; to be created again after the next start or stop."""
         self.context = replace(simulation.context, scripts=_ScriptsForClients(simulation.context.scripts))
         self._operations = simulation.operations
         self._vehicles = list(simulation.vehicles.values())
 
-    def surroundings(self) -> Surroundings:
+    def services(self) -> SceneServices:
         """Return the services of the scene, without a time limit for calls."""
-        return surroundings(self._vehicles, self.context, self._operations, TimeLimit(0.0), Turns())
+        return services(self._vehicles, self.context, self._operations, TimeLimit(0.0), Turns())
 
     @property
     def sensors(self) -> Mapping[str, Readable]:

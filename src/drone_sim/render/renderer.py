@@ -32,7 +32,7 @@ _MIN_ROWS = 16  # of an image, rendered at once
 _CLIP_DISTANCES = range(0x3000, 0x3004)  # GL_CLIP_DISTANCE0 to 3, which clip each tile to its rectangle
 
 
-class Moment(NamedTuple):
+class FrameState(NamedTuple):
     """The camera pose of an image, world-from-optical (4, 4), and its visuals' poses (N, 4, 4)."""
 
     camera_pose: np.ndarray
@@ -46,7 +46,7 @@ class _View(NamedTuple):
     camera_pose: np.ndarray
     poses: np.ndarray
     instances: np.ndarray | None = None
-    before: Moment | None = None
+    before: FrameState | None = None
     box: Box | None = None  # the part of the image to render; None: all
 
     @property
@@ -142,7 +142,7 @@ class Renderer:
         poses: np.ndarray,
         *,
         instances: np.ndarray | None = None,
-        before: Moment | None = None,
+        before: FrameState | None = None,
     ) -> dict[str, np.ndarray]:
         """Return the named entries of `outputs.OUTPUTS`, rendered in one pass. Transparent objects count as solid.
 

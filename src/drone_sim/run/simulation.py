@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from drone_sim.hosting.child_scripts import ChildScript
-from drone_sim.importing.folder import holes
+from drone_sim.importing.folder import unsupported_features
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.object_tree import NO_HANDLES, Handles
 from drone_sim.mechanics.saved_state import Restore
+from drone_sim.run.flight_changes import apply_in_flight
 from drone_sim.run.parameters import Parameters
-from drone_sim.run.rearrangement import rearrange
 from drone_sim.run.scene_document import SceneContent, SceneDocument
 from drone_sim.run.scene_settings import settings_now
 from drone_sim.run.simulation_setup import SimulationSetup, give_back_memory, script_of
@@ -33,7 +33,7 @@ from drone_sim.scripting.api.windows import Windows
 from drone_sim.scripting.breakpoints import Breakpoints, Scope
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG
-from drone_sim.sensors.truth import VEHICLE, Identity, category_of
+from drone_sim.sensors.truth import VEHICLE, ObjectLabel, category_of
 from drone_sim.sensors.vision import Vision
 from drone_sim.vehicles.vehicle import Vehicle
 from drone_sim.world import World
@@ -42,7 +42,7 @@ from drone_sim.world import World
 class Snapshot(NamedTuple):
     """Exact dynamic state at one time; see Simulation.snapshot."""
 
-    era: int
+    topology_version: int
     scripts: int  # ScriptScheduler.changes at that time
     world: int
     restore: Restore
@@ -94,15 +94,15 @@ class Simulation:
         self.scenes_read = 0  # number of times that a scene was loaded from a file or the parameters
         self._handles = NO_HANDLES  # of the objects in the initial scene
         self._is_edited = False  # whether the initial scene was edited and differs from the scene file
-        self._original: Parameters | None = None  # what stop restores after `rearrange` in this run
+        self._original: Parameters | None = None  # what stop restores after `apply_in_flight` in this run
         self.run = 0  # run number, incremented by every start and stop
-        self.era = 0  # incremented by every start and stop, and when vehicles are added or removed
+        self.topology_version = 0  # incremented by every start and stop, and when vehicles are added or removed
         flying_scripts = [script_of(vehicle, parameters, script) for vehicle in parameters.fleet]
         # Missing files are reported before a world is built.
         for path in (*flying_scripts, *(attached.script for attached in parameters.scene.scripts)):
             load.script_path(path)
         self._use(self._new_setup(parameters, _world(parameters, gui)))
-        self.holes: list[str] = []  # what does not work here in a scene imported from V-REP
+        self.unsupported: list[str] = []  # what does not work here in a scene imported from V-REP
         self._warn_of_unsupported()
         self.document = SceneDocument(parameters, self.object_handles)
         try:
@@ -138,18 +138,18 @@ class Simulation:
         self.vision.look_at(self.world.pictures, self.context.blades, self._identify)
         self._begin_run()
 
-    def _identify(self) -> list[Identity]:
+    def _identify(self) -> list[ObjectLabel]:
         """Return the name and category of the object of each of the world's visuals."""
         categories = self.scene.categories()
         return [
-            Identity(name, categories.get(name) or (VEHICLE if name in self.vehicles else category_of(name)))
+            ObjectLabel(name, categories.get(name) or (VEHICLE if name in self.vehicles else category_of(name)))
             for name in map(self.context.person_name_of, self.world.pictures.places())
         ]
 
     def _begin_run(self) -> None:
         self._stepper = Stepper(self._setup)
         self.run += 1
-        self.era += 1
+        self.topology_version += 1
         self._drawings.clear()
         self.windows.clear()
 
@@ -183,8 +183,8 @@ class Simulation:
                 self._setup.remove(name, self.running)
         finally:
             if added or removed:
-                self.era += 1
-                self._stepper.list_vehicles()
+                self.topology_version += 1
+                self._stepper.refresh_vehicles()
         self.parameters = parameters
         if self._original:
             self._original = parameters.varied(self._original.weather, self._original.scene, parameters.fleet)
@@ -224,13 +224,13 @@ class Simulation:
 
     def _warn_of_unsupported(self) -> None:
         """Warn of what does not work in a scene imported from V-REP, unless the same warning was given before."""
-        file, before = self.parameters.scene_file, self.holes
-        self.holes = holes(file) if file else []
-        for unsupported in self.holes:
-            if unsupported not in before:
-                LOG.warning("%s: %s", file, unsupported)
+        file, before = self.parameters.scene_file, self.unsupported
+        self.unsupported = unsupported_features(file) if file else []
+        for feature in self.unsupported:
+            if feature not in before:
+                LOG.warning("%s: %s", file, feature)
 
-    def arrange(self, parameters: Parameters, rebuild: bool = True) -> None:
+    def replace_scene(self, parameters: Parameters, rebuild: bool = True) -> None:
         """While stopped, replace the initial scene by that of `parameters`; objects keep present or former handles.
 
         Without `rebuild`, the world changes at the next start. Raises ParameterError and UrdfError, without a change.
@@ -241,17 +241,17 @@ class Simulation:
         self.parameters = parameters
         self._is_edited = True
 
-    def rearrange(self, parameters: Parameters) -> None:
+    def apply_in_flight(self, parameters: Parameters) -> None:
         """While running, apply floor, weather and vehicles of `parameters`; stop reverts them.
 
         Raises ParameterError, UrdfError and ScriptError, without a change.
         """
         self._original = self._original or self.parameters
         self.scene.is_changed = True
-        if rearrange(self._setup, self.parameters, parameters, self.script):
-            self.era += 1
-            self._stepper.list_vehicles()
-        self._stepper.lay_floor(parameters.scene.floor)
+        if apply_in_flight(self._setup, self.parameters, parameters, self.script):
+            self.topology_version += 1
+            self._stepper.refresh_vehicles()
+        self._stepper.set_floor(parameters.scene.floor)
         self.parameters = parameters
 
     def load_scripts(self) -> None:
@@ -358,14 +358,16 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """Save the exact dynamic state, including the scripts' variables; it is valid until the next start or stop."""
         number = self.world.saved_states.snapshot()
-        return Snapshot(self.era, self._setup.scripts.changes, number, self._setup.save_state())
+        return Snapshot(self.topology_version, self._setup.scripts.changes, number, self._setup.save_state())
 
     def restore(self, snapshot: Snapshot) -> None:
         """Restore a snapshot: the flight then continues as before, to the last bit. May be repeated.
 
         Raises ValueError for a snapshot from before a start, a stop, or a change of vehicles, shapes or their scripts.
         """
-        is_valid = snapshot.era == self.era and snapshot.scripts == self._setup.scripts.changes
+        is_valid = (
+            snapshot.topology_version == self.topology_version and snapshot.scripts == self._setup.scripts.changes
+        )
         if not is_valid or not self.world.saved_states.has_snapshot(snapshot.world):
             reason = "start, stop, and adding or removing a vehicle, a shape or a script of one make a snapshot invalid"
             raise ValueError(f"the snapshot is from an earlier run: {reason}")
@@ -374,11 +376,11 @@ class Simulation:
             vehicle.body.let_go()
         self.world.saved_states.restore(snapshot.world)
         snapshot.restore()
-        self._stepper.feel_weather()
+        self._stepper.update_wind_forces()
 
     def forget(self, snapshot: Snapshot) -> None:
         """Free a snapshot. Start and stop free all snapshots themselves."""
-        if snapshot.era == self.era:
+        if snapshot.topology_version == self.topology_version:
             self.world.saved_states.forget_snapshot(snapshot.world)
 
     @property
@@ -389,7 +391,7 @@ class Simulation:
     def content(self) -> SceneContent:
         """Return the present content of the scene; vehicles and weather are those at the start."""
         scene = self.scene
-        entries = {scene.tree.handle(entry.name): scene.entry_now(index) for index, entry in scene.entries.items()}
+        entries = {scene.tree.handle(entry.name): scene.current_entry(index) for index, entry in scene.entries.items()}
         return SceneContent(entries, dict(scene.scripts), self.document.settings)
 
     def save_scene(self, path: Path) -> str:

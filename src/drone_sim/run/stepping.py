@@ -60,25 +60,25 @@ class Stepper:
         self._velocities = setup.context.velocities
         self._sub_steps = setup.parameters.sub_steps
         self._vehicles = setup.vehicles
-        self.lay_floor(setup.parameters.scene.floor)
+        self.set_floor(setup.parameters.scene.floor)
         self._clock.steps = 0
-        self.list_vehicles()
+        self.refresh_vehicles()
 
-    def lay_floor(self, floor: FloorParameters) -> None:
+    def set_floor(self, floor: FloorParameters) -> None:
         """Use another floor for the check whether vehicles left it."""
         self._divergence_check = DivergenceCheck(floor, self._clock)
 
-    def list_vehicles(self) -> None:
+    def refresh_vehicles(self) -> None:
         """Refresh the vehicle lists after a vehicle was added or removed."""
         self.flying = tuple(self._vehicles.values())
         self._bodies = tuple(vehicle.body.number for vehicle in self.flying)
-        self.feel_weather()
+        self.update_wind_forces()
 
-    def feel_weather(self) -> None:
+    def update_wind_forces(self) -> None:
         """Update the forces of every vehicle after a change of the weather."""
         self._weather_change_seen = self._context.weather.changes
         for vehicle in self.flying:
-            vehicle.feel_weather()
+            vehicle.update_wind_forces()
         self._context.tunings += 1
         self._has_sub_step_work = any(vehicle.sub_step_forces or vehicle.instruments for vehicle in self.flying)
         self.list_scripts()
@@ -134,7 +134,7 @@ class Stepper:
         """Apply changes of scripts and weather, then run each script thread until it yields."""
         self._follow_scripts()
         if self._weather_change_seen != self._context.weather.changes:
-            self.feel_weather()
+            self.update_wind_forces()
         for thread in self._threaded:
             if thread.script.threaded:
                 thread.script.take_turn()

@@ -105,7 +105,7 @@ class CarriedBody:
             self._last_matrix = matrix
             self._world.set_pose(self._number, Pose(frames.position(matrix), frames.to_quaternion(matrix)))
 
-    def renew(self) -> None:
+    def reapply_pose(self) -> None:
         """Move the body to its frame after the world's state was restored, if it was ever moved."""
         if self._last_matrix is not None:
             self._last_matrix = None
@@ -159,9 +159,9 @@ class ShapeObject(SceneObject):
         return self.link != -1
 
     @property
-    def is_loose(self) -> bool:
+    def is_free_child(self) -> bool:
         """Whether it is a free child: it follows its parent only when a script moves that parent."""
-        return not self.is_held and super().is_loose
+        return not self.is_held and super().is_free_child
 
     @property
     def parent(self) -> SceneObject | None:  # type: ignore[override]

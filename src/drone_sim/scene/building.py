@@ -17,7 +17,7 @@ from drone_sim.scene.object_parameters import ObjectParameters
 from drone_sim.shapes.compound import Compound, parts_of
 from drone_sim.shapes.mass import inertia_of
 from drone_sim.world import World
-from drone_sim.world.assemblies import Hinge, Link
+from drone_sim.world.assemblies import Link, LinkJoint
 
 
 class Built(NamedTuple):
@@ -103,12 +103,12 @@ def _frame(entries: Mapping[int, EntryParameters], chain: Chain, matrices: Mappi
     return multiply(matrices[joint], frames.invert(entries[joint].local))
 
 
-def _hinge(entries: Mapping[int, EntryParameters], hung: Hung) -> Hinge:
+def _hinge(entries: Mapping[int, EntryParameters], hung: Hung) -> LinkJoint:
     joint = entries[hung.joint]
     if isinstance(joint, ForceSensorParameters):
-        return Hinge(hung.above, hung.local, "fixed", None, 0.0)
+        return LinkJoint(hung.above, hung.local, "fixed", None, 0.0)
     assert isinstance(joint, JointParameters), "a chain consists of joints and shapes"
-    return Hinge(hung.above, hung.local, joint.type, joint.limits, joint.value)
+    return LinkJoint(hung.above, hung.local, joint.type, joint.limits, joint.value)
 
 
 def _link(entry: ObjectParameters, local: Matrix) -> Link:

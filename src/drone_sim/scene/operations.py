@@ -55,7 +55,7 @@ class SceneOperations:
     def entry(self, handle: int) -> EntryParameters:
         """Return an object's entry with its present values. Raises ValueError if the object is not of the scene."""
         index = self._index(handle)
-        self._scene.write_down((index,))
+        self._scene.sync_entries((index,))
         return self._scene.entries[index]
 
     def model(self, handle: int) -> list[int]:
@@ -341,17 +341,17 @@ class SceneOperations:
     def _mark_for_rebuild(self, moved: SceneObject) -> None:
         """Mark a re-parented joint or force sensor, and those below a re-parented object, for rebuild."""
         for index, item in self._scene.objects.items():
-            if item.kind in ("joint", "force_sensor") and (item is moved or item.hangs_on(moved)):
+            if item.kind in ("joint", "force_sensor") and (item is moved or item.is_descendant_of(moved)):
                 self._scene.changed[index] += 1
 
     # ---- properties
 
     def change(self, handle: int, **values: Any) -> None:
         """Change keys of an object's entry, such as `mass` or `size`. Raises ParameterError."""
-        self.exchange({handle: self.entry_with(handle, values)})
+        self.replace_entries({handle: self.entry_with(handle, values)})
 
     def entry_with(self, handle: int, values: dict[str, Any]) -> EntryParameters:
-        """Return the entry of an object with some values changed, for `exchange`. Raises ParameterError."""
+        """Return the entry of an object with some values changed, for `replace_entries`. Raises ParameterError."""
         entry = self.entry(handle)
         if values.get("mass") and isinstance(entry, ObjectParameters) and not entry.mass:
             values.setdefault("static", True)  # as before
@@ -411,7 +411,7 @@ class SceneOperations:
             for handle in entries:
                 m = tree[handle].matrix() if tree[handle].parent is None else tree.matrix(handle, PARENT)
                 places[handle] = (*m[:3], x * m[3], *m[4:7], y * m[7], *m[8:11], z * m[11])
-        self.exchange(entries)
+        self.replace_entries(entries)
         for handle in sorted(places, key=lambda key: levels(tree[key])):
             if not getattr(tree[handle], "is_held", False):
                 tree.set_matrix(handle, PARENT, places[handle])
@@ -427,7 +427,7 @@ class SceneOperations:
         x, y, z = (1.0, 1.0, 1.0) if index is None else self._scene.factors.get(index, (1.0, 1.0, 1.0))
         return x * item.size_factor, y * item.size_factor, z * item.size_factor
 
-    def exchange(self, entries: Mapping[int, EntryParameters]) -> None:
+    def replace_entries(self, entries: Mapping[int, EntryParameters]) -> None:
         """Replace the entries of objects; names, parents and poses stay the same. Raises ParameterError."""
         scene = self._scene
         indices = {handle: self._index(handle) for handle in entries}
@@ -441,7 +441,7 @@ class SceneOperations:
                 entry, before = entries[handle], scene.objects[index]
                 if isinstance(entry, KindParameters):
                     place = Place(before.names, before.alias, before.parent, before.local)
-                    scene.exchange(index, int(handle), entry, place)
+                    scene.replace_object(index, int(handle), entry, place)
 
         with self._changing(any(isinstance(entry, _IN_DYNAMICS) for entry in new_entries), change_tree=replace_objects):
             for handle, index in indices.items():
@@ -461,7 +461,7 @@ class SceneOperations:
         scripts = dict(scene.scripts)
         try:
             yield
-            scene.renew(change_tree, bodies)
+            scene.rebuild(change_tree, bodies)
         except ValueError:
             scene.entries, scene.changed, scene.next_index, scene.scripts = entries, versions, number, scripts
             raise

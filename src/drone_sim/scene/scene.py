@@ -38,7 +38,7 @@ _AT_REST = (0.0, 0.0, 0.0)
 class Scene:
     """The world without vehicles: entries as in a scene file, their bodies and their objects.
 
-    Entries may be added, removed and changed at any time (operations.py): `renew` then builds missing bodies and
+    Entries may be added, removed and changed at any time (operations.py): `rebuild` then builds missing bodies and
     objects and removes those without an entry; everything else continues unchanged.
     """
 
@@ -66,7 +66,7 @@ class Scene:
         self._forget_objects()
         _warn(self.entries, self._build()[1])
 
-    def lay_floor(self, floor: FloorParameters) -> None:
+    def set_floor(self, floor: FloorParameters) -> None:
         """Replace the floor. Raises ParameterError for a file that cannot be used."""
         check_files(floor, self.entries.values())
         self._world.remove(self.floor)
@@ -180,7 +180,7 @@ class Scene:
             self._initial_poses = {index: item.matrix() for index, item in self.objects.items()}
         self._follow()
 
-    def renew(self, change_tree: Callable[[], None] = lambda: None, bodies: bool = True) -> None:
+    def rebuild(self, change_tree: Callable[[], None] = lambda: None, bodies: bool = True) -> None:
         """Update world and tree from the entries; `change_tree` is called once the new bodies exist.
 
         `bodies`: also rebuild bodies. Raises ParameterError; then world and tree have not changed.
@@ -202,14 +202,14 @@ class Scene:
         self._place_free_children(self.objects.keys() - present)
         self._follow()
 
-    def exchange(self, index: int, handle: int, entry: KindParameters, place: Place) -> None:
+    def replace_object(self, index: int, handle: int, entry: KindParameters, place: Place) -> None:
         """Replace an object by one built from `entry`."""
         made = entry.make(place, self._context)
         made.is_model, made.size_factor = entry.model, entry.size_factor
         before, self.objects[index] = self.objects[index], made
         if isinstance(made, Joint) and isinstance(before, Joint):
             made.turn = before.turn
-        self.tree.exchange(handle, made)
+        self.tree.replace(handle, made)
 
     def paint(self, index: int, rgba: Sequence[float]) -> None:
         """Set the displayed color of a shape."""
@@ -311,7 +311,7 @@ class Scene:
         """Move added free children to their entries' poses relative to the parent, now that it exists."""
         for index in added:
             item = self.objects[index]
-            if item.is_loose and item.parent is not None:
+            if item.is_free_child and item.parent is not None:
                 item.put(multiply(item.parent.below(), self.entries[index].local))
 
     # ---- present values
@@ -327,22 +327,22 @@ class Scene:
             values.update({"static": item.is_static} if is_other else {})
         return values
 
-    def entry_now(self, index: int) -> EntryParameters:
+    def current_entry(self, index: int) -> EntryParameters:
         """Return an entry with its present values; the same entry if nothing differs."""
         entry, now = self.entries[index], self.now(index).items()
         values = {key: tuple(value) if isinstance(value, list) else value for key, value in now}
         values = {key: value for key, value in values.items() if getattr(entry, key) != value}
         return entry.model_copy(update=values) if values else entry
 
-    def write_down(self, indices: Iterable[int]) -> None:
+    def sync_entries(self, indices: Iterable[int]) -> None:
         """Update entries to the present values of their objects."""
         for index in indices:
-            self.entries[index] = self.entry_now(index)
+            self.entries[index] = self.current_entry(index)
 
     def write_down_joints(self) -> None:
         """Update all entries to the present values if there are joints or force sensors, whose links may change."""
         if any(isinstance(entry, (JointParameters, ForceSensorParameters)) for entry in self.entries.values()):
-            self.write_down(self.entries)
+            self.sync_entries(self.entries)
 
     def put_in_order(self) -> None:
         """Sort the entries by their objects' handles, the order in which they were first added."""
@@ -351,7 +351,7 @@ class Scene:
 
     def parameters_now(self) -> SceneParameters:
         """Return the parameters of the scene with their present values."""
-        self.write_down(self.entries)
+        self.sync_entries(self.entries)
         now = {"objects": list(self.entries.values()), "scripts": list(self.scripts.values())}
         return self.parameters.model_copy(update=now)
 
@@ -363,7 +363,7 @@ class Scene:
             self.entries.update({index: entry for index, entry in entries.items() if index in self.entries})
             shapes = [it.carried for it in self.objects.values() if isinstance(it, ShapeObject) and not it.is_held]
             for body in (*self._carried_bases.values(), *shapes):
-                body.renew()
+                body.reapply_pose()
 
         return restore
 

@@ -21,7 +21,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from drone_sim.config.types import Finite, Fraction, Name, ParameterError, Unit, Within
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic
+from drone_sim.sensors.sensor import Fields, Instrument, Mounting, Output, SensorParameters, Topic
 
 _DISCHARGING, _GOOD, _DEAD, _LIPO = 2, 1, 3, 3  # sensor_msgs/BatteryState: status, health, health, technology
 _HOUR = 3600.0  # s
@@ -45,9 +45,9 @@ class BatteryParameters(SensorParameters):
     charge: Fraction = 1.0  # at the start, as a fraction of the capacity
     noise: NoiseParameters = NoiseParameters()  # V
 
-    def make(self, fitting: Fitting) -> Battery:
+    def make(self, mounting: Mounting) -> Battery:
         """Return the instrument; call its `reset` before `look`."""
-        return Battery(self, fitting)
+        return Battery(self, mounting)
 
     def check(self, sub_step: float) -> None:
         """Raise ParameterError as the base class does, and for contradictory values."""
@@ -72,9 +72,9 @@ class Battery(Instrument):
 
     parameters: BatteryParameters
 
-    def __init__(self, parameters: BatteryParameters, fitting: Fitting):
+    def __init__(self, parameters: BatteryParameters, mounting: Mounting):
         """Create it; call `reset` before `look`."""
-        super().__init__(parameters, fitting)
+        super().__init__(parameters, mounting)
         self._noise = self.make_noise(parameters.noise, 1)
         self._charge = 0.0  # Ah
         self.outputs = (Output("", "sensor_msgs/BatteryState", self._message),)
@@ -86,7 +86,7 @@ class Battery(Instrument):
 
     def look(self, count: int) -> None:
         """Drain the battery over a sub-step, then sample if due."""
-        used = self._load()[1] * self.fitting.sub_step / _HOUR
+        used = self._load()[1] * self.mounting.sub_step / _HOUR
         self._charge = max(0.0, self._charge - used)
         super().look(count)
 

@@ -12,7 +12,7 @@ from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.outputs import COLOR
-from drone_sim.render.renderer import Moment
+from drone_sim.render.renderer import FrameState
 from drone_sim.render.shutter import Shutter
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.imperfections.photography import Photography
@@ -33,16 +33,16 @@ class CameraFitting(NamedTuple):
 class Camera(Sensor):
     """A vision sensor. Its period counts simulation steps; it renders only if a viewer wants the image."""
 
-    def __init__(self, parameters: CameraParameters, fitting: CameraFitting, vision: Vision):
+    def __init__(self, parameters: CameraParameters, mounting: CameraFitting, vision: Vision):
         """`vision` renders its images."""
         super().__init__(parameters.every)
         self.kind = parameters.kind
-        self._photography = Photography(fitting.name, fitting.clock)
+        self._photography = Photography(mounting.name, mounting.clock)
         self.change(parameters)
         self.viewers: set[Callable[[], bool]] = set()  # each returns whether it wants images now
         self.shown = 0  # number of images delivered to the viewers
         self.image: np.ndarray | None = None  # the last delivered image; None without viewers
-        self.pose, self._velocity = fitting.pose, fitting.velocity
+        self.pose, self._velocity = mounting.pose, mounting.velocity
         self.failure: Failure = "ok"
         self.is_linked = False  # whether images are delayed or lost by a simulated link
         self.age = 0.0  # s, of `image` at its delivery
@@ -57,7 +57,7 @@ class Camera(Sensor):
         self.period = parameters.every
         self.intrinsics = parameters.intrinsics()
         self._photography.change(parameters)
-        self._moment: Moment | None = None  # of the last ground truth
+        self._moment: FrameState | None = None  # of the last ground truth
         self._truth: PictureTruth | None = None  # requested since the last image
         self._drawn: tuple[int, Matrix, PictureTruth] | None = None  # scene changes, pose, truth of the last image
         self._last: dict[str, tuple[int, Matrix, np.ndarray]] = {}  # by kind: scene changes, pose, image

@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 from drone_sim.config.types import Name
 from drone_sim.mechanics.frames import Vector, cross, position, rotate_back
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
-from drone_sim.sensors.sensor import Contact, Fields, Fitting, Instrument, Output, SensorParameters, Topic, xyz
+from drone_sim.sensors.sensor import Contact, Fields, Instrument, Mounting, Output, SensorParameters, Topic, xyz
 
 _NEWTONS = 10.0  # per metre of a marker's arrow
 _ARROW, _ADD = 0, 0  # visualization_msgs/Marker
@@ -33,9 +33,9 @@ class ContactsParameters(SensorParameters):
 
     suffixes = ("", "/wrench")
 
-    def make(self, fitting: Fitting) -> Contacts:
+    def make(self, mounting: Mounting) -> Contacts:
         """Return the instrument; call its `reset` before `look`."""
-        return Contacts(self, fitting)
+        return Contacts(self, mounting)
 
 
 class ContactsSample(NamedTuple):
@@ -49,9 +49,9 @@ class ContactsSample(NamedTuple):
 class Contacts(Instrument):
     """Reads the contacts after every sub-step."""
 
-    def __init__(self, parameters: ContactsParameters, fitting: Fitting):
+    def __init__(self, parameters: ContactsParameters, mounting: Mounting):
         """Create it; call `reset` before `look`."""
-        super().__init__(parameters, fitting)
+        super().__init__(parameters, mounting)
         self.outputs = (
             Output("", "visualization_msgs/MarkerArray", self._markers),
             Output("/wrench", "geometry_msgs/WrenchStamped", self._wrench),
@@ -81,7 +81,7 @@ class Contacts(Instrument):
         return hardest
 
     def _sum(self, contacts: list[Contact]) -> ContactsSample:
-        pose = self.fitting.pose()
+        pose = self.mounting.pose()
         x, y, z = position(pose)
         forces = [contact.force for contact in contacts]
         torques = [cross((c.point[0] - x, c.point[1] - y, c.point[2] - z), c.force) for c in contacts]

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from drone_sim.config.types import Checked, Name
 from drone_sim.mechanics.frames import Matrix, Vector, position, transform
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic, diagonal
+from drone_sim.sensors.sensor import Fields, Instrument, Mounting, Output, SensorParameters, Topic, diagonal
 
 SEMI_MAJOR = 6378137.0  # m
 FLATTENING = 1 / 298.257223563
@@ -82,9 +82,9 @@ class FixParameters(SensorParameters):
     frame: Name = "gps_link"
     noise: FixNoise = FixNoise()
 
-    def make(self, fitting: Fitting) -> Fix:
+    def make(self, mounting: Mounting) -> Fix:
         """Return the instrument; call its `reset` before `look`."""
-        return Fix(self, fitting)
+        return Fix(self, mounting)
 
 
 class Fix(Instrument):
@@ -92,16 +92,16 @@ class Fix(Instrument):
 
     parameters: FixParameters
 
-    def __init__(self, parameters: FixParameters, fitting: Fitting):
+    def __init__(self, parameters: FixParameters, mounting: Mounting):
         """Create it; call `reset` before `look`."""
-        super().__init__(parameters, fitting)
+        super().__init__(parameters, mounting)
         self._horizontal = self.make_noise(parameters.noise.horizontal, 2)
         self._vertical = self.make_noise(parameters.noise.vertical, 1)
         self.outputs = (Output("", "sensor_msgs/NavSatFix", self._message),)
 
     def sample(self) -> Vector:
         """Return latitude, longitude and altitude."""
-        x, y, z = position(self.fitting.pose())
+        x, y, z = position(self.mounting.pose())
         datum = self.carrier.datum
         local = (*self._horizontal.add((x, y)), *self._vertical.add((z,)))
         return geodetic(local, (datum.latitude, datum.longitude, datum.altitude))

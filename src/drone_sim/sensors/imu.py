@@ -33,7 +33,7 @@ from drone_sim.mechanics.frames import (
 )
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic, diagonal, xyz
+from drone_sim.sensors.sensor import Fields, Instrument, Mounting, Output, SensorParameters, Topic, diagonal, xyz
 
 _ZERO: Vector = (0.0, 0.0, 0.0)
 _NOT_REPORTED = [-1.0, *([0.0] * 8)]  # covariance of a missing measurement (REP 145)
@@ -57,9 +57,9 @@ class ImuParameters(SensorParameters):
 
     suffixes = ("/data", "/data_raw")
 
-    def make(self, fitting: Fitting) -> Imu:
+    def make(self, mounting: Mounting) -> Imu:
         """Return the instrument; call its `reset` before `look`."""
-        return Imu(self, fitting)
+        return Imu(self, mounting)
 
 
 class ImuSample(NamedTuple):
@@ -75,9 +75,9 @@ class Imu(Instrument):
 
     parameters: ImuParameters
 
-    def __init__(self, parameters: ImuParameters, fitting: Fitting):
+    def __init__(self, parameters: ImuParameters, mounting: Mounting):
         """Create it; call `reset` before `look`."""
-        super().__init__(parameters, fitting)
+        super().__init__(parameters, mounting)
         noise = parameters.noise
         self._rate_noise = self.make_noise(noise.angular_velocity, 3)
         self._force_noise = self.make_noise(noise.linear_acceleration, 3)
@@ -86,7 +86,7 @@ class Imu(Instrument):
             Output("/data", "sensor_msgs/Imu", self._data),
             Output("/data_raw", "sensor_msgs/Imu", self._raw),
         )
-        self._velocity, self._axes, self._jumps = _ZERO, IDENTITY, 0
+        self._velocity, self._axes, self._teleports = _ZERO, IDENTITY, 0
         self._delta_velocity, self._delta_angle, self._duration = _ZERO, _ZERO, 0.0
 
     # ---- measuring
@@ -94,18 +94,18 @@ class Imu(Instrument):
     def reset(self) -> None:
         """Return to the state at the start of a run."""
         super().reset()
-        self._axes = self.fitting.pose()
+        self._axes = self.mounting.pose()
         self._velocity = self._point_velocity(self._axes)
-        self._jumps = self.carrier.jumps
+        self._teleports = self.carrier.teleports
         self._delta_velocity, self._delta_angle, self._duration = _ZERO, _ZERO, 0.0  # m/s, rad, s since the last sample
 
     def look(self, count: int) -> None:
         """Integrate over the last sub-step, then sample if due."""
-        axes, step = self.fitting.pose(), self.fitting.sub_step
+        axes, step = self.mounting.pose(), self.mounting.sub_step
         velocity, last, dv_gravity = self._point_velocity(axes), self._velocity, self.carrier.gravity * step
         last_axes = self._axes
-        if self._jumps != self.carrier.jumps:  # a teleport, at rest, is neither acceleration nor rotation
-            self._jumps, last, last_axes = self.carrier.jumps, _ZERO, axes
+        if self._teleports != self.carrier.teleports:  # a teleport, at rest, is neither acceleration nor rotation
+            self._teleports, last, last_axes = self.carrier.teleports, _ZERO, axes
         change = velocity[0] - last[0], velocity[1] - last[1], velocity[2] - last[2] - dv_gravity
         (gx, gy, gz), (cx, cy, cz) = self._delta_velocity, rotate_back(axes, change)
         self._delta_velocity = gx + cx, gy + cy, gz + cz
@@ -136,7 +136,7 @@ class Imu(Instrument):
         return in_turn(super().save_state(), integrals, self._update_jumps)
 
     def _update_jumps(self) -> None:
-        self._jumps = self.carrier.jumps
+        self._teleports = self.carrier.teleports
 
     # ---- messages
 

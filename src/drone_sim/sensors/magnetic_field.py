@@ -8,7 +8,7 @@ from typing import Any, Literal
 from drone_sim.config.types import Name
 from drone_sim.mechanics.frames import rotate_back
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic, diagonal, xyz
+from drone_sim.sensors.sensor import Fields, Instrument, Mounting, Output, SensorParameters, Topic, diagonal, xyz
 
 
 class MagneticFieldParameters(SensorParameters):
@@ -19,9 +19,9 @@ class MagneticFieldParameters(SensorParameters):
     frame: Name = "imu_link"
     noise: NoiseParameters = NoiseParameters()  # T
 
-    def make(self, fitting: Fitting) -> MagneticField:
+    def make(self, mounting: Mounting) -> MagneticField:
         """Return the instrument; call its `reset` before `look`."""
-        return MagneticField(self, fitting)
+        return MagneticField(self, mounting)
 
 
 class MagneticField(Instrument):
@@ -29,15 +29,15 @@ class MagneticField(Instrument):
 
     parameters: MagneticFieldParameters
 
-    def __init__(self, parameters: MagneticFieldParameters, fitting: Fitting):
+    def __init__(self, parameters: MagneticFieldParameters, mounting: Mounting):
         """Create it; call `reset` before `look`."""
-        super().__init__(parameters, fitting)
+        super().__init__(parameters, mounting)
         self._noise = self.make_noise(parameters.noise, 3)
         self.outputs = (Output("", "sensor_msgs/MagneticField", self._message),)
 
     def sample(self) -> list[float]:
         """Return the field in T along the sensor's axes."""
-        return self._noise.add(rotate_back(self.fitting.pose(), self.carrier.magnetic_field))
+        return self._noise.add(rotate_back(self.mounting.pose(), self.carrier.magnetic_field))
 
     def _message(self, value: list[float], header: Mapping[str, Any]) -> Fields:
         covariance = diagonal(*[self._noise.variance] * 3)

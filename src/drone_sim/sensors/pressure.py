@@ -17,7 +17,7 @@ from typing import Any, Literal, NamedTuple
 from drone_sim.config.types import Name
 from drone_sim.mechanics.frames import position
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic, xyz
+from drone_sim.sensors.sensor import Fields, Instrument, Mounting, Output, SensorParameters, Topic, xyz
 
 _SEA_LEVEL = 101325.0  # Pa
 _BASE_TEMPERATURE, _LAPSE = 288.15, 0.0065  # K, K/m
@@ -52,9 +52,9 @@ class PressureParameters(SensorParameters):
 
     suffixes = ("", "/height")
 
-    def make(self, fitting: Fitting) -> Pressure:
+    def make(self, mounting: Mounting) -> Pressure:
         """Return the instrument; call its `reset` before `look`."""
-        return Pressure(self, fitting)
+        return Pressure(self, mounting)
 
 
 class PressureSample(NamedTuple):
@@ -69,9 +69,9 @@ class Pressure(Instrument):
 
     parameters: PressureParameters
 
-    def __init__(self, parameters: PressureParameters, fitting: Fitting):
+    def __init__(self, parameters: PressureParameters, mounting: Mounting):
         """Create it; call `reset` before `look`."""
-        super().__init__(parameters, fitting)
+        super().__init__(parameters, mounting)
         self._noise = self.make_noise(parameters.noise, 1)
         self.outputs = (
             Output("", "sensor_msgs/FluidPressure", self._message),
@@ -81,7 +81,7 @@ class Pressure(Instrument):
     def sample(self) -> PressureSample:
         """Return pressure and height, both with the noise of the pressure."""
         ground = self.carrier.datum.altitude
-        (measured,) = self._noise.add((pressure_at(ground + position(self.fitting.pose())[2]),))
+        (measured,) = self._noise.add((pressure_at(ground + position(self.mounting.pose())[2]),))
         return PressureSample(measured, height_of(max(measured, 1e-6)) - ground)
 
     def _message(self, value: PressureSample, header: Mapping[str, Any]) -> Fields:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from drone_sim.config.types import Finite, Length, Name, ParameterError, Unit, Within
 from drone_sim.mechanics.frames import Vector, from_rpy, position, rotate_back, transform
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.sensor import Fields, Fitting, Hit, Instrument, Output, SensorParameters, Topic
+from drone_sim.sensors.sensor import Fields, Hit, Instrument, Mounting, Output, SensorParameters, Topic
 
 _RADIATION = {"ultrasound": 0, "infrared": 1}  # sensor_msgs/Range
 # Sensor frame from object frame. V-REP's proximity and vision sensors have z forward, y up and x left.
@@ -34,9 +34,9 @@ class RangeParameters(SensorParameters):
     default_mount = from_rpy((0.0, 0.0, 0.0), (0.0, math.pi / 2, 0.0))
     from_object = _OBJECT
 
-    def make(self, fitting: Fitting) -> Range:
+    def make(self, mounting: Mounting) -> Range:
         """Return the instrument; call its `reset` before `look`."""
-        return Range(self, fitting)
+        return Range(self, mounting)
 
     def check(self, sub_step: float) -> None:
         """Raise ParameterError as the base class does, and for an empty range."""
@@ -60,15 +60,15 @@ class Range(Instrument):
 
     parameters: RangeParameters
 
-    def __init__(self, parameters: RangeParameters, fitting: Fitting):
+    def __init__(self, parameters: RangeParameters, mounting: Mounting):
         """Create it; call `reset` before `look`."""
-        super().__init__(parameters, fitting)
+        super().__init__(parameters, mounting)
         self._noise = self.make_noise(parameters.noise, 1)
         self.outputs = (Output("", "sensor_msgs/Range", self._message),)
 
     def sample(self) -> RangeSample:
         """Return the distance along the ray."""
-        parameters, pose = self.parameters, self.fitting.pose()
+        parameters, pose = self.parameters, self.mounting.pose()
         hit = self.carrier.ray(position(pose), transform(pose, (parameters.max_range, 0.0, 0.0)))
         if hit is None:
             return RangeSample(math.inf, None, (0.0, 0.0, 0.0))

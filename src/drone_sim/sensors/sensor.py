@@ -81,7 +81,7 @@ class SensorParameters(Checked):
     default_mount: ClassVar[Matrix] = IDENTITY  # root-from-sensor, without `mount` and without a URDF link `frame`
     from_object: ClassVar[Matrix] = IDENTITY  # sensor frame from the frame of the object that scripts find
 
-    def make(self, fitting: Fitting) -> Instrument:
+    def make(self, mounting: Mounting) -> Instrument:
         """Return the instrument; call its `reset` before `look`."""
         raise NotImplementedError
 
@@ -149,7 +149,7 @@ class Carrier(Protocol):
     """The vehicle as its sensors see it, after the last sub-step."""
 
     state: State  # of the root link
-    jumps: int  # number of teleports, each of which leaves it at rest; never decreases
+    teleports: int  # number of teleports, each of which leaves it at rest; never decreases
     mass: float  # kg
     gravity: float  # acceleration of free fall along z in m/s², negative downwards
     datum: DatumParameters  # position of the world's origin on the Earth
@@ -171,7 +171,7 @@ class Carrier(Protocol):
 
 
 @dataclass(frozen=True)
-class Fitting:
+class Mounting:
     """The connection of a sensor to its vehicle."""
 
     name: str  # unique, such as drone/imu; seeds the noise
@@ -224,15 +224,15 @@ class Instrument(Sensor):
 
     outputs: tuple[Output, ...]
 
-    def __init__(self, parameters: SensorParameters, fitting: Fitting):
+    def __init__(self, parameters: SensorParameters, mounting: Mounting):
         """Create it; call `reset` before `look`."""
-        super().__init__(parameters.period(fitting.sub_step))
+        super().__init__(parameters.period(mounting.sub_step))
         self.parameters = parameters
-        self.fitting = fitting
-        self.carrier = fitting.carrier
-        self.interval = self.period * fitting.sub_step  # s
+        self.mounting = mounting
+        self.carrier = mounting.carrier
+        self.interval = self.period * mounting.sub_step  # s
         self.readings: list[Reading] = []
-        self._delay = round(parameters.latency / fitting.sub_step)
+        self._delay = round(parameters.latency / mounting.sub_step)
         self._queue: deque[tuple[int, Reading]] = deque()  # (count at which the sample becomes a reading, sample)
         self._noises: list[Noise] = []
         self._random = np.random.default_rng()
@@ -268,7 +268,7 @@ class Instrument(Sensor):
         self.latest = None
         self.readings.clear()
         self._queue.clear()
-        entropy = [self.parameters.seed, *self.fitting.name.encode()]
+        entropy = [self.parameters.seed, *self.mounting.name.encode()]
         self._random = np.random.default_rng(np.random.SeedSequence(entropy))
         for noise in self._noises:
             noise.restart(self._random)
@@ -280,7 +280,7 @@ class Instrument(Sensor):
 
     def header(self, reading: Reading) -> dict[str, Any]:
         """Return the std_msgs/Header of a reading: time of the measurement (s, simulated) and frame."""
-        return {"stamp": reading.at * self.fitting.sub_step, "frame_id": self.parameters.frame}
+        return {"stamp": reading.at * self.mounting.sub_step, "frame_id": self.parameters.frame}
 
     def read(self) -> Fields | None:
         """Return the latest reading as the fields of its first message; None before the first reading."""

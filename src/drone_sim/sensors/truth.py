@@ -17,7 +17,7 @@ from drone_sim.mechanics.frames import to_quaternion
 from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.outputs import COLOR
-from drone_sim.render.renderer import Moment
+from drone_sim.render.renderer import FrameState
 from drone_sim.shapes.shape import DrawnShape
 from drone_sim.shapes.visual import Visual
 
@@ -27,7 +27,7 @@ _HIDDEN = 1.02  # a point was hidden if its distance exceeded the depth by this 
 _HIDDEN_BY = 1e-3  # ... and this distance, m
 
 
-class Identity(NamedTuple):
+class ObjectLabel(NamedTuple):
     """The object of a visual: its name in the scene, and its category."""
 
     name: str
@@ -48,7 +48,7 @@ class Box2D(NamedTuple):
         return max(0.0, self.right - self.left) * max(0.0, self.bottom - self.top)
 
 
-class Seen(NamedTuple):
+class Detection(NamedTuple):
     """An object visible in the image.
 
     visible: box around its pixels. full: box around the whole object, without occlusion and image borders, and around
@@ -60,7 +60,7 @@ class Seen(NamedTuple):
     """
 
     number: int
-    identity: Identity
+    identity: ObjectLabel
     pixels: int
     visible: Box2D
     full: Box2D
@@ -75,11 +75,11 @@ class Numbered:
     """The numbers of a scene's objects in masks: 1, 2, ...; 0 is background."""
 
     instances: np.ndarray  # number of each visual, (N,)
-    identities: list[Identity] = field(default_factory=list)  # of the objects 1, 2, ...
+    identities: list[ObjectLabel] = field(default_factory=list)  # of the objects 1, 2, ...
     categories: list[str] = field(default_factory=list)  # of the category numbers 1, 2, ...
 
     @classmethod
-    def of(cls, visuals: Sequence[Identity]) -> Numbered:
+    def of(cls, visuals: Sequence[ObjectLabel]) -> Numbered:
         """Number the objects of the visuals in the order of their first appearance."""
         identities = list(dict.fromkeys(visuals))
         numbers = {identity: number for number, identity in enumerate(identities, 1)}
@@ -105,7 +105,7 @@ class PictureTruth:
         draw: Callable[[Sequence[str]], Mapping[str, np.ndarray]],
         alone: Callable[[], np.ndarray],
         intrinsics: Intrinsics,
-        moment: Moment,
+        moment: FrameState,
         visuals: Sequence[Visual],
         numbered: Numbered,
     ):
@@ -162,7 +162,7 @@ class PictureTruth:
         flow = np.where(known[..., None], self.intrinsics.pixels - source, 0.0)
         return flow.astype(np.float32), known
 
-    def seen(self) -> list[Seen]:
+    def seen(self) -> list[Detection]:
         """Return all objects with a visible pixel, including the floor, in the order of their numbers."""
         mask = self.output("instance")
         counts, alone = np.bincount(mask.ravel(), minlength=len(self.numbered.identities) + 1), self._alone()
@@ -180,7 +180,7 @@ class PictureTruth:
             count, unoccluded = int(counts[number]), max(int(alone[number]), int(counts[number]))
             shares = 1 - count / unoccluded, 1 - inside.area / full.area if full.area > 0 else 0.0
             identity = self.numbered.identities[number - 1]
-            objects.append(Seen(int(number), identity, count, visible, full, *shares, pose, size))
+            objects.append(Detection(int(number), identity, count, visible, full, *shares, pose, size))
         return objects
 
     def _box(self, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -207,7 +207,7 @@ class PictureTruth:
         return np.concatenate(pieces)
 
     def _full_box(self, number: int, corners: np.ndarray, visible: Box2D) -> Box2D:
-        """Return `Seen.full` of an object with these corners."""
+        """Return `Detection.full` of an object with these corners."""
         lens = self.intrinsics
         if not isinstance(lens, Distorted) and (corners[:, 2] < lens.near).any():
             corners = _clip_near(self._optical(number, _triangle_corners).reshape(-1, 3, 3), lens.near)
@@ -218,7 +218,7 @@ class PictureTruth:
         return Box2D(*map(float, (*pixels.min(axis=0), *pixels.max(axis=0))))
 
 
-def described(objects: Sequence[Seen]) -> list[dict[str, Any]]:
+def described(objects: Sequence[Detection]) -> list[dict[str, Any]]:
     """Return objects as JSON values: px, m, and poses optical-from-box with quaternions xyzw."""
     return [
         {
@@ -234,7 +234,7 @@ def described(objects: Sequence[Seen]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def quaternion_of(seen: Seen) -> tuple[float, ...]:
+def quaternion_of(seen: Detection) -> tuple[float, ...]:
     """Return the orientation of an object's box in the optical frame, a quaternion xyzw."""
     return tuple(map(float, to_quaternion(tuple(seen.pose[:3].ravel()))))
 

@@ -15,9 +15,9 @@ from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics, Lens, Orthographic
 from drone_sim.render.light import decoded
 from drone_sim.render.outputs import COLOR
-from drone_sim.render.renderer import Moment, Renderer
+from drone_sim.render.renderer import FrameState, Renderer
 from drone_sim.render.shutter import Shutter, gathered, moved
-from drone_sim.sensors.truth import Identity, Numbered, PictureTruth
+from drone_sim.sensors.truth import Numbered, ObjectLabel, PictureTruth
 from drone_sim.shapes.visual import Visual
 
 _LOG = logging.getLogger(__name__)
@@ -69,7 +69,7 @@ class Vision:
         self.pictures, self.seconds = 0, 0.0  # number of images so far, and their total rendering time (wall clock)
 
     def look_at(
-        self, subject: Subject, blades: Collection[TurningBlades], identify: Callable[[], list[Identity]] = list
+        self, subject: Subject, blades: Collection[TurningBlades], identify: Callable[[], list[ObjectLabel]] = list
     ) -> None:
         """Set the subject. Its blades are rotated only when an image is rendered.
 
@@ -143,7 +143,7 @@ class Vision:
         self.pictures += 1
         self.seconds += time.perf_counter() - start
 
-    def truth(self, intrinsics: Intrinsics, pose: np.ndarray, before: Moment | None) -> PictureTruth | None:
+    def truth(self, intrinsics: Intrinsics, pose: np.ndarray, before: FrameState | None) -> PictureTruth | None:
         """Return the ground truth of the image from `pose`, with the flow since `before`; None without OpenGL."""
         self._open()
         renderer = self._renderer
@@ -153,7 +153,7 @@ class Vision:
         visuals, poses = self._subject.visuals(), np.array(self._subject.visual_poses())
         numbered = Numbered.of(self._identify())
         renderer.set_visuals(visuals)
-        since = before if before is not None and len(before.poses) == len(poses) else Moment(pose, poses)
+        since = before if before is not None and len(before.poses) == len(poses) else FrameState(pose, poses)
 
         def draw(names: Sequence[str]) -> Mapping[str, np.ndarray]:
             return renderer.render_outputs(names, intrinsics, pose, poses, instances=numbered.instances, before=since)
@@ -161,7 +161,7 @@ class Vision:
         def alone() -> np.ndarray:
             return renderer.count_alone(intrinsics, pose, poses, numbered.instances)
 
-        return PictureTruth(draw, alone, intrinsics, Moment(pose, poses), visuals, numbered)
+        return PictureTruth(draw, alone, intrinsics, FrameState(pose, poses), visuals, numbered)
 
     def _tiny_picture(self, kind: str, intrinsics: Lens, pose: np.ndarray) -> np.ndarray:
         if isinstance(intrinsics, (Orthographic, Distorted)):

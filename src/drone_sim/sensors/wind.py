@@ -8,7 +8,7 @@ from typing import Any, Literal
 from drone_sim.config.types import Name
 from drone_sim.mechanics.frames import Vector
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic, xyz
+from drone_sim.sensors.sensor import Fields, Instrument, Mounting, Output, SensorParameters, Topic, xyz
 
 
 class WindParameters(SensorParameters):
@@ -19,9 +19,9 @@ class WindParameters(SensorParameters):
     frame: Name = "base_link"
     noise: NoiseParameters = NoiseParameters()  # m/s
 
-    def make(self, fitting: Fitting) -> Wind:
+    def make(self, mounting: Mounting) -> Wind:
         """Return the instrument; call its `reset` before `look`."""
-        return Wind(self, fitting)
+        return Wind(self, mounting)
 
 
 class Wind(Instrument):
@@ -29,9 +29,9 @@ class Wind(Instrument):
 
     parameters: WindParameters
 
-    def __init__(self, parameters: WindParameters, fitting: Fitting):
+    def __init__(self, parameters: WindParameters, mounting: Mounting):
         """Create it; call `reset` before `look`."""
-        super().__init__(parameters, fitting)
+        super().__init__(parameters, mounting)
         self._noise = self.make_noise(parameters.noise, 3)
         self.outputs = (Output("", "geometry_msgs/Vector3Stamped", self._message),)
 

@@ -45,7 +45,7 @@ class Body:
         self.rigid = rigid
         self.mass, self.gravity = rigid.mass, context.gravity
         self.datum, self.magnetic_field = context.datum, context.magnetic_field
-        self.jumps = 0  # number of teleports
+        self.teleports = 0  # number of teleports
         self.pushes = 0  # number of forces that scripts added
         self.is_held = False  # dragged by a user; not saved in snapshots
         self._context = context
@@ -81,7 +81,7 @@ class Body:
 
     def begin_again(self) -> None:
         """Return to the start pose during a run, and forget the body's contacts."""
-        self.jumps += 1
+        self.teleports += 1
         self._world.part(self.number)
         self.reset()
 
@@ -94,7 +94,7 @@ class Body:
 
     def move(self, pose: Pose) -> None:
         """Teleport the body to a pose, at rest."""
-        self.jumps += 1
+        self.teleports += 1
         self._world.set_pose(self.number, pose)
         self.refresh()
 
@@ -113,7 +113,7 @@ class Body:
 
     def restored(self) -> None:
         """Read the state after the world was restored from a snapshot."""
-        self.jumps += 1
+        self.teleports += 1
         self._pending = []
         self.refresh()
 

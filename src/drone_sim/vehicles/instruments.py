@@ -8,7 +8,7 @@ from functools import partial
 from drone_sim.context import SimulationContext
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.saved_state import Restore, in_turn
-from drone_sim.sensors.sensor import Failing, Failure, Fitting, Instrument, SensorParameters
+from drone_sim.sensors.sensor import Failing, Failure, Instrument, Mounting, SensorParameters
 from drone_sim.vehicles.body import Body
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.quadricopter_objects import DRONE
@@ -28,7 +28,7 @@ class Instruments:
         for name, sensor in vehicle.sensors.items():
             object_name = f"{sensor.object or name}{suffix}"
             pose = partial(_pose, context, sensor, object_name)
-            instrument = sensor.make(Fitting(f"{vehicle.name}/{name}", body, pose, context.sub_step))
+            instrument = sensor.make(Mounting(f"{vehicle.name}/{name}", body, pose, context.sub_step))
             self.by_name[name] = self.by_object[object_name] = instrument
             parent, matrix = sensor.placed(body.rigid.links)
             if parent not in ("", DRONE):

@@ -163,7 +163,7 @@ class Propulsion:
     def _velocities(self) -> Sequence[float]:
         return [parameters[PARTICLE_VELOCITY] for parameters in self._driven]
 
-    def give_way(self, name: str) -> dict[str, Any] | None:
+    def disable_thrust_model(self, name: str) -> dict[str, Any] | None:
         """Disable the built-in thrust model of a propeller, whose script applies the forces itself.
 
         Return the propeller's script parameters; None if `name` is not a propeller.

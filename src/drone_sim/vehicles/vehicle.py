@@ -106,10 +106,10 @@ class Vehicle:
         self._forces: list[Force] = [self.propulsion.law, *(force for force in others if not force.every_sub_step)]
         self.sub_step_forces = [force for force in others if force.every_sub_step]
         self._has_drag = any(force.feels_wind for force in others)
-        self.feel_weather()
+        self.update_wind_forces()
         self.commands.begin()
 
-    def feel_weather(self) -> None:
+    def update_wind_forces(self) -> None:
         """Add a drag force with DragParameters' defaults if there is wind and `forces` defines none."""
         if self.context.weather.is_felt and not self._has_drag:
             self._has_drag = True

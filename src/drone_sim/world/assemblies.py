@@ -25,7 +25,7 @@ _MAX_VELOCITY = 1e4  # rad/s or m/s of a joint; PyBullet's own limit is 100
 _NO_INERTIA = PrincipalInertia((0.0, 0.0, 0.0))
 
 
-class Hinge(NamedTuple):
+class LinkJoint(NamedTuple):
     """How a link is attached to its parent: by a joint about or along z.
 
     parent: index of the parent link; local: the parent's frame from the joint's; motion: "revolute", "prismatic", or
@@ -49,7 +49,7 @@ class Link(NamedTuple):
     local: Matrix = IDENTITY
     mass: float = 0.0
     inertia: PrincipalInertia = _NO_INERTIA
-    hinge: Hinge | None = None
+    hinge: LinkJoint | None = None
 
 
 def create(client: int, files: BulletFiles, links: Sequence[Link], pose: Pose) -> tuple[int, list[int]]:
@@ -82,7 +82,7 @@ def create(client: int, files: BulletFiles, links: Sequence[Link], pose: Pose) -
     return body, numbers
 
 
-def _set_joint(client: int, body: int, number: int, hinge: Hinge) -> None:
+def _set_joint(client: int, body: int, number: int, hinge: LinkJoint) -> None:
     """Give a link V-REP's material, and let its joint move freely."""
     pybullet.changeDynamics(body, number, lateralFriction=1, restitution=0, physicsClientId=client)
     pybullet.changeDynamics(body, number, jointDamping=0, maxJointVelocity=_MAX_VELOCITY, physicsClientId=client)
@@ -125,7 +125,7 @@ def _add_link(files: BulletFiles, robot: Xml.Element, index: int, link: Link) ->
             collision.set("concave", "yes")
 
 
-def _add_joint(robot: Xml.Element, index: int, hinge: Hinge) -> None:
+def _add_joint(robot: Xml.Element, index: int, hinge: LinkJoint) -> None:
     kind = "continuous" if hinge.motion == "revolute" and hinge.limits is None else hinge.motion
     joint = Xml.SubElement(robot, "joint", name=f"j{index}", type=kind)
     Xml.SubElement(joint, "parent", link=f"l{hinge.parent}")

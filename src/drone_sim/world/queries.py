@@ -29,7 +29,7 @@ class RayHit(NamedTuple):
     normal: Vector
 
 
-class Met(NamedTuple):
+class SurfacePoint(NamedTuple):
     """A point on a body's link (-1: the root): its position (m), and the unit normal of the surface."""
 
     body: int
@@ -48,7 +48,7 @@ class Gap(NamedTuple):
     point: Vector
 
 
-class Touch(NamedTuple):
+class ContactPoint(NamedTuple):
     """A contact in the last sub-step: the other body, position (m), unit normal, and the force (N) that it exerts."""
 
     body: int
@@ -64,7 +64,7 @@ class Queries:
         """Use a PyBullet client; `collision_filter` knows its permeable links."""
         self._client = client
         self._filter = collision_filter
-        self._contacts_of_parts: dict[int, dict[int, Touch]] = {}  # by body, and by the other body
+        self._contacts_of_parts: dict[int, dict[int, ContactPoint]] = {}  # by body, and by the other body
         self._probe: int | None = None  # a collision shape that stands for a point
 
     def ray(self, start: Vector, end: Vector, ignoring: int = -1) -> RayHit | None:
@@ -79,7 +79,7 @@ class Queries:
             hit = min(others, key=lambda other: other[2])  # PyBullet does not sort them
         return RayHit(hit[0], hit[2] * dist(start, end), _normal(start, end, hit))
 
-    def rays(self, ends: Sequence[tuple[Vector, Vector]], counts: Callable[[int, int], bool]) -> list[Met]:
+    def rays(self, ends: Sequence[tuple[Vector, Vector]], counts: Callable[[int, int], bool]) -> list[SurfacePoint]:
         """Return the first hit of each ray (from, to, m) on a body and link for which `counts` is true."""
         starts, stops = zip(*ends)
         hits = []
@@ -88,7 +88,7 @@ class Queries:
                 others = [other for other in self._all_hits(start, stop) if counts(other[0], other[1])]
                 hit = min(others, key=lambda other: other[2], default=(_NO_BODY,))
             if hit[0] != _NO_BODY:
-                hits.append(Met(hit[0], hit[1], hit[3], _normal(start, stop, hit)))
+                hits.append(SurfacePoint(hit[0], hit[1], hit[3], _normal(start, stop, hit)))
         return hits
 
     def _all_hits(self, start: Vector, end: Vector) -> Iterator[Any]:
@@ -102,7 +102,7 @@ class Queries:
 
     def nearest_points(
         self, point: Vector, reach: float, counts: Callable[[int, int], bool], *, measured: bool = False
-    ) -> list[Met]:
+    ) -> list[SurfacePoint]:
         """Return the points nearest to a point, within `reach` (m), of all bodies and links for which `counts` is true.
 
         `measured`: include bodies that contain the point, and links that collide with nothing; sensors see neither.
@@ -125,7 +125,7 @@ class Queries:
                     collisionShapePositionA=point,
                     physicsClientId=self._client,
                 )
-                points += [Met(body, link, row[6], row[7]) for row in rows if measured or row[8] > 0]
+                points += [SurfacePoint(body, link, row[6], row[7]) for row in rows if measured or row[8] > 0]
         return points
 
     def gaps(self, body: int, link: int, reach: float, counts: Callable[[int, int], bool]) -> list[Gap]:
@@ -144,7 +144,7 @@ class Queries:
                 gaps += [Gap(other[0], other[1], row[8], row[5], row[6]) for row in rows]
         return gaps
 
-    def contacts(self, body: int) -> list[Touch]:
+    def contacts(self, body: int) -> list[ContactPoint]:
         """Return the contacts of a body in the last sub-step; one per other body if the sub-step was divided."""
         if body in self._contacts_of_parts:
             return list(self._contacts_of_parts[body].values())
@@ -164,7 +164,7 @@ class Queries:
                 force = x + touch.force[0] * share, y + touch.force[1] * share, z + touch.force[2] * share
                 by_other[touch.body] = touch._replace(force=force)
 
-    def _touches(self, body: int, rows: Sequence[Any]) -> list[Touch]:
+    def _touches(self, body: int, rows: Sequence[Any]) -> list[ContactPoint]:
         """Return a body's contacts that push it, from PyBullet's rows about it."""
         # If the requested body is the second one of a contact, PyBullet swaps bodies, positions and normal, but not the
         # friction. A request for it as the second body returns exactly these contacts.
@@ -200,8 +200,8 @@ def _normal(start: Vector, end: Vector, hit: Any) -> Vector:
     return x, y, z
 
 
-def _touch(row: Any, sign: float) -> Touch:
+def _touch(row: Any, sign: float) -> ContactPoint:
     other, point, normal = row[2], row[5], row[7]
     push, first, along, second, across = row[9], row[10] * sign, row[11], row[12] * sign, row[13]
     x, y, z = (n * push + a * first + b * second for n, a, b in zip(normal, along, across))
-    return Touch(other, point, normal, (x, y, z))
+    return ContactPoint(other, point, normal, (x, y, z))

@@ -12,7 +12,7 @@ import rospy
 import rospy.core
 
 from drone_sim.ros.core.startup import init_node, reported
-from drone_sim.run.guardian import Guardian
+from drone_sim.run.watchdog import Watchdog
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _PATIENCE = 2.0  # s, of one thread for the other
@@ -23,22 +23,22 @@ class Shutdown:
 
     rospy's own signal handler waits for ever if a signal interrupts code that holds a lock it needs: see
     end_on_signals. And `rosnode kill` closes the topics from another thread, while a step may be publishing on them:
-    here it waits until there are no more steps. If the steps do not end, the guardian, if there is one, ends the
+    here it waits until there are no more steps. If the steps do not end, the watchdog, if there is one, ends the
     process.
     """
 
-    def __init__(self, guardian: Guardian | None = None, numbers: Iterable[int] = SIGNALS) -> None:
+    def __init__(self, watchdog: Watchdog | None = None, numbers: Iterable[int] = SIGNALS) -> None:
         """Take over the signals; init_node must have been called, with disable_signals.
 
-        Without a guardian `numbers` are those that end the node.
+        Without a watchdog `numbers` are those that end the node.
         """
-        self._guardian, self._numbers = guardian, tuple(numbers)
+        self._watchdog, self._numbers = watchdog, tuple(numbers)
         self._asked = False  # no Event: the signal may interrupt who holds its lock
         self._done, self._closed = threading.Event(), threading.Event()
-        if guardian is None:
+        if watchdog is None:
             end_on_signals(self._numbers)
         else:
-            guardian.ready(self._ask)
+            watchdog.ready(self._ask)
         rospy.on_shutdown(self._wait_for_the_node)
         rospy.core.add_shutdown_hook(lambda _reason: self._closed.set())  # the last: topics are closed by then
 
@@ -52,7 +52,7 @@ class Shutdown:
         Another signal ends it at once, where the master does not answer.
         """
         self._done.set()
-        for number in self._numbers if self._guardian is None else ():
+        for number in self._numbers if self._watchdog is None else ():
             signal.signal(number, signal.SIG_DFL)
         rospy.signal_shutdown("the node ends")  # where another thread does that already, it returns at once
         self._closed.wait(_PATIENCE)
@@ -61,8 +61,8 @@ class Shutdown:
         self._asked = True
 
     def _wait_for_the_node(self) -> None:
-        if self._guardian is not None:
-            self._guardian.count()
+        if self._watchdog is not None:
+            self._watchdog.count()
         self._ask()
         self._done.wait(_PATIENCE)
 

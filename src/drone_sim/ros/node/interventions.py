@@ -29,7 +29,7 @@ class Interventions:
         """Advertise for `simulation`."""
         self._simulation = simulation
         self._topic = rospy.Publisher("~interventions", String, queue_size=_WAITING)
-        self._run = self._era = -1
+        self._run = self._topology_version = -1
 
     def update(self) -> None:
         """Begin anew in another run; publish what was tuned before it, and is still in force."""
@@ -74,8 +74,8 @@ class Interventions:
 
     def _clients(self) -> Actions:
         """Return the rules for clients: they may fly all vehicles, also by the green spheres, and are not scripts."""
-        if self._era != self._simulation.era:
-            self._era = self._simulation.era
+        if self._topology_version != self._simulation.topology_version:
+            self._topology_version = self._simulation.topology_version
             flown = self._simulation.vehicles.values()
             self._actions = Actions(self._simulation, flown, frozenset(), [one.target for one in flown])
         return self._actions

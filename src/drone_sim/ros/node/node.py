@@ -47,11 +47,11 @@ from drone_sim.ros.vehicle.script_backend import RosBackend
 from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.ros.vehicle.vehicle_topics import FleetTopics
 from drone_sim.run.diagnosis.diagnosis import Diagnosis
-from drone_sim.run.guardian import Guardian
 from drone_sim.run.pacing import Beat, Pace, Pacer, period
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
+from drone_sim.run.watchdog import Watchdog
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import script_path
@@ -291,12 +291,12 @@ class _ToRosout(logging.Handler):
         logging.getLogger("rosout").log(record.levelno, self.format(record))
 
 
-def main(guardian: Guardian) -> int:
+def main(watchdog: Watchdog) -> int:
     """Run the node; return its exit status: 1, after one line, for a wrong parameter, file or script."""
     # The time of messages is the simulation's; hearing its own /clock would cost the node half of its speed.
     if not init_node(_NAME, is_required=True, disable_signals=True, disable_rostime=True):
         return 1
-    shutdown = Shutdown(guardian)
+    shutdown = Shutdown(watchdog)
     nodes = []
 
     def run() -> None:
@@ -317,5 +317,5 @@ def main(guardian: Guardian) -> int:
 
 
 if __name__ == "__main__":
-    its_guardian = Guardian(_NAME)
-    its_guardian.end_at_once(main(its_guardian))
+    its_watchdog = Watchdog(_NAME)
+    its_watchdog.end_at_once(main(its_watchdog))

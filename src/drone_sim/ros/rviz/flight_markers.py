@@ -209,7 +209,7 @@ class _Path:
 
     def __init__(self) -> None:
         self._lines: list[list[Vector]] = []
-        self._jumps: int | None = None  # None where nobody has looked for a while
+        self._teleports: int | None = None  # None where nobody has looked for a while
         self._place: Vector = (0.0, 0.0, 0.0)
 
     @property
@@ -223,18 +223,18 @@ class _Path:
 
     def interrupt(self) -> None:
         """Begin another line the next time."""
-        self._jumps = None
+        self._teleports = None
 
     def follow(self, vehicle: Vehicle) -> None:
         """Add the vehicle's position to the path if it is far enough from the last point."""
         self._place = vehicle.body.state.position
-        if vehicle.body.jumps != self._jumps:
+        if vehicle.body.teleports != self._teleports:
             self._lines = [line for line in self._lines if len(line) > 1]
             self._lines.append([self._place])
         elif math.dist(self._place, self._lines[-1][-1]) > _PATH_SPACING:
             self._lines[-1].append(self._place)
             self._shorten()
-        self._jumps = vehicle.body.jumps
+        self._teleports = vehicle.body.teleports
 
     def _shorten(self) -> None:
         if sum(map(len, self._lines)) > _PATH_LENGTH:

@@ -79,15 +79,15 @@ class _StepContacts:
 
     def __init__(self, simulation: Simulation):
         self._simulation = simulation
-        self._seen: dict[str, tuple[tuple[int, int], int]] = {}  # run and step, and the vehicle's jumps
+        self._seen: dict[str, tuple[tuple[int, int], int]] = {}  # run and step, and number of teleports of the vehicle
 
     def by(self, vehicle: Vehicle) -> tuple[Contact, ...]:
         now = self._simulation.run, self._simulation.steps
-        seen, jumps = self._seen.get(vehicle.name, (None, 0))
+        seen, teleports = self._seen.get(vehicle.name, (None, 0))
         if seen != now:
-            jumps = vehicle.body.jumps
-            self._seen[vehicle.name] = now, jumps
-        if not self._simulation.steps or jumps != vehicle.body.jumps:
+            teleports = vehicle.body.teleports
+            self._seen[vehicle.name] = now, teleports
+        if not self._simulation.steps or teleports != vehicle.body.teleports:
             return ()
         return tuple(vehicle.body.contacts())
 

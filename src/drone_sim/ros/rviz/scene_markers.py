@@ -95,13 +95,13 @@ class VehicleMarkers:
         self._simulation = simulation
         self._files = files
         self._topic = MarkerTopic(f"{namespace(simulation)}/view/bodies", WORDS)
-        self._shown = -1  # era
+        self._shown = -1  # topology version
 
     def update(self) -> None:
         """Publish what is new, if anybody listens."""
         self._topic.repeat()
-        if self._simulation.era != self._shown and self._topic.due():
-            self._shown = self._simulation.era
+        if self._simulation.topology_version != self._shown and self._topic.due():
+            self._shown = self._simulation.topology_version
             looks = [one for vehicle in self._simulation.vehicles.values() for one in self._looks(vehicle)]
             self._topic.show([Marker(action=Marker.DELETEALL), *looks])  # some have gone, or have another name
 

@@ -19,7 +19,7 @@ from drone_sim.ros.core.image_messages import image
 from drone_sim.ros.core.mask_colors import painted
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.sensors.camera import Camera
-from drone_sim.sensors.truth import PictureTruth, Seen, described, quaternion_of
+from drone_sim.sensors.truth import Detection, PictureTruth, described, quaternion_of
 
 try:
     from vision_msgs.msg import (
@@ -126,16 +126,16 @@ def _cloud(points: np.ndarray, header: Header) -> PointCloud2:
     return PointCloud2(header=header, fields=fields, is_dense=False, data=points.tobytes(), **size)
 
 
-def _boxes(objects: list[Seen], header: Header) -> String:
+def _boxes(objects: list[Detection], header: Header) -> String:
     said = {"stamp": header.stamp.to_sec(), "frame": header.frame_id, "objects": described(objects)}
     return String(json.dumps(said))
 
 
-def _pose(one: Seen) -> Pose:
+def _pose(one: Detection) -> Pose:
     return Pose(Point(*one.pose[:3, 3]), Quaternion(*quaternion_of(one)))
 
 
-def _markers(objects: list[Seen], header: Header) -> MarkerArray:
+def _markers(objects: list[Detection], header: Header) -> MarkerArray:
     """Return 3D boxes with names for rviz, except the floor's; those of the last picture are deleted."""
     made = [Marker(header=header, action=Marker.DELETEALL)]
     for one in (each for each in objects if each.identity.name != _FLOOR):
@@ -146,7 +146,7 @@ def _markers(objects: list[Seen], header: Header) -> MarkerArray:
     return MarkerArray(made)
 
 
-def _detections(objects: list[Seen], header: Header) -> Any:
+def _detections(objects: list[Detection], header: Header) -> Any:
     made = []
     for one in objects:
         left, top, right, bottom = one.visible
@@ -156,7 +156,7 @@ def _detections(objects: list[Seen], header: Header) -> Any:
     return Detection2DArray(header=header, detections=made)
 
 
-def _detections_3d(objects: list[Seen], header: Header) -> Any:
+def _detections_3d(objects: list[Detection], header: Header) -> Any:
     made = []
     for one in objects:
         box = BoundingBox3D(center=_pose(one), size=Vector3(*one.size))

@@ -83,7 +83,7 @@ class FleetTopics:
         self._stamp = stamp
         self._topics: dict[str, VehicleTopics] = {}
         self._transforms = Transforms()
-        self._era = -1
+        self._topology_version = -1
         self._tuned: tuple[int, int, bool] | None = None
         self.descriptions: tuple[str, ...] = ()  # names of the parameters that hold the URDFs; any thread may read it
         self.follow()
@@ -93,7 +93,7 @@ class FleetTopics:
         simulation = self._simulation
         context = simulation.context
         tuned = context.tunings, context.scripts.asked, simulation.steps > 0  # after a step it is known what is read
-        if self._era != simulation.era:
+        if self._topology_version != simulation.topology_version:
             self._follow_vehicles()
         elif self._tuned != tuned:
             for topics in self._topics.values():
@@ -101,7 +101,7 @@ class FleetTopics:
         self._tuned = tuned
 
     def _follow_vehicles(self) -> None:
-        self._era = self._simulation.era
+        self._topology_version = self._simulation.topology_version
         vehicles = self._simulation.vehicles
         for name, topics in list(self._topics.items()):
             if name not in vehicles or _told(topics.vehicle.parameters) != _told(vehicles[name].parameters):

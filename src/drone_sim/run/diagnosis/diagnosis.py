@@ -18,7 +18,7 @@ from drone_sim.sensors.vision import TINY
 
 _ENOUGH = 0.9  # fraction of the nominal rate, and of the requested real-time factor
 _FEW = 2  # pictures that may be counted in this diagnosis or the next
-_MAX_HOLES = 3  # messages about what an import left out
+_MAX_UNSUPPORTED = 3  # messages about what an import left out
 _LATE = 0.1  # fraction of the steps; a few are late on any busy computer
 
 
@@ -64,7 +64,9 @@ def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool
     factor = since.steps * simulation.parameters.time_step / since.seconds if since else None
     problems = [Problem(ERROR, f"stopped: {player.why_stopped}")] if player.why_stopped and not player.playing else []
     problems += [Problem(ERROR, f"script of {key} failed: {error}") for key, error in simulation.failed_scripts.items()]
-    problems += [Problem(WARN, f"will not work here: {hole}") for hole in simulation.holes[:_MAX_HOLES]]
+    problems += [
+        Problem(WARN, f"will not work here: {feature}") for feature in simulation.unsupported[:_MAX_UNSUPPORTED]
+    ]
     if simulated_time and not player.playing:
         problems.append(Problem(WARN, f"{player.state}: /clock stands still, and nodes that use simulated time wait"))
     if held and since and not since.steps:

@@ -208,7 +208,7 @@ class VehicleDiagnosis:
             "position": f"{numbers(vehicle.body.state.position)} m",
             "speed": f"{self._speed():.2f} m/s",
             "contacts": ", ".join(_names(self._contacts)) or "none",
-            "put elsewhere": f"{vehicle.body.jumps} times",
+            "put elsewhere": f"{vehicle.body.teleports} times",
             "script": str(vehicle.parameters.script or self._player.simulation.script or load.DEFAULT),
             "frame": f"{self._frames_below}{vehicle.parameters.frame_prefix}base_link, in world",
         }

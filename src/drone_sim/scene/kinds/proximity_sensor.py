@@ -22,7 +22,7 @@ from drone_sim.scene.bodies import bodies_above
 from drone_sim.scene.kinds.kind import KindParameters, Place
 from drone_sim.scripting.api.sensors import EVERYTHING
 from drone_sim.world import World
-from drone_sim.world.queries import Met
+from drone_sim.world.queries import SurfacePoint
 
 _REFINEMENTS = 5  # number of refinements around the best ray
 _REFINEMENT_FACTOR = 3.0  # factor by which each refinement reduces the spacing of the rays
@@ -128,6 +128,6 @@ class _Search(NamedTuple):
         hits = [self._hit(met) for met in self.world.queries.nearest_points(origin, reach, self.counts)]
         return [hit for hit in hits if self.volume.holds(hit.point)]
 
-    def _hit(self, hit: Met) -> _Hit:
+    def _hit(self, hit: SurfacePoint) -> _Hit:
         point = frames.transform(frames.invert(self.matrix), hit.point)
         return _Hit(math.hypot(*point), point, hit.normal, hit.body, hit.link)

@@ -167,7 +167,7 @@ class Operations(Protocol):
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class SceneServices:
     """What the API needs besides the drone: how a script is run, and what it sees, by object name."""
 
     pictures: Mapping[str, Callable[..., np.ndarray]] = field(default_factory=dict)  # of a kind, or without one its own
@@ -184,12 +184,12 @@ class Surroundings:
 class Functions:
     """Functions of `sim` about what a script is attached to; docs/api.md has a section for each such class."""
 
-    def __init__(self, host: Host, surroundings: Surroundings, ignored: Ignored):
+    def __init__(self, host: Host, services: SceneServices, ignored: Ignored):
         """`host` is the drone that the script flies, or what else it is on; `surroundings` are what else it sees.
 
         `ignored` says that something is ignored.
         """
-        self._host, self._surroundings, self._ignored = host, surroundings, ignored
+        self._host, self._surroundings, self._ignored = host, services, ignored
         self._context, self._objects = host.context, host.context.objects
 
     def _found(self, handle: int, kind: type[_Kind], called: str) -> _Kind:

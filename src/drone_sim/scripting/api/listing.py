@@ -14,7 +14,7 @@ from drone_sim.mechanics.velocity_meter import VelocityMeter
 from drone_sim.scripting.api import ignored
 from drone_sim.scripting.api.calls import Api, Declaration, contents, declaration_of, flat_name
 from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.host import ScriptContext, Surroundings
+from drone_sim.scripting.api.host import SceneServices, ScriptContext
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
 from drone_sim.scripting.api.registry import Scripts
@@ -43,8 +43,8 @@ def apis() -> dict[str, Api]:
         own_script="Drone",
     )
     ros = make_sim_ros(MessageBus("drone"), host.context.clock)
-    vision = make_sim_vision(host, Surroundings())
-    return {"sim": make_sim(host, Surroundings()), "simROS": ros, "simVision": vision, **make_plugins(host)}
+    vision = make_sim_vision(host, SceneServices())
+    return {"sim": make_sim(host, SceneServices()), "simROS": ros, "simVision": vision, **make_plugins(host)}
 
 
 @functools.cache

@@ -17,7 +17,7 @@ from drone_sim.scripting.api.distances import DistanceFunctions
 from drone_sim.scripting.api.drawings import DrawingFunctions
 from drone_sim.scripting.api.dynamics import Dynamics
 from drone_sim.scripting.api.graphs import GraphFunctions
-from drone_sim.scripting.api.host import Host, Surroundings
+from drone_sim.scripting.api.host import Host, SceneServices
 from drone_sim.scripting.api.ignored import PLUGINS, Ignored
 from drone_sim.scripting.api.image_filters import ImageFilters
 from drone_sim.scripting.api.joints import JointFunctions
@@ -45,23 +45,23 @@ from drone_sim.scripting.api.windows import Dialogs, Views
 from drone_sim.scripting.api.wireless import Wireless
 
 
-def make_sim(host: Host, surroundings: Surroundings) -> Api:
+def make_sim(host: Host, services: SceneServices) -> Api:
     """Return `sim` for a script, on what it is attached to."""
     context = host.context
     names, ignored, trajectories = NameFunctions(host), _ignored(host), TrajectoryFunctions()
-    seen = host, surroundings, ignored
+    seen = host, services, ignored
     motions = MotionFunctions(*seen)
     parts = (
         Sensors(*seen),
         Objects(*seen),
         JointFunctions(*seen),
         ProximitySensors(*seen),
-        DistanceFunctions(context.objects, context.collections, surroundings.nearest),
+        DistanceFunctions(context.objects, context.collections, services.nearest),
         CollectionFunctions(names, context.objects, context.collections),
         Paths(*seen),
         ObjectKinds(*seen),
-        SceneObjects(surroundings),
-        Shapes(surroundings),
+        SceneObjects(services),
+        Shapes(services),
         Dynamics(*seen),
         ShapeMasses(*seen),
         Matrices(),
@@ -103,9 +103,9 @@ def make_sim_ros(bus: MessageBus, clock: Clock) -> Api:
     return Api("simROS", functions_of(TopicFunctions(bus), ServiceFunctions(bus), RosFunctions(bus, clock)), {})
 
 
-def make_sim_vision(host: Host, surroundings: Surroundings) -> Api:
+def make_sim_vision(host: Host, services: SceneServices) -> Api:
     """Return `simVision` for a script, on what it is attached to."""
-    filters = ImageFilters(host, surroundings, _ignored(host))
+    filters = ImageFilters(host, services, _ignored(host))
     return Api("simVision", functions_of(filters), {}, filters.save_state)
 
 

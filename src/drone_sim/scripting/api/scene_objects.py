@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS, bare
-from drone_sim.scripting.api.host import Operations, Surroundings
+from drone_sim.scripting.api.host import Operations, SceneServices
 from drone_sim.scripting.api.types import Handle, Name, Number, Numbers, SevenNumbers, ThreeNumbers, WrongValue, numbers
 
 _Value = TypeVar("_Value")
@@ -34,9 +34,9 @@ _VOLUMES = {
 class SceneObjects:
     """Objects of the scene: making, copying, naming and removing them; models in files."""
 
-    def __init__(self, surroundings: Surroundings):
+    def __init__(self, services: SceneServices):
         """Take what may be done to the scene, and how something is done whole."""
-        self._operations, self._outside = surroundings.operations, surroundings.outside
+        self._operations, self._outside = services.operations, services.outside
 
     def _do(self, action: Callable[[Operations], _Value]) -> _Value:
         operations = self._operations
@@ -229,9 +229,9 @@ class SceneObjects:
 class Shapes:
     """Shapes of the scene: their looks, masses, sizes and meshes."""
 
-    def __init__(self, surroundings: Surroundings):
+    def __init__(self, services: SceneServices):
         """Take what may be done to the scene, and how something is done whole."""
-        self._do = SceneObjects(surroundings)._do
+        self._do = SceneObjects(services)._do
 
     @sim("345")
     def setShapeColor(self, handle: Handle, _colorName: Any, colorComponent: int, rgbData: Numbers) -> int:

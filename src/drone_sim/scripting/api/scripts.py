@@ -19,7 +19,7 @@ from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.host import Functions, Host, Surroundings
+from drone_sim.scripting.api.host import Functions, Host, SceneServices
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.names import NameFunctions
 from drone_sim.scripting.api.registry import Attachment, Callee, ScriptParameters
@@ -48,9 +48,9 @@ _CHILD, _CUSTOMIZATION, _NONE = CONSTANTS["scripttype_childscript"], CONSTANTS["
 class _OnScripts(Functions):
     """What functions on scripts share."""
 
-    def __init__(self, names: NameFunctions, host: Host, surroundings: Surroundings, ignored: Ignored):
+    def __init__(self, names: NameFunctions, host: Host, services: SceneServices, ignored: Ignored):
         """`names` understands names; the others are what all functions take."""
-        super().__init__(host, surroundings, ignored)
+        super().__init__(host, services, ignored)
         self._find = names.getObject
         self._scripts = host.context.scripts
 

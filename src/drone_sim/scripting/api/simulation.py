@@ -10,7 +10,7 @@ from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.control import PAUSE, STOP
-from drone_sim.scripting.api.host import Functions, Host, Surroundings
+from drone_sim.scripting.api.host import Functions, Host, SceneServices
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.types import Number, numbers
 
@@ -23,9 +23,9 @@ _PLUGINS = ("RosInterface", "ROSInterface", "ROS", "simROS", "CustomUI", "simUI"
 class SimulationFunctions(Functions):
     """The simulation as a whole: its state, its time, and the parameters of the simulator."""
 
-    def __init__(self, host: Host, surroundings: Surroundings, ignored: Ignored):
+    def __init__(self, host: Host, services: SceneServices, ignored: Ignored):
         """Take what all functions take."""
-        super().__init__(host, surroundings, ignored)
+        super().__init__(host, services, ignored)
         self._random = random.Random(1)  # the same flight every time
         self._values: dict[str, dict[int, Any]] = {
             "intparam": _by_number(

@@ -19,7 +19,7 @@ from drone_sim.scripting.api import listing
 from drone_sim.scripting.api.calls import Api, Function, contents
 from drone_sim.scripting.api.constants import bare
 from drone_sim.scripting.api.control import Call, Steps, Turns, Wait, waits
-from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.scripts import ScriptFunctions
 from drone_sim.scripting.api.threads import Threads
 from drone_sim.scripting.rpc import effects
@@ -93,7 +93,7 @@ class ApiStubs:
         self._succeeded: set[Any] = set()
         self._places = Places()
         self._threads = Threads.__new__(Threads)
-        self._threads._surroundings = Surroundings(turns=turns)
+        self._threads._surroundings = SceneServices(turns=turns)
         self.modules = {
             name: Api(
                 name, {key: self._local(func) or self._stub(name, func) for key, func in functions.items()}, constants

@@ -34,7 +34,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _HANDLED = 0  # written once the process has handled the signal; its shutdown then has no time limit
 
 
-class Guardian:
+class Watchdog:
     """Handler of SIGINT, SIGTERM and SIGHUP, one per process; `asked` is the first signal received, or 0.
 
     A process that does not end within PATIENCE is killed by SIGKILL, after a line on stderr.

@@ -1,4 +1,4 @@
-"""A process ends when it is told to, whatever it does; and the guardian ends with it."""
+"""A process ends when it is told to, whatever it does; and the watchdog ends with it."""
 
 import contextlib
 import os
@@ -12,13 +12,13 @@ SOURCE = os.pathsep.join(path for path in sys.path if path)
 HANGS = 90.0  # s; nothing here takes nearly as long unless it hangs
 BEGIN = """
 import os, signal, sys, threading, time
-from drone_sim.run.guardian import Guardian
-guardian = Guardian("it")
+from drone_sim.run.watchdog import Watchdog
+watchdog = Watchdog("it")
 """
 
 
 # What runs after BEGIN, and the signal that it gets then. All run at once: most of their time is patience.
-SPIN, LOOKS = "sum(range(10**13))", "while not guardian.asked: time.sleep(0.01)\n"
+SPIN, LOOKS = "sum(range(10**13))", "while not watchdog.asked: time.sleep(0.01)\n"
 SCRIPT = """
 from drone_sim.scripting.time_limit import Labels, TimeLimit
 def hide():
@@ -31,7 +31,7 @@ limit = TimeLimit(0.5)
 limit.label = Labels("some.py", limit)["init"]
 limit.run({})
 """
-READY = "guardian.ready()\nprint('begun')\n"
+READY = "watchdog.ready()\nprint('begun')\n"
 PROGRAMS = {
     "in a call that holds Python's lock": (READY + SPIN, signal.SIGINT),
     "in a call that lets go of it": (READY + "while True: time.sleep(1000)", signal.SIGTERM),
@@ -40,29 +40,29 @@ PROGRAMS = {
     "looks": (READY + LOOKS + "sys.exit(7)", signal.SIGTERM),
     "another signal": (
         "signal.signal(signal.SIGALRM, lambda *_: None)\n" + READY + "os.kill(os.getpid(), signal.SIGALRM)\n"
-        "time.sleep(3)\nsys.exit(guardian.asked)",
+        "time.sleep(3)\nsys.exit(watchdog.asked)",
         None,
     ),
     "not ready": ("print('begun')\n" + SPIN, signal.SIGINT),
-    "counts": (READY + "guardian.count()\ntime.sleep(1000)", None),
+    "counts": (READY + "watchdog.count()\ntime.sleep(1000)", None),
     "stands down": (
-        READY + LOOKS + "guardian.stand_down()\nprint('in hand')\ntime.sleep(3)\nos.kill(os.getpid(), signal.SIGINT)",
+        READY + LOOKS + "watchdog.stand_down()\nprint('in hand')\ntime.sleep(3)\nos.kill(os.getpid(), signal.SIGINT)",
         signal.SIGINT,
     ),
     "a script in a call that holds Python's lock": (READY + SCRIPT.format("lambda: " + SPIN), None),
     "a script that hides from the alarm": (READY + SCRIPT.format("hide"), None),
     "a script that pauses": (READY + SCRIPT.format("pause") + "time.sleep(7)\nsys.exit(4)", None),
     "ends beside a thread": (
-        READY + "threading.Thread(target=time.sleep, args=(1000,)).start()\nguardian.end(3)",
+        READY + "threading.Thread(target=time.sleep, args=(1000,)).start()\nwatchdog.end(3)",
         None,
     ),
-    "ends with atexit": (READY + "import atexit\natexit.register(time.sleep, 1000)\nguardian.end(3)", None),
-    "ends": (READY + "import atexit\natexit.register(print, 'saved')\nguardian.end(3)", None),
+    "ends with atexit": (READY + "import atexit\natexit.register(time.sleep, 1000)\nwatchdog.end(3)", None),
+    "ends": (READY + "import atexit\natexit.register(print, 'saved')\nwatchdog.end(3)", None),
     "killed": (READY + SPIN, signal.SIGKILL),
     "a fork": (
-        "guardian.ready()\nchild = os.fork()\nif child == 0:\n    time.sleep(1000)\n"
+        "watchdog.ready()\nchild = os.fork()\nif child == 0:\n    time.sleep(1000)\n"
         "os.kill(child, signal.SIGTERM)\nassert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGTERM\n"
-        "print('begun')\ntime.sleep(3)\nsys.exit(guardian.asked)",
+        "print('begun')\ntime.sleep(3)\nsys.exit(watchdog.asked)",
         None,
     ),
 }
@@ -78,7 +78,7 @@ def _ended():
             process.send_signal(PROGRAMS[name][1])
 
     def ended(name):
-        """Return exit status and stderr; stderr ends when the guardian has ended, too."""
+        """Return exit status and stderr; stderr ends when the watchdog has ended, too."""
         _, errors = started[name].communicate(timeout=HANGS)
         return started[name].returncode, errors
 
@@ -164,7 +164,7 @@ def test_it_ends_with_the_process_however_that_ends(ended):
 
 
 def test_a_fork_goes_its_own_way(ended):
-    """Its signals do not count, and what it holds open does not keep the guardian."""
+    """Its signals do not count, and what it holds open does not keep the watchdog."""
     assert ended("a fork") == (0, "")
 
 
@@ -176,7 +176,7 @@ print(sorted(os.readlink(f"/proc/{child}/fd/{one}").partition(":")[0] for one in
 """
 
 
-def test_the_guardian_has_no_file_of_the_process_open(tmp_path):
+def test_the_watchdog_has_no_file_of_the_process_open(tmp_path):
     opened = f"file = open({str(tmp_path / 'results')!r}, 'w')"
     program = f"{opened}{BEGIN}{LINKS}"
     ended = subprocess.run(

@@ -29,7 +29,7 @@ class AttachedObject(NamedTuple):
     local: Matrix
 
 
-def rearrange(setup: SimulationSetup, before: Parameters, after: Parameters, script: str) -> bool:
+def apply_in_flight(setup: SimulationSetup, before: Parameters, after: Parameters, script: str) -> bool:
     """Apply the floor, weather and vehicles of `after`; return whether a vehicle was added, replaced or removed.
 
     A vehicle with a new start pose is put there, at rest; one with other changes is built again where it is. `script`
@@ -37,7 +37,7 @@ def rearrange(setup: SimulationSetup, before: Parameters, after: Parameters, scr
     """
     added = _replace_vehicles(setup, before, after, script)
     if after.scene.floor != before.scene.floor:
-        setup.scene.lay_floor(after.scene.floor)
+        setup.scene.set_floor(after.scene.floor)
     if after.weather != before.weather:
         setup.context.change_weather(after.weather.model_dump())
     before_by_name = {vehicle.name: vehicle for vehicle in before.fleet}
