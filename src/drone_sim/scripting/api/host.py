@@ -185,7 +185,7 @@ class Functions:
     """Functions of `sim` about what a script is attached to; docs/api.md has a section for each such class."""
 
     def __init__(self, host: Host, services: SceneServices, ignored: Ignored):
-        """`host` is the drone that the script flies, or what else it is on; `services` are what scripts may use of the scene.
+        """`host` is the drone or object that the script belongs to; `services` give access to the rest of the scene.
 
         `ignored` says that something is ignored.
         """
