@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 
 from drone_sim.grading.plan import Plan
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.load import Script
+from drone_sim.scripting.api.script import Script
 
 _CALLED = {"call", "take_turn", "call_function", "call_own", "execute", "execute_own", "callback", "answer"}
 _Value = TypeVar("_Value")

@@ -22,7 +22,7 @@ from drone_sim.scripting.api.host import Operations, SceneServices
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.scripting.guarded import GuardedScript, tell_failure
+from drone_sim.scripting.script_log import log_failure
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.sensors.sensor import Instrument
 from drone_sim.vehicles.parameters import VehicleParameters
@@ -94,10 +94,8 @@ class HostedScript(ABC):
         """The sensors that the script can access, by object name."""
         return ChainMap(*(vehicle.instruments.by_object for vehicle in self.seen()))
 
-    def _load(
-        self, path: str, operations: Operations, guarded: Callable[[load.Script], load.Script] = lambda script: script
-    ) -> None:
-        """Load a script ('' for the pilot), with operations on objects; `guarded` wraps it. Raises ScriptError."""
+    def _load(self, path: str, operations: Operations) -> None:
+        """Load a script ('' for the pilot), with operations on objects. Raises ScriptError."""
         self.close()
         context = self.context
         limit, turns = TimeLimit(context.script_time_limit), Turns()
@@ -111,7 +109,7 @@ class HostedScript(ABC):
         script = context.load_script(path, modules, limit, turns, context.breakpoints)
         self.flat_names = script.flat_names
         self._filters_pictures = filters_pictures(context, self.own_script, script)
-        self.script, self.path = guarded(script), load.script_path(path)
+        self.script, self.path = script, load.script_path(path)
         context.scripts.attached_to(self.own_script).loaded(self.script, context.clock.time)
 
     def _call_init(self) -> None:
@@ -273,28 +271,29 @@ class AttachedScript(HostedScript):
         if self._is_removed:  # the init of another script has removed its object
             return
         try:
-            self._load(path, operations, GuardedScript)
+            self._load(path, operations)
         except ScriptError as error:
             self.failure = error
-            tell_failure(error)
+            log_failure(error)
             return
+        self.script.isolate()
         if self.script.idle:
             _LOG.warning("%s, on %s: %s", path, self.own_script, self.script.idle)
         self._call_init()
 
     def error(self) -> ScriptError | None:
         """Return the error after which the script is no longer called; None while it is called."""
-        return self.failure or (self.script.failure if isinstance(self.script, GuardedScript) else None)
+        return self.failure or self.script.failure
 
     @property
     def is_loaded(self) -> bool:
         """Whether the script was loaded, even if it has failed."""
-        return self.failure is not None or isinstance(self.script, GuardedScript)
+        return self.failure is not None or self.script is not load.no_script()
 
     @property
     def is_busy(self) -> bool:
         """Whether the script is being called, or has a thread that has not ended."""
-        return isinstance(self.script, GuardedScript) and self.script.is_busy
+        return self.script.is_busy
 
     def leave(self) -> None:
         """Unload the script and remove it from the simulation."""

@@ -11,7 +11,8 @@ from drone_sim.mechanics.frames import Vector
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.api.host import Readable, SceneServices
-from drone_sim.scripting.api.registry import Attachment, Callee, Scripts
+from drone_sim.scripting.api.registry import Attachment, Scripts
+from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.vehicles.quadricopter_objects import DRONE
 from drone_sim.vehicles.vehicle import Vehicle
@@ -75,5 +76,5 @@ class _ScriptsForClients(Scripts):
     def is_own(self, _caller: Attachment, _callee: Attachment) -> bool:
         return False
 
-    def call(self, _caller: Attachment, callee: Attachment, call: Callable[[Callee], Any]) -> Any:
+    def call(self, _caller: Attachment, callee: Attachment, call: Callable[[Script], Any]) -> Any:
         return super().call(self._NO_CALLER, callee, call)

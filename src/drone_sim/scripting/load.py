@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Protocol
 
 from drone_sim.files.resources import resolve
 from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import Api
 from drone_sim.scripting.api.control import Turns
-from drone_sim.scripting.api.types import Callback
-from drone_sim.scripting.breakpoints import Breakpoints, Scope
+from drone_sim.scripting.api.script import Script
+from drone_sim.scripting.breakpoints import Breakpoints
 from drone_sim.scripting.errors import ScriptError, read_source
 from drone_sim.scripting.python.helpers import BUILT_IN
 from drone_sim.scripting.python.script import PythonScript
@@ -21,61 +20,6 @@ from drone_sim.scripting.time_limit import TimeLimit
 _ENDINGS = (".py", ".lua")
 DEFAULT = "pilot"
 NO_SCRIPT = "none"  # what a vehicle says that has none, for others to fly it: the one that is given, or a client
-
-
-class Script(Protocol):
-    """A child script that is loaded."""
-
-    language: str  # lua or python
-    idle: str  # why none of its phases is ever called, '' where one is
-    is_empty: bool
-    flat_names: Collection[str]  # functions that it calls by their names of 3.x
-
-    @property
-    def threaded(self) -> bool:
-        """Whether it has a thread that has not ended."""
-
-    def call(self, phase: str) -> None:
-        """Run a phase: init, actuation, sensing or cleanup. Raises ScriptError."""
-
-    def take_turn(self) -> None:
-        """Let its thread run until it is left; raises ScriptError."""
-
-    def defines(self, name: str) -> bool:
-        """Return whether the script's own file defines a global function of this name. Raises ScriptError."""
-
-    def call_function(self, name: str, arguments: list[Any]) -> Any:
-        """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
-
-    def call_own(self, name: str, arguments: list[Any]) -> Any:
-        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
-
-    def execute(self, text: str) -> Any:
-        """Run a text in the script; return None, a value or a tuple of several. Raises ScriptError."""
-
-    def execute_own(self, text: str) -> Any:
-        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
-
-    def callback(self, callback: Callback, message: Any) -> None:
-        """Call a function of the script with a message. Raises ScriptError."""
-
-    def answer(self, callback: Callback, request: Any) -> Any:
-        """Call a function of the script with a request; return what it returns. Raises ScriptError."""
-
-    def check(self, callback: Callback) -> None:
-        """Raise ScriptError where the script has no such function to call back."""
-
-    def follow_breakpoints(self) -> None:
-        """Look at the lines that have breakpoints by now, or at none."""
-
-    def variables(self) -> list[Scope]:
-        """Return its variables, as a person reads them; none where it cannot be called any more."""
-
-    def save_state(self) -> Callable[[], None]:
-        """Return a function that gives the script's variables the values that they have now."""
-
-    def close(self) -> None:
-        """Free what the script holds; may be called twice."""
 
 
 Loader = Callable[[str, Mapping[str, Api], TimeLimit, Turns, "Breakpoints | None"], Script]  # as `load` below

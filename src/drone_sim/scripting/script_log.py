@@ -30,6 +30,11 @@ def say(text: Any, level: int = logging.INFO) -> None:
         LOG.log(level, "%s", encodable(shortened))
 
 
+def log_failure(error: Exception) -> None:
+    """Log an error after which a script is not called any more, while the simulation continues."""
+    LOG.error("%s; this script is no longer called", error)
+
+
 def end_call() -> None:
     """Begin to count anew, after a call of the script; say how many lines were left out."""
     left_out, Lines.count = Lines.count - MOST, 0

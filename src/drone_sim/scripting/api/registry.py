@@ -7,35 +7,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from drone_sim.message_text import near_names
+from drone_sim.scripting.api.script import Script
 
 ScriptParameters = dict[str, Any]  # what getScriptSimulationParameter reads
 
 FIRST = 500_000  # the first handle: no object has one that large
 DEEPEST = 8  # scripts that wait for each other
-
-
-class Callee(Protocol):
-    """A script whose functions others may call."""
-
-    language: str  # lua or python
-
-    def defines(self, name: str) -> bool:
-        """Return whether the script's own file defines a global function of this name; imported ones do not count."""
-
-    def call_function(self, name: str, arguments: list[Any]) -> Any:
-        """Return what a global function returns: None, a value, or a tuple of several. Raises ScriptError."""
-
-    def call_own(self, name: str, arguments: list[Any]) -> Any:
-        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
-
-    def execute(self, text: str) -> Any:
-        """Run a text in the script; return None, a value or a tuple of several. Raises ScriptError."""
-
-    def execute_own(self, text: str) -> Any:
-        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
 
 
 class Attachment:
@@ -54,9 +34,9 @@ class Attachment:
         self.is_law = is_law
         self.is_embedded = False  # whether `..` in its paths is the parent of its object, as up to CoppeliaSim 4.8
         self.began = 0.0  # s, simulated, when it was loaded
-        self.script: Callee | None = None
+        self.script: Script | None = None
 
-    def loaded(self, script: Callee, time: float) -> None:
+    def loaded(self, script: Script, time: float) -> None:
         """Take the script, which begins at a simulated time (s)."""
         self.script, self.began = script, time
 
@@ -147,7 +127,7 @@ class Scripts:
         """Tell whether a script calls itself."""
         return caller is callee
 
-    def call(self, caller: Attachment, callee: Attachment, call: Callable[[Callee], Any]) -> Any:
+    def call(self, caller: Attachment, callee: Attachment, call: Callable[[Script], Any]) -> Any:
         """Let a script call another, or itself. Raises ValueError for one that waits for this call, or is too deep."""
         if callee.script is None:
             why = (

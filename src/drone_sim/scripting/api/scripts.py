@@ -22,7 +22,8 @@ from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.host import Functions, Host, SceneServices
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.names import NameFunctions
-from drone_sim.scripting.api.registry import Attachment, Callee, ScriptParameters
+from drone_sim.scripting.api.registry import Attachment, ScriptParameters
+from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.api.script_values import refuse_if_too_large
 from drone_sim.scripting.api.types import Handle, Name, WrongValue
 from drone_sim.scripting.errors import ScriptError
@@ -322,7 +323,7 @@ class ScriptCalls(_OnScripts):
         own = self._own.script if self._scripts.are_own else None
         return own is not None and own.language == "python"
 
-    def _call(self, callee: Attachment, call: Callable[[Callee], Any], call_own: Callable[[Callee], Any]) -> Any:
+    def _call(self, callee: Attachment, call: Callable[[Script], Any], call_own: Callable[[Script], Any]) -> Any:
         """Call another script, or on its own time this one. Raises ValueError."""
         try:
             if self._scripts.is_own(self._own, callee):

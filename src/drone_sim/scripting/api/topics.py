@@ -7,8 +7,9 @@ import functools
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
+from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.api.service_servers import ServiceRequest, carry_out
 from drone_sim.scripting.api.types import Callback
 
@@ -35,16 +36,6 @@ class OwnTopic:
     def shutdown(self) -> None:
         """Forget what was said."""
         self._said.pop(self._topic, None)
-
-
-class Receiver(Protocol):
-    """Who gets messages and requests: a script."""
-
-    def callback(self, callback: Callback, message: Any) -> None:
-        """Call a function with a message."""
-
-    def answer(self, callback: Callback, request: Any) -> Any:
-        """Call a function with a request; return what it returns."""
 
 
 class _Subscription(NamedTuple):
@@ -123,13 +114,13 @@ class Subscriptions:
         new, self._new_callbacks = self._new_callbacks, []
         return new
 
-    def deliver(self, receiver: Receiver) -> None:
+    def deliver(self, script: Script) -> None:
         """Hand over every waiting message and request, of each subscription the oldest first."""
         for callback, message in self.take():
             if type(message) is ServiceRequest:
-                carry_out(message, functools.partial(receiver.answer, callback))
+                carry_out(message, functools.partial(script.answer, callback))
             else:
-                receiver.callback(callback, message)
+                script.callback(callback, message)
 
     def take(self) -> list[tuple[Callback, Any]]:
         """Return the messages and requests that wait, and whom each is for; of each subscription the oldest first."""

@@ -19,6 +19,7 @@ from drone_sim.message_text import near_names
 from drone_sim.scripting import phase_names, script_log
 from drone_sim.scripting.api.calls import Api, save_state
 from drone_sim.scripting.api.constants import CONSTANTS, PHASES
+from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.breakpoints import Breakpoints, Scope
@@ -45,7 +46,7 @@ _MOST_PLACES = 4000  # values of breakpoints, two for each, that one call hands 
 _ABOUT_MEMORY = f"not enough memory: the script uses more than {state.MEMORY // state.MIB} MiB"
 
 
-class LuaScript:
+class LuaScript(Script):
     """A file that defines sysCall_init, ... as it needs them, or looks at sim_call_type."""
 
     language = "lua"
@@ -71,7 +72,6 @@ class LuaScript:
         self._modules = modules
         self._end = ""  # why nothing can be called any more
         self._phases = 0
-        self.idle = ""  # why nothing of it is ever called
         self._helpers = LuaHelpers(path)
         self._breakpoints = breakpoints if breakpoints is not None else Breakpoints()
         self._check_form(text)
@@ -130,52 +130,43 @@ class LuaScript:
             for name, line, chunk in zip(words[::3], words[1::3], words[2::3])
         }
 
-    def check(self, callback: Callback) -> None:
-        """Raise ScriptError where there is no function to call back."""
+    def _check_callback(self, callback: Callback) -> None:
         name = callback.encode() if isinstance(callback, str) else callback
         if not self._run(str(callback), self._lua.get("has"), name):
             raise self._error(str(callback), no_function(callback, self._named_functions()))
 
-    def call(self, phase: str) -> None:
-        """Run a phase; raises ScriptError."""
+    def _run_phase(self, phase: str) -> None:
         number = _NUMBERS[phase]
         if self._phases & 1 << number - 1:
             if self._end and phase == "cleanup":  # said when it happened
                 return
             self._run(phase, self._lua.get("phase"), number)
 
-    @property
-    def threaded(self) -> bool:
-        """Whether it has a thread that has not ended."""
+    def _has_thread(self) -> bool:
         return bool(self._phases & _THREAD) and not self._end
 
-    def take_turn(self) -> None:
-        """Let its thread run until it is left; raises ScriptError."""
+    def _resume_thread(self) -> None:
         self._run("thread", self._lua.get("phase"), _NUMBERS["thread"])
 
-    def defines(self, name: str) -> bool:
-        """Return whether the script's own file defines a global function of this name. Raises ScriptError."""
+    def _has_function(self, name: str) -> bool:
         path, _ = self._named_functions().get(name, ("", 0))
         return path == self._path
 
-    def call_function(self, name: str, arguments: list[Any]) -> Any:
-        """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
-        self._run(name, self._call_function, name, arguments)
+    def _run_function(self, name: str, arguments: list[Any]) -> Any:
+        to_lua = self._state.values.to_lua
+        self._run(name, lambda: self._lua["called"](name.encode(), *to_lua(arguments, unpacked=True)))
         return self._state.values.handed_back()
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
-        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
         arguments = self._state.values.to_lua(arguments, unpacked=True)
         self._check_own(name, self._lua["called_own"](name.encode(), *arguments))
         return self._state.values.handed_back()
 
-    def execute(self, text: str) -> Any:
-        """Run a text in the script; return None, a value or a tuple of several. Raises ScriptError."""
+    def _run_text(self, text: str) -> Any:
         self._run(_EXECUTE, self._lua.get("executed"), text.encode("utf-8", "replace"))
         return self._state.values.handed_back()
 
     def execute_own(self, text: str) -> Any:
-        """Do the same when the script calls itself: the time counts for its present call. Raises ScriptError."""
         self._check_own(_EXECUTE, self._lua["executed_own"](text.encode("utf-8", "replace")))
         return self._state.values.handed_back()
 
@@ -184,15 +175,10 @@ class LuaScript:
         if how is not True:
             raise self._failure(name, how, found)
 
-    def _call_function(self, name: str, arguments: list[Any]) -> Any:
-        return self._lua["called"](name.encode(), *self._state.values.to_lua(arguments, unpacked=True))
-
-    def callback(self, callback: Callback, message: Any) -> None:
-        """Call the script's function of that name with a message; raises ScriptError."""
+    def _run_callback(self, callback: Callback, message: Any) -> None:
         self._call_back(callback, message, False)
 
-    def answer(self, callback: Callback, request: Any) -> Any:
-        """Call the script's function with a request; return its value, a tuple of several. Raises ScriptError."""
+    def _answer_request(self, callback: Callback, request: Any) -> Any:
         self._call_back(callback, request, True)
         return self._state.values.handed_back()
 
@@ -202,7 +188,6 @@ class LuaScript:
         self._run(name, lambda: self._lua["called_back"](called, to_lua(message), answered))
 
     def follow_breakpoints(self) -> None:
-        """Let the hook come for every line while there are breakpoints in it, or in a file beside it."""
         places: list[bytes | int] = []
         for path, lines in self._breakpoints.all().items():
             chunk = self._helpers.chunk_of(path).encode("utf-8", "replace")
@@ -212,16 +197,14 @@ class LuaScript:
             self._run("breakpoints", self._lua["break_at"], *places[:_MOST_PLACES])
 
     def variables(self) -> list[Scope]:
-        """Return its variables, as a person reads them; nothing of the script is called for that."""
         return [] if self._end else read_rows(self._run("variables", self._lua["variables"]))
 
-    def save_state(self) -> Callable[[], None]:
-        """Return a function that gives the script's variables the values that they have now. Raises ScriptError."""
+    def _save(self) -> Callable[[], None]:
         snapshot = self._run("snapshot", self._lua.get("save_state"))
         restoring = save_state(self._modules.values())
 
         def restore() -> None:
-            if self.threaded or self._has_coroutines:
+            if self._has_thread() or self._has_coroutines:
                 script_log.say(script_log.THREAD_GOES_ON.format(self._path))
             self._run("restore", self._lua.get("restore"), snapshot)
             for one in restoring:

@@ -9,7 +9,7 @@ import functools
 import inspect
 import reprlib
 import traceback
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from types import CodeType
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from drone_sim.message_text import near_names
 from drone_sim.scripting import phase_names, script_log
 from drone_sim.scripting.api.calls import Api, Function, UnknownName, contents, mistake, save_state
 from drone_sim.scripting.api.control import Call, NoThread, Turns, waits
+from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.breakpoints import Breakpoints, Scope
@@ -47,7 +48,7 @@ class Variables:
         return f"self({', '.join(f'{name}={value!r}' for name, value in vars(self).items())})"
 
 
-class PythonScript:
+class PythonScript(Script):
     """A file that defines sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup as it needs them.
 
     It finds `sim`, `simROS`, `require` and `self` (an empty object to keep variables in), as
@@ -73,7 +74,6 @@ class PythonScript:
         self._path = path
         self._limit, self._labels = limit, Labels(path, limit)
         self.is_empty = not source.strip()
-        self.flat_names: Collection[str] = ()
         self._modules = modules
         self._thread = self._new_thread(turns) if _NAMES_THREAD in source else None
         self._found = {name: _waiting(one, turns, self._called) for name, one in modules.items()}
@@ -126,8 +126,7 @@ class PythonScript:
         path, line = (code.co_filename, code.co_firstlineno) if inspect.iscode(code) else (self._path, 0)
         return ScriptError("load", path, line, message)
 
-    def call(self, phase: str) -> None:
-        """Call `sysCall_<phase>` if the script has it; raises ScriptError."""
+    def _run_phase(self, phase: str) -> None:
         function = self._globals.get(FUNCTIONS[phase])
         if function is None:
             return
@@ -137,66 +136,54 @@ class PythonScript:
         else:
             self._run(phase, function)
 
-    @property
-    def threaded(self) -> bool:
-        """Whether it has a thread that has not ended."""
+    def _has_thread(self) -> bool:
         return self._thread is not None and not self._thread.has_ended and self._thread_function() is not None
 
     def _thread_function(self) -> Any:
         return next((self._globals[name] for name in THREADS if name in self._globals), None)
 
-    def take_turn(self) -> None:
-        """Let its thread run until it is left; raises ScriptError."""
+    def _resume_thread(self) -> None:
         if self._thread is not None:
             self._run("thread", self._thread.take_turn, self._thread_function())
 
-    def defines(self, name: str) -> bool:
-        """Return whether the script's own file defines a global function of this name; imported ones do not count."""
+    def _has_function(self, name: str) -> bool:
         function = self._globals.get(name)
         return inspect.isfunction(function) and function.__code__.co_filename == self._path
 
-    def call_function(self, name: str, arguments: list[Any]) -> Any:
-        """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
-        self.check(name)
+    def _run_function(self, name: str, arguments: list[Any]) -> Any:
+        self._check_callback(name)
         return self._run(name, self._globals[name], *arguments)
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
-        """Do the same when the script calls itself: the time counts for its present call."""
-        self.check(name)
+        self._check_callback(name)
         return self._globals[name](*arguments)
 
-    def execute(self, text: str) -> Any:
-        """Run a text in the script; return its value where it is an expression, else None. Raises ScriptError."""
+    def _run_text(self, text: str) -> Any:
         return self._run("executeScriptString", self.execute_own, text)
 
     def execute_own(self, text: str) -> Any:
-        """Do the same when the script calls itself: the time counts for its present call."""
+        """Return the value of `text` if it is an expression; otherwise run it and return None."""
         try:
             code = _compiled_text(text, "eval")
         except SyntaxError:
             code = _compiled_text(text, "exec")
         return eval(code, self._globals)
 
-    def callback(self, callback: Callback, message: Any) -> Any:
-        """Call the script's function (or that of this name) with a message, or a request; return its value.
-
-        Raises ScriptError.
-        """
+    def _run_callback(self, callback: Callback, message: Any, /) -> Any:
         if callable(callback):
             return self._run(getattr(callback, "__name__", "callback"), callback, message)
-        self.check(callback)
+        self._check_callback(callback)
         return self._run(callback, self._globals[callback], message)
 
-    answer = callback
+    _answer_request = _run_callback
 
     def _called(self, call: Call) -> Any:
         """Return what one of its functions returns, in the midst of its thread."""
-        self.check(call.callback)
+        self._check_callback(call.callback)
         function = call.callback if callable(call.callback) else self._globals[call.callback]
         return function(*call.arguments)
 
-    def check(self, callback: Callback) -> None:
-        """Raise ScriptError where there is no function to call back."""
+    def _check_callback(self, callback: Callback) -> None:
         if not callable(callback) and not callable(self._globals.get(callback)):
             known = [name for name, one in self._named() if inspect.isfunction(one)]
             raise ScriptError(str(callback), self._path, 0, no_function(callback, known))
@@ -212,20 +199,18 @@ class PythonScript:
             self.__dict__.pop("_run", None)
 
     def variables(self) -> list[Scope]:
-        """Return its variables, as a person reads them; nothing of the script is called for that."""
         return variables_of(self._globals)
 
-    def save_state(self) -> Callable[[], None]:
-        """Return a function that gives `self` and the global variables the values that they have now.
+    def _save(self) -> Callable[[], None]:
+        """Return a function that restores `self`, and the global variables of the script and of the modules beside it.
 
-        Likewise for the modules beside the script. Values that cannot be copied (open files, modules, API
-        objects) stay as they are. Both raise ScriptError.
+        Values that cannot be copied (open files, modules, API objects) stay as they are.
         """
         restoring = save_state(self._modules.values())
         restore_variables = self._run("snapshot", self._save_variables)
 
         def restore() -> None:
-            if self.threaded:
+            if self._has_thread():
                 script_log.say(THREAD_GOES_ON.format(self._path))
             self._run("restore", restore_variables)
             for one in restoring:
@@ -255,7 +240,7 @@ class PythonScript:
 
     def close(self) -> None:
         """Forget the script; it cannot be called after that."""
-        if self.threaded and self._thread is not None:
+        if self._has_thread() and self._thread is not None:
             with contextlib.suppress(ScriptError):
                 self._run("cleanup", self._thread.end)
         self.__dict__.pop("_run", None)

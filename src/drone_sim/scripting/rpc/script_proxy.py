@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import contextlib
 import inspect
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from time import monotonic
 from typing import Any, NoReturn
 
 from drone_sim.scripting.api.calls import Api, Function, contents, mistake, save_state
 from drone_sim.scripting.api.control import Wait
+from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.breakpoints import Scope
 from drone_sim.scripting.errors import ScriptError
@@ -37,8 +38,8 @@ class ConnectionClosed(ScriptError):
     """The script's process has ended or violated the protocol; its scripts are not called any more."""
 
 
-class ScriptProxy:
-    """A script in another process, with the interface of scripting.load.Script."""
+class ScriptProxy(Script):
+    """A script in another process."""
 
     def __init__(self, connection: ScriptConnection, path: str, modules: Mapping[str, Api], limit: TimeLimit):
         """Load the script file at `path` with the API `modules`, in the process of `connection`. Raises ScriptError."""
@@ -57,54 +58,47 @@ class ScriptProxy:
         self._phase = ""  # the current one
         self._has_gone_on = False  # whether it ran the next actuation right after a sensing
         self.language = "python" if path.endswith(".py") else "lua"
-        self.idle, self.is_empty, self.threaded = "", False, False
-        self.flat_names: Collection[str] = ()
+        self._thread_is_alive = False
         result = self._do("load", [self._limit.seconds, self._connection.processor])
         self.idle, self.is_empty = str(result[0])[:_MAX_TEXT], bool(result[1])
 
     # ---- interface of a script
 
-    def call(self, phase: str) -> None:
-        """Run a phase: init, actuation, sensing or cleanup. Raises ScriptError."""
+    def _run_phase(self, phase: str) -> None:
         if self._has_gone_on and phase == "actuation":
             self._finish()
         elif not self._connection.why_closed or phase != "cleanup":
             self._do("call", [phase], phase == "sensing" and self._connection.is_quiet())
 
-    def take_turn(self) -> None:
-        """Resume its thread until it yields. Raises ScriptError."""
+    def _has_thread(self) -> bool:
+        return self._thread_is_alive
+
+    def _resume_thread(self) -> None:
         self._do("take_turn", [])
 
-    def defines(self, name: str) -> bool:
+    def _has_function(self, name: str) -> bool:
         """Return False: only scripts in this process are asked, because another process could lie."""
         return False
 
-    def call_function(self, name: str, arguments: list[Any]) -> Any:
-        """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
+    def _run_function(self, name: str, arguments: list[Any]) -> Any:
         return self._do("call_function", [name, arguments])
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
-        """Like call_function, for a call by the script itself: counts towards its current time limit."""
         return self._do("call_own", [name, arguments])
 
-    def execute(self, text: str) -> Any:
-        """Run `text` as code of the script; return None, a value or a tuple of values. Raises ScriptError."""
+    def _run_text(self, text: str) -> Any:
         return self._do("execute", [text])
 
     def execute_own(self, text: str) -> Any:
-        """Like execute, for a call by the script itself: counts towards its current time limit."""
         return self._do("execute_own", [text])
 
-    def callback(self, callback: Callback, message: Any) -> None:
-        """Call a function of the script with a message. Raises ScriptError."""
+    def _run_callback(self, callback: Callback, message: Any) -> None:
         self._do("callback", [callback, message])
 
-    def answer(self, callback: Callback, request: Any) -> Any:
-        """Call a function of the script with a request; return what it returns. Raises ScriptError."""
+    def _answer_request(self, callback: Callback, request: Any) -> Any:
         return self._do("answer", [callback, request])
 
-    def check(self, callback: Callback) -> None:
-        """Raise ScriptError if the script does not have this callback function."""
+    def _check_callback(self, callback: Callback) -> None:
         if not isinstance(callback, ScriptFunction):
             self._do("check", [callback])
 
@@ -115,8 +109,7 @@ class ScriptProxy:
         """Return none: nobody debugs a submission while it is graded."""
         return []
 
-    def save_state(self) -> Callable[[], None]:
-        """Return a function that restores the current values of the script's variables."""
+    def _save(self) -> Callable[[], None]:
         number, restoring = self._do("save", []), save_state(self._modules.values())
 
         def restore() -> None:
@@ -127,7 +120,6 @@ class ScriptProxy:
         return restore
 
     def close(self) -> None:
-        """Free the script's resources; a second call does nothing."""
         if not self._connection.why_closed:
             self._do("close", [])
 
@@ -190,7 +182,7 @@ class ScriptProxy:
                 if kind == "set" and len(item) > 1:
                     self._set(item)
                 elif kind == "call":
-                    self._answer(item)
+                    self._serve_call(item)
                 elif kind == "reads":
                     self._expected.note(item)
                 elif kind == "end":
@@ -206,7 +198,7 @@ class ScriptProxy:
         if not 3 <= len(item) <= 4:
             raise NoMessage("malformed end of a call")
         self._has_gone_on = len(item) == 4
-        self.threaded = item[1] is True
+        self._thread_is_alive = item[1] is True
         if self._failure is not None:
             raise ScriptError(phase, self._path, 0, self._explained(*self._failure))
         return None if item[2] is None else self._value(item[2])
@@ -215,7 +207,7 @@ class ScriptProxy:
         if len(item) != 6 or [type(field) for field in item[2:]] != [str, str, int, str]:
             raise NoMessage("malformed failure")
         _, threaded, phase, path, line, reason = item
-        self.threaded = threaded is True
+        self._thread_is_alive = threaded is True
         raise ScriptError(phase[:_MAX_TEXT], path[:_MAX_TEXT], line, reason)
 
     # ---- requests of the script
@@ -238,7 +230,7 @@ class ScriptProxy:
         except Exception as error:
             self._failure = name, error
 
-    def _answer(self, item: list[Any]) -> None:
+    def _serve_call(self, item: list[Any]) -> None:
         """Execute a call, and send its result with the results of the reads that are expected next."""
         if len(item) < 4 or type(item[2]) is not int or type(item[3]) is not list:
             raise NoMessage("malformed call")
