@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from types import UnionType
-from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
+from typing import Any, NamedTuple, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from drone_sim.config.schema import ValueType, field_type, value_type
 from drone_sim.config.types import (
     PATTERNS,
     Checked,
@@ -24,7 +24,6 @@ from drone_sim.config.types import (
 from drone_sim.files.yaml_files import YamlLines
 from drone_sim.message_text import near_names, shown
 
-_UNIONS = (Union, UnionType)  # Union[A, B] and A | B
 _Model = TypeVar("_Model", bound=Checked)
 
 
@@ -68,46 +67,36 @@ def line_of(lines: YamlLines, problem: ParameterProblem) -> int | None:
 
 class _ErrorPlace(NamedTuple):
     location: Location  # without the tags that pydantic adds
-    annotation: Any  # type of the value there, or of the list that contains it
+    type: ValueType  # of the value there, or of the list that contains it
     is_in_list: bool
     known: tuple[str, ...]  # all keys allowed at that level
 
 
 def _place(model: Any, loc: Location) -> _ErrorPlace:
     location: list[Key] = []
-    annotation = model
+    here = value_type(model)
     known: tuple[str, ...] = ()
     for part in loc:
         if part == "[key]":
             break
-        choice = _choice(annotation)
+        choice = _choice(here)
         if part in choice.models:
-            annotation = choice.models[str(part)]
+            here = value_type(choice.models[str(part)])
             continue
         location.append(part)
-        if get_origin(_bare(annotation)) is tuple:
-            return _ErrorPlace(tuple(location), annotation, True, ())
-        annotation, known = _inside(annotation, part)
-    return _ErrorPlace(tuple(location), annotation, False, known)
+        if get_origin(here.kind) is tuple:
+            return _ErrorPlace(tuple(location), here, True, ())
+        known = tuple(here.fields)
+        here = _inside(here, part)
+    return _ErrorPlace(tuple(location), here, False, known)
 
 
-def _inside(annotation: Any, part: Key) -> tuple[Any, tuple[str, ...]]:
-    bare = _bare(annotation)
-    fields = {field.alias or name: field for name, field in getattr(bare, "model_fields", {}).items()}
-    if part in fields:
-        return Annotated[fields[part].annotation, fields[part]], tuple(fields)
-    arguments = get_args(bare)
-    return arguments[-1] if arguments and not fields else None, tuple(fields)
-
-
-def _bare(annotation: Any) -> Any:
-    """Return a type without Annotated and without `| None`."""
-    while True:
-        arguments = [inner for inner in get_args(annotation) if inner is not type(None)]
-        if get_origin(annotation) is Annotated or (get_origin(annotation) in _UNIONS and len(arguments) == 1):
-            annotation = arguments[0]
-        else:
-            return annotation
+def _inside(value: ValueType, part: Key) -> ValueType:
+    """Return the type of a model's field, or of the items of a list or mapping."""
+    if part in value.fields:
+        return field_type(value.fields[str(part)])
+    arguments = get_args(value.kind)
+    return value_type(arguments[-1]) if arguments and not value.fields else ValueType(None)
 
 
 class _Choice(NamedTuple):
@@ -119,41 +108,26 @@ class _Choice(NamedTuple):
     others: tuple[str, ...] = ()  # the words for the alternative key
 
 
-def _choice(annotation: Any) -> _Choice:
+def _choice(value: ValueType) -> _Choice:
     """Return the choice that a type offers; an empty one if it is no discriminated union."""
-    first, *others = [inner for inner in get_args(annotation) if inner is not type(None)] or [None]
-    if get_origin(annotation) is Annotated:
-        for key in (getattr(mark, "discriminator", None) for mark in others):
-            if isinstance(key, str):
-                models = get_args(_bare(first))
-                return _Choice(
-                    key, {word: model for model in models for word in get_args(model.model_fields[key].annotation)}
-                )
-            if isinstance(key, Word):
-                types = [_bare(tagged) for tagged in get_args(_bare(first))]
-                words = tuple(word_of(kind, key.or_key) for kind in types if key.or_key in kind.model_fields)
-                return _Choice(key.key, {word_of(kind, key.key, key.or_key): kind for kind in types}, key.or_key, words)
-        return _choice(first)
-    if get_origin(annotation) in _UNIONS and not others:
-        return _choice(first)
+    for key in (getattr(mark, "discriminator", None) for mark in value.marks):
+        models = [value_type(model).kind for model in get_args(value.kind)]
+        if isinstance(key, str):
+            words = {word: model for model in models for word in get_args(model.model_fields[key].annotation)}
+            return _Choice(key, words)
+        if isinstance(key, Word):
+            others = tuple(word_of(model, key.or_key) for model in models if key.or_key in model.model_fields)
+            return _Choice(key.key, {word_of(it, key.key, key.or_key): it for it in models}, key.or_key, others)
     return _Choice("", {})
 
 
-def _description(annotation: Any) -> str:
+def _description(value: ValueType) -> str:
     """Return a description of a type for messages, '' if it has none."""
-    if get_origin(annotation) is Annotated:
-        inner, *others = get_args(annotation)
-        texts = [str(mark.description) for mark in others if getattr(mark, "description", None)]
-        return texts[0] if texts else _description(inner)
-    bare = _bare(annotation)
-    if bare is not annotation:
-        return _description(bare)
-    if get_origin(bare) is tuple:
-        count = len(get_args(bare))
-        return f"{count} numbers" if count else "left out"
-    if get_origin(bare) is Literal:
-        return f"one of {', '.join(map(repr, get_args(bare)))}"
-    return ""
+    if value.description:
+        return value.description
+    if get_origin(value.kind) is tuple:
+        return f"{len(value.elements)} numbers" if value.elements else "left out"
+    return f"one of {', '.join(map(repr, value.words))}" if value.words else ""
 
 
 # ---- text of a problem
@@ -176,7 +150,7 @@ def _problems(error: Any, place: _ErrorPlace, model: type[BaseModel]) -> Sequenc
 def _problem(error: Any, place: _ErrorPlace, model: type[BaseModel]) -> ParameterProblem:
     location, value = place.location, error["input"]
     if error["type"] in ("union_tag_invalid", "union_tag_not_found") and isinstance(value, Mapping):
-        return _wrong_choice(_choice(place.annotation), location, value)
+        return _wrong_choice(_choice(place.type), location, value)
     if error["type"] == "missing":  # an element of a list
         location = location[:-1]
     if error["type"] == "extra_forbidden":
@@ -202,10 +176,9 @@ def _reason(error: Any, place: _ErrorPlace) -> str:
     kind, message = error["type"], error["msg"].replace("Value error, ", "")
     if (place.is_in_list and kind == "missing") or kind in ("tuple_type", "too_long"):
         return _with_description(place, "must be") or message
-    fields = getattr(_bare(place.annotation), "model_fields", None) or {}
-    choice = _choice(place.annotation)
+    choice = _choice(place.type)
     plain = {
-        "model_type": f"must hold `key: value` lines with {', '.join(fields)}",
+        "model_type": f"must hold `key: value` lines with {', '.join(place.type.fields)}",
         "model_attributes_type": f"must have `key: value` lines, one of them `{choice.key}`",
         "union_tag_not_found": f"must have `key: value` lines, one of them `{choice.key}`",
         "bool_type": "must be true or false",
@@ -215,7 +188,7 @@ def _reason(error: Any, place: _ErrorPlace) -> str:
 
 
 def _with_description(place: _ErrorPlace, verb: str) -> str:
-    description = _description(place.annotation)
+    description = _description(place.type)
     return f"{verb} {description}" if description else ""
 
 
@@ -229,7 +202,7 @@ def _must_be_one_of(choice: _Choice, key: str = "") -> str:
 
 def _suggested_path(model: type[BaseModel], key: str) -> str:
     """Return 'did you mean a/key?' if the key belongs in a nested mapping of the model, else ''."""
-    for name, field in model.model_fields.items():
-        if key in getattr(_bare(field.annotation), "model_fields", {}):
-            return f"did you mean {field.alias or name}/{key}?"
+    for name, field in ValueType(model).fields.items():
+        if key in field_type(field).fields:
+            return f"did you mean {name}/{key}?"
     return ""

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
-from types import UnionType
-from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+from typing import Any, NamedTuple
 
 import yaml
 
+from drone_sim.config.schema import ValueType, field_type, value_type
 from drone_sim.config.types import Checked, Location, Parts, Unit, Within
 from drone_sim.files.resources import package_path
-
-_UNIONS = (Union, UnionType)
 
 
 class ParameterField(NamedTuple):
@@ -38,49 +36,42 @@ class ParameterField(NamedTuple):
 @lru_cache(maxsize=1024)
 def fields_of(model: type[Checked], above: Location = ()) -> tuple[ParameterField, ...]:
     """Return the fields of a model whose keys are below `above`; mappings with arbitrary keys are left out."""
-    fields = model.model_fields.items()
     return tuple(
         parameter
-        for name, field in fields
-        for parameter in _fields_in(field.annotation, [*field.metadata, field], ParameterField((*above, name), float))
+        for name, field in model.model_fields.items()
+        for parameter in _fields_in(field_type(field), ParameterField((*above, name), float))
     )
 
 
-def _fields_in(annotation: Any, marks: Sequence[Any], here: ParameterField) -> Iterator[ParameterField]:
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin is Annotated:
-        yield from _fields_in(arguments[0], [*marks, *arguments[1:]], here)
-    elif origin in _UNIONS and type(None) in arguments:
-        (inner,) = (kind for kind in arguments if kind is not type(None))
-        yield from _fields_in(inner, marks, here._replace(none=0.0))
-    elif origin is tuple:
-        yield from _elements(arguments, marks, here)
-    elif origin is Literal and all(isinstance(word, str) for word in arguments):
-        yield here._replace(kind=str, choices=arguments)
-    elif isinstance(annotation, type) and issubclass(annotation, Checked):
-        yield from fields_of(annotation, here.location)
-    elif annotation in (float, int, bool):
-        yield _number(annotation, marks, here)
+def _fields_in(value: ValueType, here: ParameterField) -> Iterator[ParameterField]:
+    here = here._replace(none=0.0) if value.has_none else here
+    if value.elements:
+        yield from _elements(value, here)
+    elif value.words and all(isinstance(word, str) for word in value.words):
+        yield here._replace(kind=str, choices=value.words)
+    elif isinstance(value.kind, type) and issubclass(value.kind, Checked):
+        yield from fields_of(value.kind, here.location)
+    elif value.kind in (float, int, bool):
+        yield _number(value, here)
 
 
-def _number(kind: type, marks: Sequence[Any], here: ParameterField) -> ParameterField:
-    within = next((mark for mark in marks if isinstance(mark, Within)), None)
-    unit = next((mark.word for mark in marks if isinstance(mark, Unit)), "")
-    description = next((mark.description for mark in marks if getattr(mark, "description", None)), "")
-    text = ", ".join(filter(None, (unit, description)))
+def _number(value: ValueType, here: ParameterField) -> ParameterField:
+    kind, within, unit = value.kind, value.mark(Within), value.mark(Unit)
+    text = ", ".join(filter(None, (unit.word if unit else "", value.description)))
     if within is None:
         return here._replace(kind=kind, said=text)
     low = 0.0 if within.or_zero or here.none is not None else within.low
     return here._replace(kind=kind, low=kind(low), high=kind(within.high), said=text)
 
 
-def _elements(arguments: Sequence[Any], marks: Sequence[Any], here: ParameterField) -> Iterator[ParameterField]:
-    names = next((mark.names for mark in marks if isinstance(mark, Parts)), tuple(map(str, range(len(arguments)))))
-    if arguments[-1] is Ellipsis:
-        arguments = [arguments[0]] * len(names)
-    for index, (name, argument) in enumerate(zip(names, arguments)):
+def _elements(value: ValueType, here: ParameterField) -> Iterator[ParameterField]:
+    elements, parts = value.elements, value.mark(Parts)
+    names = parts.names if parts else tuple(map(str, range(len(elements))))
+    if elements[-1] is Ellipsis:
+        elements = elements[:1] * len(names)
+    for index, (name, element) in enumerate(zip(names, elements)):
         part = here._replace(location=(*here.location, index), part=name, none=None)
-        for parameter in _fields_in(argument, (), part):
+        for parameter in _fields_in(value_type(element), part):
             widest = parameter.high if index else parameter.low  # limits [lowest, highest] that are `none` do not limit
             yield parameter._replace(none=None if here.none is None else widest)
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Any
 
+from drone_sim.config.schema import ValueType, field_type, value_type
 from drone_sim.config.types import Checked, Unit, Within, word_of
 from drone_sim.scene.kinds import KINDS
 from drone_sim.scene.object_parameters import SHAPES
@@ -44,11 +44,11 @@ def word_of_part(model: type[Checked]) -> str:
 def inner_fields(model: type[Checked], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Yield the fields of a vehicle's camera or sensor with their keys; nested keys have dots."""
     for key, field in model.model_fields.items():
-        bare, _ = _bare(field.annotation, field.metadata)
-        if key in _PART_EXCLUDED or (get_origin(bare) is Literal and len(get_args(bare)) == 1):  # the key `kind`
+        value = field_type(field)
+        if key in _PART_EXCLUDED or len(value.words) == 1:  # the key `kind`
             continue
-        if isinstance(bare, type) and issubclass(bare, Checked):
-            yield from inner_fields(bare, f"{prefix}{key}.")
+        if isinstance(value.kind, type) and issubclass(value.kind, Checked):
+            yield from inner_fields(value.kind, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", field
 
@@ -63,42 +63,28 @@ def _part_keys(model: type[Checked]) -> list[dict[str, Any]]:
 
 
 def _property(key: str, field: Any) -> dict[str, Any]:
-    bare, metadata = _bare(field.annotation, field.metadata)
-    parts = get_args(bare) if get_origin(bare) is tuple else ()
-    if parts:
-        metadata = [*_bare(parts[0], [])[1], *metadata]
-    limits = next((item for item in metadata if isinstance(item, Within)), None)
+    value = field_type(field)
+    number = value_type(value.elements[0], value.marks) if value.elements else value
+    limits, unit = number.mark(Within), number.mark(Unit)
     default = None if field.is_required() else field.get_default(call_default_factory=True)
     simple = isinstance(default, (bool, int, float, str)) or default is None
     return {
         "key": key,
-        "kind": "file" if key in _FILES else "color" if key == "color" else _kind(bare, parts),
-        "count": len(parts) or None,
-        "whole": bare is int,
-        "choices": list(get_args(bare)) if get_origin(bare) is Literal else None,
+        "kind": "file" if key in _FILES else "color" if key == "color" else _kind(value),
+        "count": len(value.elements) or None,
+        "whole": value.kind is int,
+        "choices": list(value.words) or None,
         "least": (0 if limits.or_zero else limits.low) if limits else None,
         "most": limits.high if limits else None,
-        "unit": next((item.word for item in metadata if isinstance(item, Unit)), ""),
+        "unit": unit.word if unit else "",
         "default": list(default) if isinstance(default, tuple) else default if simple else None,
         "what": field.description or "",
     }
 
 
-def _kind(bare: Any, parts: tuple[Any, ...]) -> str:
-    if get_origin(bare) is Literal:
+def _kind(value: ValueType) -> str:
+    if value.words:
         return "choice"
-    if ... in parts:
+    if ... in value.elements:
         return "list"
-    return "numbers" if parts else _KINDS.get(bare, "other")
-
-
-def _bare(annotation: Any, metadata: list[Any]) -> tuple[Any, list[Any]]:
-    """Return a type without annotations and without None, and the annotations."""
-    if get_origin(annotation) is Annotated:
-        inner, *others = get_args(annotation)
-        return _bare(inner, [*metadata, *others])
-    if get_origin(annotation) in (Union, UnionType):
-        members = [item for item in get_args(annotation) if item is not type(None)]
-        if len(members) == 1:
-            return _bare(members[0], metadata)
-    return annotation, metadata
+    return "numbers" if value.elements else _KINDS.get(value.kind, "other")
