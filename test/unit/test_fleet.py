@@ -238,6 +238,31 @@ def test_a_new_one_whose_script_fails_goes_again(fly, tmp_path):
     simulation.step()
 
 
+def test_a_failing_vehicle_takes_back_those_added_before_it(fly, tmp_path):
+    script = tmp_path / "broken.py"
+    script.write_text("def sysCall_init():\n    no_such_name\n", encoding="utf-8")
+    simulation = fly(vehicles=1)
+    names = set(simulation.context.objects.names)
+    with pytest.raises(Exception, match="no_such_name"):
+        simulation.set_vehicles(
+            {"drone1": {}, "sound": {"position": [2, 0, 1]}, "guest": {"script": str(script), "position": [3, 3, 1]}}
+        )
+    assert list(simulation.vehicles) == ["drone1"] == [vehicle.name for vehicle in simulation.parameters.fleet]
+    assert set(simulation.context.objects.names) == names
+    simulation.step()
+
+
+def test_a_failing_cleanup_keeps_no_vehicle(fly, tmp_path):
+    script = tmp_path / "broken.py"
+    script.write_text("def sysCall_init():\n    pass\n\n\ndef sysCall_cleanup():\n    no_such_name\n", encoding="utf-8")
+    failing = {"script": str(script)}
+    simulation = fly(vehicles={"a": failing, "b": {**failing, "position": [2, 0, 1]}, "c": {"position": [4, 0, 1]}})
+    with pytest.raises(Exception, match="no_such_name"):
+        simulation.set_vehicles({"c": {}})
+    assert list(simulation.vehicles) == ["c"] == [vehicle.name for vehicle in simulation.parameters.fleet]
+    simulation.step()
+
+
 def test_one_that_cannot_be_built_leaves_nothing(fly):
     simulation = fly(vehicles=1)
     names, bodies = set(simulation.context.objects.names), len(simulation.world.pictures.visuals())

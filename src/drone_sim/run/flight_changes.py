@@ -13,7 +13,6 @@ from drone_sim.run.parameters import Parameters
 from drone_sim.run.scene_settings import PLACE, are_same
 from drone_sim.run.simulation_setup import SimulationSetup, script_of
 from drone_sim.scripting import load
-from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
@@ -123,27 +122,13 @@ def _exchange(setup: SimulationSetup, removed: list[Vehicle], added: list[Vehicl
     handles: Mapping[str, int] = {
         name: handle for each in removed for handle in each.handles for name in each.context.objects[handle].names
     }
-    for vehicle in removed:
-        _remove(setup, vehicle.name)
-    done: list[str] = []
+    for error in setup.remove_all([vehicle.name for vehicle in removed], running=True):
+        LOG.error("%s", error)
+    setup.context.objects.reserve(handles)
     try:
-        for new in added:
-            setup.context.objects.reserve(handles)
-            setup.add(new, True, script)
-            done.append(new.name)
+        setup.add_all(added, True, script)
     except BaseException:
-        for name in done:
-            _remove(setup, name)
         for vehicle in removed:
             restored = vehicle.parameters.model_copy(update={"suffix": split(f"_{vehicle.suffix}")[1]})
-            setup.context.objects.reserve(handles)
             setup.add(_as_successor(restored, vehicle.parameters, {vehicle.name: vehicle}), True, script)
         raise
-
-
-def _remove(setup: SimulationSetup, name: str) -> None:
-    """Remove a vehicle, even if the cleanup of its scripts fails."""
-    try:
-        setup.remove(name, running=True)
-    except ScriptError as error:
-        LOG.error("%s", error)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from drone_sim.hosting.child_scripts import ChildScript
+from drone_sim.hosting.script_scheduler import raise_first
 from drone_sim.importing.folder import unsupported_features
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.object_tree import NO_HANDLES, Handles
@@ -165,8 +166,9 @@ class Simulation:
     def set_vehicles(self, entries: Any) -> tuple[list[str], list[str]]:
         """Add and remove vehicles to match `entries` (as the parameter `vehicles`); return the added and removed names.
 
-        Other vehicles fly on unchanged, to the last bit. A new one whose script fails in init is removed again.
-        Snapshots become invalid. Raises ParameterError, UrdfError and ScriptError.
+        Other vehicles fly on unchanged, to the last bit. Snapshots become invalid. Raises ParameterError, UrdfError and
+        ScriptError without a change if a vehicle cannot be added or its script fails in init; ScriptError after the
+        change if the cleanup of a removed one fails.
         """
         parameters = self.parameters.with_vehicles(entries)
         if self._is_edited or self._original:
@@ -176,11 +178,10 @@ class Simulation:
         removed = [name for name in self.vehicles if name not in wanted]
         for name in added:
             load.script_path(script_of(wanted[name], parameters, self.script))
+        errors: list[ScriptError] = []
         try:
-            for name in added:
-                self._setup.add(wanted[name], self.running, self.script)
-            for name in removed:
-                self._setup.remove(name, self.running)
+            self._setup.add_all([wanted[name] for name in added], self.running, self.script)
+            errors = self._setup.remove_all(removed, self.running)
         finally:
             if added or removed:
                 self.topology_version += 1
@@ -188,6 +189,7 @@ class Simulation:
         self.parameters = parameters
         if self._original:
             self._original = parameters.varied(self._original.weather, self._original.scene, parameters.fleet)
+        raise_first(errors)
         return added, removed
 
     def set_pace(self, factor: Any) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from drone_sim.config.types import ParameterError
@@ -23,7 +23,9 @@ from drone_sim.scene import object_collections
 from drone_sim.scene.operations import SceneOperations
 from drone_sim.scene.scene import Scene
 from drone_sim.scripting.api.remote_ports import RemotePorts
+from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import NO_SCRIPT
+from drone_sim.scripting.script_log import LOG
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 from drone_sim.world import World
@@ -158,6 +160,26 @@ class SimulationSetup:
         self.scripts.detach(name)
         self.vehicles.pop(name).leave()
         raise_first(errors)
+
+    def add_all(self, vehicles: Sequence[VehicleParameters], running: bool, script: str) -> None:
+        """Add vehicles as `add` does; if one cannot be added, remove the others again."""
+        for index, vehicle in enumerate(vehicles):
+            try:
+                self.add(vehicle, running, script)
+            except BaseException:
+                for error in self.remove_all([added.name for added in vehicles[:index]], running):
+                    LOG.error("%s", error)
+                raise
+
+    def remove_all(self, names: Iterable[str], running: bool) -> list[ScriptError]:
+        """Remove vehicles as `remove` does; return the errors of the cleanups."""
+        errors = []
+        for name in names:
+            try:
+                self.remove(name, running)
+            except ScriptError as error:
+                errors.append(error)
+        return errors
 
     def _create_vehicle(self, parameters: VehicleParameters) -> Vehicle:
         vehicle = Vehicle(parameters, self._suffix(parameters), self.context)
