@@ -135,7 +135,7 @@ def test_what_acts_in_a_sub_step_acts_through_all_of_its_parts(space):
         body = space.add_object(Box((0.2,) * 3), Pose((x, 0.0, 2.0)), mass=1.0)
         space.set_velocity(body, (0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
         push = wrench(force=(-1.0, 0.0, 2.0))
-        space.advance({}, 20, between=lambda _count, body=body, push=push: space.apply(body, push))
+        space.advance({body: Wrench()}, 20, lambda _count, body=body, push=push: space.apply(body, push))
         gained.append(space.state(body).linear_velocity)
     assert gained[0] == pytest.approx((-0.1, 1.0, 0.2), abs=1e-9)
     assert gained[0] == pytest.approx(gained[1], abs=1e-9)

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from drone_sim.config.types import Checked, Finite, Within
 from drone_sim.forces.force import Force, PushedBody
-from drone_sim.mechanics.frames import invert, rotate
+from drone_sim.mechanics.frames import rotate, rotate_back
 from drone_sim.mechanics.wrench import Wrench
 
 _Coefficient = Annotated[Finite, Within(0, 100)]
@@ -49,6 +49,6 @@ class Drag(Force):
     def add_to(self, wrench: Wrench, body: PushedBody) -> None:
         """Add the present drag."""
         (vx, vy, vz), (wx, wy, wz), (ax, ay, az) = body.state.linear_velocity, self._wind, body.wind
-        x, y, z = rotate(invert(body.matrix), (vx - wx - ax, vy - wy - ay, vz - wz - az))
+        x, y, z = rotate_back(body.matrix, (vx - wx - ax, vy - wy - ay, vz - wz - az))
         cx, cy, cz = self._coefficients
-        wrench.add(rotate(body.matrix, (-cx * x, -cy * y, -cz * z)), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        wrench.push(rotate(body.matrix, (-cx * x, -cy * y, -cz * z)))

@@ -46,19 +46,27 @@ class GustSeries:
         random = np.random.default_rng(np.random.SeedSequence(list(seed)))
         self._generator = _first_order(random) if is_along else _second_order(random)
         self._knots = array("d")
+        self._end = -1  # knot up to which `at` needs not call _reach
 
     def at(self, way: float) -> float:
         """Return the gust after a way, in lengths L."""
         knot = abs(way) * KNOTS
-        if not knot < _TOO_FAR:  # also if NaN: the body's position is not finite
-            return 0.0
+        if not knot < self._end:
+            if not knot < _TOO_FAR:  # also if NaN: the body's position is not finite
+                return 0.0
+            knot = self._reach(knot)
+        index = int(knot)
+        before = self._knots[index]
+        return before + (knot - index) * (self._knots[index + 1] - before)
+
+    def _reach(self, knot: float) -> float:
+        """Return the knot from 0 to MOST that has the same gust, and extend the series to it."""
         knot %= 2 * MOST
         knot = min(knot, 2 * MOST - knot)
-        index = int(knot)
-        while index + 1 >= len(self._knots):
+        while int(knot) + 1 >= len(self._knots):
             self._knots.extend(next(self._generator) for _ in range(_BLOCK))
-        before, after = self._knots[index], self._knots[index + 1]
-        return before + (knot - index) * (after - before)
+        self._end = min(len(self._knots) - 1, MOST)
+        return knot
 
 
 class Gusts:

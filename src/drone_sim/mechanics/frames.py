@@ -192,6 +192,26 @@ def rotation_vector(m: Sequence[float]) -> Vector:
     return x * scale, y * scale, z * scale
 
 
+def rotation_between(a: Sequence[float], b: Sequence[float]) -> Vector:
+    """Return the rotation from the axes of transform a to those of b, as its axis times its angle (rad, 0 to pi).
+
+    Its components are the same along the axes of a and of b. It is rotation_vector(relative_turn(a, b)) in one
+    function, because an IMU calls it in every sub-step.
+    """
+    a0, a1, a2, _, a4, a5, a6, _, a8, a9, a10, _ = a
+    b0, b1, b2, _, b4, b5, b6, _, b8, b9, b10, _ = b
+    ww = 1 + (a0 * b0 + a4 * b4 + a8 * b8) + (a1 * b1 + a5 * b5 + a9 * b9) + (a2 * b2 + a6 * b6 + a10 * b10)
+    if not ww > 2:  # a rotation of 90° or more
+        return rotation_vector(relative_turn(a, b))
+    scale = 0.5 / sqrt(ww)
+    x = (a2 * b1 + a6 * b5 + a10 * b9 - (a1 * b2 + a5 * b6 + a9 * b10)) * scale
+    y = (a0 * b2 + a4 * b6 + a8 * b10 - (a2 * b0 + a6 * b4 + a10 * b8)) * scale
+    z = (a1 * b0 + a5 * b4 + a9 * b8 - (a0 * b1 + a4 * b5 + a8 * b9)) * scale
+    sine = hypot(x, y, z)
+    scale = 2.0 * atan2(sine, ww * scale) / sine if sine else 2.0
+    return x * scale, y * scale, z * scale
+
+
 def turned(quaternion: Sequence[float], vector: Sequence[float]) -> Vector:
     """Return a vector rotated by a unit quaternion: v + 2 w (q x v) + 2 q x (q x v)."""
     x, y, z, w = quaternion

@@ -154,6 +154,13 @@ class ObjectTree:
             return self._handles[name]
         raise ValueError(f"no object named '{name}'; {near_names(name, self._handles)}")
 
+    def named(self, name: str) -> SceneObject:
+        """Return the object `name`. Raises ValueError, which lists similar names."""
+        try:
+            return self._objects[self._handles[name]]
+        except KeyError:
+            return self[self.handle(name)]
+
     @property
     def names(self) -> Iterable[str]:
         """All names of all objects."""

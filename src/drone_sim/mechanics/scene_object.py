@@ -103,7 +103,8 @@ class SceneObject:
         # Scripts read the same few frames several times a step: the product of the same two tuples is cached.
         parent, local = self.parent.below(), self.local
         if parent is not self._cached_parent or local is not self._cached_local:
-            self._cached_parent, self._cached_local, self._cached_matrix = parent, local, frames.multiply(parent, local)
+            self._cached_parent, self._cached_local = parent, local
+            self._cached_matrix = parent if local == IDENTITY else frames.multiply(parent, local)
         return self._cached_matrix
 
     # Transform world from the frame that children are relative to: the object's frame, except in a joint.

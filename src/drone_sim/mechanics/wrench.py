@@ -23,6 +23,11 @@ class Wrench:
         self._torque: Vector = (0.0, 0.0, 0.0)  # the part that does not depend on R: the torques, and every l x a
         self._levers: list[tuple[float, ...]] = []  # 2 l and a of each axis, in one tuple
 
+    def push(self, force: Vector) -> None:
+        """Add a force (N, world) at the centre of mass."""
+        (fx, fy, fz), (px, py, pz) = self.force, force
+        self.force = fx + px, fy + py, fz + pz
+
     def add(self, force: Vector, torque: Vector, point: Vector) -> None:
         """Add a force (N, world) at a point (m, inertial frame of the body), and a torque (N m, world)."""
         self.add_parallel(force, torque, point, force)
@@ -49,6 +54,8 @@ class Wrench:
     def torque_under(self, orientation: Quaternion) -> Vector:
         """Return the torque about the centre of mass (N m, world) for an orientation of the body."""
         # Vector operations are written out for speed; Dynamics has a copy of this code in its loop over sub-steps.
+        if not self._levers:
+            return self._torque
         x, y, z, w = orientation
         sum_x, sum_y, sum_z = self._torque
         for lx, ly, lz, ax, ay, az in self._levers:

@@ -80,7 +80,9 @@ class Stepper:
         for vehicle in self.flying:
             vehicle.update_wind_forces()
         self._context.tunings += 1
-        self._has_sub_step_work = any(vehicle.sub_step_forces or vehicle.instruments for vehicle in self.flying)
+        # Vehicles with work in every sub-step: each with what updates its instruments, None without any.
+        looks = [(vehicle, vehicle.instruments.look if vehicle.instruments else None) for vehicle in self.flying]
+        self._in_sub_steps = [(vehicle, look) for vehicle, look in looks if look or vehicle.sub_step_forces]
         self.list_scripts()
 
     def list_scripts(self) -> None:
@@ -102,7 +104,7 @@ class Stepper:
         carries = carried.shapes or carried.bases
         if carries:
             carried.follow()
-        between = self._with_watch(watch) if self._has_sub_step_work else watch
+        between = self._with_watch(watch) if self._in_sub_steps else watch
         self._world.advance(wrenches, self._sub_steps, between)
         for vehicle in vehicles:
             vehicle.body.refresh()
@@ -151,10 +153,11 @@ class Stepper:
         return between
 
     def _at_sub_step(self, count: int) -> None:
-        """After `count` sub-steps of the step, update instruments and forces."""
-        if count:
-            for vehicle in self.flying:
-                vehicle.after_sub_step(self._clock.steps * self._sub_steps + count)
-        if count < self._sub_steps:
-            for vehicle in self.flying:
-                vehicle.before_sub_step()
+        """After `count` sub-steps of the step, read the instruments, then apply the forces for the next one."""
+        number, is_last = self._clock.steps * self._sub_steps + count, count == self._sub_steps
+        for vehicle, look in self._in_sub_steps:
+            vehicle.body.refresh()
+            if count and look:
+                look(number)
+            if vehicle.sub_step_forces and not is_last:
+                vehicle.body.apply(vehicle.sub_step_forces)

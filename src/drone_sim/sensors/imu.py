@@ -23,12 +23,9 @@ from drone_sim.mechanics.frames import (
     Matrix,
     Quaternion,
     Vector,
-    cross,
     multiply_quaternions,
-    position,
-    relative_turn,
     rotate_back,
-    rotation_vector,
+    rotation_between,
     to_quaternion,
 )
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
@@ -101,16 +98,15 @@ class Imu(Instrument):
 
     def look(self, count: int) -> None:
         """Integrate over the last sub-step, then sample if due."""
-        axes, step = self.mounting.pose(), self.mounting.sub_step
-        velocity, last, dv_gravity = self._point_velocity(axes), self._velocity, self.carrier.gravity * step
-        last_axes = self._axes
-        if self._teleports != self.carrier.teleports:  # a teleport, at rest, is neither acceleration nor rotation
-            self._teleports, last, last_axes = self.carrier.teleports, _ZERO, axes
-        change = velocity[0] - last[0], velocity[1] - last[1], velocity[2] - last[2] - dv_gravity
+        axes, step, carrier = self.mounting.pose(), self.mounting.sub_step, self.carrier
+        velocity, last, last_axes = self._point_velocity(axes), self._velocity, self._axes
+        if self._teleports != carrier.teleports:  # a teleport, at rest, is neither acceleration nor rotation
+            self._teleports, last, last_axes = carrier.teleports, _ZERO, axes
+        change = velocity[0] - last[0], velocity[1] - last[1], velocity[2] - last[2] - carrier.gravity * step
         (gx, gy, gz), (cx, cy, cz) = self._delta_velocity, rotate_back(axes, change)
         self._delta_velocity = gx + cx, gy + cy, gz + cz
         # A rotation vector has the same components in the old and the new frame.
-        (tx, ty, tz), (rx, ry, rz) = self._delta_angle, rotation_vector(relative_turn(last_axes, axes))
+        (tx, ty, tz), (rx, ry, rz) = self._delta_angle, rotation_between(last_axes, axes)
         self._delta_angle = tx + rx, ty + ry, tz + rz
         self._axes, self._velocity = axes, velocity
         self._duration += step
@@ -118,17 +114,20 @@ class Imu(Instrument):
 
     def sample(self) -> ImuSample:
         """Return the mean rates and forces since the last sample, and the present orientation."""
-        force, rate = (_sum(_ZERO, one, 1 / self._duration) for one in (self._delta_velocity, self._delta_angle))
+        (vx, vy, vz), (tx, ty, tz), rate = self._delta_velocity, self._delta_angle, 1 / self._duration
         self._delta_velocity, self._delta_angle, self._duration = _ZERO, _ZERO, 0.0
-        orientation = multiply_quaternions(to_quaternion(self._axes), _quaternion(self._tilt_noise.add(_ZERO)))
-        return ImuSample(orientation, _vector(self._rate_noise.add(rate)), _vector(self._force_noise.add(force)))
+        orientation, tilt = to_quaternion(self._axes), self._tilt_noise.add(_ZERO)
+        if any(tilt):
+            orientation = multiply_quaternions(orientation, _quaternion(tilt))
+        wx, wy, wz = self._rate_noise.add((tx * rate, ty * rate, tz * rate))
+        fx, fy, fz = self._force_noise.add((vx * rate, vy * rate, vz * rate))
+        return ImuSample(orientation, (wx, wy, wz), (fx, fy, fz))
 
     def _point_velocity(self, axes: Matrix) -> Vector:
         """Return the velocity (m/s, world) of the vehicle at the sensor's position."""
-        root, _, linear, angular = self.carrier.state
-        (x, y, z), (vx, vy, vz) = position(axes), linear
-        sx, sy, sz = cross(angular, (x - root[0], y - root[1], z - root[2]))
-        return vx + sx, vy + sy, vz + sz
+        root, _, (vx, vy, vz), (wx, wy, wz) = self.carrier.state
+        x, y, z = axes[3] - root[0], axes[7] - root[1], axes[11] - root[2]
+        return vx + (wy * z - wz * y), vy + (wz * x - wx * z), vz + (wx * y - wy * x)
 
     def save_state(self) -> Restore:
         """Return a function that restores the sensor and its integrals."""
@@ -157,15 +156,6 @@ class Imu(Instrument):
             "orientation": {"x": x, "y": y, "z": z, "w": w},
             "orientation_covariance": diagonal(*[self._tilt_noise.variance] * 3),
         }
-
-
-def _sum(a: Sequence[float], b: Sequence[float], factor: float) -> Vector:
-    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
-
-
-def _vector(values: Sequence[float]) -> Vector:
-    x, y, z = values
-    return x, y, z
 
 
 def _quaternion(vector: Sequence[float]) -> Quaternion:

@@ -68,6 +68,12 @@ class Noise:
             self._walk = self._spread * math.sqrt(1 - self._keep**2)
         else:
             self._keep, self._walk = 1.0, p.bias_walk * math.sqrt(interval)
+        self._update_is_off()
+
+    def _update_is_off(self) -> None:
+        """Note whether a measurement is the truth; after a change of parameters a bias may remain."""
+        is_shifted = any(self._constant) or any(self._bias)
+        self._is_off = not (self._white or self._walk or self.parameters.quantisation or is_shifted)
 
     def change(self, parameters: NoiseParameters) -> None:
         """Change the parameters from the next sample on; the constant bias is scaled with its standard deviation."""
@@ -95,11 +101,14 @@ class Noise:
             [spread * value for value in _normal(random, self._axes)] if spread else [0.0] * self._axes
             for spread in (self.parameters.bias, self._spread)
         )
+        self._update_is_off()
 
     def add(self, truth: Sequence[float]) -> list[float]:
         """Return the next noisy sample of `truth`, one number for each axis."""
         if self._random is None:
             raise RuntimeError("restart() must be called before add()")
+        if self._is_off:
+            return list(truth)
         # Lists of floats: for so few axes Python is faster than numpy.
         measured = [true + constant + bias for true, constant, bias in zip(truth, self._constant, self._bias)]
         if self._white:
@@ -113,7 +122,7 @@ class Noise:
 
     def save_state(self) -> Restore:
         """Return a function that restores bias and parameters; the sensor restores the random generator."""
-        return saved(self, "parameters", "_white", "_spread", "_keep", "_walk", "_constant", "_bias")
+        return saved(self, "parameters", "_white", "_spread", "_keep", "_walk", "_constant", "_bias", "_is_off")
 
 
 def _normal(random: Generator, count: int) -> list[float]:

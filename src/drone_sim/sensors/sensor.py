@@ -120,8 +120,6 @@ class SensorParameters(Checked):
 
     def sensor_at(self, world_from_object: Matrix) -> Matrix:
         """Return the transform world-from-sensor for the pose of the object that scripts find."""
-        if self.from_object is IDENTITY:  # the usual case; called in every sub-step
-            return world_from_object
         return multiply(world_from_object, invert(self.from_object))
 
 
@@ -257,8 +255,13 @@ class Instrument(Sensor):
 
     def look(self, count: int) -> None:
         """Process a sub-step, the `count`-th since the start of the run."""
-        if self.is_due(count):
-            self._queue.append((count + self._delay, Reading(count, self.sample())))
+        if count % self.period == 0:  # is_due, without a call in every sub-step
+            sample = Reading(count, self.sample())
+            if not self._delay:
+                self.latest = sample
+                self.readings.append(sample)
+                return
+            self._queue.append((count + self._delay, sample))
         while self._queue and self._queue[0][0] <= count:
             self.latest = self._queue.popleft()[1]
             self.readings.append(self.latest)

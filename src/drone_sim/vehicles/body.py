@@ -90,7 +90,7 @@ class Body:
         state = self._world.state(self.number)
         if state is not self._last_read:
             self._last_read = self.state = state
-            self.matrix = state.matrix
+            self.matrix = frames.from_quaternion(state.position, state.orientation)
 
     def move(self, pose: Pose) -> None:
         """Teleport the body to a pose, at rest."""
@@ -149,14 +149,13 @@ class Body:
             wrench.add(force, torque, point)
         return wrench
 
-    def apply(self, force: Force) -> None:
-        """Apply a force, evaluated at the present state, in the next sub-step; ignored while the body is held."""
-        if self.is_held:
-            return
-        self.refresh()
-        wrench = Wrench()
-        force.add_to(wrench, self)
-        self._world.apply(self.number, wrench)
+    def apply(self, forces: Sequence[Force]) -> None:
+        """Apply forces, evaluated at the state of the last refresh(), in the next sub-step; not while it is held."""
+        if not self.is_held:
+            wrench = Wrench()
+            for force in forces:
+                force.add_to(wrench, self)
+            self._world.apply(self.number, wrench)
 
     # ---- rays and contacts
 

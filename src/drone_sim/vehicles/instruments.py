@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 
 from drone_sim.context import SimulationContext
-from drone_sim.mechanics.frames import Matrix
+from drone_sim.mechanics.frames import IDENTITY, Matrix
+from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.saved_state import Restore, in_turn
 from drone_sim.sensors.sensor import Failing, Failure, Instrument, Mounting, SensorParameters
 from drone_sim.vehicles.body import Body
@@ -27,7 +27,7 @@ class Instruments:
         self.moving_frames: dict[str, Callable[[], Matrix]] = {}  # world from sensor frame, for other sensors
         for name, sensor in vehicle.sensors.items():
             object_name = f"{sensor.object or name}{suffix}"
-            pose = partial(_pose, context, sensor, object_name)
+            pose = _pose(context.objects, sensor, object_name)
             instrument = sensor.make(Mounting(f"{vehicle.name}/{name}", body, pose, context.sub_step))
             self.by_name[name] = self.by_object[object_name] = instrument
             parent, matrix = sensor.placed(body.rigid.links)
@@ -55,8 +55,8 @@ class Instruments:
 
     def look(self, count: int) -> None:
         """Update the working instruments after sub-step number `count` of the run."""
-        position, _, linear, angular = self._body.state
-        if not -_DIVERGED < sum(position) + sum(linear) + sum(angular) < _DIVERGED:  # a NaN also makes this true
+        (x, y, z), _, (vx, vy, vz), (wx, wy, wz) = self._body.state
+        if not -_DIVERGED < x + y + z + vx + vy + vz + wx + wy + wz < _DIVERGED:  # a NaN also makes this true
             return
         for instrument in self._working:
             instrument.look(count)
@@ -72,7 +72,8 @@ class Instruments:
         return in_turn(*(instrument.save_state() for instrument in self._all))
 
 
-def _pose(context: SimulationContext, parameters: SensorParameters, name: str) -> Matrix:
-    """Return world from a sensor's frame, by its object, which a script may have moved."""
-    objects = context.objects
-    return parameters.sensor_at(objects.matrix(objects.handle(name)))
+def _pose(objects: ObjectTree, parameters: SensorParameters, name: str) -> Callable[[], Matrix]:
+    """Return a function that returns world from a sensor's frame, by its object, which a script may have moved."""
+    if parameters.from_object is IDENTITY:  # the usual case; called in every sub-step
+        return lambda: objects.named(name).matrix()
+    return lambda: parameters.sensor_at(objects.named(name).matrix())

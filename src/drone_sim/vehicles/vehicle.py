@@ -198,16 +198,6 @@ class Vehicle:
             self.pushes.add_to(wrench, body)
         return Wrench() if body.is_held else wrench
 
-    def before_sub_step(self) -> None:
-        """Apply the forces that are evaluated in every sub-step."""
-        for force in self.sub_step_forces:
-            self.body.apply(force)
-
-    def after_sub_step(self, count: int) -> None:
-        """Update the instruments after sub-step number `count` of the run."""
-        self.body.refresh()
-        self.instruments.look(count)
-
     def take_pictures(self, steps: int, now: bool = False) -> None:
         """Render every subscribed camera that is due at step `steps`, or all of them if `now`.
 

@@ -38,7 +38,7 @@ class Dynamics:
         self.shape_forces = ShapeForces(client)
         self._gyroscopic_term = GyroscopicTerm(client) if gyroscopic else NoGyroscopicTerm(client)
         self._impacts = Impacts(client, sub_step)
-        self._applied: list[tuple[int, Wrench]] = []  # in the next sub-step
+        self._applied: dict[int, Wrench] = {}  # in the next sub-step, by body
         self._term_acts = False  # whether the gyroscopic term acts on a body without load
         self._cached: dict[int, Motion] = {}  # read since PyBullet's last step, by body
 
@@ -75,8 +75,8 @@ class Dynamics:
     # ---- steps
 
     def apply(self, body: int, wrench: Wrench) -> None:
-        """Apply a wrench to a body in the next sub-step, in addition to those of `advance`."""
-        self._applied.append((body, wrench))
+        """See World.apply."""
+        self._applied[body] = wrench
 
     def advance(
         self, wrenches: Mapping[int, Wrench], sub_steps: int, between: Callable[[int], None] | None = None
@@ -88,19 +88,16 @@ class Dynamics:
         any_fast = self._impacts.begin_step(sub_steps, self._cached)
         if not any_fast:
             self._queries.begin_sub_step()
-        if between is None and not any_fast:
-            self._step(loads, sub_steps, self._sub_step)
+        if between is not None:
+            between(0)
+        if not any_fast:
+            self._step(loads, sub_steps, self._sub_step, between)
         else:
-            if between is not None:
-                between(0)
             for count in range(1, sub_steps + 1):
-                if any_fast:
-                    self._step_in_parts(loads, self._impacts.parts())
-                else:
-                    self._step(loads, 1, self._sub_step)
+                self._step_in_parts(loads, self._impacts.parts())
                 if between is not None:
                     between(count)
-        self.all_moved()
+        self.shape_forces.sums.clear()
 
     def _step_in_parts(self, loads: Sequence[_Load], parts: int) -> None:
         """Advance by one sub-step, divided into equal parts."""
@@ -112,33 +109,37 @@ class Dynamics:
             return
         self._queries.begin_sub_step(load[0] for load in loads)
         part = self._sub_step / parts
-        applied = list(self._applied)
+        applied = dict(self._applied)
         with self._impacts.divided(part):
             for _ in range(parts):
-                self._applied[:] = applied
+                self._applied.update(applied)
                 self._step(loads, 1, part)
                 self._queries.end_part(1 / parts)
 
-    def _step(self, loads: Sequence[_Load], steps: int, duration: float) -> None:
-        """Take `steps` PyBullet steps of `duration` (s) and apply all forces in each."""
+    def _step(
+        self, loads: Sequence[_Load], steps: int, duration: float, between: Callable[[int], None] | None = None
+    ) -> None:
+        """Take `steps` PyBullet steps of `duration` (s) and apply all forces in each; call `between` after each."""
         # The simulation spends most of its time here. So names are local, PyBullet's arguments positional,
         # Wrench.torque_under is written out, and a body that has hardly rotated costs no call for its term w x Iw.
         client, cached, applied, term = self._client, self._cached, self._applied, self._gyroscopic_term
         sums, slow = self.shape_forces.sums, SLOW * duration * duration / 4
-        for _ in range(steps):
-            if applied:
-                self._apply_once()
+        for count in range(1, steps + 1):
             for load in loads:
                 body, force, (torque_x, torque_y, torque_z), levers, moments, past = load
                 centre, attitude = cached[body][:2] if cached and body in cached else _pose_of(body, client)
                 x, y, z, w = load[_PAST_ATTITUDE] = attitude
-                _apply_force(body, -1, force, centre, _IN_WORLD, client)
                 for lx, ly, lz, ax, ay, az in levers:
                     tx, ty, tz = y * lz - z * ly, z * lx - x * lz, x * ly - y * lx
                     ux, uy, uz = w * tx + y * tz - z * ty, w * ty + z * tx - x * tz, w * tz + x * ty - y * tx
                     torque_x += uy * az - uz * ay
                     torque_y += uz * ax - ux * az
                     torque_z += ux * ay - uy * ax
+                if applied and body in applied:
+                    (fx, fy, fz), (tx, ty, tz) = applied[body].force, applied[body].torque_under(attitude)
+                    force = force[0] + fx, force[1] + fy, force[2] + fz
+                    torque_x, torque_y, torque_z = torque_x + tx, torque_y + ty, torque_z + tz
+                _apply_force(body, -1, force, centre, _IN_WORLD, client)
                 _apply_torque(body, -1, (torque_x, torque_y, torque_z), _IN_WORLD, client)
                 if moments is not None:
                     if past is not None:
@@ -151,6 +152,8 @@ class Dynamics:
                         torque = term.torque_of_velocity(moments, body, attitude, duration)
                     if torque is not None:
                         _apply_torque(body, -1, torque, _ALONG_AXES, client)
+            if applied:
+                applied.clear()
             if sums:
                 self.shape_forces.apply()
             if self._term_acts:
@@ -160,11 +163,5 @@ class Dynamics:
                 term.end_sub_step(duration)
             if cached:
                 cached.clear()
-
-    def _apply_once(self) -> None:
-        """Apply the wrenches that were given to `apply`."""
-        for body, wrench in self._applied:
-            centre, attitude = self._cached[body][:2] if body in self._cached else _pose_of(body, self._client)
-            _apply_force(body, -1, wrench.force, centre, _IN_WORLD, self._client)
-            _apply_torque(body, -1, wrench.torque_under(attitude), _IN_WORLD, self._client)
-        self._applied.clear()
+            if between is not None:
+                between(count)

@@ -34,6 +34,8 @@ _IDENTITY = (0.0, 0.0, 0.0, 1.0)  # quaternion
 # bodies at rest rattle by some 1e-3 m/s², which only accelerometers measure; with this, by less than 1e-6 m/s².
 _RESIDUAL_THRESHOLD = 1e-18
 _FAR_UP = 1e6  # m
+_NOWHERE = State((0.0, 0.0, 0.0), _IDENTITY, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+_UNKNOWN: tuple[Motion | None, State] = (None, _NOWHERE)  # of a body that has not been read yet
 _unused: list[int] = []  # clients
 
 
@@ -228,16 +230,16 @@ class World:
     def state(self, body: int) -> State:
         """Return pose and velocity of a body's root link; the same object as long as it does not move."""
         motion = self._dynamics.motion(body)
-        cached_motion, state = self._states.get(body, (None, None))
-        if cached_motion is motion and state is not None:
-            return state
-        centre, axes, (vx, vy, vz), angular = motion
+        cached_motion, cached_state = self._states.get(body, _UNKNOWN)
+        if cached_motion is motion:
+            return cached_state
+        (x, y, z), axes, (vx, vy, vz), angular = motion
         inertial, from_root = self._inertial_frames[body]
         orientation = axes if from_root.orientation is _IDENTITY else multiply_quaternions(axes, from_root.orientation)
-        arm = turned(orientation, inertial.position)  # from the root link to the centre of mass
-        sx, sy, sz = cross(angular, arm)
-        position = (centre[0] - arm[0], centre[1] - arm[1], centre[2] - arm[2])
-        state = State(position, orientation, (vx - sx, vy - sy, vz - sz), angular)
+        ax, ay, az = turned(orientation, inertial.position)  # from the root link to the centre of mass
+        wx, wy, wz = angular
+        velocity = vx - (wy * az - wz * ay), vy - (wz * ax - wx * az), vz - (wx * ay - wy * ax)
+        state = State((x - ax, y - ay, z - az), orientation, velocity, angular)
         self._states[body] = motion, state
         return state
 
@@ -277,7 +279,10 @@ class World:
         self.pictures.look_anew()
 
     def apply(self, body: int, wrench: Wrench) -> None:
-        """Apply a wrench to a body in the next sub-step, in addition to those of `advance`."""
+        """Add a wrench to that of `advance` for a body, in the next sub-step; a second one replaces the first.
+
+        `advance` must have a wrench for the body, even if it is zero.
+        """
         self._dynamics.apply(body, wrench)
 
     def keep_initial_poses(self) -> None:
