@@ -55,8 +55,10 @@ def test_what_is_copied_is_written_as_in_a_scene_file(editor):
 
 
 def test_it_is_pasted_in_another_scene_as_it_was(editor, other):
-    (editor.scene.folder / "lamp.lua").write_text("function sysCall_init() end\nfunction sysCall_actuation() end\n")
-    (editor.scene.folder / "tile.png").write_bytes((package_path() / "urdf/floor.png").read_bytes())
+    (editor.simulation.document.folder / "lamp.lua").write_text(
+        "function sysCall_init() end\nfunction sysCall_actuation() end\n"
+    )
+    (editor.simulation.document.folder / "tile.png").write_bytes((package_path() / "urdf/floor.png").read_bytes())
     script = {"object": "Lamp", "script": "lamp.lua", "parameters": {"power": 3}}
     edit(editor, {"do": "add", "objects": [{**CRATE, "texture": "tile.png"}, LAMP], "scripts": [script]})
     text = copied(editor, "Crate")
@@ -64,13 +66,15 @@ def test_it_is_pasted_in_another_scene_as_it_was(editor, other):
     assert place(other, "Crate") == [1, 2, 0.2]
     assert other.simulation.context.objects[other.simulation.context.objects.handle("Lamp")].parent.name == "Crate"
     now = other.simulation.scene.scripts["Lamp"]
-    assert now.script == str(editor.scene.folder / "lamp.lua")
+    assert now.script == str(editor.simulation.document.folder / "lamp.lua")
     assert now.parameters == {"power": 3}
-    assert str(editor.scene.folder / "tile.png") in other.answer({"text": True})["text"]
+    assert str(editor.simulation.document.folder / "tile.png") in other.answer({"text": True})["text"]
     assert paste(editor, text) == ["Crate0", "Lamp0"]
     assert place(editor, "Crate0") == [1.5, 2.5, 0.2], "beside what stands there"
     assert "tile.png" in editor.answer({"text": True})["text"]
-    assert str(editor.scene.folder) not in editor.answer({"text": True})["text"], "it lies beside the file"
+    assert str(editor.simulation.document.folder) not in editor.answer({"text": True})["text"], (
+        "it lies beside the file"
+    )
     other.answer({"undo": True})
     assert "Crate" not in other.simulation.context.objects
 

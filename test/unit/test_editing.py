@@ -52,7 +52,7 @@ def _course(tmp_path):
 @pytest.fixture(name="shared", scope="module")
 def _shared(tmp_path_factory):
     made = editor_of()
-    made.scene.document.folder = tmp_path_factory.mktemp("shared")
+    made.simulation.document.folder = tmp_path_factory.mktemp("shared")
     edit(made, {"do": "add", "objects": [GATE]})
     yield made
     made.simulation.close()
@@ -206,7 +206,7 @@ def test_vehicles_floor_and_weather_are_edited_in_flight_until_stop(editor):
     assert simulation.drone is not drone
     assert place(editor, "Drone") == pytest.approx([1, 2, 2], abs=0.1)
     assert simulation.context.objects.handle("Drone") == handle
-    assert editor.scene.tree.matrix(editor.scene.tree.handle("Mark"), handle)[11] == pytest.approx(0.3)
+    assert editor.simulation.tree.matrix(editor.simulation.tree.handle("Mark"), handle)[11] == pytest.approx(0.3)
     (new,) = edit(editor, {"do": "add_vehicle", "name": "second", "position": [-2, 0, 1]})["handles"]
     edit(editor, {"do": "rename", "object": new, "name": "guest"})
     simulation.step()
@@ -284,7 +284,7 @@ def test_a_model_is_grouped_copied_into_a_row_and_removed_whole(editor):
 
 
 def test_a_script_is_attached_and_taken_away(course):
-    folder = course.scene.document.file.parent
+    folder = course.simulation.document.file.parent
     edit(course, {"do": "attach_script", "object": "Lamp"})
     assert "sysCall_actuation" in (folder / "lamp.lua").read_text(encoding="utf-8")
     edit(course, {"do": "set", "object": "Lamp", "values": {"script_parameters": {"speed": 2}}})
@@ -415,7 +415,7 @@ def test_in_flight_it_is_saved_as_it_stands_and_stays_the_scene_that_it_was(cour
     course.simulation.start()
     course.simulation.drone.body.move(Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0)))
     said = course.answer({"save": True})["said"]
-    file = course.scene.document.file
+    file = course.simulation.document.file
     assert "in flight" in said and said.endswith(str(file))
     was, now = changed_lines(COURSE, file.read_text(encoding="utf-8"))
     assert (was, now) == (["drone: {position: [0, 0, 1.50]}"], ["drone: {position: [1, 2, 3]}"])
@@ -429,13 +429,13 @@ def test_saved_as_another_file_in_flight_it_is_a_copy_and_the_answer_says_so(cou
     other = tmp_path / "other.yaml"
     said = course.answer({"save": str(other)})["said"]
     assert str(other) in said and "This is a copy" in said
-    assert course.scene.document.file == tmp_path / "course.yaml"
+    assert course.simulation.document.file == tmp_path / "course.yaml"
 
 
 def test_a_start_reads_what_somebody_has_written_since_it_was_saved(course):
     edit(course, {"do": "move", "object": "Left", "position": [4, 1, 1]})
     course.answer({"save": True})
-    file = course.scene.document.file
+    file = course.simulation.document.file
     file.write_text(COURSE.replace("[3, 1, 1]", "[5, 1, 1]"), encoding="utf-8")
     os.utime(file, ns=(1, 1))
     course.follow()
@@ -446,7 +446,7 @@ def test_a_start_reads_what_somebody_has_written_since_it_was_saved(course):
 def test_a_scene_of_the_package_is_copied(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     editor = editor_of({"scene_file": "package://drone_sim/config/scenes/gates.yaml"})
-    shipped = editor.scene.document.file
+    shipped = editor.simulation.document.file
     before = shipped.read_text(encoding="utf-8")
     edit(editor, {"do": "remove", "objects": ["Red"]})
     assert editor.answer({"save": True})["file"] == str(tmp_path / ".ros/drone_sim/gates.yaml")

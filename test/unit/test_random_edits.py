@@ -115,7 +115,7 @@ def assert_agree(editor, folder):
 
 
 def by_name(editor):
-    content = editor.scene.content()
+    content = editor.simulation.content()
     rounded = {one.name: rounded_entry(one) for one in content.entries.values()}
     return content._replace(entries=rounded, settings={})
 

@@ -19,7 +19,7 @@ def _editor():
 
 
 def row(editor, name):
-    rows, _ = SceneRows(editor.scene).follow()
+    rows, _ = SceneRows(editor.simulation).follow()
     return next(one for one in rows if one["name"] == name)
 
 

@@ -11,12 +11,12 @@ from drone_sim.config.errors import checked
 from drone_sim.config.types import Checked
 from drone_sim.editing import clipboard, records, scripts, signs
 from drone_sim.editing.object_edits import ObjectEdits
-from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.editing.vehicle_edits import FLOOR, VehicleEdits
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Quaternion, Vector
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.mechanics.state import Pose
+from drone_sim.run.simulation import Simulation
 
 _MIN_LENGTH = 0.1  # of a quaternion
 _PASTE_OFFSET = 0.5  # m along x and y, between a pasted object and one at the same position
@@ -25,10 +25,10 @@ _PASTE_OFFSET = 0.5  # m along x and y, between a pasted object and one at the s
 class EditOperations:
     """Executes operation records on objects of the scene, vehicles or the floor."""
 
-    def __init__(self, scene: SceneAccess):
+    def __init__(self, simulation: Simulation):
         """Edit this scene."""
-        self._scene = scene
-        self._objects, self._vehicles = ObjectEdits(scene), VehicleEdits(scene)
+        self._simulation = simulation
+        self._objects, self._vehicles = ObjectEdits(simulation), VehicleEdits(simulation)
 
     def do(self, operations: Iterable[Any]) -> list[int]:
         """Execute operations in order; return the handles of the objects that they created or changed."""
@@ -42,7 +42,7 @@ class EditOperations:
         executors: Mapping[type[Checked], Callable[[Any], list[int] | None]] = {
             records.Add: self._objects.add,
             records.AddModel: self._objects.add_model,
-            records.AddSign: lambda op: signs.add(self._scene, op),
+            records.AddSign: lambda op: signs.add(self._simulation, op),
             records.AddVehicle: self._vehicles.add,
             records.Remove: self._remove,
             records.Move: self._move,
@@ -52,11 +52,11 @@ class EditOperations:
             records.Copy: self._copy,
             records.Paste: self._paste,
             records.Group: lambda op: self._objects.group(self._handles(op.objects), op.name, op.as_),
-            records.Ungroup: lambda op: self._objects.ungroup(self._scene.handle(op.object)),
+            records.Ungroup: lambda op: self._objects.ungroup(self._simulation.tree.resolve(op.object)),
             records.AttachScript: self._attach_script,
-            records.DetachScript: lambda op: scripts.detach(self._scene, self._scene.handle(op.object)),
+            records.DetachScript: lambda op: scripts.detach(self._simulation, self._simulation.tree.resolve(op.object)),
         }
-        changed = [self._scene.handle(op.object)] if hasattr(op, "object") else self._changed_handles(op)
+        changed = [self._simulation.tree.resolve(op.object)] if hasattr(op, "object") else self._changed_handles(op)
         created = executors[type(op)](op)
         return changed if created is None else created
 
@@ -64,10 +64,10 @@ class EditOperations:
         return self._handles(op.objects) if isinstance(op, (records.Scale, records.Reparent)) else []
 
     def _handles(self, objects: list[Any]) -> list[int]:
-        return [self._scene.handle(item) for item in objects]
+        return [self._simulation.tree.resolve(item) for item in objects]
 
     def _is_of_scene(self, handle: int) -> bool:
-        return self._scene.vehicle_of(handle) is None and self._scene.tree[handle].name != FLOOR
+        return self._simulation.vehicle_of(handle) is None and self._simulation.tree[handle].name != FLOOR
 
     def _remove(self, op: records.Remove) -> list[int]:
         handles = self._handles(op.objects)
@@ -94,11 +94,13 @@ class EditOperations:
         of_scene = [handle for handle in handles if self._is_of_scene(handle)]
         vehicles = dict(self._vehicles.described(handle) for handle in handles if handle not in of_scene)
         entries, scripts_on = self._objects.described(of_scene)
-        return clipboard.written(entries, scripts_on, vehicles, self._scene.folder)
+        return clipboard.written(entries, scripts_on, vehicles, self._simulation.document.folder)
 
     def _paste(self, op: records.Paste) -> list[int]:
-        content = clipboard.read(op.text, self._scene.folder)
-        occupied = {self._place(it) for it in self._scene.tree if self._is_of_scene(it) or self._scene.is_root(it)}
+        content = clipboard.read(op.text, self._simulation.document.folder)
+        occupied = {
+            self._place(it) for it in self._simulation.tree if self._is_of_scene(it) or self._simulation.is_vehicle(it)
+        }
         created: list[int] = []
         for name, values in content["vehicles"].items():
             place = {key: values[key] for key in ("position", "yaw") if key in values}
@@ -107,7 +109,7 @@ class EditOperations:
         if content["objects"]:
             add = {"do": "add", "objects": content["objects"], "scripts": content["scripts"]}
             created += self._objects.add(checked(records.Add, add))
-        self._put_aside(self._scene.tops(created), occupied)
+        self._put_aside(self._simulation.tree.tops(created), occupied)
         return created
 
     def _put_aside(self, handles: list[int], occupied: Collection[Vector]) -> None:
@@ -119,14 +121,14 @@ class EditOperations:
             self._move(records.Move(do="move", object=handle, position=(x + by, y + by, z)))
 
     def _place(self, handle: int) -> Vector:
-        x, y, z = (round(value, 6) for value in frames.position(self._scene.tree.matrix(handle)))
+        x, y, z = (round(value, 6) for value in frames.position(self._simulation.tree.matrix(handle)))
         return x, y, z
 
     def _move(self, op: records.Move) -> None:
-        tree, handle = self._scene.tree, self._scene.handle(op.object)
+        tree, handle = self._simulation.tree, self._simulation.tree.resolve(op.object)
         fixed_frames = {"world": WORLD, "parent": PARENT}
         is_fixed = isinstance(op.relative_to, str) and op.relative_to in fixed_frames
-        frame = fixed_frames[str(op.relative_to)] if is_fixed else self._scene.handle(op.relative_to)
+        frame = fixed_frames[str(op.relative_to)] if is_fixed else self._simulation.tree.resolve(op.relative_to)
         matrix = _placed(op, tree.matrix(handle, frame))
         if self._is_of_scene(handle):
             self._objects.put(handle, frame, matrix)
@@ -134,20 +136,20 @@ class EditOperations:
             self._vehicles.move(handle, frame, matrix)
 
     def _rename(self, op: records.Rename) -> list[int]:
-        handle = self._scene.handle(op.object)
+        handle = self._simulation.tree.resolve(op.object)
         is_of_scene = self._is_of_scene(handle)
         return self._objects.rename(handle, op.name) if is_of_scene else self._vehicles.rename(handle, op.name)
 
     def _reparent(self, op: records.Reparent) -> None:
-        parent = WORLD if op.parent == WORLD else self._scene.handle(op.parent)
-        for handle in self._scene.tops(self._handles(op.objects)):
+        parent = WORLD if op.parent == WORLD else self._simulation.tree.resolve(op.parent)
+        for handle in self._simulation.tree.tops(self._handles(op.objects)):
             edits = self._objects if self._is_of_scene(handle) else self._vehicles
             edits.reparent(handle, parent, op.keep)
 
     def _set(self, operations: Sequence[records.Set]) -> list[int]:
         values_by_handle: dict[int, dict[str, Any]] = {}
         for op in operations:
-            values_by_handle.setdefault(self._scene.handle(op.object), {}).update(op.values)
+            values_by_handle.setdefault(self._simulation.tree.resolve(op.object), {}).update(op.values)
         self._objects.set({handle: values for handle, values in values_by_handle.items() if self._is_of_scene(handle)})
         for handle, values in values_by_handle.items():
             if not self._is_of_scene(handle):
@@ -155,13 +157,13 @@ class EditOperations:
         return [*values_by_handle]
 
     def _attach_script(self, op: records.AttachScript) -> None:
-        handle = self._scene.handle(op.object)
-        if self._scene.is_root(handle):
+        handle = self._simulation.tree.resolve(op.object)
+        if self._simulation.is_vehicle(handle):
             if not op.script:
                 raise ValueError("attach_script to a vehicle needs a file, which becomes its key `script`")
             self._vehicles.set(handle, {"script": op.script})
         else:
-            scripts.attach(self._scene, handle, op.script, op.language, op.parameters)
+            scripts.attach(self._simulation, handle, op.script, op.language, op.parameters)
 
 
 def _unit(quaternion: Quaternion) -> Quaternion:

@@ -14,7 +14,6 @@ from drone_sim.editing.changes import SceneChange, apply_change, change_between
 from drone_sim.editing.drafts import Drafts
 from drone_sim.editing.edit_operations import EditOperations
 from drone_sim.editing.history import History, Step
-from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.editing.scene_files import SceneFiles
 from drone_sim.files.yaml_text import YamlText
 from drone_sim.run.pacing import Throttle
@@ -33,8 +32,7 @@ class SceneEditor:
         """Edit the scene of `player`'s simulation; unsaved changes are kept as drafts in the folder `drafts`."""
         self._player = player
         self.simulation = player.simulation
-        self.scene = SceneAccess(self.simulation)
-        self.files = SceneFiles(self.scene)
+        self.files = SceneFiles(self.simulation)
         self.history = History()
         self._drafts, self._last_draft = Drafts(drafts), (0, False)
         self._draft_throttle = Throttle(_DRAFT_PERIOD)
@@ -42,7 +40,7 @@ class SceneEditor:
         self._saved = 0  # the revision in the file
         self._started = 0, False  # revision at the start of the run, and whether it was modified
         self._run = -1  # number of the run, -1 while stopped
-        self._operations = EditOperations(self.scene)
+        self._operations = EditOperations(self.simulation)
         self._scenes_read, self._is_opening = -1, False
         self.follow()
 
@@ -54,7 +52,7 @@ class SceneEditor:
     @property
     def scene_file(self) -> str:
         """The file of the scene, '' if it has none."""
-        return str(self.scene.document.file or "")
+        return str(self.simulation.document.file or "")
 
     def described(self) -> dict[str, Any]:
         """Return the state of the editor for windows."""
@@ -79,7 +77,7 @@ class SceneEditor:
                 self._drafts.offer()
             self._reset()
         run = simulation.run if simulation.running else -1
-        if run == -1 and not self.is_modified and self.scene.document.is_changed_on_disk:
+        if run == -1 and not self.is_modified and self.simulation.document.is_changed_on_disk:
             simulation.read_at_start()
         if run != self._run:
             if self._run != -1:
@@ -130,21 +128,21 @@ class SceneEditor:
 
     def _change(self, name: str, change: Callable[[], list[int]], merge: str = "") -> dict[str, Any]:
         """Call `change` atomically and add it to the history; if it fails, the scene is restored."""
-        before = self.scene.content()
+        before = self.simulation.content()
         try:
             handles = change()
         except Exception:  # any exception: restore the scene
-            self._apply(change_between(self.scene.content(), before))
+            self._apply(change_between(self.simulation.content(), before))
             raise
-        done = change_between(before, self.scene.content())
+        done = change_between(before, self.simulation.content())
         if not done.is_empty:
             self.history.add(Step(name, merge, done))
             self.revision += 1
-        return self._answer(name, handles=[key for key in handles if self.scene.tree.get(key) is not None])
+        return self._answer(name, handles=[key for key in handles if self.simulation.tree.get(key) is not None])
 
     def _apply(self, change: SceneChange) -> None:
         if not change.is_empty:
-            apply_change(self.simulation, change, self.scene.apply_settings)
+            apply_change(self.simulation, change, self.simulation.apply_settings)
 
     def _answer(self, message: str, **more: Any) -> dict[str, Any]:
         return {"revision": self.revision, "said": message, "until_stop": self.simulation.running, **more}
@@ -154,7 +152,7 @@ class SceneEditor:
         if not request.merge or self.history.is_last(request.merge):
             return self._step(self.history.undone, self.history.redone, "undone")
         step = self.history.of(request.merge)
-        change, now = step.change.reversed, self.scene.settings
+        change, now = step.change.reversed, self.simulation.document.settings
         settings = now, as_between(now, *change.settings)
         return self._change(f"Revert: {step.name}", lambda: self._revert(change._replace(settings=settings)))
 
@@ -166,15 +164,15 @@ class SceneEditor:
         """Undo or redo a step; `back` restores the history if that fails."""
         entry = step()
         change = entry.change.reversed if word == "undone" else entry.change
-        before = self.scene.content()
+        before = self.simulation.content()
         try:
             self._apply(change)
         except (ValueError, OSError, ScriptError) as error:
-            self._apply(change_between(self.scene.content(), before))
+            self._apply(change_between(self.simulation.content(), before))
             back()
             raise ValueError(f"'{entry.name}' cannot be {word}: {error}") from None
         self.revision += 1
-        handles = [handle for handle in change.entries if self.scene.tree.get(handle) is not None]
+        handles = [handle for handle in change.entries if self.simulation.tree.get(handle) is not None]
         return self._answer(f"{word}: {entry.name}", handles=handles)
 
     # ---- texts and files
@@ -194,11 +192,11 @@ class SceneEditor:
         new_content = self.files.content_of(text)
 
         def change() -> list[int]:
-            self._apply(change_between(self.scene.content(), new_content))
+            self._apply(change_between(self.simulation.content(), new_content))
             return []
 
         answer = self._change("Edit text", change)
-        self.scene.document.take_text(text, self.simulation.object_handles)
+        self.simulation.document.take_text(text, self.simulation.object_handles)
         return answer
 
     def _open(self, file: str | None) -> dict[str, Any]:
@@ -221,7 +219,7 @@ class SceneEditor:
         if self.simulation.running:
             note = (
                 ""
-                if path == self.scene.document.file
+                if path == self.simulation.document.file
                 else ". This is a copy: to save the scene itself, stop the simulation first"
             )
             return self._answer(f"saved the scene as it is in flight to {path}{note}", file=str(path))
@@ -229,7 +227,7 @@ class SceneEditor:
         return self._answer(f"saved {path}", file=str(path))
 
     def _save_model(self, request: records.SaveModel) -> dict[str, Any]:
-        path = self.files.save_model(self.scene.handle(request.save_model), request.file)
+        path = self.files.save_model(self.simulation.tree.resolve(request.save_model), request.file)
         return self._answer(f"saved {path}", file=str(path))
 
     # ---- drafts

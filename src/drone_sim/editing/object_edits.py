@@ -11,12 +11,12 @@ from drone_sim.config.errors import changed
 from drone_sim.config.types import ParameterError
 from drone_sim.editing import records
 from drone_sim.editing.library import model_said
-from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.editing.scripts import set_parameters
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.object_names import first_free, numbered
 from drone_sim.mechanics.object_tree import PARENT, WORLD
+from drone_sim.run.simulation import Simulation
 from drone_sim.scene import models, scene_parameters
 from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters, placed
@@ -29,16 +29,16 @@ _OPERATION_FOR = {"name": "rename", "parent": "reparent", "position": "move", "r
 class ObjectEdits:
     """Operations on scene objects; each returns the handles of created or changed objects. All raise ValueError."""
 
-    def __init__(self, scene: SceneAccess):
+    def __init__(self, simulation: Simulation):
         """Edit this scene."""
-        self._scene = scene
+        self._simulation = simulation
 
     # ---- adding and removing
 
     def add(self, op: records.Add) -> list[int]:
         """Add entries under unused names."""
         content = {"objects": copy.deepcopy(op.objects), "scripts": copy.deepcopy(op.scripts)}
-        scene_parameters.find_files_beside(self._scene.folder, {"scene": content})
+        scene_parameters.find_files_beside(self._simulation.document.folder, {"scene": content})
         entries, scripts = models.Model(**content).checked()
         if op.position is not None:
             entries[0] = _set_down(entries[0], op.position, op.yaw)
@@ -47,7 +47,7 @@ class ObjectEdits:
     def _add_renamed(
         self, entries: Sequence[EntryParameters], scripts: Sequence[AttachedScriptParameters]
     ) -> list[int]:
-        tree = self._scene.tree
+        tree = self._simulation.tree
         renames: dict[str, str] = {}
         for entry in entries:
             renames[entry.name] = first_free(numbered(entry.name), tree, renames.values())
@@ -56,30 +56,34 @@ class ObjectEdits:
             for entry in entries
         ]
         moved = [it.model_copy(update={"object": renames.get(it.object, it.object)}) for it in scripts]
-        return self._scene.operations.add(renamed, moved)
+        return self._simulation.operations.add(renamed, moved)
 
     def add_model(self, op: records.AddModel) -> list[int]:
         """Add the objects of a model, with its origin at `position`."""
-        entries, scripts = model_said(op.model, self._scene.folder, self._scene.operations.imported).checked()
+        entries, scripts = model_said(
+            op.model, self._simulation.document.folder, self._simulation.operations.imported
+        ).checked()
         at = frames.from_rpy(op.position, (0.0, 0.0, op.yaw))
         moved = [entry if entry.parent else placed(entry, "", frames.multiply(at, entry.local)) for entry in entries]
         if len(entries) == 1 and not op.model.endswith(".yaml") and isinstance(entries[0], ObjectParameters):
             moved = [_set_down(entries[0], op.position, op.yaw)]
-        return self._scene.operations.add_named_anew(moved, scripts)
+        return self._simulation.operations.add_named_anew(moved, scripts)
 
     def remove(self, handles: Sequence[int], below: bool) -> list[int]:
         """Remove objects; a model, or with `below` every object, is removed with its descendants except vehicles."""
-        tree, operations = self._scene.tree, self._scene.operations
+        tree, operations = self._simulation.tree, self._simulation.operations
         removed: dict[int, None] = {}
         for top in handles:
             group = operations.model(top) if below or tree[top].is_model else [top]
-            removed.update(dict.fromkeys(part for part in group if part == top or self._scene.vehicle_of(part) is None))
+            removed.update(
+                dict.fromkeys(part for part in group if part == top or self._simulation.vehicle_of(part) is None)
+            )
         operations.remove([*removed])
         return []
 
     def copy(self, handles: Sequence[int], places: Sequence[Vector]) -> list[int]:
         """Copy objects with their descendants, once for each of `places`: offsets (m, world) from the originals."""
-        operations = self._scene.operations
+        operations = self._simulation.operations
         originals = [*dict.fromkeys(part for handle in handles for part in operations.model(handle))]
         if len(places) * len(originals) > scene_parameters.MAX_OBJECTS:
             raise ValueError(
@@ -88,25 +92,25 @@ class ObjectEdits:
         copies = []
         for place in places:
             new = dict(zip(originals, operations.copy(originals)))
-            for handle in self._scene.tops(handles):
+            for handle in self._simulation.tree.tops(handles):
                 self._shift(new[handle], handle, place)
             copies += [new[handle] for handle in handles]
         return copies
 
     def described(self, handles: Sequence[int]) -> tuple[list[EntryParameters], list[AttachedScriptParameters]]:
         """Return the entries and scripts of objects and their descendants; the topmost are in the world frame."""
-        tree, operations, scripts = self._scene.tree, self._scene.operations, self._scene.simulation.scene.scripts
-        tops = self._scene.tops(handles)
+        tree, operations, scripts = self._simulation.tree, self._simulation.operations, self._simulation.scene.scripts
+        tops = self._simulation.tree.tops(handles)
         entries = []
         for handle in dict.fromkeys(part for top in tops for part in operations.model(top)):
-            if self._scene.vehicle_of(handle) is None:
+            if self._simulation.vehicle_of(handle) is None:
                 entry = operations.entry(handle)
                 entries.append(placed(entry, "", tree.matrix(handle)) if handle in tops else entry)
         return entries, [scripts[entry.name] for entry in entries if entry.name in scripts]
 
     def _shift(self, copied: int, original: int, by: Sequence[float]) -> None:
         """Give a copy the original's parent and place it at an offset (m, world) from the original."""
-        tree, operations = self._scene.tree, self._scene.operations
+        tree, operations = self._simulation.tree, self._simulation.operations
         operations.set_parent(copied, tree.handle_of(tree[original].parent), keep_in_place=True)
         matrix = list(tree.matrix(original))
         for index, distance in zip((3, 7, 11), by):
@@ -117,33 +121,33 @@ class ObjectEdits:
 
     def rename(self, handle: int, name: str) -> list[int]:
         """Rename an object and reset its alias to the name."""
-        self._scene.operations.rename(handle, name)
-        if self._scene.operations.entry(handle).alias:
-            self._scene.operations.describe(handle, alias="")
+        self._simulation.operations.rename(handle, name)
+        if self._simulation.operations.entry(handle).alias:
+            self._simulation.operations.describe(handle, alias="")
         return [handle]
 
     def reparent(self, handle: int, parent: int, keep: str) -> None:
         """Set an object's parent; `keep`: the pose in the world, or the one relative to the parent."""
-        local = self._scene.tree.matrix(handle, PARENT)
-        self._scene.operations.set_parent(handle, parent, keep_in_place=True)
+        local = self._simulation.tree.matrix(handle, PARENT)
+        self._simulation.operations.set_parent(handle, parent, keep_in_place=True)
         if keep == "relative":
-            self._scene.operations.put(handle, local)
+            self._simulation.operations.put(handle, local)
 
     def put(self, handle: int, relative_to: int, matrix: Matrix) -> None:
         """Set an object's pose relative to its parent, the world, or another object."""
-        tree = self._scene.tree
+        tree = self._simulation.tree
         parent = tree[handle].parent
         if relative_to not in (PARENT, WORLD):
             matrix = frames.multiply(tree[relative_to].below(), matrix)
         if relative_to != PARENT and parent is not None:
             matrix = frames.relative(parent.below(), matrix)
-        self._scene.operations.put(handle, matrix)
+        self._simulation.operations.put(handle, matrix)
 
     # ---- properties
 
     def set(self, values_by_handle: Mapping[int, Mapping[str, Any]]) -> None:
         """Set keys of entries, by handle, all at once, so that the world is rebuilt only once."""
-        operations = self._scene.operations
+        operations = self._simulation.operations
         rest = {handle: self._set_simple(handle, values) for handle, values in values_by_handle.items()}
         entries = {handle: operations.entry_with(handle, values) for handle, values in rest.items() if values}
         if entries:
@@ -154,10 +158,10 @@ class ObjectEdits:
         for key, operation in _OPERATION_FOR.items():
             if key in values:
                 raise ParameterError(f"{key}: cannot be set here; use the operation `{operation}`")
-        operations, values = self._scene.operations, dict(values)
+        operations, values = self._simulation.operations, dict(values)
         parameters = values.pop("script_parameters", None)
         if parameters is not None:
-            set_parameters(self._scene, handle, parameters)
+            set_parameters(self._simulation, handle, parameters)
         entry = operations.entry(handle)
         values = {key: _default(entry, key) if value is None else value for key, value in values.items()}
         self._find_files(values)
@@ -169,20 +173,20 @@ class ObjectEdits:
         return values
 
     def _find_files(self, values: dict[str, Any]) -> None:
-        scene_parameters.find_files_beside(self._scene.folder, {"scene": {"objects": [values]}})
+        scene_parameters.find_files_beside(self._simulation.document.folder, {"scene": {"objects": [values]}})
 
     def scale(self, handles: Sequence[int], factors: tuple[float, float, float]) -> None:
         """Scale objects by factors along their own axes."""
-        self._scene.operations.scale(handles, factors)
+        self._simulation.operations.scale(handles, factors)
 
     def group(self, handles: Sequence[int], name: str, as_: str) -> list[int]:
         """Group objects into a compound shape, or into a model below a new dummy."""
-        operations = self._scene.operations
+        operations = self._simulation.operations
         if as_ == "shape":
             compound = operations.group(handles)
             return self.rename(compound, operations.free_name(name)) if name else [compound]
-        handles = self._scene.tops(handles)
-        matrices = [self._scene.tree.matrix(handle) for handle in handles]
+        handles = self._simulation.tree.tops(handles)
+        matrices = [self._simulation.tree.matrix(handle) for handle in handles]
         middle = [sum(matrix[axis] for matrix in matrices) / len(matrices) for axis in (3, 7)]
         entry = {
             "name": operations.free_name(name or "Model"),
@@ -197,7 +201,7 @@ class ObjectEdits:
 
     def ungroup(self, handle: int) -> list[int]:
         """Split a compound into its parts, or a model into independent objects."""
-        operations, tree = self._scene.operations, self._scene.tree
+        operations, tree = self._simulation.operations, self._simulation.tree
         if not tree[handle].is_model:
             return operations.ungroup(handle)
         children = [child for child, _ in tree.children(tree[handle])]

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from drone_sim.config.types import Checked
-from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.editing.vehicle_edits import FLOOR
 from drone_sim.editing.vehicle_parts import Part, part_named
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.run.scene_settings import PLACE, vehicles_in
+from drone_sim.run.simulation import Simulation
 from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters, place_of
 from drone_sim.vehicles.vehicle import Vehicle
@@ -23,21 +23,21 @@ _ROW_KEYS = ("name", "alias", "model", "parent", "position", "rpy", "shape", "ki
 class SceneRows:
     """One row for each object, rebuilt when its content changes."""
 
-    def __init__(self, scene: SceneAccess):
+    def __init__(self, simulation: Simulation):
         """Show the objects of this scene; the first follow() makes the rows."""
-        self._scene = scene
+        self._simulation = simulation
         self._known: dict[int, tuple[Any, ...]] = {}  # content from which each row was made
         self.rows: dict[int, Row] = {}
 
     def follow(self) -> tuple[list[Row], list[int]]:
         """Return the rows that changed since the last call, and the handles of removed objects."""
-        scene, changed = self._scene, []
-        tree = scene.tree
-        entries = {entry.name: (index, entry) for index, entry in scene.simulation.scene.entries.items()}
-        owners = {handle: item for item in scene.simulation.vehicles.values() for handle in item.handles}
-        written = vehicles_in(scene.settings, scene.simulation.parameters) if owners else {}
+        simulation, changed = self._simulation, list[Row]()
+        tree = simulation.tree
+        entries = {entry.name: (index, entry) for index, entry in simulation.scene.entries.items()}
+        owners = {handle: item for item in simulation.vehicles.values() for handle in item.handles}
+        written = vehicles_in(simulation.document.settings, simulation.parameters) if owners else {}
         written = {name: {key: value for key, value in it.items() if key not in PLACE} for name, it in written.items()}
-        scripts = scene.simulation.scene.scripts
+        scripts = simulation.scene.scripts
         handles = {id(tree[handle]): handle for handle in tree}
         for handle in tree:
             item = tree[handle]
@@ -53,7 +53,7 @@ class SceneRows:
             if self._known.get(handle) != state:
                 self._known[handle] = state
                 if entry is not None:
-                    content = scene.simulation.scene.current_entry(index)
+                    content = simulation.scene.current_entry(index)
                 self.rows[handle] = row = _row(handle, item, parent, content, script)
                 row["vehicle"] = vehicle.name if vehicle else ""
                 row["of"] = "vehicle" if vehicle else "scene" if entry is not None else "floor"
@@ -68,7 +68,7 @@ class SceneRows:
     def _other_content(self, item: SceneObject, vehicle: Vehicle | None, vehicle_entries: Mapping[str, Any]) -> Any:
         """Return the content of the floor, a vehicle or its part; `vehicle_entries` are as in the scene file."""
         if vehicle is None:
-            return _simple(self._scene.simulation.parameters.scene.floor)
+            return _simple(self._simulation.parameters.scene.floor)
         if item is not vehicle.object:
             return part_named(vehicle.parameters, item.name)
         return {**_simple(vehicle.parameters), **vehicle_entries.get(vehicle.name, {})}

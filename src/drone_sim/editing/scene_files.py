@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from drone_sim.config.types import ParameterError
-from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.files import writing, yaml_files
 from drone_sim.files.resources import locate, package_path
 from drone_sim.files.yaml_text import YamlText
 from drone_sim.run.scene_document import SceneContent, home
 from drone_sim.run.scene_settings import settings_of
+from drone_sim.run.simulation import Simulation
 
 _NEW = "# Metres, radians, kilograms.\nfloor: {size: 5}\nvehicles: {}\nobjects: []\n"
 
@@ -18,35 +18,37 @@ _NEW = "# Metres, radians, kilograms.\nfloor: {size: 5}\nvehicles: {}\nobjects: 
 class SceneFiles:
     """Opens and saves the scene's files for windows."""
 
-    def __init__(self, scene: SceneAccess):
+    def __init__(self, simulation: Simulation):
         """Open and save this scene."""
-        self._scene = scene
+        self._simulation = simulation
 
     @property
     def is_read_only(self) -> bool:
         """Whether the file cannot be written, so that saving makes a copy."""
-        file = self._scene.document.file
+        file = self._simulation.document.file
         return file is None or _is_read_only(file)
 
     # ---- text
 
     def text(self) -> str:
         """Return the present scene as text of a scene file."""
-        return self._scene.document.text(self._scene.content())
+        return self._simulation.document.text(self._simulation.content())
 
     def content_of(self, text: YamlText) -> SceneContent:
         """Return the content of a text. Raises ParameterError, with the line."""
         values = text.values
         if not text.is_mapping:
             raise ParameterError("line 1: must hold `key: value` lines such as `objects: []`")
-        scene = self._scene
-        parameters = scene.simulation.parameters
+        simulation = self._simulation
+        parameters = simulation.parameters
         try:
-            scene_parameters = parameters.with_content(values, scene.folder).scene
+            scene_parameters = parameters.with_content(values, simulation.document.folder).scene
         except ParameterError:  # again with line numbers, which are slow to find
-            scene_parameters = parameters.with_content(values, scene.folder, yaml_files.YamlLines(text.text)).scene
-        tree, entries = scene.tree, {}
-        scene_handles = {tree.handle(entry.name) for entry in scene.simulation.scene.entries.values()}
+            scene_parameters = parameters.with_content(
+                values, simulation.document.folder, yaml_files.YamlLines(text.text)
+            ).scene
+        tree, entries = simulation.tree, {}
+        scene_handles = {tree.handle(entry.name) for entry in simulation.scene.entries.values()}
         for number, entry in enumerate(scene_parameters.objects):
             handle = tree.handle(entry.name) if entry.name in tree else -1
             entries[handle if handle in scene_handles else -2 - number] = entry
@@ -57,7 +59,7 @@ class SceneFiles:
 
     def open(self, file: str | None) -> None:
         """Open a scene file or, for None, a new scene: a floor without vehicles. Raises ParameterError."""
-        simulation = self._scene.simulation
+        simulation = self._simulation
         if file is not None:
             simulation.load_scene(file)
             return
@@ -71,7 +73,7 @@ class SceneFiles:
         A read-only file is copied. During a run the present state is written, and the scene keeps its file. Raises
         ValueError and OSError.
         """
-        path, simulation = self._path(name), self._scene.simulation
+        path, simulation = self._path(name), self._simulation
         text = simulation.save_scene(path)
         if not simulation.running:
             simulation.operations.folder = path.parent
@@ -81,9 +83,9 @@ class SceneFiles:
 
     def save_model(self, handle: int, name: str) -> Path:
         """Write an object and its descendants as a model. Raises ValueError and OSError."""
-        operations, tree = self._scene.operations, self._scene.tree
+        operations, tree = self._simulation.operations, self._simulation.tree
         path = self._path(name)
-        members = [member for member in operations.model(handle) if self._scene.vehicle_of(member) is None]
+        members = [member for member in operations.model(handle) if self._simulation.vehicle_of(member) is None]
         if not members:
             raise ValueError(f"'{tree[handle].name}' is part of a vehicle, which cannot be saved as a model")
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -96,11 +98,11 @@ class SceneFiles:
             if path.suffix not in (".yaml", ".yml"):
                 raise ParameterError(f"{name[:80]}: the name of a scene must end in .yaml")
             if not path.is_absolute():
-                path = self._scene.folder / path
+                path = self._simulation.document.folder / path
             if _is_read_only(path):
                 raise ParameterError(f"{name[:80]}: files of the package cannot be overwritten: give another name")
             return path.resolve()
-        file = self._scene.document.file
+        file = self._simulation.document.file
         if file is not None and not _is_read_only(file):
             return file
         return home() / (file.name if file else "scene.yaml")

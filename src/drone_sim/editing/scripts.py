@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from drone_sim.config.types import named_in
-from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.files import writing
+from drone_sim.run.simulation import Simulation
 from drone_sim.scene.scene_parameters import script_from
 from drone_sim.scripting.load import script_path
 
@@ -47,13 +47,17 @@ def sysCall_cleanup():
 _TEMPLATES = {"lua": _LUA_TEMPLATE, "python": _PYTHON_TEMPLATE}
 
 
-def attach(scene: SceneAccess, handle: int, file: str, language: str, parameters: Mapping[str, Any]) -> None:
+def attach(simulation: Simulation, handle: int, file: str, language: str, parameters: Mapping[str, Any]) -> None:
     """Attach a script to an object; without `file`, create one beside the scene. Raises ValueError and OSError."""
-    name = scene.tree[handle].name
-    path = named_in(scene.folder, file) if file else named_in(scene.folder, _create(scene.folder, name, language))
+    name = simulation.tree[handle].name
+    path = (
+        named_in(simulation.document.folder, file)
+        if file
+        else named_in(simulation.document.folder, _create(simulation.document.folder, name, language))
+    )
     script_path(str(path))
     script = script_from({"object": name, "script": path, "parameters": dict(parameters)})
-    scene.operations.attach_script(script)
+    simulation.operations.attach_script(script)
 
 
 def _create(folder: Path, name: str, language: str) -> str:
@@ -68,19 +72,19 @@ def _create(folder: Path, name: str, language: str) -> str:
     raise ValueError(f"{folder}: already has a thousand scripts named {stem}")
 
 
-def set_parameters(scene: SceneAccess, handle: int, parameters: Any) -> None:
+def set_parameters(simulation: Simulation, handle: int, parameters: Any) -> None:
     """Set the parameters of an object's script. Raises ValueError if it has none."""
-    name = scene.tree[handle].name
-    script = scene.simulation.scene.scripts.get(name)
+    name = simulation.tree[handle].name
+    script = simulation.scene.scripts.get(name)
     if script is None:
         raise ValueError(f"'{name}' has no script of the scene")
     values = {**script.model_dump(), "script": script.script, "parameters": parameters}
-    scene.operations.attach_script(script_from(values))
+    simulation.operations.attach_script(script_from(values))
 
 
-def detach(scene: SceneAccess, handle: int) -> None:
+def detach(simulation: Simulation, handle: int) -> None:
     """Detach the script of an object. Raises ValueError if it has none."""
-    name = scene.tree[handle].name
-    if name not in scene.simulation.scene.scripts:
+    name = simulation.tree[handle].name
+    if name not in simulation.scene.scripts:
         raise ValueError(f"'{name}' has no script of the scene")
-    scene.operations.detach_script(name)
+    simulation.operations.detach_script(name)

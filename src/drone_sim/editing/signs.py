@@ -10,9 +10,9 @@ import numpy as np
 
 from drone_sim.config.types import named_in
 from drone_sim.editing.records import AddSign
-from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.files import writing
 from drone_sim.mechanics import frames
+from drone_sim.run.simulation import Simulation
 from drone_sim.scene.entry import placed
 from drone_sim.scene.scene_parameters import entry_from
 
@@ -21,15 +21,15 @@ _HEIGHT, _FOOT, _THICKNESS = 0.4, 1.0, 0.02  # m: board height, lower edge above
 _POST = {"shape": "cylinder", "size": [0.02, _FOOT], "color": [0.3, 0.3, 0.32, 1.0]}
 
 
-def add(scene: SceneAccess, op: AddSign) -> list[int]:
+def add(simulation: Simulation, op: AddSign) -> list[int]:
     """Add a board on a post, legible from negative x; write its texture beside the scene.
 
     Raises ValueError and OSError.
     """
     image = _draw(op.text)
-    file = _write_texture(scene.folder, op.text, image)
+    file = _write_texture(simulation.document.folder, op.text, image)
     width = _HEIGHT * image.shape[1] / image.shape[0]
-    operations = scene.operations
+    operations = simulation.operations
     name = operations.free_name("Sign")
     board = {"name": name, "model": True, "shape": "box", "size": [width, _THICKNESS, _HEIGHT], "texture": file}
     post = {"name": operations.free_name("SignPost"), "parent": name, **_POST}

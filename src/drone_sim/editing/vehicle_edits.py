@@ -9,14 +9,14 @@ from typing import Any
 
 from drone_sim.config.types import ParameterError, merged
 from drone_sim.editing import records
-from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.editing.vehicle_parts import Part, part_named, parts_of, with_part
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.object_names import first_free, plain
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.run.flight_changes import put
-from drone_sim.run.scene_settings import keep_names, say_place, vehicles_in, with_floor, with_vehicles
+from drone_sim.run.scene_settings import Settings, keep_names, say_place, vehicles_in, with_floor, with_vehicles
+from drone_sim.run.simulation import Simulation
 from drone_sim.scene.entry import pose_keys, rounded
 from drone_sim.vehicles.quadricopter_objects import REMOVABLE
 from drone_sim.vehicles.types import TYPES
@@ -28,16 +28,18 @@ FLOOR = "Floor"
 class VehicleEdits:
     """Operations on vehicles and the floor; each applies new settings to the scene. All raise ValueError."""
 
-    def __init__(self, scene: SceneAccess):
+    def __init__(self, simulation: Simulation):
         """Edit this scene."""
-        self._scene = scene
+        self._simulation = simulation
 
     def _apply(self, entries: dict[str, dict[str, Any]]) -> None:
-        scene = self._scene
-        scene.apply_settings(with_vehicles(scene.settings, entries, scene.simulation.parameters))
+        self._simulation.apply_settings(self._with_entries(entries))
+
+    def _with_entries(self, entries: dict[str, dict[str, Any]]) -> Settings:
+        return with_vehicles(self._simulation.document.settings, entries, self._simulation.parameters)
 
     def _entries(self) -> dict[str, dict[str, Any]]:
-        return vehicles_in(self._scene.settings, self._scene.simulation.parameters)
+        return vehicles_in(self._simulation.document.settings, self._simulation.parameters)
 
     def add(self, op: records.AddVehicle) -> list[int]:
         """Add a vehicle under an unused name."""
@@ -48,7 +50,7 @@ class VehicleEdits:
         x, y, z = op.position
         place = {"position": rounded([x, y, z + op.height]), **({"yaw": op.yaw} if op.yaw else {})}
         self._apply({**entries, name: merged({**TYPES[op.type].entry(), **place}, op.values)})
-        return [self.root(self._scene.simulation.vehicles[name])]
+        return [self.root(self._simulation.vehicles[name])]
 
     def copy(self, handle: int, places: Sequence[Vector]) -> list[int]:
         """Copy a vehicle without its children, once for each of `places`: offsets (m, world) from the original."""
@@ -60,33 +62,33 @@ class VehicleEdits:
             entries[new] = {**copy.deepcopy(original), "position": rounded(position)}
             names.append(new)
         self._apply(entries)
-        return [self.root(self._scene.simulation.vehicles[name]) for name in names]
+        return [self.root(self._simulation.vehicles[name]) for name in names]
 
     def described(self, handle: int) -> tuple[str, dict[str, Any]]:
         """Return the name of a vehicle, and its entry for a copy."""
         vehicle = self._vehicle(handle)
-        if not self._scene.is_root(handle):
-            raise ValueError(f"'{self._scene.tree[handle].name}' is a part of a vehicle: copy the vehicle instead")
+        if not self._simulation.is_vehicle(handle):
+            raise ValueError(f"'{self._simulation.tree[handle].name}' is a part of a vehicle: copy the vehicle instead")
         entry = self._entries()[vehicle.name]
         return vehicle.name, {key: value for key, value in entry.items() if key not in ("suffix", "objects")}
 
     def root(self, vehicle: Vehicle) -> int:
         """Return the handle of a vehicle's root."""
-        return self._scene.tree.handle_of(vehicle.object)
+        return self._simulation.tree.handle_of(vehicle.object)
 
     def remove(self, handle: int) -> None:
         """Remove a vehicle with its descendants if `handle` is its root; else a removable part, such as a camera."""
-        scene = self._scene
+        simulation = self._simulation
         vehicle = self._vehicle(handle)
         entries = self._entries()
-        if scene.is_root(handle):
-            descendants = [key for key in scene.operations.model(handle) if scene.vehicle_of(key) is None]
+        if simulation.is_vehicle(handle):
+            descendants = [key for key in simulation.operations.model(handle) if simulation.vehicle_of(key) is None]
             if descendants:
-                scene.operations.remove(descendants)
+                simulation.operations.remove(descendants)
             del entries[vehicle.name]
-            keep_names(entries, scene.simulation.vehicles)
+            keep_names(entries, simulation.vehicles)
         else:
-            self._remove_part(entries[vehicle.name], vehicle, plain(scene.tree[handle].name))
+            self._remove_part(entries[vehicle.name], vehicle, plain(simulation.tree[handle].name))
         self._apply(entries)
 
     def _remove_part(self, entry: dict[str, Any], vehicle: Vehicle, name: str) -> None:
@@ -100,25 +102,25 @@ class VehicleEdits:
 
     def rename(self, handle: int, name: str) -> list[int]:
         """Rename a vehicle, and so its topics, or a part of a vehicle."""
-        scene, entries = self._scene, self._entries()
+        simulation, entries = self._simulation, self._entries()
         vehicle = self._vehicle(handle)
         part = self._part(handle)
         if part is not None:
             self._set_camera_or_sensor(vehicle, part, {"object": name})
-            return [scene.tree.handle(f"{name}{vehicle.suffix}")]
-        if not scene.is_root(handle):
+            return [simulation.tree.handle(f"{name}{vehicle.suffix}")]
+        if not simulation.is_vehicle(handle):
             self._set_part(handle, name=name, alias=name)
             return [handle]
         if name != vehicle.name and name in entries:
             raise ParameterError(f"a vehicle named '{name}' already exists")
         self._apply({name if old == vehicle.name else old: values for old, values in entries.items()})
-        return [self.root(scene.simulation.vehicles[name])]
+        return [self.root(simulation.vehicles[name])]
 
     def move(self, handle: int, relative_to: int, matrix: Matrix) -> None:
         """Move a vehicle or a part of it."""
-        scene = self._scene
-        tree, vehicle = scene.tree, self._vehicle(handle)
-        if not scene.is_root(handle):
+        simulation = self._simulation
+        tree, vehicle = simulation.tree, self._vehicle(handle)
+        if not simulation.is_vehicle(handle):
             self._move_part(handle, relative_to, matrix)
             return
         if relative_to not in (WORLD, PARENT):
@@ -126,14 +128,14 @@ class VehicleEdits:
         entries = self._entries()
         say_place(entries[vehicle.name], matrix)
         self._apply(entries)
-        if scene.simulation.running:  # its pose may differ from that in the settings
-            put(scene.simulation.vehicles[vehicle.name], matrix)
+        if simulation.running:  # its pose may differ from that in the settings
+            put(simulation.vehicles[vehicle.name], matrix)
 
     def _move_part(self, handle: int, relative_to: int, matrix: Matrix) -> None:
-        tree = self._scene.tree
+        tree = self._simulation.tree
         before = tree.matrix(handle)
         tree.set_matrix(handle, relative_to, matrix)
-        if self._scene.simulation.running:
+        if self._simulation.running:
             return
         local = tree.matrix(handle, PARENT)
         tree.set_matrix(handle, WORLD, before)
@@ -141,8 +143,8 @@ class VehicleEdits:
 
     def reparent(self, handle: int, parent: int, keep: str) -> None:
         """Set the parent of a vehicle's part; `keep`: the pose in the world, or relative to the parent."""
-        tree = self._scene.tree
-        if self._scene.is_root(handle):
+        tree = self._simulation.tree
+        if self._simulation.is_vehicle(handle):
             raise ValueError("a vehicle cannot have a parent")
         tree.check_parent(handle, parent)
         above = None if parent == WORLD else tree[parent]
@@ -153,7 +155,7 @@ class VehicleEdits:
 
     def _set_part(self, handle: int, **values: Any) -> None:
         vehicle, entries = self._vehicle(handle), self._entries()
-        entry, name = entries[vehicle.name], plain(self._scene.tree[handle].name)
+        entry, name = entries[vehicle.name], plain(self._simulation.tree[handle].name)
         part = self._part(handle)
         if part is not None:
             where = f"{part.among}/{part.key}/mount"
@@ -165,23 +167,25 @@ class VehicleEdits:
 
     def set(self, handle: int, values: Mapping[str, Any]) -> None:
         """Set keys of the floor, of a vehicle's entry, or of a camera or sensor."""
-        scene = self._scene
-        if scene.tree[handle].name == FLOOR:
-            scene.apply_settings(with_floor(scene.settings, values))
+        simulation = self._simulation
+        if simulation.tree[handle].name == FLOOR:
+            simulation.apply_settings(with_floor(simulation.document.settings, values))
             return
         vehicle, entries = self._vehicle(handle), self._entries()
         part = self._part(handle)
         if part is not None:
             self._set_camera_or_sensor(vehicle, part, values)
             return
-        if not scene.is_root(handle):
-            raise ValueError(f"'{scene.tree[handle].name}' is a part of '{vehicle.name}': set the vehicle's own keys")
+        if not simulation.is_vehicle(handle):
+            raise ValueError(
+                f"'{simulation.tree[handle].name}' is a part of '{vehicle.name}': set the vehicle's own keys"
+            )
         entry = merged(entries[vehicle.name], dict(values))
         entries[vehicle.name] = {key: value for key, value in entry.items() if value is not None or key not in values}
         self._apply(entries)
 
     def _part(self, handle: int) -> Part | None:
-        return part_named(self._vehicle(handle).parameters, self._scene.tree[handle].name)
+        return part_named(self._vehicle(handle).parameters, self._simulation.tree[handle].name)
 
     def _set_camera_or_sensor(self, vehicle: Vehicle, part: Part, values: Mapping[str, Any]) -> None:
         entries = self._entries()
@@ -193,18 +197,17 @@ class VehicleEdits:
         entry = entries[vehicle.name]
         others = {key: values for key, values in (entry.get(part.among) or {}).items() if key != part.key}
         without = {**entries, vehicle.name: {**entry, part.among: others}}
-        scene = self._scene
         try:
-            fleet = scene.checked(with_vehicles(scene.settings, without, scene.simulation.parameters)).fleet
+            fleet = self._simulation.with_settings(self._with_entries(without)).fleet
         except ParameterError:  # another part needs this one
             return None
         (default,) = (item for item in fleet if item.name == vehicle.name)
         return next((item for item in parts_of(default).values() if item[:2] == part[:2]), None)
 
     def _vehicle(self, handle: int) -> Vehicle:
-        vehicle = self._scene.vehicle_of(handle)
+        vehicle = self._simulation.vehicle_of(handle)
         if vehicle is None:
-            raise ValueError(f"'{self._scene.tree[handle].name}' is the floor: only its size can be changed")
+            raise ValueError(f"'{self._simulation.tree[handle].name}' is the floor: only its size can be changed")
         return vehicle
 
 

@@ -161,6 +161,17 @@ class ObjectTree:
         except KeyError:
             return self[self.handle(name)]
 
+    def resolve(self, reference: int | str) -> int:
+        """Return the handle of an object, given its handle or its name. Raises ValueError."""
+        if isinstance(reference, str):
+            return self.handle(reference)
+        self[reference]  # raises ValueError for an unknown handle
+        return int(reference)
+
+    def tops(self, handles: Sequence[int]) -> list[int]:
+        """Return the handles of the objects that are not descendants of any other."""
+        return [handle for handle in handles if not any(self[handle].is_descendant_of(self[it]) for it in handles)]
+
     @property
     def names(self) -> Iterable[str]:
         """All names of all objects."""

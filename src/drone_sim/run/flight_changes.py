@@ -10,14 +10,23 @@ from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.object_names import split, suffixed
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.run.parameters import Parameters
-from drone_sim.run.scene_settings import PLACE, are_same
+from drone_sim.run.scene_settings import PLACE, Settings, are_same
 from drone_sim.run.simulation_setup import SimulationSetup, script_of
+from drone_sim.scene.scene_parameters import WORLD_KEYS
 from drone_sim.scripting import load
 from drone_sim.scripting.script_log import LOG
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
 _CHANGEABLE = (*PLACE, "suffix")  # keys whose change does not need a new vehicle
+_FIXED_IN_FLIGHT = ("datum", "magnetic_field", "collections", *WORLD_KEYS)
+
+
+def check_changeable(before: Settings, after: Settings) -> None:
+    """Raise ValueError if settings differ in a key that cannot be changed in flight."""
+    for key in _FIXED_IN_FLIGHT:
+        if before.get(key) != after.get(key):
+            raise ValueError(f"{key}: can only be changed while the simulation is stopped: stop it first")
 
 
 class AttachedObject(NamedTuple):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -100,6 +100,14 @@ def _differences(now: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str,
 # ---- vehicles
 
 
+def have_only_moved(before: Sequence[VehicleParameters], after: Sequence[VehicleParameters]) -> bool:
+    """Return whether two fleets differ only in the vehicles' poses."""
+    return len(before) == len(after) and all(
+        old.is_alone == new.is_alone and old.model_copy(update={key: getattr(new, key) for key in PLACE}) == new
+        for old, new in zip(before, after)
+    )
+
+
 def vehicles_in(settings: Settings, parameters: Parameters) -> _VehicleSettings:
     """Return the entry of each vehicle, by name, with at least its position."""
     configured = settings.get("vehicles")
@@ -126,9 +134,14 @@ def say_place(entry: dict[str, Any], matrix: Matrix, leans: bool = True) -> None
         entry["tilt"] = [roll, pitch]
 
 
+def without_vehicles(settings: Settings) -> dict[str, Any]:
+    """Return settings without the keys of the vehicles."""
+    return {key: value for key, value in settings.items() if key not in ("drone", "vehicles")}
+
+
 def with_vehicles(settings: Settings, fleet: _VehicleSettings, parameters: Parameters) -> Settings:
     """Return settings with the entries `fleet`, or with `drone:` if that is a single drone with only a start pose."""
-    others = {key: value for key, value in settings.items() if key not in ("drone", "vehicles")}
+    others = without_vehicles(settings)
     name = parameters.drone.name
     if "vehicles" not in settings and [*fleet] == [name] and fleet[name].keys() <= PlaceParameters.model_fields.keys():
         before = settings.get("drone") or {}

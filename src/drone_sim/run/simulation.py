@@ -21,10 +21,10 @@ from drone_sim.importing.folder import unsupported_features
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.object_tree import NO_HANDLES, Handles
 from drone_sim.mechanics.saved_state import Restore
-from drone_sim.run.flight_changes import apply_in_flight
+from drone_sim.run.flight_changes import apply_in_flight, check_changeable, put
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.scene_document import SceneContent, SceneDocument
-from drone_sim.run.scene_settings import settings_now
+from drone_sim.run.scene_settings import Settings, have_only_moved, settings_now, without_vehicles
 from drone_sim.run.simulation_setup import SimulationSetup, give_back_memory, script_of
 from drone_sim.run.stepping import Stepper
 from drone_sim.scripting import load
@@ -134,6 +134,7 @@ class Simulation:
         self.parameters = built.parameters
         self.context = built.context  # shared by all vehicles and scripts
         self.world, self.scene, self.operations = built.context.world, built.scene, built.operations
+        self.tree = built.context.objects
         self.vehicles: dict[str, Vehicle] = built.vehicles  # by name
         self.child_scripts: dict[str, ChildScript] = built.scripts.child_scripts  # by vehicle
         self.vision.look_at(self.world.pictures, self.context.blades, self._identify)
@@ -162,6 +163,14 @@ class Simulation:
         for first in self.vehicles.values():
             return first
         raise LookupError("the scene has no vehicle")
+
+    def vehicle_of(self, handle: int) -> Vehicle | None:
+        """Return the vehicle that an object belongs to, or None."""
+        return next((vehicle for vehicle in self.vehicles.values() if handle in vehicle.handles), None)
+
+    def is_vehicle(self, handle: int) -> bool:
+        """Return whether an object is the root of a vehicle."""
+        return any(self.tree[handle] is vehicle.object for vehicle in self.vehicles.values())
 
     def set_vehicles(self, entries: Any) -> tuple[list[str], list[str]]:
         """Add and remove vehicles to match `entries` (as the parameter `vehicles`); return the added and removed names.
@@ -238,16 +247,44 @@ class Simulation:
         Without `rebuild`, the world changes at the next start. Raises ParameterError and UrdfError, without a change.
         """
         if rebuild:
-            self._handles = self.context.objects.handles().with_those_of(self._handles)
+            self._handles = self.tree.handles().with_those_of(self._handles)
             self._rebuild(parameters, self._handles)
         self.parameters = parameters
         self._is_edited = True
 
-    def apply_in_flight(self, parameters: Parameters) -> None:
-        """While running, apply floor, weather and vehicles of `parameters`; stop reverts them.
+    def apply_settings(self, settings: Settings) -> None:
+        """Change all but objects and scripts to `settings`, which are as in a scene file.
 
-        Raises ParameterError, UrdfError and ScriptError, without a change.
+        While running, floor, weather and vehicles may change; stop reverts them. Raises ParameterError, UrdfError and
+        ScriptError, without a change.
         """
+        before = self.document.settings
+        if settings == before:
+            return
+        if self.running:
+            check_changeable(before, settings)
+        parameters = self.with_settings(settings)
+        if self.running:
+            self._apply_in_flight(parameters)
+        elif without_vehicles(settings) == without_vehicles(before) and have_only_moved(
+            self.parameters.fleet, parameters.fleet
+        ):
+            for vehicle in parameters.fleet:
+                put(self.vehicles[vehicle.name], vehicle.matrix)
+            self.replace_scene(parameters, rebuild=False)
+            self.scene.is_changed = True
+        else:
+            self.replace_scene(parameters)
+        self.document.settings = settings
+
+    def with_settings(self, settings: Settings) -> Parameters:
+        """Return the parameters of the present objects with other settings. Raises ParameterError."""
+        result = self.parameters.with_content({**settings, "objects": []}, self.document.folder)
+        present = self.scene.parameters_now()
+        scene = result.scene.model_copy(update={"objects": present.objects, "scripts": present.scripts})
+        return result.varied(result.weather, scene, result.fleet)
+
+    def _apply_in_flight(self, parameters: Parameters) -> None:
         self._original = self._original or self.parameters
         self.scene.is_changed = True
         if apply_in_flight(self._setup, self.parameters, parameters, self.script):
@@ -258,7 +295,7 @@ class Simulation:
 
     def load_scripts(self) -> None:
         """Load the scripts of a simulation that has none loaded, and run their init. Raises ScriptError."""
-        self._handles = self.context.objects.handles()
+        self._handles = self.tree.handles()
         self._restore_document = self.document.save_state()
         self.running = True
         self._setup.load_scripts(self._setup.scripts.all(), self.script)
@@ -270,7 +307,7 @@ class Simulation:
         Changes of objects in flight are undone; changes made while stopped become the initial scene.
         """
         if self.scene.is_changed and not self.running:
-            self._handles, self._is_edited = self.context.objects.handles(), True
+            self._handles, self._is_edited = self.tree.handles(), True
             before, scene = self.parameters, self.scene.parameters_now()
             self.parameters = before.varied(before.weather, scene, before.fleet)
         if self.running:
@@ -388,7 +425,7 @@ class Simulation:
     @property
     def object_handles(self) -> Mapping[str, int]:
         """Handles of all objects, by name."""
-        return self.context.objects.handles().by_name
+        return self.tree.handles().by_name
 
     def content(self) -> SceneContent:
         """Return the present content of the scene; vehicles and weather are those at the start."""

@@ -48,7 +48,7 @@ class SceneEditing:
         self._player, self._inbox, self._services = player, inbox, services
         name = rospy.get_name().strip("/").replace("/", "_")
         self.editor = SceneEditor(player, Path(rospkg.get_ros_home()) / "drone_sim" / name)
-        self._rows = SceneRows(self.editor.scene)
+        self._rows = SceneRows(self.editor.simulation)
         self._topic = LatchedText("~scene_objects", queue_size=_WAITING)
         self._throttle = Throttle(_PERIOD)
         self._version = 0
