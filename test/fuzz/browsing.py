@@ -31,7 +31,7 @@ from drone_sim.ros.cockpit.server.page_socket import PageSocket
 from drone_sim.ros.cockpit.teleop import CommandPublisher, HeldCommands
 from drone_sim.ros.cockpit.topics import FoundTopics, ImageTopic
 
-_PATIENCE = 10.0  # s
+_PATIENCE = 60.0  # s
 _LEFT_OUT = "grade"  # which is a process of its own
 _LAST = 424242  # the number of a question that is asked after all others
 

@@ -16,8 +16,8 @@ from case import Answer, Case
 HANGS = 3.0  # s of the processor that a case may take
 GROWTH = 800 << 20  # bytes that a case may leave behind; and what a worker may grow by before it is replaced
 _BUSY = 6.0  # s of the processor, and
-_IDLE = 30.0  # s by the clock, after which nobody waits for it any more
-_FIRST = 60.0  # s for the first case: imports, compiling shaders
+_IDLE = 120.0  # s by the clock, after which nobody waits for it any more
+_FIRST = 180.0  # s for the first case: imports, compiling shaders
 _SOURCE = Path(__file__).resolve().parents[2] / "src"
 
 

@@ -11,7 +11,6 @@ import subprocess
 import sys
 import termios
 import threading
-import time
 import unittest
 
 import pyte
@@ -57,10 +56,13 @@ class Terminal:
                 self._stream.feed(data)
                 self._came.notify_all()
 
-    def type(self, *pieces, delay=0.1):
-        for piece in pieces:
-            os.write(self._own, piece)
-            time.sleep(delay)
+    def type(self, keys):
+        os.write(self._own, keys)
+
+    def pause(self):
+        """Wait for what is shown next, but only for a moment."""
+        with self._came:
+            self._came.wait(0.03)
 
     def resize(self, rows, columns):
         with self._came:
@@ -94,7 +96,7 @@ class KeyTeleop(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.sent = Listener("/drone/cmd_vel", Twist)
+        # Not of cmd_vel: key_teleop says "ready" once its commands have a subscriber, which is to be the simulator.
         cls.in_force = Listener("/drone/command", TwistStamped)
         cls.states = Listener("/drone_sim/state", String)
         rospy.wait_for_service("/drone_sim/restart", PATIENCE)
@@ -107,11 +109,13 @@ class KeyTeleop(unittest.TestCase):
         self.addCleanup(self.terminal.process.kill)
 
     def ready(self):
-        self.terminal.wait_for("state    flying", "command  vx +0.00", "height 0.")
-        time.sleep(0.5)  # the input has been flushed by now
+        self.terminal.wait_for("ready", "state    flying", "command  vx +0.00", "height 0.")
 
     def wait_for_command(self, vx, vy=0.0):
-        self.in_force.wait_for(lambda m: (m.twist.linear.x, m.twist.linear.y) == (vx, vy))
+        """Wait until a command is in force; and shown, where the terminal is open: the next key changes it then."""
+        self.in_force.wait_for(lambda m: (m.twist.linear.x, m.twist.linear.y) == (vx, vy), after=-1)
+        if self.terminal.process.poll() is None:
+            self.terminal.wait_for(f"command  vx {vx:+.2f}  vy {vy:+.2f}")
 
     def assert_it_says_stop(self):
         status, shown = self.terminal.left()
@@ -121,31 +125,35 @@ class KeyTeleop(unittest.TestCase):
         self.wait_for_command(0.0)
 
     def test_keys_while_it_starts_do_not_end_it(self):
-        typed, before = 0, len(self.sent.messages)
-        while "stop the drone and leave" not in self.terminal.shown:
-            self.terminal.type(UP, b"\x1b[", b"A", delay=0.03)
+        typed, before = 0, len(self.in_force.messages)
+
+        def counted():
+            """Return how many of the keys, which all mean forward or left, are in the commands."""
+            heard = [message.twist.linear for message in self.in_force.messages[before:]]
+            return max((round(10 * (one.x + one.y)) for one in heard), default=0)
+
+        while not counted():
+            for piece in (UP, b"\x1b[", b"A"):
+                self.terminal.type(piece)
+                self.terminal.pause()
             self.assertIsNone(self.terminal.process.poll(), self.terminal.shown)
             typed += 2
-        self.assertGreater(typed, 6)
-        self.terminal.wait_for("state    flying", "command  vx")
-        self.assertIsNone(self.terminal.process.poll(), self.terminal.shown)
-        self.assertLess(len(self.sent.messages) - before, typed, "what was typed before it read keys is forgotten")
-        for _ in range(round(PATIENCE)):  # so may be the first Escape, as any key until then
-            self.terminal.type(b"\x1b", delay=1)
-            if self.terminal.process.poll() is not None:
-                break
+        self.terminal.type(b"\x1b")
         self.assert_it_says_stop()
+        self.assertLess(counted(), typed, "what was typed before it read keys is forgotten")
 
     def test_keys_command_and_escape_leaves(self):
         self.ready()
-        self.terminal.type(UP, LEFT, delay=0)
+        self.terminal.type(UP)
+        self.wait_for_command(0.1)
+        self.terminal.type(LEFT)
         self.wait_for_command(0.1, 0.1)
-        self.terminal.type(b"\x1b", b"[", b"A", delay=0.3)
+        self.terminal.type(b"w")
         self.wait_for_command(0.2, 0.1)
-        self.terminal.type(b"w", b"d")
-        self.wait_for_command(0.3, 0.0)
+        self.terminal.type(b"d")
+        self.wait_for_command(0.2, 0.0)
         self.terminal.type(b"z")
-        self.terminal.wait_for("no such key: the drone is stopped", "command  vx +0.00  vy +0.00")
+        self.terminal.wait_for("no such key: the drone is stopped")
         self.wait_for_command(0.0)
         self.terminal.type(b"\x1b")
         self.assert_it_says_stop()
@@ -156,8 +164,7 @@ class KeyTeleop(unittest.TestCase):
         self.wait_for_command(0.1)
         other = Twist()
         other.linear.y = 0.5
-        # Two: the simulator, and this test itself.
-        connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1), listeners=2).publish(other)
+        connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1)).publish(other)
         self.wait_for_command(0.0, 0.5)
         self.terminal.wait_for("command  vx +0.00  vy +0.50")
         self.terminal.type(UP)
@@ -182,10 +189,13 @@ class KeyTeleop(unittest.TestCase):
         self.wait_for_command(0.1)
         for rows, columns in ((3, 10), (1, 1), (80, 300), (2, 200), (24, 80)):
             self.terminal.resize(rows, columns)
-            time.sleep(0.3)  # it looks every 0.1 s
+            self.terminal.type(UP)
+            self.in_force.wait_for(lambda m: m.twist.linear.x > 0)
+            self.terminal.type(b" ")
+            self.in_force.wait_for(lambda m: m.twist.linear.x == 0)
             self.assertIsNone(self.terminal.process.poll(), self.terminal.shown)
         self.terminal.type(UP)
-        self.wait_for_command(0.2)
+        self.in_force.wait_for(lambda m: m.twist.linear.x > 0)
         self.terminal.close()
         self.assertIsNotNone(self.terminal.process.wait(PATIENCE))
         self.wait_for_command(0.0)

@@ -39,7 +39,7 @@ FLIGHTS = {
     "slow_real": Flight(1, False, 0.8),
     "slow_simulated": Flight(1, True, 0.8),
     "real": Flight(5, False, 0.4),
-    "simulated": Flight(5, True, 2.0),
+    "simulated": Flight(5, True, 4.0),  # longer: its bag is played by the clock, and a busy machine joins what is close
 }
 QUICK = ("real", "simulated")
 RECORDED = "simulated"
@@ -53,7 +53,7 @@ def clock(name):
 
 
 def path(messages):
-    """Return where a drone was at each step since it was first told to go, and the steps at which that changed."""
+    """Return where a drone was since it was first told to go, by steps, and the steps at which it was told otherwise."""
     odometry, commands = messages
     told = {}
     for message in commands:
@@ -62,7 +62,7 @@ def path(messages):
     steps = sorted(told)
     changes = [now for before, now in itertools.pairwise(steps) if told[now] != told[before]]
     places = {round(m.header.stamp.to_sec() / STEP): m.pose.pose.position for m in odometry}
-    flown = [(places[step].x, places[step].y) for step in sorted(places) if step >= changes[0]]
+    flown = {step - changes[0]: (place.x, place.y) for step, place in places.items() if step >= changes[0]}
     return flown, [step - changes[0] for step in changes]
 
 
@@ -196,8 +196,9 @@ class States(unittest.TestCase):
         again, changes_again = path([one.messages[count:] for one, count in zip(heard, before)])
         self.assertEqual(len(changes_again), len(changes))
         late = max(abs(one - other) for one, other in zip(changes, changes_again))
-        for (x, y), (x_again, y_again) in zip(flown, again):  # each command holds a little longer or shorter
-            self.assertLess(math.hypot(x - x_again, y - y_again), SPEED * STEP * max(late, 1) * len(changes))
+        for step in flown.keys() & again.keys():
+            # Each command holds a little longer or shorter. What a busy machine has not heard looks one step later.
+            self.assertLess(math.dist(flown[step], again[step]), SPEED * STEP * (late + 1) * len(changes))
 
     def test_5_slow(self):
         for name in FLIGHTS.keys() - set(QUICK):

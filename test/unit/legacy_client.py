@@ -62,7 +62,7 @@ class Client:
     """`serve(seconds)` is called while an answer is awaited."""
 
     def __init__(self, port, serve):
-        self.peer = socket.create_connection(("127.0.0.1", port), timeout=10)
+        self.peer = socket.create_connection(("127.0.0.1", port), timeout=60)
         self.peer.setblocking(False)
         self._serve = serve
         self._numbers = itertools.count()

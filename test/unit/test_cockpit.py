@@ -66,7 +66,7 @@ class Served:
         self.loop.call_soon_threadsafe(self.loop.stop)
 
     def get(self, path, **headers):
-        connection = http.client.HTTPConnection(self.host, timeout=5)
+        connection = http.client.HTTPConnection(self.host, timeout=60)
         connection.request("GET", path, headers=headers)
         answer = connection.getresponse()
         return answer.status, answer, answer.read()
@@ -135,7 +135,7 @@ def test_a_browser_that_takes_it_gets_the_page_compressed(served):
 
 def raw(served, *lines):
     """Return the status and the text that such lines get for an answer."""
-    with socket.create_connection(("127.0.0.1", served.port), timeout=5) as one:
+    with socket.create_connection(("127.0.0.1", served.port), timeout=60) as one:
         one.sendall(b"\r\n".join((*lines, b"", b"")))
         said = b"".join(iter(lambda: one.recv(4096), b""))
     head, _, body = said.partition(b"\r\n\r\n")
@@ -172,7 +172,7 @@ def test_odd_headers_get_an_answer_and_leave_no_traceback(served, caplog, path, 
     "junk", [b"\x01\x00\x02\x00x", b"POST / HTTP/1.1", b"GET / HTTP/1.1\r\nno header", b"\x16\x03\x01"]
 )
 def test_what_is_no_browser_is_hung_up_on(served, caplog, junk):
-    with socket.create_connection(("127.0.0.1", served.port), timeout=5) as one:
+    with socket.create_connection(("127.0.0.1", served.port), timeout=60) as one:
         one.sendall(junk + b"\r\n\r\n")
         said = b"".join(iter(lambda: one.recv(4096), b""))
     assert b"Traceback" not in said and b"200 OK" not in said and not caplog.records
@@ -197,7 +197,7 @@ def test_a_browser_that_vanishes_leaves_a_stopped_drone(served):
     with served.connect() as socket:
         socket.send(json.dumps({"hold": {"vx": 1.5}}))
         socket.send(json.dumps({"id": 7, "ask": "double", "number": 21}))
-        assert json.loads(socket.recv(timeout=5)) == {"id": 7, "twice": 42}
+        assert json.loads(socket.recv(timeout=60)) == {"id": 7, "twice": 42}
         assert served.sent == [Command(vx=1.5)]
     gone = threading.Event()
     while len(served.sent) < 2:
@@ -209,7 +209,7 @@ def test_what_a_browser_asks_is_done_in_turn(served):
     with served.connect() as socket:
         for number, seconds in enumerate((0.2, 0.1, 0)):
             socket.send(json.dumps({"id": number, "ask": "double", "number": number, "seconds": seconds}))
-        assert [json.loads(socket.recv(timeout=5))["id"] for _ in range(3)] == [0, 1, 2]
+        assert [json.loads(socket.recv(timeout=60))["id"] for _ in range(3)] == [0, 1, 2]
 
 
 @pytest.mark.parametrize(
@@ -237,10 +237,10 @@ def test_what_a_browser_asks_is_done_in_turn(served):
 def test_what_a_browser_says_is_checked(served, text, words):
     with served.connect() as socket:
         socket.send(text)
-        answer = json.loads(socket.recv(timeout=5))
+        answer = json.loads(socket.recv(timeout=60))
         assert answer["id"] is None and words in answer["error"]
         socket.send(json.dumps({"id": 1, "ask": "double", "number": 1}))
-        assert json.loads(socket.recv(timeout=5))["twice"] == 2
+        assert json.loads(socket.recv(timeout=60))["twice"] == 2
 
 
 def test_a_question_that_fails_in_any_way_is_answered_and_the_socket_stays_open(served, tmp_path, monkeypatch, caplog):
@@ -252,7 +252,7 @@ def test_a_question_that_fails_in_any_way_is_answered_and_the_socket_stays_open(
     with served.connect() as socket:
         for name, words in (("x" * 300, os.strerror(errno.ENAMETOOLONG)), ("ours", "zero")):
             socket.send(json.dumps({"id": 1, "ask": "exists", "name": name}))
-            assert words in json.loads(socket.recv(timeout=5))["error"]
+            assert words in json.loads(socket.recv(timeout=60))["error"]
     assert [one.exc_info[0] for one in caplog.records if one.exc_info] == [ZeroDivisionError]
 
 
@@ -538,8 +538,8 @@ def test_a_page_that_is_opened_early_is_answered_when_all_is_there():
         with pytest.raises(TimeoutError):
             early.recv(timeout=0.1)
         serving.begin(socket, lambda path: ("image/png", path.encode()))
-        assert early.recv(timeout=5) == "heard this"
-    connection = http.client.HTTPConnection(host, timeout=5)
+        assert early.recv(timeout=60) == "heard this"
+    connection = http.client.HTTPConnection(host, timeout=60)
     connection.request("GET", "/a.png", headers=cookie)
     assert connection.getresponse().read() == b"/a.png"
     serving.stop()

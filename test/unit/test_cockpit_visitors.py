@@ -56,7 +56,7 @@ def _said():
     heard = logging.Handler()
     heard.emit = lambda record: lines.put(record.getMessage())
     logging.getLogger("rosout").addHandler(heard)
-    yield lambda: lines.get(timeout=10)
+    yield lambda: lines.get(timeout=60)
     logging.getLogger("rosout").removeHandler(heard)
     assert lines.empty(), "one line is enough"
 
@@ -65,7 +65,7 @@ def ended(one):
     """Return how the node closed a socket: the code, and why."""
     with pytest.raises(ConnectionClosed) as closed:
         while True:
-            one.recv(timeout=10)
+            one.recv(timeout=60)
     return closed.value.rcvd.code, closed.value.rcvd.reason
 
 

@@ -20,44 +20,59 @@ from drone_sim.scripting import load
 from drone_sim.scripting.api.calls import contents
 from drone_sim.scripting.api.ignored import MODULES
 
-SETTINGS = settings.load({"limits": {"seconds": 5.0, "patience": 2.0, "memory": 256}})
+SETTINGS = settings.load({"limits": {"seconds": 30.0, "patience": 100.0, "memory": 256}})  # however busy the machine
 SECRET = 123_456_789_012
 PLAN = """
 name: attacked
 title: A word of the plan that nobody needs
 duration: 0.5
-config: {script_time_limit: 3.0}
+config: {script_time_limit: 60.0}
 criteria:
   - {kind: reach, places: [[3, 0, 1]], within: 0.2, points: 5}
   - {kind: signal, signal: found, equals: nothing, points: 0.5}
 """
-# What a Python script does in each sensing; `found` is what it has laid its hands on, if anything.
+IMPATIENT = PLAN.replace("60.0", "1.0")  # for scripts that do not return
+# What a Python script does in its first sensing: each attempt returns what it has laid its hands on, if anything.
 PYTHON = """
 import contextlib, ctypes, gc, glob, mmap, os, re, resource, signal, socket, struct, subprocess, sys, tempfile, time
 LIBC = ctypes.CDLL(None)
 HERE = os.path.dirname(__file__)
 
-def attempt():
-    found = None
-    BODY
-    return found
+ATTEMPTS = {}
+
+def refused(call, said):
+    try:
+        call()
+    except ValueError as error:
+        return None if said in str(error) else str(error)
+    return "is not refused"
 
 def sysCall_init():
     self.drone = sim.getObjectHandle("Drone")
     self.base = sim.getObjectHandle("Quadricopter_base")
-    self.found = "nothing"
+    self.found = None
 
 def sysCall_sensing():
-    try:
-        found = attempt()
-        if found:
-            self.found = repr(found)[:300]
-    except (OSError, ValueError, LookupError, AttributeError, ImportError, RuntimeError):
-        pass
-    sim.setStringSignal("found", self.found)
+    if self.found is None:
+        self.found = {}
+        for what, attempt in ATTEMPTS.items():
+            try:
+                if found := attempt():
+                    self.found[what] = repr(found)[:300]
+            except (OSError, ValueError, LookupError, AttributeError, ImportError, RuntimeError):
+                pass
+    sim.setStringSignal("found", repr(self.found) if self.found else "nothing")
 """
-RULES = {  # what is called, and what is said of it
-    "moves itself": ("sim.setObjectPosition(self.drone, -1, [3, 0, 1])", "tried to move Drone"),
+ATTEMPT = """
+def attempt():
+    found = None
+    {body}
+    return found
+
+ATTEMPTS[{what!r}] = attempt
+"""
+RULES = {  # what is called, and what is refused
+    "moves itself": ("sim.setObjectPosition(self.drone, -1, [3, 0, 1])", "move Drone"),
     "moves itself by name": (
         "sim.setObjectPosition(position=[3, 0, 1], handle=self.drone, relativeTo=-1)",
         "move Drone",
@@ -66,21 +81,21 @@ RULES = {  # what is called, and what is said of it
         "sim.setObjectPosition(self.drone + sim.handleflag_axis + 0.5, -1, [3, 0, 1])",
         "to move",
     ),
-    "moves itself in a pose": ("sim.setObjectPose(self.drone, -1, [3, 0, 1, 0, 0, 0, 1])", "tried to move Drone"),
-    "moves along": ("sim.moveToPose({'object': self.drone, 'targetPose': [3, 0, 1, 0, 0, 0, 1]})", "tried to move"),
-    "pushes itself": ("sim.addForceAndTorque(self.drone, [9, 0, 9], [0, 0, 0])", "tried to push Drone"),
-    "hangs itself up": ("sim.setObjectParent(self.drone, self.base, False)", "tried to move Drone"),
-    "is made a dummy's": ("sim.setObjectPosition(self.base, -1, [3, 0, 1])", "tried to move Quadricopter_base"),
-    "makes a step longer": ("sim.setSimulationTimeStep(0.5)", "tried to change the scene"),
-    "has no weight": ("sim.setShapeMass(self.drone, 1e-3)", "tried to change Drone"),
-    "builds a bridge": ("sim.createPrimitiveShape(0, [9, 9, 1])", "tried to change the scene"),
-    "is called another": ("sim.setObjectName(self.drone, 'Floor')", "tried to change Drone"),
+    "moves itself in a pose": ("sim.setObjectPose(self.drone, -1, [3, 0, 1, 0, 0, 0, 1])", "move Drone"),
+    "moves along": ("sim.moveToPose({'object': self.drone, 'targetPose': [3, 0, 1, 0, 0, 0, 1]})", "move"),
+    "pushes itself": ("sim.addForceAndTorque(self.drone, [9, 0, 9], [0, 0, 0])", "push Drone"),
+    "hangs itself up": ("sim.setObjectParent(self.drone, self.base, False)", "move Drone"),
+    "is made a dummy's": ("sim.setObjectPosition(self.base, -1, [3, 0, 1])", "move Quadricopter_base"),
+    "makes a step longer": ("sim.setSimulationTimeStep(0.5)", "change the scene"),
+    "has no weight": ("sim.setShapeMass(self.drone, 1e-3)", "change Drone"),
+    "builds a bridge": ("sim.createPrimitiveShape(0, [9, 9, 1])", "change the scene"),
+    "is called another": ("sim.setObjectName(self.drone, 'Floor')", "change Drone"),
     "has more air": (
         "sim.setScriptSimulationParameter(sim.getScriptHandle('Quadricopter_propeller_respondable1'),"
         " 'particleDensity', 9e9)",
-        "tried to change the script of Quadricopter_propeller_respondable1",
+        "change the script of Quadricopter_propeller_respondable1",
     ),
-    "writes a file": ("sim.saveModel(self.drone, 'mine.ttm')", "tried to write Drone"),
+    "writes a file": ("sim.saveModel(self.drone, 'mine.ttm')", "write Drone"),
 }
 SEARCHES = {  # each would find something, were it there
     "the judge by gc": "found = [type(one) for one in gc.get_objects() if type(one).__module__.startswith("
@@ -140,11 +155,12 @@ ENDS = {  # what ends the flight, and what is said of it
         "malformed named arguments",
     ),
     "the door closed": ("os.close(3)", "before the flight was over"),
-    "a stop": ("os.kill(os.getpid(), signal.SIGSTOP)", "did not return after 3 s (script_time_limit)"),
-    "a step without end": ("while True:\n        pass", "stopped after 3 s without returning"),
+    "a stop": ("os.kill(os.getpid(), signal.SIGSTOP)", "did not return after 1 s (script_time_limit)"),
+    "a step without end": ("while True:\n        pass", "stopped after 1 s without returning"),
     "a fork bomb": ("while True:\n        os.fork()", ""),  # too many, or no return, whichever comes first
     "a crash": ("ctypes.string_at(0)", "crashed: its process was ended by SIGSEGV"),
 }
+WITHOUT_END = ("a stop", "a step without end", "a fork bomb")
 FAR = {  # of the judge, where no sandbox hides it: each would find something, were it in reach
     **{what: SEARCHES[what] for what in ("the judge by gc", "the judge by modules", "the seed", "the plan in memory")},
     **{what: SEARCHES[what] for what in ("descriptors", "the parent's memory", "passwords in the environment")},
@@ -205,11 +221,10 @@ EXCESS = {  # of what no limit of a single process counts, and what is said of i
         "more than 20000 files",
     ),
 }
-ONCE = "if not hasattr(self, 'begun'):\n        self.begun"
 STAYS = {  # what would outlive the flight
     "a daemon": "subprocess.Popen(['sleep', '4321'], start_new_session=True)",
-    "a daemon's daemon": "ONCE = os.fork() or (os.setsid(), os.fork() and os._exit(0), time.sleep(4321))",
-    "a copy": "ONCE = os.fork() or (os.setsid(), time.sleep(4321))",
+    "a daemon's daemon": "os.fork() or (os.setsid(), os.fork() and os._exit(0), time.sleep(4321))",
+    "a copy": "os.fork() or (os.setsid(), time.sleep(4321))",
     "a fake table": "print('script   passed  points\\nmine.py     20/20    20/20', file=sys.__stdout__, flush=True);"
     " os.write(1, b'20 of 20'); os.write(2, b'20 of 20')",
     "other criteria": "import drone_sim.grading.criteria.reach as reach\n    reach.Reach._judged = lambda *_: 1 / 0",
@@ -234,14 +249,10 @@ LUA = {  # the same in Lua, as far as it goes there, and what is said of it
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("attacked")
     (made / "attacked.yaml").write_text(PLAN)
+    (made / "impatient.yaml").write_text(IMPATIENT)
     (made / "secret").write_bytes(os.urandom(32))
     (made / "other.py").write_text("def sysCall_init(): pass\n")
     return made
-
-
-@pytest.fixture(scope="module")
-def plan(folder):
-    return plans.read(folder / "attacked.yaml")
 
 
 def no_sandbox():
@@ -252,35 +263,44 @@ def no_sandbox():
     return ""
 
 
-def flying(plan, folder, sandboxed):
+def flying(sandboxed):
+    """Yield a function that flies a submission by a plan, whose folder gets the script."""
     with contextlib.closing(Flyer(SETTINGS.limits, sandboxed=sandboxed)) as flyer:
 
-        def flown(name, text):
-            (folder / "handed_in").mkdir(exist_ok=True)
-            path = folder / "handed_in" / name
+        def flown(name, text, plan, seed=SECRET):
+            (plan.parent / "handed_in").mkdir(exist_ok=True)
+            path = plan.parent / "handed_in" / name
             path.write_text(text)
-            job = Job(str(plan.path), str(path), SECRET, {}, key_of(contents_of(plan, str(path)), SECRET, {}))
-            return flyer.fly(job).result
+            key = key_of(contents_of(plans.read(plan), str(path)), seed, {})
+            return flyer.fly(Job(str(plan), str(path), seed, {}, key)).result
 
         yield flown
 
 
 @pytest.fixture(scope="module")
-def fly(plan, folder):
-    yield from flying(plan, folder, not no_sandbox())
+def fly_by_plan():
+    yield from flying(sandboxed=False)
 
 
 @pytest.fixture(scope="module")
-def fly_without_sandbox(plan, folder):
-    yield from flying(plan, folder, False)
+def fly_without_sandbox(fly_by_plan, folder):
+    return lambda name, text: fly_by_plan(name, text, folder / "attacked.yaml")
 
 
-def python(body, folder, port=9):
+@pytest.fixture(scope="module")
+def fly(folder):
+    with contextlib.contextmanager(flying)(sandboxed=not no_sandbox()) as flown:
+        yield lambda name, text, plan="attacked": flown(name, text, folder / f"{plan}.yaml")
+
+
+def python(attempts, folder, port=9):
+    """Return a script that makes attempts, given by their names."""
+    text = PYTHON + "".join(ATTEMPT.format(what=what, body=body) for what, body in attempts.items())
     title = bytes(one ^ 1 for one in b"A word of the plan that nobody needs")
     words = {"TITLE": repr(title), "FOLDER": repr(str(folder)), "TASKS": repr(str(Path(__file__).parents[2] / "tasks"))}
     for word, value in {**words, "SEED": str(SECRET), "PORT": str(port)}.items():
-        body = body.replace(word, value)
-    return PYTHON.replace("BODY", body)
+        text = text.replace(word, value)
+    return text
 
 
 # A plan by which a script learns of the scene by its sensors alone, and what does not go round that.
@@ -329,11 +349,10 @@ def sysCall_sensing():
 """
 
 
-def test_who_may_read_of_his_own_alone_learns_nothing_of_the_scene(tmp_path):
+def test_who_may_read_of_his_own_alone_learns_nothing_of_the_scene(fly_by_plan, tmp_path):
     path = tmp_path / "own.yaml"
     path.write_text(OWN)
-    with contextlib.contextmanager(flying)(plans.read(path), tmp_path, False) as fly:
-        result = fly("reads.py", READS)
+    result = fly_by_plan("reads.py", READS, path)
     assert result.error is None and result.outcomes[0].passed, result.outcomes[0].said
     assert "tried to read Red at 0.05 s (sim.getObjectPosition)" in result.tried and not result.passed
 
@@ -345,33 +364,37 @@ def nothing_gained(result):
     )
 
 
-@pytest.mark.parametrize("what", RULES)
-def test_who_breaks_the_rules_is_told_and_gains_nothing(fly, folder, what):
-    body, said = RULES[what]
-    result = fly("breaks.py", python(body, folder))
-    assert nothing_gained(result) and result.error is None and result.flown == pytest.approx(0.5)
-    assert (
-        len(result.tried) == 1 and said in result.tried[0] and result.tried[0].split(" at ")[1].startswith("0.05 s (")
-    )
+def nothing_found(result):
+    assert nothing_gained(result) and result.error is None, result.error
+    assert result.outcomes[1].passed, result.outcomes[1].said
+
+
+def test_who_breaks_the_rules_is_told_and_gains_nothing(fly, folder):
+    calls = {what: f"found = refused(lambda: {call}, {said!r})" for what, (call, said) in RULES.items()}
+    result = fly("breaks.py", python(calls, folder))
+    nothing_found(result)
+    assert result.flown == pytest.approx(0.5)
+    told = {said for _, said in RULES.values()}
+    assert all(" at 0.05 s (" in one and any(said in one for said in told) for one in result.tried)
+    assert all(any(said in one for one in result.tried) for said in told)
+
+
+def test_what_is_found_would_be_told(fly_without_sandbox, folder):
+    result = fly_without_sandbox("finds.py", python({"a treasure": "found = 'gold'"}, folder))
+    assert all(word in result.outcomes[1].said for word in ("a treasure", "gold")) and not result.passed
 
 
 @pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
-@pytest.mark.parametrize("what", SEARCHES)
-def test_who_searches_finds_nothing(fly, folder, what, monkeypatch):
+def test_who_searches_finds_nothing(fly, folder, monkeypatch):
     monkeypatch.setenv("COURSE_SECRET", "swordfish")
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        result = fly("searches.py", python(SEARCHES[what], folder, listener.getsockname()[1]))
-    assert nothing_gained(result) and result.error is None
-    assert result.outcomes[1].passed, result.outcomes[1].said
+        nothing_found(fly("searches.py", python(SEARCHES, folder, listener.getsockname()[1])))
     assert not (folder / "written").exists() and not Path("~/.attacked").expanduser().exists()
 
 
-@pytest.mark.parametrize("what", FAR)
-def test_without_a_sandbox_the_judge_is_as_far(fly_without_sandbox, folder, what, monkeypatch):
+def test_without_a_sandbox_the_judge_is_as_far(fly_without_sandbox, folder, monkeypatch):
     monkeypatch.setenv("COURSE_SECRET", "swordfish")
-    result = fly_without_sandbox("searches.py", python(FAR[what], folder) + OF_JUDGES)
-    assert nothing_gained(result) and result.error is None
-    assert result.outcomes[1].passed, result.outcomes[1].said
+    nothing_found(fly_without_sandbox("searches.py", python(FAR, folder) + OF_JUDGES))
 
 
 @pytest.mark.parametrize("what", ENDS)
@@ -379,16 +402,16 @@ def test_who_ends_a_flight_otherwise_has_flown_nothing(fly, folder, what):
     body, said = ENDS[what]
     if what == "a fork bomb" and no_sandbox():
         pytest.skip(no_sandbox())
-    result = fly("ends.py", python(body, folder))
+    result = fly("ends.py", python({what: body}, folder), "impatient" if what in WITHOUT_END else "attacked")
     assert nothing_gained(result) and said in result.error
-    assert fly("flies.py", python("pass", folder)).error is None
+    assert fly("flies.py", python({}, folder)).error is None
 
 
 @pytest.mark.parametrize("what", STAYS)
 def test_what_stays_behind_is_nothing(fly, folder, what, capfd):
-    fly("flies.py", python("pass", folder))
+    fly("flies.py", python({}, folder))
     before = descendants()
-    result = fly("stays.py", python(STAYS[what].replace("ONCE", ONCE), folder))
+    result = fly("stays.py", python({what: STAYS[what]}, folder))
     assert nothing_gained(result) and result.error is None and result.flown == pytest.approx(0.5)
     assert capfd.readouterr() == ("", "")
     assert descendants() <= before
@@ -409,19 +432,16 @@ def descendants():
     return found
 
 
-@pytest.mark.parametrize("what", CALLS)
 @pytest.mark.parametrize("where", ["fly", "fly_without_sandbox"])
-def test_the_system_is_not_called_for_what_outlives_a_flight_or_is_not_counted(where, folder, what, request):
-    result = request.getfixturevalue(where)("calls.py", python(CALLS[what], folder))
-    assert nothing_gained(result) and result.error is None
-    assert result.outcomes[1].passed, result.outcomes[1].said
+def test_the_system_is_not_called_for_what_outlives_a_flight_or_is_not_counted(where, folder, request):
+    nothing_found(request.getfixturevalue(where)("calls.py", python(CALLS, folder)))
 
 
 @pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
 @pytest.mark.parametrize("what", EXCESS)
 def test_all_processes_of_a_submission_are_counted_together(fly, folder, what):
     body, said = EXCESS[what]
-    result = fly("takes.py", python(body, folder))
+    result = fly("takes.py", python({what: body}, folder))
     assert nothing_gained(result) and said in result.error
 
 
@@ -525,6 +545,8 @@ NEVER = {  # what no plan allows
     "a file": ("sim.saveModel(box, 'mine.yaml')", "write Box"),
 }
 TRIES = """
+ATTEMPTS = {}
+
 def sysCall_init():
     global lamp, post, box, goal, drone
     box, goal, drone = (sim.getObject(one) for one in ("/Box", "/Goal", "/Quadcopter"))
@@ -534,54 +556,56 @@ def here():
     return sim.getObjectPosition(drone, -1)
 
 def sysCall_sensing():
-    try:
-        found = repr(BODY)
-    except ValueError:
-        found = "nothing"
-    sim.setStringSignal("found", found)
+    found = {}
+    for what, (attempt, said) in ATTEMPTS.items():
+        try:
+            found[what] = repr(attempt())
+        except ValueError as error:
+            if said not in str(error):
+                found[what] = str(error)
+    sim.setStringSignal("found", repr(found) if found else "nothing")
 """
 
 
+def tries(attempts):
+    """Return a script that makes calls, given by their names, each with what is said of it."""
+    return TRIES + "".join(
+        f"ATTEMPTS[{what!r}] = lambda: {call}, {said!r}\n" for what, (call, said) in attempts.items()
+    )
+
+
 @pytest.fixture(scope="module")
-def fly_in_scene(tmp_path_factory):
+def fly_in_scene(fly_by_plan, tmp_path_factory):
     """Return a function that flies a submission in the scene with scripts, under a plan with `more` keys."""
     folder = tmp_path_factory.mktemp("scene")
     files = {"scene.yaml": SCENE, "post.py": POST, "lamp.lua": LAMP, "helper.py": "def run(*words): return words"}
     files["model.yaml"] = "objects: [{name: Loaded, kind: dummy}]"
     for name, text in files.items():
         (folder / name).write_text(text)
-    with contextlib.closing(Flyer(SETTINGS.limits, sandboxed=False)) as flyer:
 
-        def fly(body, more="", script=TRIES):
-            (folder / "plan.yaml").write_text(IN_SCENE.replace("MORE", more))
-            (folder / "handed_in").mkdir(exist_ok=True)
-            path = folder / "handed_in" / "tries.py"
-            path.write_text(script.replace("BODY", body))
-            contents = contents_of(plans.read(folder / "plan.yaml"), str(path))
-            return flyer.fly(Job(str(folder / "plan.yaml"), str(path), 0, {}, key_of(contents, 0, {}))).result
+    def fly(script, more=""):
+        (folder / "plan.yaml").write_text(IN_SCENE.replace("MORE", more))
+        return fly_by_plan("tries.py", script, folder / "plan.yaml", seed=0)
 
-        yield fly
+    return fly
 
 
-@pytest.mark.parametrize("what", NOT_ITS_OWN)
-def test_what_belongs_to_the_scene_is_out_of_reach(fly_in_scene, what):
-    body, said = NOT_ITS_OWN[what]
-    result = fly_in_scene(body)
+def test_what_belongs_to_the_scene_is_out_of_reach(fly_in_scene):
+    result = fly_in_scene(tries(NOT_ITS_OWN))
     assert result.error is None and not result.passed
     assert [one.passed for one in result.outcomes] == [False, True, True, True], result.outcomes
-    assert len(result.tried) == 1 and said in result.tried[0]
+    assert result.tried and all(any(said in one for _, said in NOT_ITS_OWN.values()) for one in result.tried)
 
 
-@pytest.mark.parametrize("what", NEVER)
-def test_no_plan_lends_the_scenes_rights_or_its_goals(fly_in_scene, what):
-    body, said = NEVER[what]
-    result = fly_in_scene(body, WITH_ALL)
+def test_no_plan_lends_the_scenes_rights_or_its_goals(fly_in_scene):
+    result = fly_in_scene(tries(NEVER), WITH_ALL)
     assert result.error is None and result.outcomes[1].passed, result.outcomes
-    assert len(result.tried) == 1 and said in result.tried[0]
+    assert result.tried and all(any(said in one for _, said in NEVER.values()) for one in result.tried)
 
 
 def test_a_topic_of_the_scene_is_not_a_submissions(fly_in_scene):
-    result = fly_in_scene("simROS.publish(simROS.advertise('/verdict', 'std_msgs/Int32'), {'data': 5})")
+    publish = "simROS.publish(simROS.advertise('/verdict', 'std_msgs/Int32'), {'data': 5})"
+    result = fly_in_scene(tries({"a topic": (publish, "")}))
     assert [one.passed for one in result.outcomes] == [False, True, True, True], result.outcomes
 
 
@@ -589,11 +613,13 @@ CALLED = "(sim.callScriptFunction('door', post, 3), sim.callScriptFunction('shin
 
 
 def test_a_plan_lists_the_functions_that_a_submission_may_call(fly_in_scene):
-    result = fly_in_scene(CALLED, "calls: [door, shine, helper]")
+    calls = "calls: [door, shine, helper]"
+    result = fly_in_scene(tries({"listed": (CALLED, "")}), calls)
     assert result.error is None and result.tried == (), result.error
-    assert "was '(6, 2)'" in result.outcomes[1].said
-    imported = fly_in_scene("sim.callScriptFunction('helper', post, 'x')", "calls: [door, shine, helper]")
-    assert "tried to call helper of the script of Post" in imported.tried[0] and imported.outcomes[1].passed
+    assert "(6, 2)" in result.outcomes[1].said
+    imported = ("sim.callScriptFunction('helper', post, 'x')", "call helper of the script of Post")
+    result = fly_in_scene(tries({"imported": imported}), calls)
+    assert "tried to call helper of the script of Post" in result.tried[0] and result.outcomes[1].passed
 
 
 ITS_OWN = """
@@ -623,7 +649,7 @@ def twice(value):
 
 
 def test_what_is_its_own_a_submission_may_set_and_call(fly_in_scene):
-    result = fly_in_scene("", script=ITS_OWN)
+    result = fly_in_scene(ITS_OWN)
     assert result.error is None and result.tried == ()
     assert [one.passed for one in result.outcomes] == [False, True, True, True], result.outcomes
 

@@ -25,7 +25,7 @@ from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.jobs.pool import FlightOptions, PoolError
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
-SETTINGS = settings.load({"limits": {"seconds": 5.0, "patience": 2.0, "memory": 256}, "batches": {"largest": 1}})
+SETTINGS = settings.load({"limits": {"seconds": 30.0, "patience": 100.0, "memory": 256}, "batches": {"largest": 1}})
 LEFT_BEHIND = f"left-behind-{os.getpid()}"  # another checkout's tests may run on this machine
 PLAN = """
 name: hold

@@ -273,7 +273,7 @@ def closed(peer):
     ],
 )
 def test_who_does_not_speak_zmtp_3_is_dropped_and_never_served(stage, sent):
-    with socket.create_connection(("127.0.0.1", stage.server.port), timeout=10) as peer:
+    with socket.create_connection(("127.0.0.1", stage.server.port), timeout=60) as peer:
         peer.sendall(sent)
         peer.setblocking(False)
         assert stage.settled(lambda: closed(peer))

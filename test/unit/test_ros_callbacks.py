@@ -168,9 +168,9 @@ def test_a_picture_that_cannot_be_encoded_does_not_end_the_encoder(monkeypatch):
     output = cameras.CompressedPublisher("drone/camera/image", None)
     output.publisher.publish = published.put
     output.publish(Header(), np.zeros((0, 4, 3), np.uint8))
-    assert published.get(timeout=20) == "failed" and len(errors) == 1
+    assert published.get(timeout=60) == "failed" and len(errors) == 1
     output.publish(Header(), np.zeros((2, 4, 3), np.uint8))
-    assert "png" in published.get(timeout=20).format
+    assert "png" in published.get(timeout=60).format
     output.unregister()
 
 

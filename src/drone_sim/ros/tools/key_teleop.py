@@ -74,7 +74,10 @@ class Screen:
             self._fly()
 
     def _fly(self) -> None:
+        is_ready = False
         while not self._over():
+            if self._teleop.connected and not is_ready:
+                is_ready, self._teleop.said = True, "ready"
             self._draw()
             for key in self._read():
                 if key == ESCAPE:
