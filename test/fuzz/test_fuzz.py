@@ -4,7 +4,7 @@ import pytest
 from pool import Trier
 from run import KINDS, keep, run_kind
 
-CASES = 12  # of each kind
+CASES = 6  # of each kind
 MORE = {"archives": 100}  # none of which needs a simulation
 SEED = 8
 

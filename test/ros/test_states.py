@@ -53,7 +53,7 @@ def clock(name):
 
 
 def path(messages):
-    """Return where a drone was since it was first told to go, by steps, and the steps at which it was told otherwise."""
+    """Return where a drone was since it was first told to go, by steps, and the steps at which it was told anew."""
     odometry, commands = messages
     told = {}
     for message in commands:

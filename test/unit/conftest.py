@@ -39,6 +39,12 @@ def pytest_collection_modifyitems(items):
                 item.add_marker(pytest.mark.skip(reason="needs ROS"))
 
 
+def pytest_terminal_summary(terminalreporter, config):
+    seed = getattr(config.option, "randomly_seed", None)
+    if isinstance(seed, int):
+        terminalreporter.write_line(f"the order of these tests comes back with -p randomly --randomly-seed={seed}")
+
+
 def pytest_make_parametrize_id(val):
     """Name a long value by its length: pytest would make it a part of the test's name, over and over."""
     return f"{len(val)} long" if isinstance(val, (str, bytes)) and len(val) > 200 else None

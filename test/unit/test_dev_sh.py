@@ -31,7 +31,7 @@ case "$*" in
   "-m pytest"*) exit "$STATUS" ;;
 esac
 """
-PACKAGING = ("packaging/pybullet.sh", "packaging/slim_pybullet.sh", "packaging/wheel.sh")
+PACKAGING = ("packaging/venv.sh", "packaging/pybullet.sh", "packaging/slim_pybullet.sh", "packaging/wheel.sh")
 CMAKE = """#!/bin/bash
 mkdir devel
 touch devel/setup.bash
