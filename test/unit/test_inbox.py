@@ -45,6 +45,22 @@ def test_what_comes_while_it_empties_waits_for_the_next_time():
     assert done == [1, 1]
 
 
+def test_a_job_may_have_its_own_jobs_executed_at_once():
+    inbox, done = Inbox(), []
+
+    def first():
+        with inbox.at_once():
+            inbox.put(lambda: done.append("inside"))
+        inbox.put(lambda: done.append("later"))
+        done.append("first")
+
+    inbox.put(first)
+    inbox.empty()
+    assert done == ["inside", "first"]
+    inbox.empty()
+    assert done == ["inside", "first", "later"]
+
+
 def test_who_asks_gets_the_answer_or_the_error():
     inbox = Inbox()
     for job, expected in ((lambda: "done", "done"), (lambda: str(1 / 0), ZeroDivisionError)):

@@ -20,7 +20,7 @@ criteria: [{kind: reach, places: [[1, 0, 1]], within: 0.3}]
 class Topics:
     """Those of one vehicle, without a master."""
 
-    def __init__(self, _simulation, vehicle, _inbox):
+    def __init__(self, _simulation, vehicle, _inbox, _gate):
         self.vehicle, self.is_open = vehicle, True
 
     def follow(self, vehicle):

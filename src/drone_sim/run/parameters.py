@@ -37,6 +37,7 @@ from drone_sim.forces.weather import WeatherParameters
 from drone_sim.importing.cache import imported_scene
 from drone_sim.message_text import MAX_NAME, shown
 from drone_sim.run.dumps import read_config
+from drone_sim.run.lockstep_parameters import LockstepParameters
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import SceneParameters
 from drone_sim.sensors.validation import check_rates
@@ -76,6 +77,8 @@ class Parameters(PaceParameters, EquipmentParameters):
     config: FileName
     gui: Switch
     script_time_limit: Annotated[Finite, Within(0.01, 1e4, or_zero=True)]
+    step_count: Annotated[int, Within(1, 1_000_000)]
+    lockstep: LockstepParameters
     remote_api: RemoteApiParameters
     time_step: Annotated[Finite, Within(1e-4, 1)]
     sub_step: Annotated[Finite, Within(1e-5, 1)]

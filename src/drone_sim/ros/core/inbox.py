@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, wait
 from functools import partial
 from queue import SimpleQueue
@@ -13,8 +14,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # it imports rospy, which this file does without
     from drone_sim.ros.core.intervention import Intervention
 
+Gate = Callable[[str, Callable[[Any], None]], Callable[[Any], None]]  # of a topic and its callback, its new callback
 _LOG = logging.getLogger(__name__)
 _PATIENCE = 30.0  # s; a step, or a scene that is read anew, takes far less
+
+
+def open_gate(_topic: str, take: Callable[[Any], None]) -> Callable[[Any], None]:
+    """Let every message of a topic pass."""
+    return take
 
 
 class Inbox:
@@ -37,14 +44,29 @@ class Inbox:
         self._jobs: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._came = threading.Event()
         self._sleep, self._wake = sleep or self._came.wait, wake
+        self._executing = 0  # the thread in which `at_once` executes jobs
 
     def put(self, job: Callable[[], None], intervention: Intervention | None = None) -> None:
         """Leave a job and go on."""
+        if threading.get_ident() == self._executing:
+            if intervention is not None:
+                self._tell(intervention)
+            job()
+            return
         if intervention is not None:
             self._jobs.put(partial(self._tell, intervention))
         self._jobs.put(job)
         self._came.set()
         self._wake()
+
+    @contextlib.contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Execute jobs that the simulation's thread itself leaves in this block at once, and in this block."""
+        self._executing = threading.get_ident()
+        try:
+            yield
+        finally:
+            self._executing = 0
 
     def ask(self, job: Callable[[], str], intervention: Intervention | None = None) -> str:
         """Leave a job, wait until it is done, and return its answer; raises what it raised.

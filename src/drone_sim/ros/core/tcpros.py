@@ -35,6 +35,8 @@ def _in_a_thread(inbound: _Inbound) -> _Inbound:
             connection.settimeout(_SAYS)
             connection.recv(1, socket.MSG_PEEK)
             connection.settimeout(None)
+            # Without it a small message waits until the last one has been acknowledged, for up to 40 ms.
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             return inbound(connection, address)
         connection.close()
         return None

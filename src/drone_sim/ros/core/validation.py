@@ -76,9 +76,10 @@ def parameters_of(name: str, **others: Any) -> Parameters:
     if not isinstance(given, dict):
         raise ParameterError(f"must be a namespace with parameters such as {name}/script", (name,), str(given)[:80])
     given = {key: value for key, value in given.items() if value != _DEFAULTS.get(key, ...)}
-    remote = given.get("remote_api")
-    if isinstance(remote, dict) and remote.get("serve") == NOT_GIVEN:
-        given["remote_api"] = {key: value for key, value in remote.items() if key != "serve"}
+    for group, argument in (("remote_api", "serve"), ("lockstep", "wait_for")):
+        values = given.get(group)
+        if isinstance(values, dict) and values.get(argument) == NOT_GIVEN:
+            given[group] = {key: value for key, value in values.items() if key != argument}
     for key, read in (("config", from_shell), ("script", script_from_shell), ("scene_file", from_shell)):
         if isinstance(given.get(key), str):
             names = given[key].split(",") if key == "config" else [given[key]]

@@ -19,7 +19,7 @@ from std_msgs.msg import String
 
 from drone_sim.mechanics.frames import position, to_euler
 from drone_sim.remote.remote_api import start_server
-from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.inbox import Inbox, open_gate
 from drone_sim.ros.core.master_watch import MasterWatch
 from drone_sim.ros.core.publishing import StepTime
 from drone_sim.ros.core.shutdown import Shutdown
@@ -28,6 +28,7 @@ from drone_sim.ros.core.validation import parameters_of, use_sim_time
 from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.inspection import InspectionTopics
 from drone_sim.ros.node.interventions import Interventions
+from drone_sim.ros.node.lockstep import Lockstep
 from drone_sim.ros.node.object_poses import ObjectPoses
 from drone_sim.ros.node.scene_editing import SceneEditing
 from drone_sim.ros.node.services import Services
@@ -47,6 +48,7 @@ from drone_sim.ros.vehicle.script_backend import RosBackend
 from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.ros.vehicle.vehicle_topics import FleetTopics
 from drone_sim.run.diagnosis.diagnosis import Diagnosis
+from drone_sim.run.diagnosis.finding import Finding
 from drone_sim.run.pacing import Beat, Pace, Pacer, period
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.player import Player
@@ -70,7 +72,9 @@ class Node:
         self._parameters = parameters
         logging.getLogger("drone_sim").handlers = [_ToRosout()]
         drawings = Drawings()
-        backend = RosBackend(self._is_of_a_camera, lambda: self._time.stamp())
+        backend = RosBackend(
+            self._is_of_a_camera, lambda: self._time.stamp(), lambda topic, take: self._gate(topic, take)
+        )
         self.simulation = Simulation(
             parameters,
             script=parameters.script,
@@ -88,7 +92,10 @@ class Node:
         others = self._outside  # who are to be heard while the inbox waits
         sleep = others.wait if others.address else None
         self._inbox = Inbox(sleep=sleep, wake=others.wake, tell=self._interventions.tell)
-        self._topics = FleetTopics(self.simulation, self._inbox, self._time.stamp)
+        is_awaited = bool(parameters.lockstep.wait_for)
+        self._lockstep = Lockstep(parameters.lockstep, self.simulation, self._inbox) if is_awaited else None
+        self._gate = self._lockstep.gate if self._lockstep else open_gate
+        self._topics = FleetTopics(self.simulation, self._inbox, self._time.stamp, self._gate)
         self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
         self._services = Services(self.player, self._inbox, self._topics.follow)
         self._editing = SceneEditing(self.player, self._inbox, self._services)
@@ -110,7 +117,7 @@ class Node:
             ForceMarkers(self.simulation),
             StateText(self.simulation, self.player),  # the last one: `show` waits for its topic
         )
-        diagnosis = Diagnosis(
+        self._diagnosis = Diagnosis(
             self.player,
             self._pacer,
             self._topics.command_logs,
@@ -119,7 +126,7 @@ class Node:
             held=lambda: self._outside.holds,
             unheard=lambda: self._diagnostics.unheard,
         )
-        self._diagnostics = Diagnostics(diagnosis.look, self._time.stamp, self._inbox)
+        self._diagnostics = Diagnostics(self._look, self._time.stamp, self._inbox)
         self._beat = Beat(_SOON, _SELDOM)
         self._shown = -1  # the world's changes, when it was shown
         for camera in [one for vehicle in self._first() for one in vehicle.cameras.values()]:
@@ -163,6 +170,12 @@ class Node:
         if self.player.begun:  # reading scene and script took its time, which no step is late for
             self.player.begun = False
             self._pacer.restart()
+        if self._lockstep is not None and not self._lockstep.is_ready():
+            self._time.tell_new_subscribers()
+            self._inbox.wait(_SOON)
+            self._process_requests()
+            self._pacer.excuse()  # the node may take as long as it needs
+            return False
         if self._pacer.is_far:  # at such a pace, who asks for something is not to wait for the step
             self._inbox.wait(_SOON)
             self._process_requests()
@@ -198,8 +211,12 @@ class Node:
     def _step_and_show(self) -> None:
         self._time.begin()
         self.simulation.step()
-        self._show()
-        self._topics.publish_readings()
+        if self._lockstep is not None:
+            is_shown = self._lockstep.open()
+            self._time.end(at_once=True)
+            if not is_shown:
+                return
+        self._show(is_step=True)
         self._time.end(at_once=self.player.paused)  # who asks for single steps is told of each
 
     def _idle(self) -> None:
@@ -215,6 +232,9 @@ class Node:
             self.simulation.look()
             self._show()
 
+    def _look(self) -> list[Finding]:
+        return self._diagnosis.look() + ([self._lockstep.finding()] if self._lockstep is not None else [])
+
     def _until_shown(self) -> float:
         return self._beat.left(self.simulation.world.pictures.changes != self._shown)
 
@@ -228,10 +248,14 @@ class Node:
 
     # ---- what is there
 
-    def _show(self) -> None:
+    def _show(self, is_step: bool = False) -> None:
         self._topics.follow()
-        self._show_state()
+        self._topics.publish_state()
         self._topics.publish_transforms()
+        if is_step:
+            self._topics.publish_readings()
+        self._topics.publish_pictures()
+        self._shown = self.simulation.world.pictures.changes
         self._show_to_eyes()
 
     def _show_at_the_same_time(self) -> None:
@@ -246,6 +270,7 @@ class Node:
 
     def _show_state(self) -> None:
         self._topics.publish_state()
+        self._topics.publish_pictures()
         self._shown = self.simulation.world.pictures.changes
 
     def _show_to_eyes(self) -> None:
@@ -303,6 +328,9 @@ def main(watchdog: Watchdog) -> int:
         check_launch_arguments()
         parameters = parameters_of(rospy.get_name())
         script_path(parameters.script)  # none there ends the node; an error in one that is there stops the flight
+        if parameters.lockstep.wait_for and not use_sim_time():
+            rospy.set_param("/use_sim_time", True)
+            rospy.logwarn("lockstep needs simulated time: /use_sim_time is now true, for nodes that start from now on")
         check_others([one.name for one in parameters.fleet], use_sim_time())
         nodes.append(Node(parameters))
         MasterWatch(nodes[0].descriptions).start()

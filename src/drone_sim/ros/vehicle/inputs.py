@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import rospy
 from diagnostic_msgs.msg import KeyValue
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Vector3Stamped, WrenchStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TwistStamped, Vector3Stamped, WrenchStamped
 from geometry_msgs.msg import Twist as TwistMessage
 from std_msgs.msg import Empty
 
@@ -16,7 +16,7 @@ from drone_sim.config.types import ParameterError
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.grading.permissions import CHANGE, MOVE, PUSH
 from drone_sim.mechanics.state import Pose
-from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.inbox import Gate, Inbox, open_gate
 from drone_sim.ros.core.intervention import intervention, sender
 from drone_sim.ros.core.message_conversion import xyz
 from drone_sim.ros.core.validation import check_changes, check_frame, checked_pose, read_changes
@@ -28,8 +28,11 @@ from drone_sim.vehicles.commands import EMPTY, REQUESTS
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
+_COMMAND, _STAMPED_COMMAND = "cmd_vel", "cmd_vel_stamped"
 _QUIET = 5.0  # s, between two warnings
-_QUEUES = {"push": 100, "weather": 100, "faults": 100}  # messages; each counts: of all others only the last one does
+# Messages; each counts: of all others only the last one does, unless a gate chooses among them.
+_QUEUES = {"push": 100, "weather": 100, "faults": 100}
+_GATED_QUEUE = 10
 _INTERVENTIONS = {  # what is more than flying
     **dict.fromkeys(("set_pose", "initialpose", "reset"), MOVE),
     "push": PUSH,
@@ -48,16 +51,20 @@ class _Limits(NamedTuple):
 class VehicleInputs:
     """The commands of one vehicle, in its namespace."""
 
-    def __init__(self, simulation: Simulation, parameters: VehicleParameters, inbox: Inbox):
-        """Subscribe for the vehicle with these parameters; the thread of `simulation` empties `inbox`."""
-        self._simulation = simulation
+    def __init__(self, simulation: Simulation, parameters: VehicleParameters, inbox: Inbox, gate: Gate = open_gate):
+        """Subscribe for the vehicle with these parameters; the thread of `simulation` empties `inbox`.
+
+        `gate` wraps the callback of each topic.
+        """
+        self._simulation, self._gate = simulation, gate
         self._name, self._inbox = parameters.name, inbox
         self._limits = _Limits(parameters, simulation.parameters.weather)
         self.log = CommandLog(senders=self._commanders)
         self._subscribers = [
             self._subscriber(topic, kind, read)
             for topic, kind, read in (
-                ("cmd_vel", TwistMessage, self._twist),
+                (_COMMAND, TwistMessage, self._twist),
+                (_STAMPED_COMMAND, TwistStamped, lambda message: self._twist(message.twist)),
                 ("goto", PoseStamped, self._posing(lambda vehicle, pose: vehicle.ask("goto", pose))),
                 *((topic, Empty, self._asking(topic)) for topic, kind in REQUESTS.items() if kind == EMPTY),
                 ("set_pose", PoseStamped, self._posing(lambda vehicle, pose: vehicle.body.move(pose))),
@@ -71,12 +78,14 @@ class VehicleInputs:
         ]
 
     def _subscriber(self, topic: str, kind: type, read: Callable[[Any], _Job]) -> rospy.Subscriber:
-        name, take, queue = f"{self._name}/{topic}", self._taking(topic, read), _QUEUES.get(topic, 1)
+        name, queue = f"{self._name}/{topic}", _QUEUES.get(topic, 1 if self._gate is open_gate else _GATED_QUEUE)
+        take = self._gate(name, self._taking(_COMMAND if topic == _STAMPED_COMMAND else topic, read))
         return rospy.Subscriber(name, kind, take, queue_size=queue, tcp_nodelay=True)
 
     def _commanders(self) -> list[str]:
-        """Return the nodes that are connected to cmd_vel."""
-        return sorted({one.callerid_pub for one in self._subscribers[0].impl.connections})
+        """Return the nodes that are connected to cmd_vel, or to cmd_vel_stamped."""
+        commands = self._subscribers[:2]
+        return sorted({one.callerid_pub for topic in commands for one in topic.impl.connections})
 
     def follow(self, vehicle: Vehicle) -> None:
         """Check against what this vehicle allows from now on; it has been tuned, or taken the place of the last one."""
@@ -89,7 +98,7 @@ class VehicleInputs:
 
     def _taking(self, topic: str, read: Callable[[Any], _Job]) -> Callable[[Any], None]:
         """Return a callback that leaves what a message asks for to the simulation's thread, or says why not."""
-        kept = ", the last valid one is kept" if topic == "cmd_vel" else ""
+        kept = ", the last valid one is kept" if topic == _COMMAND else ""
         throttle, action = Throttle(_QUIET), _INTERVENTIONS.get(topic)
 
         def take(message: Any) -> None:

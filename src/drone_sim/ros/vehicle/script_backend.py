@@ -16,6 +16,7 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from drone_sim.ros.core import image_messages
+from drone_sim.ros.core.inbox import Gate, open_gate
 from drone_sim.ros.core.message_conversion import fill, message_class, service_class
 from drone_sim.scripting.api.backend import Ask, Image
 from drone_sim.scripting.api.service_servers import Unanswered
@@ -26,12 +27,13 @@ _LONGEST = 1.0  # s: the simulation waits meanwhile
 class RosBackend:
     """Subscribes and advertises any installed message type."""
 
-    def __init__(self, is_of_a_camera: Callable[[str], bool], stamp: Callable[[], rospy.Time]):
+    def __init__(self, is_of_a_camera: Callable[[str], bool], stamp: Callable[[], rospy.Time], gate: Gate = open_gate):
         """Take what messages are stamped with.
 
-        `is_of_a_camera` tells the topics on which the node's own cameras publish already.
+        `is_of_a_camera` tells the topics on which the node's own cameras publish already. `gate` wraps callbacks of
+        subscriptions.
         """
-        self._is_of_a_camera, self._stamp = is_of_a_camera, stamp
+        self._is_of_a_camera, self._stamp, self._gate = is_of_a_camera, stamp, gate
         self._frames: rospy.Publisher | None = None
 
     def time(self) -> float:
@@ -105,6 +107,7 @@ class RosBackend:
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
         """Call `take` with every message, in rospy's thread; return what ends that."""
+        take = self._gate(topic, take)
         return rospy.Subscriber(topic, message_class(kind), take, queue_size=10).unregister
 
     def advertise(self, topic: str, kind: str, queue: int, latch: bool) -> _Sender:

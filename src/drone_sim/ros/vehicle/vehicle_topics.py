@@ -9,7 +9,7 @@ from xml.etree import ElementTree as Xml
 import rospy
 
 from drone_sim.files.resources import read_bytes
-from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.inbox import Gate, Inbox, open_gate
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.ros.vehicle.cameras import CameraOutput
 from drone_sim.ros.vehicle.inputs import VehicleInputs
@@ -28,11 +28,14 @@ _LARGEST_URDF = 4 * 2**20  # bytes
 class VehicleTopics:
     """The topics in the namespace of one vehicle, which may be another object after every start."""
 
-    def __init__(self, simulation: Simulation, vehicle: Vehicle, inbox: Inbox):
-        """Advertise, subscribe, and set the vehicle's robot_description; the thread of `simulation` empties `inbox`."""
+    def __init__(self, simulation: Simulation, vehicle: Vehicle, inbox: Inbox, gate: Gate):
+        """Advertise, subscribe, and set the vehicle's robot_description; the thread of `simulation` empties `inbox`.
+
+        `gate` wraps the callback of each topic.
+        """
         self._simulation = simulation
         self.vehicle, parameters = vehicle, vehicle.parameters
-        self.inputs = VehicleInputs(simulation, parameters, inbox)
+        self.inputs = VehicleInputs(simulation, parameters, inbox, gate)
         self.new_subscribers = NewSubscribers()  # to pictures or state
         self.outputs = VehicleOutputs(parameters, self.new_subscribers)
         self.cameras = {
@@ -73,13 +76,13 @@ class VehicleTopics:
 class FleetTopics:
     """Topics for every vehicle of a simulation, and their frames."""
 
-    def __init__(self, simulation: Simulation, inbox: Inbox, stamp: Stamp):
+    def __init__(self, simulation: Simulation, inbox: Inbox, stamp: Stamp, gate: Gate = open_gate):
         """Advertise for the vehicles of `simulation`, whose thread empties `inbox`.
 
-        `stamp` returns that of what is sent now.
+        `stamp` returns that of what is sent now; `gate` wraps the callback of each topic.
         """
         self._simulation = simulation
-        self._inbox = inbox
+        self._inbox, self._gate = inbox, gate
         self._stamp = stamp
         self._topics: dict[str, VehicleTopics] = {}
         self._transforms = Transforms()
@@ -111,7 +114,7 @@ class FleetTopics:
             if name in self._topics:
                 self._topics[name].follow(vehicle)
             else:
-                self._topics[name] = VehicleTopics(self._simulation, vehicle, self._inbox)
+                self._topics[name] = VehicleTopics(self._simulation, vehicle, self._inbox, self._gate)
         self.descriptions = tuple(rospy.resolve_name(f"{name}/robot_description") for name in vehicles)
         self._transforms.publish_static(vehicles.values(), self._stamp)
         # rospy's topics hold on to themselves, and each has a descriptor (epoll) open until the collector comes by.
@@ -122,11 +125,15 @@ class FleetTopics:
         return {name: topics.inputs.log for name, topics in self._topics.items()}
 
     def publish_state(self) -> None:
-        """Publish pictures and state of every vehicle."""
+        """Publish the state of every vehicle."""
+        for topics in self._topics.values():
+            topics.outputs.publish_state(topics.vehicle, self._stamp)
+
+    def publish_pictures(self) -> None:
+        """Publish the pictures of every vehicle's cameras."""
         for topics in self._topics.values():
             for camera in topics.cameras.values():
                 camera.publish(self._stamp)
-            topics.outputs.publish_state(topics.vehicle, self._stamp)
 
     def publish_readings(self) -> None:
         """Publish what the sensors of every vehicle read in the step that has just been."""

@@ -1,0 +1,247 @@
+#!/usr/bin/env python3
+"""Steps that wait for nodes: the same flight every time, whatever becomes of the nodes."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+from pathlib import Path
+
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray
+from ending import HANGS, end
+from listening import Listener
+from nav_msgs.msg import Odometry
+from std_srvs.srv import Trigger
+
+from drone_sim.files.resources import package_path
+
+NODES = package_path() / "docs/lockstep"
+OTHER = Path(__file__).with_name("lockstep_node.py")
+SMALL = "cameras: {front: {width: 64, height: 48, every: 4}}\n"
+SCENE = "package://drone_sim/config/scenes/gates.yaml"
+FIRST = 5 * 10**7  # ns, the first stamp
+SECONDS = 4.0  # s of simulated time
+FREE = "_real_time_factor:=0"
+COMMANDS, STAMPED = "_lockstep/wait_for:=cmd_vel", "_lockstep/wait_for:=cmd_vel_stamped"
+
+
+def state(message):
+    """Return the numbers of an odometry."""
+    pose, twist = message.pose.pose, message.twist.twist
+    parts = pose.position, pose.orientation, twist.linear, twist.angular
+    return message.header.stamp.to_nsec(), *(getattr(one, axis) for one in parts for axis in one.__slots__)
+
+
+class Flight:
+    """The odometry of one vehicle, as it comes."""
+
+    def __init__(self, drone="drone"):
+        self.rows, self._came = [], threading.Condition()
+        self._subscriber = rospy.Subscriber(f"/{drone}/odom", Odometry, self._take)
+
+    def _take(self, message):
+        with self._came:
+            if message.header.stamp.to_nsec() > FIRST:  # while it is stopped, the state has the stamp 0
+                self.rows.append(state(message))
+            self._came.notify_all()
+
+    def until(self, seconds, timeout=HANGS):
+        """Return the rows until a time (s), once they have come."""
+        with self._came:
+            last = round(seconds * 1e9)
+            assert self._came.wait_for(lambda: self.rows and self.rows[-1][0] >= last, timeout), self.rows[-1:]
+            return [row for row in self.rows if row[0] <= last]
+
+    def close(self):
+        self._subscriber.unregister()
+
+
+class Simulator:
+    """A simulator as a process, with its lines of output."""
+
+    def __init__(self, *arguments):
+        command = ["rosrun", "drone_sim", "simulator", FREE, f"_scene_file:={SCENE}", *arguments]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+        self.process = subprocess.Popen(command, start_new_session=True, **pipes)
+        self.lines, self._came = [], threading.Condition()
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            with self._came:
+                self.lines.append(line)
+                self._came.notify_all()
+
+    def wait_for(self, text, timeout=HANGS):
+        """Wait for a line with a text."""
+        with self._came:
+            assert self._came.wait_for(lambda: any(text in line for line in self.lines), timeout), "".join(self.lines)
+
+    def close(self):
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, signal.SIGINT)
+        try:
+            self.process.wait(HANGS)
+        finally:
+            self.process.stdout.close()
+
+
+def started(*command):
+    return subprocess.Popen([sys.executable, *map(str, command)])
+
+
+class Lockstep(unittest.TestCase):
+    """Each flight has its own simulator and its own nodes."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.config = Path(cls.folder.name) / "small.yaml"
+        cls.config.write_text(SMALL)
+        rospy.set_param("/use_sim_time", True)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def setUp(self):
+        if rospy.has_param("/drone_sim"):
+            rospy.delete_param("/drone_sim")
+
+    @contextlib.contextmanager
+    def flying(self, *arguments, nodes=(), drone="drone"):
+        """Yield simulator, flight and nodes."""
+        flight, simulator, processes = Flight(drone), Simulator(f"_config:={self.config}", *arguments), []
+        try:
+            processes += [started(*node) for node in nodes]
+            yield simulator, flight, processes
+        finally:
+            flight.close()
+            end(*processes, number=signal.SIGKILL)
+            simulator.close()
+
+    def flown(self, *arguments, nodes, drone="drone"):
+        with self.flying(*arguments, nodes=nodes, drone=drone) as (_, flight, _):
+            return flight.until(SECONDS)
+
+    def test_1_a_flight_is_the_same_every_time(self):
+        arguments = COMMANDS, "_lockstep/trigger:=odom", "_real_time_factor:=5"
+        first, second = (self.flown(*arguments, nodes=[(NODES / "reacting.py",)]) for _ in range(2))
+        self.assertEqual(first[0][0], 10**8, "the messages of the second step are the first")
+        self.assertEqual(len(first), SECONDS * 20 - 1)
+        self.assertEqual(first, second)
+        self.assertNotEqual(first[0][3], first[-1][3], "the commands have an effect")
+
+    def test_2_in_every_run_of_a_simulator_too_whatever_wakes_the_node(self):
+        flights = {}
+        for node, *arguments in (
+            ("reacting.py", COMMANDS),
+            ("sleeping.py", COMMANDS),
+            ("seeing.py", STAMPED, "_lockstep/trigger:=front"),
+        ):
+            with self.subTest(node), self.flying(*arguments, nodes=[(NODES / node, "0.1")]) as (_, flight, _):
+                flights[node] = flight.until(SECONDS)
+                self.assertTrue(rospy.ServiceProxy("/drone_sim/stop", Trigger)().success)
+                time.sleep(0.5)
+                flight.rows.clear()
+                self.assertTrue(rospy.ServiceProxy("/drone_sim/start", Trigger)().success)
+                self.assertEqual(flight.until(SECONDS), flights[node])
+            self.setUp()
+        self.assertEqual(flights["reacting.py"], flights["sleeping.py"])
+        self.assertNotEqual(flights["reacting.py"], flights["seeing.py"])
+
+    def test_3_of_stamped_answers_doubled_and_late_ones_are_told_apart(self):
+        once = self.flown(STAMPED, nodes=[(OTHER, "stamped", "1", "drone")])
+        self.assertEqual(self.flown(STAMPED, nodes=[(OTHER, "stamped", "3", "drone")]), once)
+
+    def test_4_two_vehicles_with_a_node_each(self):
+        two = [(OTHER, "plain", "1", f"drone{number}", f"__name:=of{number}") for number in (1, 2)]
+        first, second = (self.flown(COMMANDS, "_vehicles:=2", nodes=two, drone="drone2") for _ in range(2))
+        self.assertEqual(first, second)
+
+    def test_5_a_node_that_stands_is_waited_for_and_one_that_dies_can_be_started_again(self):
+        wanted = self.flown(COMMANDS, "_lockstep/timeout:=1", nodes=[(OTHER, "plain", "1", "drone")])
+        node = (OTHER, "plain", "1", "drone")
+        with self.flying(COMMANDS, "_lockstep/timeout:=1", "_real_time_factor:=4", nodes=[node]) as (
+            simulator,
+            flight,
+            (process,),
+        ):
+            found = Listener("/diagnostics", DiagnosticArray)
+            flight.until(0.5)
+            process.send_signal(signal.SIGSTOP)
+            simulator.wait_for("/drone/cmd_vel: /controller has not answered within 1 s")
+            late = found.wait_for(lambda m: any("has not answered the stamp" in one.message for one in m.status))
+            self.assertIn("/drone/cmd_vel: /controller", str(late))
+            process.send_signal(signal.SIGCONT)
+            self.assertEqual(flight.until(SECONDS), wanted)
+            process.kill()
+            simulator.wait_for("/controller has gone")
+            process.wait(HANGS)
+            stands = flight.rows[-1]
+            again = started(*node)
+            try:
+                flight.until(stands[0] * 1e-9 + 1)
+            finally:
+                end(again, number=signal.SIGKILL)
+            found.close()
+
+    def test_6_policies(self):
+        node = (OTHER, "plain", "1", "drone")
+        with self.flying(COMMANDS, "_lockstep/on_timeout:=end", nodes=[node]) as (simulator, flight, (process,)):
+            flight.until(0.5)
+            process.kill()
+            simulator.wait_for("/controller has gone")
+            self.assertEqual(simulator.process.wait(HANGS), 1)
+        self.setUp()
+        with self.flying(COMMANDS, "_lockstep/on_timeout:=go on", "_real_time_factor:=5", nodes=[node]) as (
+            _,
+            flight,
+            (process,),
+        ):
+            flight.until(0.5)
+            process.kill()
+            flight.until(flight.rows[-1][0] * 1e-9 + 2)
+
+    def test_7_it_ends_while_it_waits(self):
+        for nodes in ([], [(OTHER, "plain", "1", "drone")]):
+            with self.subTest(nodes), self.flying(COMMANDS, nodes=nodes) as (simulator, flight, processes):
+                if processes:
+                    flight.until(0.5)
+                    processes[0].send_signal(signal.SIGSTOP)
+                simulator.wait_for("time stands at 0.05 s until there is" if not nodes else "waiting on")
+                began = time.monotonic()
+                os.killpg(simulator.process.pid, signal.SIGINT)
+                self.assertEqual(simulator.process.wait(HANGS), 0)
+                self.assertLess(time.monotonic() - began, 20)
+
+    def test_8_two_instances_are_told(self):
+        node = (OTHER, "plain", "1", "drone", "--anonymous")
+        with self.flying(COMMANDS, "_real_time_factor:=1", nodes=[node, node]):
+            found = Listener("/diagnostics", DiagnosticArray)
+            found.wait_for(lambda m: any("the first counts" in one.message for one in m.status), after=0)
+            found.close()
+
+    def test_9_what_is_wrong_is_told_in_one_line(self):
+        for argument, said in (
+            ("_lockstep/wait_for:=cmd_vell", "nothing listens to /drone/cmd_vell; near names are cmd_vel"),
+            ("_lockstep:={wait_for: [cmd_vel], trigger: fronnt}", "no such trigger; near names are front"),
+            ("_lockstep:={wait_for: [cmd_vel], on_timeout: stop}", "input should be 'hold', 'go on' or 'end'"),
+        ):
+            with self.subTest(argument), self.flying(argument) as (simulator, _, _):
+                simulator.wait_for(said)
+                self.assertEqual(simulator.process.wait(HANGS), 1)
+                self.assertNotIn("Traceback", "".join(simulator.lines))
+            self.setUp()
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_lockstep", disable_rostime=True)
+    sys.exit(rostest.rosrun("drone_sim", "lockstep", Lockstep))
