@@ -67,7 +67,8 @@ class Simulator:
     """A simulator as a process, with its lines of output."""
 
     def __init__(self, *arguments):
-        command = ["rosrun", "drone_sim", "simulator", FREE, f"_scene_file:={SCENE}", *arguments]
+        program = package_path() / "scripts/simulator"  # rosrun would look for it for seconds on a busy machine
+        command = [sys.executable, program, FREE, f"_scene_file:={SCENE}", *arguments]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
         self.process = subprocess.Popen(command, start_new_session=True, **pipes)
         self.lines, self._came = [], threading.Condition()
@@ -122,6 +123,8 @@ class Lockstep(unittest.TestCase):
         try:
             processes += [started(*node) for node in nodes]
             yield simulator, flight, processes
+        except AssertionError as error:
+            raise AssertionError(f"{error}\n{''.join(simulator.lines)}") from error
         finally:
             flight.close()
             end(*processes, number=signal.SIGKILL)

@@ -108,7 +108,7 @@ class Lockstep:
         self._open: dict[str, _Awaited] = {}  # by topic
         self._owed: dict[str, _Awaited] = {}  # answers to the end of the run before, which are ignored
         self._expected: dict[str, _Expected] = {}  # by topic
-        self._era = self._run = -1
+        self._topology_version = self._run = -1
         self._standing_since: float | None = None  # s, where time stands until nodes are connected
         self._connections: set[tuple[str, str]] = set()
         self._changed_at = 0.0  # s, when the connections changed
@@ -251,9 +251,9 @@ class Lockstep:
 
     def _follow(self) -> None:
         """Find the topics of the vehicles that fly now. Raises ParameterError for a trigger that there is not."""
-        if self._era == self._simulation.era:
+        if self._topology_version == self._simulation.topology_version:
             return
-        self._era, before = self._simulation.era, self._expected
+        self._topology_version, before = self._simulation.topology_version, self._expected
         found = [one for entry in self._parameters.wait_for for one in _expectations(entry, self._simulation.vehicles)]
         self._expected = {one.topic: before.get(one.topic, one) for one in found}
         with self._lock:
