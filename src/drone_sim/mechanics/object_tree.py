@@ -248,14 +248,16 @@ class ObjectTree:
 
     def _frame(self, moved: SceneObject, relative_to: int, base: bool) -> Matrix | None:
         """Return the transform world from the frame of reference, None for the world's."""
-        reference = None if relative_to == WORLD else moved.parent if relative_to == PARENT else self[relative_to]
+        if relative_to == WORLD:
+            return None
+        reference = moved.parent if relative_to == PARENT else self[relative_to]
         if reference is None:
             return None
         return reference.matrix() if base else reference.below()
 
     def turn(self, handle: int, relative_to: int = WORLD, base: bool = False) -> Matrix:
         """Return `matrix` with a correct rotation only; the translation may be 0, which saves time."""
-        if relative_to in (WORLD, PARENT):
+        if relative_to == WORLD or relative_to == PARENT:
             return self.matrix(handle, relative_to, base)
         reference = self[relative_to]
         return frames.relative_turn(reference.matrix() if base else reference.below(), self[handle].matrix())
@@ -267,7 +269,10 @@ class ObjectTree:
         """
         moved = self[handle]
         frame = self._frame(moved, relative_to, base)
-        matrix = matrix if frame is None else frames.multiply(frame, matrix)
+        self._place(moved, matrix if frame is None else frames.multiply(frame, matrix))
+
+    def _place(self, moved: SceneObject, matrix: Matrix) -> None:
+        """Place an object, with its descendants, in the world."""
         if not self._free_children:
             moved.put(matrix)
             return
@@ -291,7 +296,7 @@ class ObjectTree:
         frame = self._frame(moved, relative_to, base)
         x, y, z = position if frame is None else frames.transform(frame, position)
         m0, m1, m2, _, m4, m5, m6, _, m8, m9, m10, _ = moved.matrix()
-        self.set_matrix(handle, WORLD, (m0, m1, m2, x, m4, m5, m6, y, m8, m9, m10, z))
+        self._place(moved, (m0, m1, m2, x, m4, m5, m6, y, m8, m9, m10, z))
 
     def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None:
         """Give an object a new parent (WORLD: none); it keeps its pose in the world, or its local transform.

@@ -75,7 +75,9 @@ class VelocityMeter:
         if handle not in self._now:
             self._begin_to_measure(handle, matrix)
         before = self._before.get(handle)
-        return None if before is None or matrix != self._now[handle] else frames.relative_turn(before, matrix)
+        now = self._now[handle]
+        is_moved = matrix is not now and matrix != now
+        return None if before is None or is_moved else frames.relative_turn(before, matrix)
 
     def _begin_to_measure(self, handle: int, now: Matrix) -> None:
         """Measure one more object, as if its carrier had moved it through the last step."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from math import dist
 from typing import Any
 
 import pybullet
@@ -123,11 +125,12 @@ class Dynamics:
         # The simulation spends most of its time here. So names are local, PyBullet's arguments positional,
         # Wrench.torque_under is written out, and a body that has hardly rotated costs no call for its term w x Iw.
         client, cached, applied, term = self._client, self._cached, self._applied, self._gyroscopic_term
-        sums, slow = self.shape_forces.sums, SLOW * duration * duration / 4
+        sums, slow = self.shape_forces.sums, math.sqrt(SLOW) * duration / 2
         for count in range(1, steps + 1):
             for load in loads:
                 body, force, (torque_x, torque_y, torque_z), levers, moments, past = load
-                centre, attitude = cached[body][:2] if cached and body in cached else _pose_of(body, client)
+                known = cached.get(body) if cached else None
+                centre, attitude = known[:2] if known else _pose_of(body, client)
                 x, y, z, w = load[_PAST_ATTITUDE] = attitude
                 for lx, ly, lz, ax, ay, az in levers:
                     tx, ty, tz = y * lz - z * ly, z * lx - x * lz, x * ly - y * lx
@@ -143,13 +146,12 @@ class Dynamics:
                 _apply_torque(body, -1, (torque_x, torque_y, torque_z), _IN_WORLD, client)
                 if moments is not None:
                     if past is not None:
-                        px, py, pz, pw = past
-                        px, py, pz, pw = px - x, py - y, pz - z, pw - w
-                        if px * px + py * py + pz * pz + pw * pw < slow:  # this sum is at least sin² of half the angle
+                        if dist(past, attitude) < slow:  # this distance is at least the sine of half the angle
                             continue
                         torque = torque_of_turn(moments, past, attitude, duration)
                     else:
-                        torque = term.torque_of_velocity(moments, body, attitude, duration)
+                        velocity = known[3] if known else _velocity_of(body, client)[1]
+                        torque = term.torque_of_velocity(moments, attitude, velocity, duration)
                     if torque is not None:
                         _apply_torque(body, -1, torque, _ALONG_AXES, client)
             if applied:

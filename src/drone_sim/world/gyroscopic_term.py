@@ -61,8 +61,10 @@ class NoGyroscopicTerm:
     def begin_sub_step(self, duration: float) -> None:
         """Apply torques for the next PyBullet step of `duration` (s) to all bodies that Dynamics does not push."""
         for body, moments in self._unpushed.items():
-            torque = self.torque_of_velocity(moments, body, None, duration)
-            if torque is not None:
+            velocity = pybullet.getBaseVelocity(body, self._client)[1]
+            if _rotates(velocity):
+                attitude = pybullet.getBasePositionAndOrientation(body, self._client)[1]
+                torque = self._torque(moments, _in_frame(attitude, velocity), duration)
                 _apply_torque(body, -1, torque, _ALONG_AXES, self._client)
         if self._links:
             self._begin_sub_step_of_links(duration)
@@ -79,17 +81,10 @@ class NoGyroscopicTerm:
                     _apply_torque(body, number, torque, _ALONG_AXES, self._client)
 
     def torque_of_velocity(
-        self, moments: Vector, body: int, attitude: Quaternion | None, duration: float
+        self, moments: Vector, attitude: Quaternion, velocity: Vector, duration: float
     ) -> Vector | None:
-        """Return the torque on a root (N m, principal axes) from its velocity, None if it hardly rotates.
-
-        A known `attitude` saves a call of PyBullet.
-        """
-        velocity = pybullet.getBaseVelocity(body, self._client)[1]
-        if not _rotates(velocity):
-            return None
-        attitude = attitude or pybullet.getBasePositionAndOrientation(body, self._client)[1]
-        return self._torque(moments, _in_frame(attitude, velocity), duration)
+        """Return the torque on a root (N m, principal axes) with this angular velocity; None if it hardly rotates."""
+        return self._torque(moments, _in_frame(attitude, velocity), duration) if _rotates(velocity) else None
 
     def _torque(self, moments: Vector, velocity: Vector, _duration: float) -> Vector:
         """Return ω × Iω (N m), all along the principal axes."""

@@ -193,14 +193,14 @@ AXIS = GREYSCALE = CODED = CONSTANTS["handleflag_axis"]  # the same bit, which e
 BASE, WXYZ = CONSTANTS["handleflag_reljointbaseframe"], CONSTANTS["handleflag_wxyzquat"]
 METRES = ABSOLUTE = CONSTANTS["handleflag_depthbuffermeters"]  # ABSOLUTE: handleflag_abscoords
 RESET_FORCE, RESET_TORQUE = CONSTANTS["handleflag_resetforce"], CONSTANTS["handleflag_resettorque"]
-_FIRST_FLAG, _BEYOND_FLAGS = 1 << 20, 1 << 31
+FIRST_FLAG, _BEYOND_FLAGS = 1 << 20, 1 << 31  # a handle below FIRST_FLAG has no flags
 
 
 def bare(handle: int) -> int:
     """Return a handle without its flags."""
-    return int(handle) % _FIRST_FLAG if _FIRST_FLAG <= handle < _BEYOND_FLAGS else handle
+    return int(handle) % FIRST_FLAG if FIRST_FLAG <= handle < _BEYOND_FLAGS else handle
 
 
 def has(handle: int, flag: int) -> bool:
     """Tell whether a flag was added to a handle."""
-    return _FIRST_FLAG <= handle < _BEYOND_FLAGS and bool(int(handle) & flag)
+    return FIRST_FLAG <= handle < _BEYOND_FLAGS and bool(int(handle) & flag)

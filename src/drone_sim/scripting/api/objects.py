@@ -10,7 +10,17 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.scripting.api.calls import sim
-from drone_sim.scripting.api.constants import AXIS, BASE, CONSTANTS, RESET_FORCE, RESET_TORQUE, WXYZ, bare, has
+from drone_sim.scripting.api.constants import (
+    AXIS,
+    BASE,
+    CONSTANTS,
+    FIRST_FLAG,
+    RESET_FORCE,
+    RESET_TORQUE,
+    WXYZ,
+    bare,
+    has,
+)
 from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.matrices import unit
 from drone_sim.scripting.api.types import (
@@ -60,11 +70,16 @@ class Objects(Functions):
     def setObjectPosition(self, handle: Handle, relativeTo: Handle, position: ThreeNumbers = ()) -> None:
         """Move an object: (handle, relativeTo, position), or (handle, position, relativeTo) as in 4.x."""
         frame, place = _frame_and_values(relativeTo, position, 3)
-        self._objects.set_position(bare(handle), frame, place, has(handle, BASE))
+        if handle < FIRST_FLAG:
+            self._objects.set_position(handle, frame, place)
+        else:
+            self._objects.set_position(bare(handle), frame, place, has(handle, BASE))
 
     @sim("345")
     def getObjectOrientation(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the Euler angles of an object."""
+        if handle < FIRST_FLAG:
+            return list(frames.to_euler(self._objects.turn(handle, relativeTo)))
         return list(frames.to_euler(self._objects.turn(bare(handle), relativeTo, has(handle, BASE))))
 
     @sim("345")
@@ -110,12 +125,15 @@ class Objects(Functions):
         self._put(handle, frame, place)
 
     def _matrix(self, handle: int, frame: int) -> frames.Matrix:
-        if handle < BASE:  # most often, and often in a step
+        if handle < FIRST_FLAG:  # most often, and often in a step
             return self._objects.matrix(handle, frame)
         return self._objects.matrix(bare(handle), frame, has(handle, BASE))
 
     def _put(self, handle: int, frame: int, matrix: frames.Matrix) -> None:
-        self._objects.set_matrix(bare(handle), frame, matrix, has(handle, BASE))
+        if handle < FIRST_FLAG:
+            self._objects.set_matrix(handle, frame, matrix)
+        else:
+            self._objects.set_matrix(bare(handle), frame, matrix, has(handle, BASE))
 
     # ---- how they move
 
