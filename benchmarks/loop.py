@@ -10,6 +10,7 @@ from tqdm import tqdm
 
 from benchmarks.cores import one_core
 from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
@@ -53,8 +54,8 @@ def _row(name: str, times: list[float], share: float) -> Row:
     return {"name": name, "factor": STEP / median, **spread, "of_bare": share}
 
 
-def bare() -> Callable[[], None]:
-    """Return a step of the floor of any PyBullet drone: same body, four thrusts and torques, a step; nothing read."""
+def _drone_alone() -> tuple[int, int, list[Vector]]:
+    """Return PyBullet's client and body of a drone above its floor, and the places of its propellers."""
     world = World(STEP / SUB_STEPS, -9.81)
     settings = parameters.load()
     world.add_floor(settings.scene.floor.size, settings.scene.floor.texture)
@@ -64,7 +65,12 @@ def bare() -> Callable[[], None]:
         frames.position(simulation.drone.body.rigid.links[f"propeller_{place}"]) for place, _ in QUADRICOPTER.rotors
     ]
     simulation.close()
-    client = world._client  # the bare loop is the one thing that goes behind the world's back
+    return world._client, body, places  # the bare loops are the only ones that go behind the world's back
+
+
+def bare() -> Callable[[], None]:
+    """Return a step of the floor of any PyBullet drone: same body, four thrusts and torques, a step; nothing read."""
+    client, body, places = _drone_alone()
     thrust = [0.0, 0.0, 0.52 * 9.81 / 4]
 
     def step() -> None:
@@ -72,6 +78,21 @@ def bare() -> Callable[[], None]:
             for place, (_, turn) in zip(places, QUADRICOPTER.rotors):
                 pybullet.applyExternalForce(body, -1, thrust, place, pybullet.LINK_FRAME, client)
                 pybullet.applyExternalTorque(body, -1, [0, 0, turn * 0.01], pybullet.LINK_FRAME, client)
+            pybullet.stepSimulation(client)
+
+    return step
+
+
+def least() -> Callable[[], None]:
+    """Return a step of the PyBullet calls that each of our sub-steps needs: pose, force, torque, step."""
+    client, body, _ = _drone_alone()
+    thrust, torque = (0.0, 0.0, 0.52 * 9.81), (0.0, 0.0, 0.0)
+
+    def step() -> None:
+        for _ in range(SUB_STEPS):
+            centre, _ = pybullet.getBasePositionAndOrientation(body, client)
+            pybullet.applyExternalForce(body, -1, thrust, centre, pybullet.WORLD_FRAME, client)
+            pybullet.applyExternalTorque(body, -1, torque, pybullet.WORLD_FRAME, client)
             pybullet.stepSimulation(client)
 
     return step

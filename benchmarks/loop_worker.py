@@ -7,6 +7,7 @@ import statistics
 import sys
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
@@ -16,13 +17,21 @@ STEPS = 400  # timed at once
 LEG = 60  # steps that the drone flies one way
 
 
-def hover() -> Callable[[], None]:
-    """Return the step of a drone that hovers."""
-    return Simulation(parameters.load()).step
+class Flight(NamedTuple):
+    """A simulation, and a function that takes one step of it."""
+
+    simulation: Simulation
+    step: Callable[[], None]
 
 
-def turns() -> Callable[[], None]:
-    """Return the step of a drone that flies to and fro at up to 5 m/s, and turns at 1 rad/s."""
+def hover() -> Flight:
+    """Return the flight of a drone that hovers."""
+    simulation = Simulation(parameters.load())
+    return Flight(simulation, simulation.step)
+
+
+def turns() -> Flight:
+    """Return the flight of a drone that flies to and fro at up to 5 m/s, and turns at 1 rad/s."""
     simulation = Simulation(parameters.load())
     ways = [Twist(Vector3(x=speed), Vector3(z=1.0)) for speed in (5.0, -5.0)]
 
@@ -31,13 +40,14 @@ def turns() -> Callable[[], None]:
             simulation.drone.commands.receive(ways[simulation.steps // LEG % 2])
         simulation.step()
 
-    return step
+    return Flight(simulation, step)
 
 
-def wind() -> Callable[[], None]:
-    """Return the step of a drone that hovers in wind and gusts, with an IMU."""
+def wind() -> Flight:
+    """Return the flight of a drone that hovers in wind and gusts, with an IMU."""
     weather = {"wind": [2.0, 1.0, 0.0], "gusts": {"deviation": [0.5, 0.5, 0.2]}}
-    return Simulation(parameters.load({"weather": weather, "sensors": {"imu": {"kind": "imu", "rate": 200.0}}})).step
+    simulation = Simulation(parameters.load({"weather": weather, "sensors": {"imu": {"kind": "imu", "rate": 200.0}}}))
+    return Flight(simulation, simulation.step)
 
 
 FLIGHTS = {"hover": hover, "turns": turns, "wind": wind}
@@ -45,7 +55,7 @@ FLIGHTS = {"hover": hover, "turns": turns, "wind": wind}
 
 def main() -> None:
     """Time STEPS steps of the flight that is named for every line of the standard input; print the median (s)."""
-    step = FLIGHTS[sys.argv[1]]()
+    step = FLIGHTS[sys.argv[1]]().step
     for _ in range(LEG):
         step()
     print("ready", flush=True)

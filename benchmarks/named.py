@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import cockpit, fleet, grade, loop, node, remote, render, start
+from benchmarks import cockpit, fleet, grade, loop, node, phases, remote, render, start
 from benchmarks.cores import one_core
 
 Row = dict[str, Any]
@@ -23,6 +23,7 @@ BENCHMARKS: dict[str, Callable[[], list[Row]]] = {
     "render": _in_a_folder(render.compare),
     "growth": _in_a_folder(render.growth),
     "loop": loop.compare,
+    "phases": phases.measure,
     "start": start.measure,
     "node": node.measure,
     "fleet": fleet.measure,

@@ -257,7 +257,7 @@ class ObjectTree:
 
     def turn(self, handle: int, relative_to: int = WORLD, base: bool = False) -> Matrix:
         """Return `matrix` with a correct rotation only; the translation may be 0, which saves time."""
-        if relative_to == WORLD or relative_to == PARENT:
+        if relative_to in (WORLD, PARENT):
             return self.matrix(handle, relative_to, base)
         reference = self[relative_to]
         return frames.relative_turn(reference.matrix() if base else reference.below(), self[handle].matrix())

@@ -1,10 +1,11 @@
-"""Execution of one step (threads, actuation, dynamics, vision, sensing), and detection of divergence."""
+"""Execution of one step (scripts, forces, advance, read back, sense), and detection of divergence."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
 from drone_sim.mechanics.clock import Clock
+from drone_sim.mechanics.wrench import Wrench
 from drone_sim.run.simulation_setup import SimulationSetup
 from drone_sim.scene.scene_parameters import FloorParameters
 from drone_sim.scripting.script_log import LOG
@@ -94,37 +95,58 @@ class Stepper:
 
     def step(self, watch: Callable[[int], None] | None = None) -> None:
         """Run one step as Simulation.step documents."""
-        vehicles, carried = self.flying, self._context.carried
         if self._threaded or self._scripts.is_changed or self._weather_change_seen != self._context.weather.changes:
             self._begin_step()
+        self._actuate()
+        wrenches = self._sum_forces()
+        self._advance(wrenches, watch)
+        self._read_back()
+        self._sense()
+
+    # ---- phases
+
+    def _actuate(self) -> None:
+        """Let the scripts command the propellers, apply forces and place objects."""
         for script in self._unordered or self._scripts.all():
             script.actuation()
+
+    def _sum_forces(self) -> dict[int, Wrench]:
+        """Return the sum of each vehicle's forces, by body."""
         self._velocities.begin_step()
-        wrenches = dict(zip(self._bodies, map(Vehicle.wrench, vehicles)))
-        carries = carried.shapes or carried.bases
-        if carries:
+        return {number: vehicle.wrench() for number, vehicle in zip(self._bodies, self.flying)}
+
+    def _advance(self, wrenches: dict[int, Wrench], watch: Callable[[int], None] | None) -> None:
+        """Take the sub-steps, with the vehicles' forces and instruments that follow each of them."""
+        carried = self._context.carried
+        if carried.shapes or carried.bases:
             carried.follow()
         between = self._with_watch(watch) if self._in_sub_steps else watch
         self._world.advance(wrenches, self._sub_steps, between)
-        for vehicle in vehicles:
+
+    def _read_back(self) -> None:
+        """Read the vehicles' states; measure velocities, and check that the states are finite."""
+        carried = self._context.carried
+        for vehicle in self.flying:
             vehicle.body.refresh()
-        if carries:
+        if carried.shapes or carried.bases:
             carried.follow()
         self._velocities.end_step()
         self._clock.steps += 1
-        self._divergence_check.check(vehicles)
-        for vehicle in vehicles:
-            vehicle.take_pictures(self._clock.steps)
-        self._follow_scripts()
-        self._sense()
+        self._divergence_check.check(self.flying)
 
     def _sense(self) -> None:
+        """Take the pictures that are due, then let the scripts sense."""
+        for vehicle in self.flying:
+            vehicle.take_pictures(self._clock.steps)
+        self._follow_scripts()
         self._clock.is_sensing = True
         try:
             for script in self._unordered or self._scripts.all():
                 script.sensing()
         finally:
             self._clock.is_sensing = False
+
+    # ---- parts of phases
 
     def _follow_scripts(self) -> None:
         """Start and end scripts of objects that were added or removed."""
