@@ -73,6 +73,13 @@ def test_without_a_bend_or_a_curve_it_is_straight(points):
     assert path(points, count=15 if is_straight else 1).points == points
 
 
+@pytest.mark.parametrize(("pauses", "count"), [((0, 2, 0), 15 + 2), ((0, 2, 2), 3), ((2, 2, 0), 3)])
+def test_a_pause_that_differs_from_both_neighbours_makes_a_curve(pauses, count):
+    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)]
+    controls = [ControlPoint(Station(at, pause=pause), 0.5, 0.5, 15) for at, pause in zip(points, pauses)]
+    assert len(ControlledPath(("Way",), "", None, frames.IDENTITY, controls, PathRules()).points) == count
+
+
 def test_two_points_are_not_closed():
     assert path(CORNER[:2], closed=True).length == 1
 
@@ -146,6 +153,12 @@ def test_a_straight_line_has_y_up_and_x_up_where_it_says_so():
     assert axes(path(ends).at(1)) == [(-1, 0, 0), (0, 0, 1), (0, 1, 0)]
     assert axes(path(ends, orientation="x_up").at(1)) == [(0, 0, 1), (1, 0, 0), (0, 1, 0)]
     assert axes(path([(0, 0, 0), (0, 0, 1)]).at(0)) == [(0, -1, 0), (1, 0, 0), (0, 0, 1)]
+
+
+def test_a_line_that_falls_steeply_has_y_up_too_as_in_vrep():
+    _, y, z = axes(path([(0, 0, 0), (1, 0, -3)]).at(1))
+    assert z == pytest.approx((math.sqrt(0.1), 0, -3 * math.sqrt(0.1)))
+    assert y == pytest.approx((3 * math.sqrt(0.1), 0, math.sqrt(0.1)))
 
 
 def test_between_two_bends_y_turns_from_one_to_the_other():

@@ -127,6 +127,13 @@ def test_what_is_fast_is_held_and_does_not_rebound(space, thrown, onto, gap, spe
     assert min(np.array(one.linear_velocity) @ way for one in states) > -0.01 * speed
 
 
+def test_a_velocity_makes_pictures_outdated_because_exposures_show_it(space):
+    body = space.add_rigid_body(BODY, Pose((0.0, 0.0, 1.0)))
+    before = space.pictures.changes
+    space.set_velocity(body, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert space.pictures.changes != before
+
+
 def test_what_acts_in_a_sub_step_acts_through_all_of_its_parts(space):
     """A body that slides along a wall is fast and near something: its sub-steps are divided."""
     space.add_object(Box((0.1, 100.0, 4.0)), Pose((0.16, 0.0, 2.0)))

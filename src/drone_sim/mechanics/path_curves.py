@@ -92,7 +92,7 @@ def _corner(previous: ControlPoint, point: ControlPoint, following: ControlPoint
 
 
 def _is_curved(before: Station, mid: Station, after: Station) -> bool:
-    """Return whether direction, orientation or pause change differently before and after a point."""
+    """Return whether direction or orientation change differently before and after a point, or the pause in both."""
     legs = [[b - a for a, b in zip(*two)] for two in ((before.position, mid.position), (mid.position, after.position))]
     lengths = [math.hypot(*leg) for leg in legs]
     if min(lengths) > 0 and _dot(*legs) < _STRAIGHT * lengths[0] * lengths[1]:
@@ -101,7 +101,7 @@ def _is_curved(before: Station, mid: Station, after: Station) -> bool:
         axes = [_axis(_rotation(before.turn, mid.turn)), _axis(_rotation(mid.turn, after.turn))]
         if _dot(*axes) < _SAME_AXIS:
             return True
-    return before.pause != mid.pause != after.pause
+    return before.pause != mid.pause and mid.pause != after.pause
 
 
 def _without_repeats(stations: Sequence[Station]) -> list[Station]:

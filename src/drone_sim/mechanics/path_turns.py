@@ -105,7 +105,7 @@ def _frame(z: Vector, side: Vector) -> Quaternion:
 
 
 def _side_of_straight_line(ahead: Vector) -> Vector:
-    return _Z_AXIS if ahead[2] < _STEEP else _X_AXIS
+    return _Z_AXIS if ahead[2] < _STEEP else _X_AXIS  # in V-REP, too, only a line that climbs steeply has x
 
 
 def _are_parallel(a: Vector, b: Vector, least: float) -> bool:

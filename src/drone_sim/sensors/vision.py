@@ -133,7 +133,7 @@ class Vision:
 
     @contextmanager
     def taking(self) -> Iterator[Renderer | None]:
-        """Count an image and its rendering time; yield the renderer, None without OpenGL."""
+        """Count an image and its rendering time, unless it fails; yield the renderer, None without OpenGL."""
         self._open()
         start = time.perf_counter()
         self._rotate_blades()

@@ -206,7 +206,7 @@ class Pictures:
         return self._parts[body]
 
     def _shapes_of(self, body: int, rows: Sequence[Sequence[Any]]) -> list[tuple[DrawnShape, str]]:
-        if body in self._shapes:  # a link without any has only visuals that PyBullet makes up
+        if body in self._shapes:  # PyBullet reports the visuals of a link in the order in which it was given them
             remaining = {link: list(looks) for link, looks in self._shapes[body].items()}
             return [remaining[row[1]].pop(0) for row in rows]
         texture = self._textures.get(body, "")

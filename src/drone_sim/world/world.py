@@ -261,7 +261,7 @@ class World:
         arm = turned(self.state(body).orientation, self._inertial_frames[body][0].position)
         velocity = [a + b for a, b in zip(linear, cross(angular, arm))]
         pybullet.resetBaseVelocity(body, velocity, angular, self._client)
-        self._dynamics.moved(body)
+        self._forget_motion_of(body)
 
     def part(self, body: int) -> None:
         """End all contacts of a body by moving it far up: Bullet would keep them wherever else it is placed."""
