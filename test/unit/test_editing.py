@@ -549,3 +549,13 @@ def test_a_vehicle_is_no_model(editor, tmp_path):
     vehicle = editor.simulation.object_handles["Drone"]
     with pytest.raises(ValueError, match="'Drone' is part of a vehicle"):
         editor.answer({"save_model": vehicle, "file": str(tmp_path / "model.yaml")})
+
+
+def test_a_pace_set_after_an_edit_in_flight_stays(editor):
+    simulation = editor.simulation
+    simulation.start()
+    edit(editor, {"do": "set", "object": "Floor", "values": {"size": 7}})
+    simulation.set_pace(2.5)
+    simulation.stop()
+    assert simulation.parameters.real_time_factor == 2.5
+    assert simulation.parameters.scene.floor.size != 7

@@ -49,6 +49,15 @@ class Snapshot(NamedTuple):
     restore: Restore
 
 
+class InitialScene(NamedTuple):
+    """What stop restores: parameters, object handles, and the scene file's text and settings."""
+
+    parameters: Parameters
+    handles: Handles = NO_HANDLES
+    restore_document: Restore = lambda: None
+    is_edited: bool = False  # whether it was edited while stopped: the next start does not read the scene file
+
+
 class Simulation:
     """A world, the vehicles in it, and the clock that counts steps.
 
@@ -93,9 +102,7 @@ class Simulation:
             load_script=load_script,
         )
         self.scenes_read = 0  # number of times that a scene was loaded from a file or the parameters
-        self._handles = NO_HANDLES  # of the objects in the initial scene
-        self._is_edited = False  # whether the initial scene was edited and differs from the scene file
-        self._original: Parameters | None = None  # what stop restores after `apply_in_flight` in this run
+        self._initial = InitialScene(parameters)
         self.run = 0  # run number, incremented by every start and stop
         self.topology_version = 0  # incremented by every start and stop, and when vehicles are added or removed
         flying_scripts = [script_of(vehicle, parameters, script) for vehicle in parameters.fleet]
@@ -180,8 +187,7 @@ class Simulation:
         change if the cleanup of a removed one fails.
         """
         parameters = self.parameters.with_vehicles(entries)
-        if self._is_edited or self._original:
-            parameters = parameters.varied(self.parameters.weather, self.parameters.scene, parameters.fleet)
+        parameters = parameters.varied(self.parameters.weather, self.parameters.scene, parameters.fleet)
         wanted = {vehicle.name: vehicle for vehicle in parameters.fleet}
         added = [name for name in wanted if name not in self.vehicles]
         removed = [name for name in self.vehicles if name not in wanted]
@@ -196,14 +202,16 @@ class Simulation:
                 self.topology_version += 1
                 self._stepper.refresh_vehicles()
         self.parameters = parameters
-        if self._original:
-            self._original = parameters.varied(self._original.weather, self._original.scene, parameters.fleet)
+        initial = self._initial.parameters
+        initial = parameters.varied(initial.weather, initial.scene, parameters.fleet)
+        self._initial = self._initial._replace(parameters=initial)
         raise_first(errors)
         return added, removed
 
     def set_pace(self, factor: Any) -> None:
         """Set the real-time factor, which persists across starts. Raises ParameterError."""
         self.parameters = self.parameters.at_pace(factor)
+        self._initial = self._initial._replace(parameters=self._initial.parameters.at_pace(factor))
 
     # ---- start and stop
 
@@ -214,8 +222,8 @@ class Simulation:
         stay, stopped. Raises ParameterError, UrdfError, ScriptError.
         """
         self.stop()
-        if scene_file is None and self._is_edited:
-            self._rebuild(self.parameters, self._handles)
+        if scene_file is None and self._initial.is_edited:
+            self._rebuild(self.parameters, self._initial.handles)
         else:
             self._load_scene(self.parameters.scene_file if scene_file is None else scene_file)
         give_back_memory()
@@ -230,7 +238,7 @@ class Simulation:
         self._rebuild(self.parameters.in_scene(scene_file), NO_HANDLES)
         self._warn_of_unsupported()
         self.document = SceneDocument(self.parameters, self.object_handles)
-        self._is_edited = False
+        self._initial = self._initial._replace(is_edited=False)
         self.scenes_read += 1
 
     def _warn_of_unsupported(self) -> None:
@@ -247,10 +255,11 @@ class Simulation:
         Without `rebuild`, the world changes at the next start. Raises ParameterError and UrdfError, without a change.
         """
         if rebuild:
-            self._handles = self.tree.handles().with_those_of(self._handles)
-            self._rebuild(parameters, self._handles)
+            handles = self.tree.handles().with_those_of(self._initial.handles)
+            self._rebuild(parameters, handles)
+            self._initial = self._initial._replace(handles=handles)
         self.parameters = parameters
-        self._is_edited = True
+        self._initial = self._initial._replace(is_edited=True)
 
     def apply_settings(self, settings: Settings) -> None:
         """Change all but objects and scripts to `settings`, which are as in a scene file.
@@ -285,7 +294,6 @@ class Simulation:
         return result.varied(result.weather, scene, result.fleet)
 
     def _apply_in_flight(self, parameters: Parameters) -> None:
-        self._original = self._original or self.parameters
         self.scene.is_changed = True
         if apply_in_flight(self._setup, self.parameters, parameters, self.script):
             self.topology_version += 1
@@ -295,8 +303,8 @@ class Simulation:
 
     def load_scripts(self) -> None:
         """Load the scripts of a simulation that has none loaded, and run their init. Raises ScriptError."""
-        self._handles = self.tree.handles()
-        self._restore_document = self.document.save_state()
+        handles, restore_document = self.tree.handles(), self.document.save_state()
+        self._initial = InitialScene(self.parameters, handles, restore_document, self._initial.is_edited)
         self.running = True
         self._setup.load_scripts(self._setup.scripts.all(), self.script)
         self._stepper.list_scripts()
@@ -306,13 +314,13 @@ class Simulation:
 
         Changes of objects in flight are undone; changes made while stopped become the initial scene.
         """
-        if self.scene.is_changed and not self.running:
-            self._handles, self._is_edited = self.tree.handles(), True
+        if self.running:
+            self.parameters = self._initial.parameters
+            self._initial.restore_document()
+        elif self.scene.is_changed:
             before, scene = self.parameters, self.scene.parameters_now()
             self.parameters = before.varied(before.weather, scene, before.fleet)
-        if self.running:
-            self._restore_document()
-        self.parameters, self._original = self._original or self.parameters, None
+            self._initial = self._initial._replace(handles=self.tree.handles(), is_edited=True)
         try:
             self._clean_up()
         finally:
@@ -326,7 +334,7 @@ class Simulation:
         """Rebuild the initial scene; return whether that was possible, as its files may be missing now."""
         self.clock.steps = 0  # the new setup must begin at time 0
         try:
-            self._rebuild(self.parameters, self._handles)
+            self._rebuild(self.parameters, self._initial.handles)
         except ValueError as error:
             LOG.error("the scene could not be restored and stays as the flight left it; `start` tries again: %s", error)
             return False
@@ -346,7 +354,8 @@ class Simulation:
 
     def read_at_start(self) -> None:
         """Discard edits made while stopped: the next start reads the scene file again."""
-        self._is_edited = self.scene.is_changed = False
+        self._initial = self._initial._replace(is_edited=False)
+        self.scene.is_changed = False
 
     # ---- stepping
 
