@@ -7,7 +7,7 @@ import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
-GOAL, GAIN = (1.0, 0.5, 1.5), 0.8  # m, 1/s
+GOAL, GAIN = (1.0, 0.5, 1.5), 0.4  # m, 1/s
 
 rospy.init_node("sleeping")
 heard = queue.Queue()

@@ -2,6 +2,7 @@
 """Steps that wait for nodes: the same flight every time, whatever becomes of the nodes."""
 
 import contextlib
+import importlib.util
 import os
 import signal
 import subprocess
@@ -18,14 +19,38 @@ from diagnostic_msgs.msg import DiagnosticArray
 from ending import HANGS, end
 from listening import Listener
 from nav_msgs.msg import Odometry
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from drone_sim.files.resources import package_path
+from drone_sim.grading import plan as plans
+from drone_sim.ros.grading.grade_live import grade
+from drone_sim.ros.grading.simulator import Mismatch
 
 NODES = package_path() / "docs/lockstep"
 OTHER = Path(__file__).with_name("lockstep_node.py")
 SMALL = "cameras: {front: {width: 64, height: 48, every: 4}}\n"
 SCENE = "package://drone_sim/config/scenes/gates.yaml"
+PLAN = """
+duration: 4
+lockstep: true
+spread: {position: [0.2, 0.2, 0], yaw: 0.2}
+timeline:
+  - {at: 1, push: {force: [0, 0, 1], duration: 0.2}}
+  - {at: 2, weather: {wind: [0, 1, 0], gusts: {deviation: [0.1, 0, 0]}}}
+criteria: [{kind: attitude, at_most: 1, points: 1}]
+"""
+EPISODES = """
+import numpy as np
+from gym_ros_env import FlyTo
+environment = FlyTo()
+for _ in range(2):
+    observation, _ = environment.reset(seed=7)
+    ends, steps = False, 0
+    while not ends:
+        observation, _, is_there, is_late, _ = environment.step(np.clip(0.4 * observation[:3], -0.5, 0.5))
+        ends, steps = is_there or is_late, steps + 1
+    print(steps, is_there, *map(repr, observation))
+"""
 FIRST = 5 * 10**7  # ns, the first stamp
 SECONDS = 4.0  # s of simulated time
 FREE = "_real_time_factor:=0"
@@ -243,6 +268,53 @@ class Lockstep(unittest.TestCase):
                 self.assertEqual(simulator.process.wait(HANGS), 1)
                 self.assertNotIn("Traceback", "".join(simulator.lines))
             self.setUp()
+
+    def test_a_graded_flight_with_a_timeline_has_the_same_digest_every_time(self):
+        file = Path(self.folder.name) / "plan.yaml"
+        file.write_text(PLAN + f"scene: {SCENE}\nconfig: {{{SMALL.strip()}}}\n")
+        plan = plans.read(file)
+        results = []
+        for _ in range(2):
+            with self.flying(COMMANDS, nodes=[(NODES / "reacting.py",)]) as (simulator, _, _):
+                simulator.wait_for("in step with")
+                results.append(grade(plan, 1, "reacting", "drone_sim", HANGS)[0])
+            self.setUp()
+        self.assertIsNone(results[0].error)
+        self.assertEqual(results[0].digest, results[1].digest)
+        self.assertEqual(results[0], results[1])
+        with self.flying() as (simulator, _, _):
+            simulator.wait_for("flying")
+            with self.assertRaisesRegex(Mismatch, "start the simulator with lockstep:=cmd_vel"):
+                grade(plan, 1, "", "drone_sim", HANGS)
+
+    def test_steps_by_hand_in_step_with_a_node(self):
+        with self.flying(COMMANDS, nodes=[(NODES / "reacting.py",)]) as (simulator, flight, _):
+            simulator.wait_for("in step with")
+            flown = flight.until(SECONDS)
+            call = {name: rospy.ServiceProxy(f"/drone_sim/{name}", Trigger) for name in ("restart", "step")}
+            pause = rospy.ServiceProxy("/drone_sim/pause", SetBool)
+            self.assertTrue(pause(True).success)
+            rospy.set_param("/drone_sim/step_count", 0)
+            self.assertIn("step_count = 0: must be a whole number from 1 to 1000000", call["step"]().message)
+            rospy.set_param("/drone_sim/step_count", 20)
+            before = flight.rows[-1][0]
+            for number in (1, 2):
+                self.assertEqual(call["step"]().message, f"t = {before * 1e-9 + number:.2f} s")
+                flight.until(before * 1e-9 + number)
+            stepped = flight.until(before * 1e-9 + 2)
+            self.assertEqual(len({row[0] for row in stepped}), round(before / FIRST) - 1 + 40)
+            self.assertEqual(stepped[: len(flown)], flown)
+
+    @unittest.skipUnless(importlib.util.find_spec("gymnasium"), "needs gymnasium, of requirements-dev.txt")
+    def test_a_gymnasium_environment_over_ros_is_repeatable(self):
+        with self.flying(STAMPED) as (simulator, _, _):
+            simulator.wait_for("flying")
+            command = [sys.executable, "-c", EPISODES]
+            said = [subprocess.run(command, cwd=NODES, capture_output=True, text=True, timeout=HANGS) for _ in range(2)]
+        self.assertEqual([one.returncode for one in said], [0, 0], said)
+        episodes = "".join(one.stdout for one in said).splitlines()
+        self.assertEqual((len(episodes), len(set(episodes))), (4, 1), episodes)
+        self.assertIn("True", episodes[0])
 
 
 if __name__ == "__main__":

@@ -126,7 +126,8 @@ def test_the_simulation_pauses_after_the_step_in_which_a_line_is_reached(begin, 
     assert reached.time == pytest.approx(2 * simulation.clock.time_step)
     assert table(reached.scopes)["locals"]["before"] == "2", "as it was at that line"
     assert row(reached.scopes, "count").value == "2" and row(variables_of(simulation), "count").value == "13"
-    player.one_step()
+    player.order_steps(1)
+    player.step()
     assert simulation.breakpoints.reached.time == pytest.approx(3 * simulation.clock.time_step)
     simulation.set_breakpoints({})
     player.pause(False)

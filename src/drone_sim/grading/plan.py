@@ -18,6 +18,7 @@ from drone_sim.config.types import (
     Label,
     Name,
     ParameterError,
+    Switch,
     Within,
     merged,
     named_in,
@@ -79,6 +80,7 @@ class Plan(Checked):
     vehicle: Label = ""
     duration: Annotated[Finite, Within(1e-3, MAX_DURATION)]  # s
     seeds: Annotated[int, Within(1, MAX_SEEDS)] = 1
+    lockstep: Switch = False  # a live flight waits in each step for the nodes that fly
     spread: Randomization = Randomization()
     timeline: Annotated[list[Any], Field(max_length=MAX_ENTRIES)] = Field(default_factory=list)
     allowed: Annotated[list[Literal["move", "push", "change"]], Field(max_length=3)] = Field(

@@ -46,6 +46,7 @@ from drone_sim.vrep_files.model import SUFFIXES, VrepFileError
 
 MAX_SUB_STEPS = 1000
 MAX_VEHICLES = 256
+MAX_STEP_COUNT = 1_000_000
 _SPACING = 1.0  # m, between two vehicles in a row
 
 
@@ -77,7 +78,8 @@ class Parameters(PaceParameters, EquipmentParameters):
     config: FileName
     gui: Switch
     script_time_limit: Annotated[Finite, Within(0.01, 1e4, or_zero=True)]
-    step_count: Annotated[int, Within(1, 1_000_000)]
+    timeline_file: FileName
+    step_count: Annotated[int, Within(1, MAX_STEP_COUNT)]
     lockstep: LockstepParameters
     remote_api: RemoteApiParameters
     time_step: Annotated[Finite, Within(1e-4, 1)]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
 
 from drone_sim.run.simulation import Simulation
 from drone_sim.run.stepping import Diverged
@@ -12,6 +14,14 @@ from drone_sim.scripting.errors import ScriptError
 
 _LOG = logging.getLogger(__name__)
 _LOG.setLevel(logging.INFO)
+
+
+@dataclass
+class _Order:
+    """Steps that are to be run while the simulation is paused."""
+
+    left: int
+    answer: Future[str] = field(default_factory=Future)  # the simulated time after the last step, in words
 
 
 class Player:
@@ -29,6 +39,7 @@ class Player:
         self.paused = False
         self.begun = False  # whether it has started since this was last set to False
         self.failure: ScriptError | Diverged | None = None  # the error that ended the last run, if one did
+        self._order: _Order | None = None
         self._simulated_time = simulated_time
         self._tell = tell
         self._last_state = ""
@@ -57,8 +68,14 @@ class Player:
         """Whether it is running and not paused, so that steps are due."""
         return self.simulation.running and not self.paused
 
+    @property
+    def is_step_due(self) -> bool:
+        """Whether a step is to be run: it is playing, or paused with ordered steps left."""
+        return self.playing or self._order is not None
+
     def start(self, scene_file: str | None = None) -> str:
         """Read scene and scripts from disk and begin at time 0. Raises as Simulation.start, and is then stopped."""
+        self._cancel_order()
         self.paused, self.failure = False, None
         self.attempt(lambda: self.simulation.start(scene_file))
         self.simulation.look()  # reads meshes and textures now, which would delay the first step
@@ -72,6 +89,7 @@ class Player:
         """Run the scripts' cleanup, and restore the initial scene. Raises ScriptError."""
         if not self.simulation.running:
             return "already stopped"
+        self._cancel_order()
         try:
             self.simulation.stop()
         finally:
@@ -92,6 +110,7 @@ class Player:
         """Pause or resume. Raises ValueError when stopped."""
         if not self.simulation.running:
             raise ValueError("the simulation is stopped: start it first")
+        self._cancel_order()
         self.paused = on
         self._publish_state()
         if on:
@@ -100,19 +119,39 @@ class Player:
             _LOG.info("resumed")
         return f"{'paused' if on else 'resumed'} at t = {self.simulation.time:.2f} s"
 
-    def one_step(self) -> str:
-        """Run one step while paused. Raises ValueError if it is not paused, ScriptError and Diverged."""
+    def order_steps(self, count: int) -> Future[str]:
+        """Have `step` run `count` steps while paused; return their answer, which may be a ScriptError or Diverged.
+
+        Raises ValueError if it is not paused, or earlier ordered steps are not done.
+        """
         if not self.simulation.running or not self.paused:
             raise ValueError("the simulation is not paused: call `pause` before `step`")
-        self.attempt(self._step)
-        return f"t = {self.simulation.time:.2f} s"
+        if self._order is not None:
+            raise ValueError(f"{self._order.left} steps of an earlier call are still to be run")
+        self._order = _Order(count)
+        return self._order.answer
+
+    def _cancel_order(self, error: Exception | None = None) -> None:
+        order, self._order = self._order, None
+        if order is not None:
+            order.answer.set_exception(error or ValueError(f"interrupted: {order.left} steps have not been run"))
+
+    def _count_ordered(self) -> None:
+        order = self._order
+        if order is not None:
+            order.left -= 1
+            if order.left == 0 or self.simulation.breakpoints.reached is not None:
+                self._order = None
+                order.answer.set_result(f"t = {self.simulation.time:.2f} s")
 
     def step(self) -> bool:
         """Run one step. If a script fails or the dynamics diverges, log it once, stop, and return False."""
         try:
             self.attempt(self._step)
-        except (ScriptError, Diverged):
+        except (ScriptError, Diverged) as error:
+            self._cancel_order(error)
             return False
+        self._count_ordered()
         self._pause_at_breakpoint()
         request = self.simulation.context.control.take()
         return not request or self._execute_request(request)

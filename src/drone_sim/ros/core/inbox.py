@@ -9,12 +9,13 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, wait
 from functools import partial
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:  # it imports rospy, which this file does without
     from drone_sim.ros.core.intervention import Intervention
 
 Gate = Callable[[str, Callable[[Any], None]], Callable[[Any], None]]  # of a topic and its callback, its new callback
+_Answer = TypeVar("_Answer")
 _LOG = logging.getLogger(__name__)
 _PATIENCE = 30.0  # s; a step, or a scene that is read anew, takes far less
 
@@ -68,12 +69,12 @@ class Inbox:
         finally:
             self._executing = 0
 
-    def ask(self, job: Callable[[], str], intervention: Intervention | None = None) -> str:
+    def ask(self, job: Callable[[], _Answer], intervention: Intervention | None = None) -> _Answer:
         """Leave a job, wait until it is done, and return its answer; raises what it raised.
 
         Raises TimeoutError where the answer does not come in time; a job that has not begun by then never will.
         """
-        answer: Future[str] = Future()
+        answer: Future[_Answer] = Future()
 
         def carry_out() -> None:
             if answer.set_running_or_notify_cancel():

@@ -80,7 +80,12 @@ def parameters_of(name: str, **others: Any) -> Parameters:
         values = given.get(group)
         if isinstance(values, dict) and values.get(argument) == NOT_GIVEN:
             given[group] = {key: value for key, value in values.items() if key != argument}
-    for key, read in (("config", from_shell), ("script", script_from_shell), ("scene_file", from_shell)):
+    for key, read in (
+        ("config", from_shell),
+        ("script", script_from_shell),
+        ("scene_file", from_shell),
+        ("timeline_file", from_shell),
+    ):
         if isinstance(given.get(key), str):
             names = given[key].split(",") if key == "config" else [given[key]]
             given[key] = ",".join(map(read, names))

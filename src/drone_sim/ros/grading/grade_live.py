@@ -43,6 +43,7 @@ from drone_sim.scene.scene_parameters import find_files_beside
 _NAME = "grade_live"
 _XML = "--gtest_output=xml:"  # by which rostest says where it looks for the result
 _SILENT, _STANDS = 1.0, 10.0  # s of real time without a step: what is stopped has ended, whatever else waits longer
+_STANDS_IN_LOCKSTEP = 90.0  # s: more than lockstep/start_timeout and lockstep/timeout usually are
 _LOOK, _LAST = 0.05, 0.3  # s of real time, between two looks; for the last messages to come
 _PATIENCE = 30.0  # s of real time
 _IN_TIME, _LATE = 1e-6, 2.0  # s of simulated time: the timeline's own puts come some steps late on a busy machine
@@ -115,7 +116,7 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
     if flown is None:
         return flight.ungraded(plan, script, seed, {}, error or "nothing was heard of the flight"), None
     late = steps_late(plan.timeline_of(parameters).of(plan.vehicle_of(parameters)), flown.rows, parameters.time_step)
-    if late:
+    if late and not plan.lockstep:
         rospy.logwarn(f"the timeline came up to {late} steps late: a lower real_time_factor gives it more time")
     flown, put = live.within_rules(flown)
     if flown is None:
@@ -139,7 +140,9 @@ class _Live:
         simulator.check_seed(wanted, self._scene)
         self._begin = next(one.position for one in wanted.fleet if one.name == plan.vehicle_of(wanted))
         self._timeline = plan.timeline_of(wanted)
-        self._sender = TimelineSender(self._timeline.entries, parameters, simulator.node)
+        self._timeline_file = seeds.timeline_file(plan) if plan.lockstep else ""
+        # In lockstep no message may come by chance a step later: the simulator itself executes the timeline.
+        self._sender = TimelineSender([] if plan.lockstep else self._timeline.entries, parameters, simulator.node)
         self.listener = FlightListener(plan, parameters, simulator.node, self._follow)
         self.rules = LiveRules(plan, simulator.node)
 
@@ -162,7 +165,7 @@ class _Live:
             self.listener.clear()
             self.rules.clear()
             self._started = True
-            self._simulator.start(self._scene)
+            self._simulator.start(self._scene, self._timeline_file)
             ended = self._wait()
             self._over.set()
             if rospy.is_shutdown():
@@ -190,7 +193,7 @@ class _Live:
                 return self._simulator.error or f"the simulation was stopped at {now:.2f} s"
             if self._simulator.state == "paused" and CHANGE not in self._plan.allowed:
                 return f"somebody has paused the simulation at {now:.2f} s; the plan does not allow that"
-            if waited > _STANDS:
+            if waited > (_STANDS_IN_LOCKSTEP if self._plan.lockstep else _STANDS):
                 return f"the simulation stands still at {now:.2f} s, {self._simulator.state}"
         return ""
 

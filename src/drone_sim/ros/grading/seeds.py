@@ -16,10 +16,19 @@ def scene_file(plan: Plan, seed: int) -> str:
     """Return a scene file in which a flight of a seed begins; of seed 0 the plan's own. Raises OSError."""
     if not seed:
         return plan.parameters().scene_file
+    return _written(f"{plan.name}-{seed}.yaml", _content(plan.parameters(seed)))
+
+
+def timeline_file(plan: Plan) -> str:
+    """Return a file with the timeline of a plan, '' for none. Raises OSError."""
+    return _written(f"{plan.name}-timeline.yaml", plan.timeline) if plan.timeline else ""
+
+
+def _written(name: str, content: Any) -> str:
     folder = cache_path() / "grading" / "seeds"
     folder.mkdir(parents=True, exist_ok=True)
-    path = Path(folder, f"{plan.name}-{seed}.yaml")  # stays: the simulator may be started in it once more
-    writing.write(path, dump(_content(plan.parameters(seed))))
+    path = Path(folder, name)  # stays: the simulator may be started with it once more
+    writing.write(path, dump(content))
     return str(path)
 
 

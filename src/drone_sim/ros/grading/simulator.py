@@ -22,7 +22,10 @@ from drone_sim.run.parameters import Parameters
 _LOOK = 0.05  # s of real time, between two looks
 _MOST = 3  # differences in a message
 # What a plan says nothing of, or what is brought about by other means.
-_OTHER = ("config", "gui", "script", "script_time_limit", "real_time_factor", "remote_api", "scene_file", "samples")
+_OTHER = (
+    *("config", "gui", "script", "script_time_limit", "real_time_factor", "remote_api", "scene_file", "samples"),
+    *("lockstep", "step_count", "timeline_file"),
+)
 _SCRIPT_ERROR = "script error: "
 
 
@@ -64,7 +67,9 @@ class GradedSimulator(Simulator):
         if [*running.vehicles] == [*wanted.vehicles] == [wanted.drone.name]:
             # Who flies is told there, with its place in the scene that is flown in now: the plan's may have another.
             running = parameters_of(self.node, scene_file=wanted.scene_file, vehicles=0)
-        if plan.timeline and not self._factor():
+        if plan.lockstep and not running.lockstep.wait_for:
+            raise Mismatch("the plan says lockstep: true: start the simulator with lockstep:=cmd_vel")
+        if plan.timeline and not plan.lockstep and not self._factor():
             raise Mismatch("real_time_factor = 0: without a pace, a timeline by topics is too late; 1 to 5 works well")
         found = [one for one in _differences(wanted.model_dump(), running.model_dump(), ()) if one]
         if found:
@@ -87,15 +92,21 @@ class GradedSimulator(Simulator):
             raise Mismatch(f"no simulator {self.node} publishes its real_time_factor") from None
         return float(decode_config(message)["real_time_factor"])
 
-    def start(self, scene: str) -> None:
-        """Start anew, in the scene of a file, '' for that of the parameters. Raises Mismatch."""
+    def start(self, scene: str, timeline: str = "") -> None:
+        """Start anew, in the scene of a file, '' for that of the parameters. Raises Mismatch.
+
+        The simulator itself executes the entries in the file `timeline`.
+        """
         self.error = ""
-        before = self.parameter("scene_file", "")
-        self.set_parameter("scene_file", scene)
+        files = {"scene_file": scene, "timeline_file": timeline}
+        before = {name: self.parameter(name, "") for name in files}
+        for name, file in files.items():
+            self.set_parameter(name, file)
         try:
             self._call("load_scene")
         finally:
-            self.set_parameter("scene_file", before)
+            for name, file in before.items():
+                self.set_parameter(name, file)
 
     def stop(self) -> None:
         """Stop, which runs the script's cleanup. Raises Mismatch."""

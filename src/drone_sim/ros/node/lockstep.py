@@ -25,6 +25,7 @@ from drone_sim.vehicles.vehicle import Vehicle
 _CLOCK = "/clock"
 _BY_STAMP = "/cmd_vel_stamped"  # the end of the topic whose messages name the stamp that they answer
 _SETTLED, _INDIRECT = 0.5, 1.5  # s of real time without a new connection; if another node than the sender is triggered
+_SHORTEST = 0.1  # s of real time in which nodes that sleep see the first time of a run
 _QUIET = 10.0  # s, between two warnings of the same kind
 
 Take = Callable[[Any], None]
@@ -183,7 +184,8 @@ class Lockstep:
     def _begin_run(self) -> None:
         self._run = self._simulation.run
         with self._lock:
-            self._owed = {name: one for name, one in self._open.items() if not one.has_arrived}
+            plain = {name: one for name, one in self._open.items() if not name.endswith(_BY_STAMP)}
+            self._owed = {name: one for name, one in plain.items() if not one.has_arrived}
             self._open = {}
         for expected in self._expected.values():
             expected.triggers = 0
@@ -214,7 +216,7 @@ class Lockstep:
     # ---- nodes that are to connect
 
     def _stand(self) -> None:
-        self._standing_since = self._changed_at = time.monotonic()
+        self._standing_since = time.monotonic()
         self._throttle = Throttle(_QUIET)
 
     def _are_nodes_there(self) -> bool:
@@ -227,7 +229,9 @@ class Lockstep:
         is_direct = all(map(_is_direct, self._expected.values()))
         with self._lock:
             self._owed = {name: one for name, one in self._owed.items() if now - one.since < self._parameters.timeout}
-        if not (missing or self._owed) and now - self._changed_at > (_SETTLED if is_direct else _INDIRECT):
+        has_settled = now - self._changed_at > (_SETTLED if is_direct else _INDIRECT)
+        has_shown_time = self._standing_since is not None and now - self._standing_since > _SHORTEST
+        if has_settled and has_shown_time and not (missing or self._owed):
             self._standing_since = None
             rospy.loginfo(f"lockstep: {self._simulation.time:.2f} s: in step with {self._nodes()}")
             return True

@@ -144,6 +144,7 @@ class Node:
             rospy.loginfo(f"drone_sim: the remote API listens on {self._outside.address}")
         else:
             with contextlib.suppress(ScriptError):  # said already; the node waits for `start`
+                self._services.read_timeline()
                 self.player.start()
             self._topics.follow()  # so that cameras see the first step
         gc.collect()
@@ -176,6 +177,9 @@ class Node:
             self._process_requests()
             self._pacer.excuse()  # the node may take as long as it needs
             return False
+        if self.player.paused:  # steps that were ordered have no pace
+            self._pacer.excuse()
+            return True
         if self._pacer.is_far:  # at such a pace, who asks for something is not to wait for the step
             self._inbox.wait(_SOON)
             self._process_requests()
@@ -186,7 +190,7 @@ class Node:
         return True
 
     def _is_running(self) -> bool:
-        return self.player.playing and not self._outside.holds
+        return self.player.is_step_due and not self._outside.holds
 
     def _reset_pacing(self) -> None:
         """Do not count a step as late if it came late because the simulation stood still."""
@@ -210,6 +214,7 @@ class Node:
 
     def _step_and_show(self) -> None:
         self._time.begin()
+        self._services.timeline.apply(self.simulation.steps, self.simulation.vehicles)
         self.simulation.step()
         if self._lockstep is not None:
             is_shown = self._lockstep.open()

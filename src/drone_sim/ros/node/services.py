@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
+from concurrent.futures import wait
 from functools import partial
 from typing import Any
 
@@ -11,23 +12,29 @@ import rospy
 from std_srvs.srv import SetBool, Trigger
 
 from drone_sim.grading.permissions import CHANGE
+from drone_sim.message_text import shown
+from drone_sim.offline import timeline as timelines
+from drone_sim.offline.timeline import Timeline, TimelineError
+from drone_sim.ros.core.connections import wait_until_written
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.core.intervention import intervention
 from drone_sim.ros.core.startup import MASTER_GONE, from_shell, script_from_shell
-from drone_sim.run.parameters import ParameterError, Parameters
+from drone_sim.run.parameters import MAX_STEP_COUNT, ParameterError, Parameters
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Snapshot
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import script_path
 
 _VEHICLES = "~vehicles"
+_LOOK, _SENT = 0.2, 1.0  # s, between two looks for the end; for the messages of a step to be written
 
 
 class Services:
     """~start, ~stop, ~restart, ~step, ~pause; ~load_scene; ~set_vehicles; ~snapshot, ~restore.
 
     Each answers when it is done, with one line. The scene's file is the private parameter `scene_file`, the script
-    that of `script`, the vehicles are those of the private parameter `vehicles`.
+    that of `script`, the vehicles are those of the private parameter `vehicles`, what happens is in `timeline_file`,
+    and `step` takes `step_count` steps.
     """
 
     def __init__(self, player: Player, inbox: Inbox, follow: Callable[[], None]):
@@ -43,9 +50,11 @@ class Services:
         self._snapshot: Snapshot | None = None
         # The scene of the config, if the parameter scene_file did not replace it.
         self._config_scene = "" if scene_parameter() else player.simulation.parameters.scene_file
-        jobs = ("start", "stop", "restart", "step", "load_scene", "set_vehicles", "snapshot", "restore")
+        self.timeline = Timeline((), player.simulation.parameters.time_step)  # executed by each run
+        jobs = ("start", "stop", "restart", "load_scene", "set_vehicles", "snapshot", "restore")
         for name in jobs:
             rospy.Service(f"~{name}", Trigger, partial(self._answer, name, getattr(self, name)))
+        rospy.Service("~step", Trigger, self._answer_step)
         rospy.Service(
             "~pause", SetBool, lambda request: self._answer("pause", lambda: self.pause(request.data), request)
         )
@@ -66,6 +75,22 @@ class Services:
             rospy.logdebug(answer)
             return True, answer
         except (ParameterError, ScriptError, ValueError, OSError, RuntimeError) as error:
+            return False, " ".join(str(error).split())
+
+    def _answer_step(self, request: Any) -> tuple[bool, str]:
+        """Answer when as many steps as the parameter `step_count` says have been run, and their messages sent."""
+        done = intervention(CHANGE, "the scene", "~step", request)
+        try:
+            count = _step_count()
+            steps = self._inbox.ask(lambda: self._player.order_steps(count), done)
+            while not rospy.is_shutdown() and not wait([steps], _LOOK).done:
+                pass  # in lockstep, a step may wait for a node for any time
+            if not steps.done():
+                return False, "the node ends"
+            answer = steps.result()
+            wait_until_written(_SENT)
+            return True, answer
+        except (ScriptError, ValueError, OSError, RuntimeError) as error:
             return False, " ".join(str(error).split())
 
     # ---- carried out in the simulation's thread
@@ -92,10 +117,6 @@ class Services:
             return said
         return self._player.pause(on)
 
-    def step(self) -> str:
-        """Run one step while paused."""
-        return self._player.one_step()
-
     def load_scene(self) -> str:
         """Start anew in the scene of `scene_file`."""
         file = scene_parameter(self._config_scene)
@@ -104,7 +125,18 @@ class Services:
 
     def _begun(self, said: str) -> str:
         self._vehicles.tell(self._player.simulation.parameters)  # the scene, read anew, may have other ones
+        try:
+            self.read_timeline()
+        except TimelineError:
+            self._player.stop()
+            raise
         return said
+
+    def read_timeline(self) -> None:
+        """Read the file of the parameter `timeline_file`, whose entries each run executes. Raises TimelineError."""
+        parameters, file = self._player.simulation.parameters, from_shell(str(rospy.get_param("~timeline_file", "")))
+        entries = timelines.read(file, parameters).entries if file else ()
+        self.timeline = Timeline(entries, parameters.time_step)
 
     def _take_script(self) -> None:
         """Let the script fly that the parameter `script` names now. Raises ScriptError where it is not there."""
@@ -139,6 +171,14 @@ def scene_parameter(otherwise: str = "") -> str:
     """Return the file that the private parameter `scene_file` names; `otherwise` if it is not set, or is `none`."""
     given = str(rospy.get_param("~scene_file", "none"))
     return otherwise if given == "none" else from_shell(given)
+
+
+def _step_count() -> int:
+    """Return how many steps `step` takes. Raises ParameterError."""
+    count = rospy.get_param("~step_count", 1)
+    if not (isinstance(count, int) and not isinstance(count, bool) and 1 <= count <= MAX_STEP_COUNT):
+        raise ParameterError(f"must be a whole number from 1 to {MAX_STEP_COUNT}", ("step_count",), shown(count))
+    return count
 
 
 class VehiclesParameter:
