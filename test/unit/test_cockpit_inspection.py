@@ -65,34 +65,34 @@ def listens(topic):
 def test_breakpoints_of_all_pages_are_published_and_go_with_them(inspector, now, tmp_path):
     ask(inspector, breakpoints={"mine/a.py": [3, 1], "mine/gone.py": [1]})
     ask(inspector, page="two", breakpoints={"mine/a.py": [2, 3]})
-    inspector.look(True)
+    inspector.update(True)
     published = Topic.there["/sim/breakpoints"].published
     file = str(tmp_path / "a.py")
     assert published == [{file: [1, 3]}, {file: [1, 2, 3]}] and listens("variables") and listens("names"), "at once"
     ask(inspector, page="two", breakpoints={})
     assert published[2:] == [{file: [1, 3]}]
     now[0] += 100.0
-    inspector.look(True)
+    inspector.update(True)
     assert published[3:] == [{}] and not listens("variables") and not listens("names")
 
 
 def test_nobody_listens_where_nobody_looks(inspector, now, told):
     ask(inspector, looks=False)
-    inspector.look(True)
+    inspector.update(True)
     assert not listens("variables") and listens("names") and not listens("breakpoints")
     ask(inspector, looks=True)
-    inspector.look(True)
+    inspector.update(True)
     assert listens("variables")
     now[0] += 5.0
-    inspector.look(True)
+    inspector.update(True)
     assert not listens("variables") and told == [{"variables": None}]
-    inspector.look(False)
+    inspector.update(False)
     assert not listens("names")
 
 
 def test_what_flies_is_told_only_where_somebody_follows_it(inspector, told):
     ask(inspector, looks=True)
-    inspector.look(True)
+    inspector.update(True)
 
     def say(state):
         Topic.there["/sim/variables"].callback(String(data=json.dumps({"state": state})))
@@ -110,7 +110,7 @@ def test_what_flies_is_told_only_where_somebody_follows_it(inspector, told):
 
 def test_names_reach_the_page(inspector):
     assert ask(inspector) == {"objects": [], "parameters": []}
-    inspector.look(True)
+    inspector.update(True)
     for names in ({"objects": ["Floor"], "parameters": ["Kz"]}, {"objects": [1]}, []):
         Topic.there["/sim/names"].callback(String(data=json.dumps(names)))
     assert ask(inspector) == {"objects": ["Floor"], "parameters": ["Kz"]}

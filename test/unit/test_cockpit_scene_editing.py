@@ -46,7 +46,7 @@ def _told():
 @pytest.fixture(name="editing")
 def _editing(asked, told, tmp_path):
     made = SceneEditing("/sim", tmp_path, told.append)
-    made.listen(True)
+    made.subscribe(True)
     return made
 
 
@@ -71,7 +71,7 @@ def test_after_a_lost_message_the_whole_is_heard_anew(editing, told):
     say(1, None, [ROW])
     before = Topic.there["/sim/scene_objects"]
     say(3, 2, [], gone=[3])
-    editing.listen(True)
+    editing.subscribe(True)
     assert Topic.there["/sim/scene_objects"] is not before
     say(4, None, [ROW])
     assert tree(editing)["version"] == 4

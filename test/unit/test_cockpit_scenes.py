@@ -13,14 +13,14 @@ GATES = "package://drone_sim/config/scenes/gates.yaml"
 @pytest.mark.parametrize("flown", [GATES, str(package_path() / "config/scenes/gates.yaml")])
 def test_a_shipped_scene_has_its_short_name_however_it_was_named(tmp_path, flown):
     scenes = SceneList(tmp_path)
-    names, name = scenes.offered(flown)
+    names, name = scenes.names(flown)
     assert name == "gates" and {"none", "empty", "gates", "room"} <= set(names)
     assert scenes.file("gates") == GATES
 
 
 @pytest.mark.parametrize("flown", ["", "none"])
 def test_no_scene_is_offered_first(tmp_path, flown):
-    names, name = SceneList(tmp_path).offered(flown)
+    names, name = SceneList(tmp_path).names(flown)
     assert names[0] == name == SceneList(tmp_path).file(name) == "none"
 
 
@@ -29,7 +29,7 @@ def test_scenes_of_the_folder_are_offered_as_ones_own_and_nothing_else_of_it(tmp
         (tmp_path / file).touch()
     (tmp_path / "folder.yaml").mkdir()
     scenes = SceneList(tmp_path)
-    names, name = scenes.offered(str(tmp_path / "yard.yaml"))
+    names, name = scenes.names(str(tmp_path / "yard.yaml"))
     assert name == "mine/yard.yaml" and [one for one in names if "/" in one] == ["mine/Old.TTT", "mine/yard.yaml"]
     assert scenes.file("mine/Old.TTT") == str(tmp_path / "Old.TTT")
 
@@ -37,5 +37,5 @@ def test_scenes_of_the_folder_are_offered_as_ones_own_and_nothing_else_of_it(tmp
 @pytest.mark.parametrize("flown", ["/elsewhere/hall.yaml", "\0", "package://nobody/x.yaml"])
 def test_a_scene_from_elsewhere_is_called_as_it_is(tmp_path, flown):
     scenes = SceneList(tmp_path / "not there")
-    names, name = scenes.offered(flown)
+    names, name = scenes.names(flown)
     assert names[-1] == name == flown == scenes.file(name)

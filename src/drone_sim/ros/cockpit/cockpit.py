@@ -98,14 +98,14 @@ class Cockpit:
         if now - self._asked > _ASKING:
             self._asked = now
             self._ask_master()
-        self._inspector.look(bool(self._topics.namespace))
+        self._inspector.update(bool(self._topics.namespace))
         wanted = self._topics.namespace if browsers else ""
         if (self._view.namespace if self._view else "") != wanted:
             self._open(wanted)
         if self._view is not None:
             self._view.meet(self._topics.vehicles)
             self._view.collect()
-            self._editing.listen(True)
+            self._editing.subscribe(True)
             self._panel.follow(self._commands.vehicle)
             self._panel.plots.rest()
             self._cameras.show()
@@ -121,7 +121,7 @@ class Cockpit:
         self._cameras.rest(not namespace)
         self._windows.listen(bool(namespace))
         if not namespace:
-            self._editing.listen(False)
+            self._editing.subscribe(False)
             self._panel.follow("")
             self._panel.plots.rest()
 

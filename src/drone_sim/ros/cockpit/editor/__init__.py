@@ -1,1 +1,1 @@
-"""What the page's editor asks for: scripts, the texts beside them, the scenes they fly in, and grading."""
+"""Backend of the page's editor: scripts, lessons, scenes and grading."""

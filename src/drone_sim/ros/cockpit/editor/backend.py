@@ -1,4 +1,4 @@
-"""What the page's editor asks for: scripts, their texts, to save them, and to fly them."""
+"""Request handlers of the page's script editor: list, open, save, fly and grade scripts."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _Message = Mapping[str, Any]
 
 
 class EditorBackend:
-    """The answers, by what is asked."""
+    """Handlers of the editor's requests."""
 
     def __init__(self, store: ScriptStore, lessons: Lessons, simulator: Simulator, player: TimelinePlayer):
-        """Answer from `store` and `lessons`; `simulator` flies a script, `player` sends what its task says happens."""
+        """`simulator` flies a script; `player` sends the timeline of its task meanwhile."""
         self._store = store
         self._lessons = lessons
         self._simulator = simulator
@@ -37,20 +37,20 @@ class EditorBackend:
 
     @property
     def answers(self) -> dict[str, Answer]:
-        """What answers each question."""
-        asked = {
+        """The handler of each request. A handler raises ValueError with one line."""
+        handlers = {
             "api": lambda _: for_editors(),
             "check": lambda message: self._checker.check(_text(message), message.get("lua") is True),
-            "scripts": lambda _: self._scripts(),
-            "open": lambda message: self._opened(self._script(message)),
-            "look": self._look,
+            "scripts": lambda _: self._list_scripts(),
+            "open": lambda message: self._open(self._script(message)),
+            "look": self._poll,
             "save": self._save,
-            "save_as": lambda one: self._described(*self._store.save_as(one.get("name"), _text(one))),
-            "keep": self._keep,
+            "save_as": lambda message: self._describe(*self._store.save_as(message.get("name"), _text(message))),
+            "keep": self._resolve_conflict,
             "rename": self._rename,
-            "duplicate": lambda one: self._described(*self._store.duplicate(self._script(one), _text(one))),
+            "duplicate": lambda message: self._describe(*self._store.duplicate(self._script(message), _text(message))),
             "delete": self._delete,
-            "bring back": lambda one: self._described(*self._store.bring_back(one.get("script"))),
+            "bring back": lambda message: self._describe(*self._store.bring_back(message.get("script"))),
             "locate": self._locate,
             "revert": lambda message: {"text": self._store.original(self._script(message))},
             "lesson": self._lesson,
@@ -58,40 +58,43 @@ class EditorBackend:
             "grade": self._grade,
             "graded": lambda message: self._grader.result(message.get("number")),
         }
-        return {name: _in_one_line(answer) for name, answer in asked.items()}
+        return {name: _with_one_line_errors(handler) for name, handler in handlers.items()}
 
     # ---- scripts
 
-    def _scripts(self) -> dict[str, Any]:
-        """Return the names of all scripts by their kinds, that of the one that flies, and the texts' titles."""
+    def _list_scripts(self) -> dict[str, Any]:
+        """Return the names of all scripts by group, the name of the flying script, and the lessons."""
         scripts = self._store.scripts()
-        kinds = list(dict.fromkeys([*(script.group for script in scripts), OWN]))
+        groups = list(dict.fromkeys([*(script.group for script in scripts), OWN]))
         return {
-            "groups": [{"name": kind, "scripts": [one.name for one in scripts if one.group == kind]} for kind in kinds],
-            "flown": self._flown(),
+            "groups": [
+                {"name": group, "scripts": [script.name for script in scripts if script.group == group]}
+                for group in groups
+            ],
+            "flown": self._flying_script(),
             "digest": self._store.digest(),
             "folder": str(self._store.folder),
             "lessons": [
-                {"lesson": one.name, "title": one.title, "task": one.task, "script": one.script}
-                for one in self._lessons.all()
+                {"lesson": lesson.name, "title": lesson.title, "task": lesson.task, "script": lesson.script}
+                for lesson in self._lessons.all()
             ],
         }
 
-    def _flown(self) -> str:
-        flown = script_from_shell(str(self._simulator.parameter("script", ""))) or "pilot"
-        with contextlib.suppress(ScriptError):  # one that is not there has its file's name
-            flown = script_path(flown)
-        script = self._store.of_file(flown)
-        return Path(flown).name if script is None else script.name
+    def _flying_script(self) -> str:
+        path = script_from_shell(str(self._simulator.parameter("script", ""))) or "pilot"
+        with contextlib.suppress(ScriptError):  # a missing script is shown by its file name
+            path = script_path(path)
+        script = self._store.of_file(path)
+        return Path(path).name if script is None else script.name
 
     def _script(self, message: _Message) -> ScriptFile:
         return self._store.find(message.get("script"))
 
-    def _opened(self, script: ScriptFile) -> dict[str, Any]:
+    def _open(self, script: ScriptFile) -> dict[str, Any]:
         text, version = self._store.read(script)
-        return {**self._described(script, version), "text": text}
+        return {**self._describe(script, version), "text": text}
 
-    def _described(self, script: ScriptFile, version: str) -> dict[str, Any]:
+    def _describe(self, script: ScriptFile, version: str) -> dict[str, Any]:
         lesson = self._lessons.of_script(script)
         return {
             "script": script.name,
@@ -100,40 +103,40 @@ class EditorBackend:
             "lesson": lesson.name if lesson else "",
         }
 
-    def _look(self, message: _Message) -> dict[str, Any]:
-        """Return what may have changed: a script's version ('' if deleted), a digest of all names, and what flies."""
+    def _poll(self, message: _Message) -> dict[str, Any]:
+        """Return a script's version ('' if deleted), a digest of all names, and the name of the flying script."""
         try:
-            flown = self._flown()
-        except FAILURES:  # the disk is there without a master, too
+            flown = self._flying_script()
+        except FAILURES:  # scripts can be edited without a ROS master
             flown = ""
         version = self._store.version(message.get("script"))
         return {"version": version, "digest": self._store.digest(), "flown": flown}
 
     def _save(self, message: _Message) -> dict[str, Any]:
-        """Save the text of a script whose version the browser has, unless somebody else has `changed` it."""
+        """Save a script unless its file is no longer the `version` that the browser has; then return `changed`."""
         name, text, version = message.get("script"), _text(message), message.get("version")
         if not isinstance(version, str):
             raise ScriptStoreError("save: needs script, text and version")
-        gone = str(name).startswith(f"{OWN}/") and not self._store.version(name)
-        saved = None if gone else self._store.save(self._store.find(name), text, version)
-        return {"changed": True} if saved is None else self._described(*saved)
+        is_deleted = str(name).startswith(f"{OWN}/") and not self._store.version(name)
+        saved = None if is_deleted else self._store.save(self._store.find(name), text, version)
+        return {"changed": True} if saved is None else self._describe(*saved)
 
-    def _keep(self, message: _Message) -> dict[str, Any]:
-        """End a conflict: both texts are kept, one of them in another file."""
+    def _resolve_conflict(self, message: _Message) -> dict[str, Any]:
+        """Save both versions of a script, one of them in a new file, the `other`."""
         mine = message.get("mine") is True
         script, _, other = self._store.keep_both(message.get("script"), _text(message), mine)
-        return {**self._opened(script), "other": other}
+        return {**self._open(script), "other": other}
 
     def _rename(self, message: _Message) -> dict[str, Any]:
-        """Give a script of the user's another name, by which the simulation knows it, too, where it flies."""
+        """Rename a script of the user's, also in the simulator's parameter if it is set there."""
         before = self._script(message)
         renamed, version = self._store.rename(before, message.get("name"))
         try:
             if self._simulator.parameter("script", "") == str(before.path):
                 self._simulator.set_parameter("script", str(renamed.path))
-        except FAILURES:  # the disk is there without a master, too
+        except FAILURES:  # scripts can be edited without a ROS master
             pass
-        return self._described(renamed, version)
+        return self._describe(renamed, version)
 
     def _delete(self, message: _Message) -> dict[str, Any]:
         self._store.remove(self._script(message))
@@ -148,17 +151,17 @@ class EditorBackend:
         script = self._store.of_file(file)
         return {"script": script.name if script else ""}
 
-    # ---- texts, and flights
+    # ---- lessons and flights
 
     def _lesson(self, message: _Message) -> dict[str, Any]:
-        """Return a text, and which of the user's scripts, or of the package's, belongs to it."""
+        """Return a lesson's text, its script (the user's own if there is one) and the scene that it flies in."""
         lesson = self._find_lesson(message)
         if lesson is None:
             raise ScriptStoreError(f"{str(message.get('lesson'))[:80]!r}: there is no such lesson")
         own = [
-            one
-            for one in self._store.scripts()
-            if one.is_own and self._lessons.of_script(one) == lesson and lesson.is_begun_by(one.path.stem)
+            script
+            for script in self._store.scripts()
+            if script.is_own and self._lessons.of_script(script) == lesson and lesson.is_begun_by(script.path.stem)
         ]
         return {
             "lesson": lesson.name,
@@ -172,7 +175,7 @@ class EditorBackend:
         return self._lessons.find(message.get("lesson"))
 
     def _run(self, message: _Message) -> dict[str, Any]:
-        """Fly a script from the start, in the scene that its text asks for; return the simulation's answer."""
+        """Start a script from the beginning, in its lesson's scene; return the simulator's answer."""
         script = self._script(message)
         path = str(script.path)
         if not path.isprintable():
@@ -182,15 +185,15 @@ class EditorBackend:
         lesson = self._find_lesson(message)
         self._player.prepare(plan_of(lesson) if lesson and lesson.task else None)
         self._simulator.set_parameter("script", path)
-        done, said = self._switcher.fly(lesson)
+        done, message_text = self._switcher.fly(lesson)
         self._player.begin() if done else self._player.end()
-        if said.endswith("unavailable"):  # rospy's word for a service of nobody
-            said = f"the simulation does not answer: {said}"
-        failure = None if done else script_failure(said)
-        return {"done": done, "said": said, "failure": failure and failure._asdict()}
+        if message_text.endswith("unavailable"):  # rospy's message for a service that does not exist
+            message_text = f"the simulation does not answer: {message_text}"
+        failure = None if done else script_failure(message_text)
+        return {"done": done, "said": message_text, "failure": failure and failure._asdict()}
 
     def _grade(self, message: _Message) -> dict[str, Any]:
-        """Begin to grade a script by the task beside it."""
+        """Begin to grade a script with its lesson's task; return the number of the run."""
         lesson, script = self._find_lesson(message), self._script(message)
         if lesson is None or not lesson.task:
             raise ScriptStoreError("grade: needs a task; choose one above the text")
@@ -204,13 +207,13 @@ def _text(message: _Message) -> str:
     return text
 
 
-def _in_one_line(answer: Callable[[_Message], Mapping[str, Any]]) -> Answer:
-    """Turn errors of files and of the master into a ValueError with one line."""
+def _with_one_line_errors(handler: Callable[[_Message], Mapping[str, Any]]) -> Answer:
+    """Convert errors of files and of the ROS master to a ValueError with one line."""
 
-    def answered(message: _Message) -> Mapping[str, Any]:
+    def handle(message: _Message) -> Mapping[str, Any]:
         try:
-            return answer(message)
+            return handler(message)
         except FAILURES as error:
             raise ValueError(str(error) or "the ROS master does not answer") from None
 
-    return answered
+    return handle

@@ -1,6 +1,6 @@
-"""The texts beside the editor: the tutorial's sections and the tasks, from the same files that are read on paper.
+"""Lessons beside the editor: the sections of docs/tutorial.md and the README.md of each task.
 
-Where readers in the browser need another text, it stands in a comment, which is invisible to other readers:
+Text for the browser only is in a comment, which other readers do not see; it replaces the text up to `end`:
 
     <!-- browser:
     Press **Run**.
@@ -8,7 +8,7 @@ Where readers in the browser need another text, it stands in a comment, which is
     Start the launch file in a terminal.
     <!-- end -->
 
-Both may also stand within a line. Controls and keys of the page are in bold there, and nothing else is.
+Both may also be within a line. In a lesson only controls and keys of the page are in bold.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from drone_sim.files.resources import package_path, read_bytes
 from drone_sim.grading import tasks
 from drone_sim.ros.cockpit.editor.script_store import SOLUTIONS, ScriptFile
 
-_LARGEST = 1 << 20  # bytes of a text
+_MAX_SIZE = 1 << 20  # bytes of a text
 _TUTORIAL = "docs/tutorial.md"
 _HEADING = re.compile(r"^## (.+)$")
 _FENCE = re.compile(r"^\s*(```|~~~)")
 _SCRIPT = re.compile(r"^\*Script: \[[^\]]+\]\(tutorial/([^)]+)\)\*$", re.MULTILINE)
-_NUMBER = re.compile(r"\d_")  # with which the name of a stage's script begins
-_FLOWN = re.compile(r"drone\.launch script:=docs/tutorial/\S+ scene:=(\S+)")
-# What the text says to who reads it in the browser, hidden from other readers, and what it says to those.
+_NUMBER = re.compile(r"\d_")  # start of the file name of a stage's script
+_LAUNCH = re.compile(r"drone\.launch script:=docs/tutorial/\S+ scene:=(\S+)")
+# The text for the browser, and the text for other readers.
 _ALTERNATIVE = re.compile(r"<!-- browser:\n?(.*?)\n?-->(.*?)<!-- end -->", re.DOTALL)
 _CONSOLE = re.compile(r"^( *)```console\n(.*?)^ *```\n", re.MULTILINE | re.DOTALL)
 _COMMAND = re.compile(r"^ *[12]\$ ")
-_FLEW = re.compile(r"^flew ([\d.]+ s) in .*?; ended at")
+_FLIGHT_RESULT = re.compile(r"^flew ([\d.]+ s) in .*?; ended at")
 _PICTURE = re.compile(r"/(docs/pictures/(?:tutorial_\w+|cockpit_build)\.png|tasks/\w+/\w+\.png)")
 
 
@@ -44,70 +44,68 @@ class Lesson:
     name: str  # the section's anchor, such as stage-2-elevation; of a task tasks/hover
     title: str
     text: str  # Markdown
-    folder: str  # in the package, from which its links and pictures are seen
-    script: str = ""  # what it begins with, as the script store names it
-    scene: str = ""  # of a section: the scene file that its command flies in, in the package; '' is any
+    folder: str  # in the package, to which links and pictures are relative
+    script: str = ""  # name in the script store of the script that the lesson starts with
+    scene: str = ""  # scene file of the section's command, in the package; '' for any scene
 
     @property
     def stem(self) -> str:
-        """The name of its script, without kind and ending; '' without one."""
+        """The file name of its script without extension; '' if it has none."""
         return Path(self.script).stem
 
     def is_begun_by(self, stem: str) -> bool:
-        """Tell whether a script of the user's with this name is a continuation of this text's script."""
+        """Return whether a user's script with this stem continues the lesson's script, such as 2_elevation_mine."""
         return bool(self.stem) and f"{stem}_".startswith(f"{self.stem}_")
 
     @property
     def task(self) -> str:
-        """The name of the task, '' for the tutorial's."""
+        """The name of the task; '' for a section of the tutorial."""
         return self.name.partition("/")[2]
 
 
 class Lessons:
-    """All texts, in the order in which they are read. A package without them has none."""
+    """All lessons, in reading order; none if the package has no docs."""
 
     def __init__(self, package: Path | None = None):
-        """Read from `package`, the folder that holds docs/ and tasks/; None is this package's."""
+        """`package` is the folder with docs/ and tasks/; by default that of this package."""
         self._package = package or package_path()
 
     def all(self) -> list[Lesson]:
-        """Return all that there are now."""
         return [*self._sections(), *self._tasks()]
 
     def find(self, name: object) -> Lesson | None:
-        """Return the text of a name, None where there is none."""
-        return next((one for one in self.all() if one.name == name), None)
+        """Return the lesson with a name; None if there is none."""
+        return next((lesson for lesson in self.all() if lesson.name == name), None)
 
     def of_script(self, script: ScriptFile) -> Lesson | None:
-        """Return the text that a script belongs to: one of the user's by its name, such as 2_elevation_mine.py.
+        """Return the lesson of a script; a user's script is found by its name, such as 2_elevation_mine.py.
 
-        A stage in Lua belongs to the text of the same stage in Python.
-
-        A solution, or a copy of one, belongs to the stage of its number.
+        A stage in Lua belongs to the lesson of the same stage in Python; a solution, or a copy of one, to the stage
+        with its number.
         """
-        texts = [one for one in self.all() if one.script]
+        lessons = [lesson for lesson in self.all() if lesson.script]
         in_python = str(Path(script.name).with_suffix(".py"))
-        shipped = next((one for one in texts if one.script in (script.name, in_python)), None)
+        shipped = next((lesson for lesson in lessons if lesson.script in (script.name, in_python)), None)
         if shipped or not (script.is_own or script.group == SOLUTIONS):
             return shipped
         stem = Path(script.file_name).stem
-        stages = [one for one in texts if _NUMBER.match(one.stem) and _NUMBER.match(stem)]
-        of_number = next((one for one in stages if one.stem[0] == stem[0]), None)
-        begun = [one for one in texts if one.is_begun_by(stem)]
-        return max(begun, key=lambda one: len(one.script), default=of_number)
+        stages = [lesson for lesson in lessons if _NUMBER.match(lesson.stem) and _NUMBER.match(stem)]
+        same_number = next((lesson for lesson in stages if lesson.stem[0] == stem[0]), None)
+        continued = [lesson for lesson in lessons if lesson.is_begun_by(stem)]
+        return max(continued, key=lambda lesson: len(lesson.script), default=same_number)
 
     def picture(self, path: str) -> tuple[str, bytes] | None:
-        """Return content type and content of a picture that a text shows, by its path in the package."""
+        """Return content type and content of a lesson's picture, by its path in the package; None if there is none."""
         if not _PICTURE.fullmatch(path):
             return None
         try:
-            return "image/png", read_bytes(self._package / path[1:], _LARGEST)
+            return "image/png", read_bytes(self._package / path[1:], _MAX_SIZE)
         except (OSError, ValueError):
             return None
 
     def _sections(self) -> Iterator[Lesson]:
-        for title, text in _parted(_text(self._package / _TUTORIAL)):
-            script, scene = _SCRIPT.search(text), _FLOWN.search(text)
+        for title, text in _split_sections(_read(self._package / _TUTORIAL)):
+            script, scene = _SCRIPT.search(text), _LAUNCH.search(text)
             yield Lesson(
                 name=_anchor(title),
                 title=title,
@@ -119,13 +117,13 @@ class Lessons:
 
     def _tasks(self) -> Iterator[Lesson]:
         for name in tasks.names():
-            text = _text(self._package / "tasks" / name / "README.md")
+            text = _read(self._package / "tasks" / name / "README.md")
             title = text.partition("\n")[0].removeprefix("# ").strip() or name
             yield Lesson(f"tasks/{name}", title, text, f"tasks/{name}", f"tasks/{name}.py")
 
 
-def _parted(text: str) -> Iterator[tuple[str, str]]:
-    """Yield title and text of each section; headings inside code blocks do not count."""
+def _split_sections(text: str) -> Iterator[tuple[str, str]]:
+    """Yield title and text of each section; `##` inside a code block is no heading."""
     title, in_code = "", False
     lines: list[str] = []
     for line in text.splitlines():
@@ -141,23 +139,23 @@ def _parted(text: str) -> Iterator[tuple[str, str]]:
 
 
 def _for_the_browser(text: str) -> str:
-    """Return a text for readers in the browser: without commands, but with what these print."""
-    return _CONSOLE.sub(_printed, _ALTERNATIVE.sub(lambda found: found[1], text))
+    """Return a text for the browser: the output of commands without the commands."""
+    return _CONSOLE.sub(_command_output, _ALTERNATIVE.sub(lambda match: match[1], text))
 
 
-def _printed(block: re.Match[str]) -> str:
-    """Return a block of what its commands print, '' where they print nothing."""
-    lines = [_FLEW.sub(r"after \1:", line) for line in block[2].splitlines() if not _COMMAND.match(line)]
+def _command_output(block: re.Match[str]) -> str:
+    """Return a code block with the output of the commands in `block`; '' if they print nothing."""
+    lines = [_FLIGHT_RESULT.sub(r"after \1:", line) for line in block[2].splitlines() if not _COMMAND.match(line)]
     return "\n".join([f"{block[1]}```text", *lines, f"{block[1]}```", ""]) if lines else ""
 
 
 def _anchor(title: str) -> str:
-    """Return the name by which a link leads to a heading, as GitHub makes it."""
+    """Return the anchor of a heading, as GitHub generates it."""
     return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
-def _text(path: Path) -> str:
+def _read(path: Path) -> str:
     try:
-        return read_bytes(path, _LARGEST).decode("utf-8")
+        return read_bytes(path, _MAX_SIZE).decode("utf-8")
     except (OSError, ValueError):
         return ""

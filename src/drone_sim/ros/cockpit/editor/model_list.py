@@ -1,4 +1,4 @@
-"""The models that the page offers, each with the operation that adds it, and its picture."""
+"""Models on the page's shelf, each with its picture and the edit operation that adds it."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from drone_sim.vehicles.types import TYPES
 
 PICTURES = "config/models/pictures"
 _WEB = "/models/"
-_FOLDER = "models"  # of the user's, in that of the scripts
-_MOST = 200
+_FOLDER = "models"  # in the folder of the user's scripts
+_MAX_MODELS = 200  # of the user's
 _Operation = dict[str, Any]
 
 
-def _added(name: str, **said: Any) -> _Operation:
-    return {"do": "add", "objects": [{"name": name, **said}]}
+def _add(name: str, **values: Any) -> _Operation:
+    return {"do": "add", "objects": [{"name": name, **values}]}
 
 
-def _shape(name: str, shape: str, **said: Any) -> _Operation:
-    return _added(name, shape=shape, **said)
+def _shape(name: str, shape: str, **values: Any) -> _Operation:
+    return _add(name, shape=shape, **values)
 
 
 SHAPES: dict[str, _Operation] = {
@@ -37,15 +37,15 @@ SHAPES: dict[str, _Operation] = {
 ARENA = ("gate", "landing_pad", "pole", "ramp", "table", "window_frame")
 _SIGN = {"do": "add_sign", "text": "START"}
 SENSORS: dict[str, _Operation] = {
-    "Dummy": _added("Dummy", kind="dummy", size=0.05),
+    "Dummy": _add("Dummy", kind="dummy", size=0.05),
     "Target sphere": _shape("Target", "sphere", size=[0.05], color=[0.2, 0.8, 0.2], respondable=False),
-    "Camera": _added("Camera", kind="vision_sensor", width=640, height=480, rpy=[1.5708, 0, -1.5708]),
-    "Vision sensor": _added("VisionSensor", kind="vision_sensor", rpy=[1.5708, 0, -1.5708]),
-    "Proximity sensor": _added("ProximitySensor", kind="proximity_sensor", type="cone", angle=0.5, range=2),
-    "Joint": _added("Joint", kind="joint", type="revolute"),
+    "Camera": _add("Camera", kind="vision_sensor", width=640, height=480, rpy=[1.5708, 0, -1.5708]),
+    "Vision sensor": _add("VisionSensor", kind="vision_sensor", rpy=[1.5708, 0, -1.5708]),
+    "Proximity sensor": _add("ProximitySensor", kind="proximity_sensor", type="cone", angle=0.5, range=2),
+    "Joint": _add("Joint", kind="joint", type="revolute"),
 }
-_HEIGHT = 0.5  # m above what a vehicle is dropped on
-_BARE: dict[str, Any] = {  # V-REP's quadricopter: its own two cameras, no frame that goes with it, the stock script
+_HEIGHT = 0.5  # m, of a vehicle above the surface that it is dropped on
+_BARE: dict[str, Any] = {  # V-REP's quadricopter: its own two cameras, no Track_base, the stock script
     "script": "target",
     "cameras": {name: None for name in ("front", "depth", "track", "floor")},
     "objects": {"Track_base": None},
@@ -53,14 +53,14 @@ _BARE: dict[str, Any] = {  # V-REP's quadricopter: its own two cameras, no frame
 
 
 class ModelList:
-    """Those of the package, and the files in the user's folder."""
+    """Models of the package and of the user's folder."""
 
     def __init__(self, folder: Path):
-        """Take the folder of the user's scripts and scenes; models are in `models` there."""
+        """`folder` is that of the user's scripts and scenes; the models are in its subfolder `models`."""
         self.folder = folder / _FOLDER
 
     def groups(self) -> list[dict[str, Any]]:
-        """Return all, in groups."""
+        """Return all models by group."""
         vehicles: dict[str, _Operation] = {
             name.capitalize(): {"do": "add_vehicle", "type": name, "height": _HEIGHT} for name in TYPES
         }
@@ -68,23 +68,23 @@ class ModelList:
         arena: dict[str, _Operation] = {name: {"do": "add_model", "model": name} for name in ARENA}
         arena["text_sign"] = _SIGN
         return [
-            {"name": "Shapes", "models": [_said(*one) for one in SHAPES.items()]},
-            {"name": "Arena", "models": [_said(name.replace("_", " ").capitalize(), op) for name, op in arena.items()]},
-            {"name": "Vehicles", "models": [_said(*one) for one in vehicles.items()]},
-            {"name": "Sensors", "models": [_said(*one) for one in SENSORS.items()]},
-            {"name": "Yours", "models": [_said(one.name, self.operation(one), "") for one in self._own()]},
+            {"name": "Shapes", "models": [_row(title, operation) for title, operation in SHAPES.items()]},
+            {"name": "Arena", "models": [_row(name.replace("_", " ").capitalize(), op) for name, op in arena.items()]},
+            {"name": "Vehicles", "models": [_row(title, operation) for title, operation in vehicles.items()]},
+            {"name": "Sensors", "models": [_row(title, operation) for title, operation in SENSORS.items()]},
+            {"name": "Yours", "models": [_row(file.name, self.operation(file), "") for file in self._own_files()]},
         ]
 
     def operation(self, file: Path) -> _Operation:
-        """Return what adds a file of the user's."""
+        """Return the edit operation that adds a file of the user's."""
         return {"do": "add_model", "model": str(file)}
 
-    def _own(self) -> list[Path]:
-        found = sorted(one for one in self.folder.glob("*") if one.suffix.lower() in KINDS and one.is_file())
-        return found[:_MOST]
+    def _own_files(self) -> list[Path]:
+        files = sorted(file for file in self.folder.glob("*") if file.suffix.lower() in KINDS and file.is_file())
+        return files[:_MAX_MODELS]
 
     def picture(self, path: str) -> Content:
-        """Return the picture of a model of the package; None for any other path."""
+        """Return the picture of one of the package's models; None for any other path."""
         if not path.startswith(_WEB):
             return None
         file = package_path() / PICTURES / path.removeprefix(_WEB)
@@ -93,7 +93,7 @@ class ModelList:
         return "image/png", file.read_bytes()
 
 
-def _said(title: str, operation: _Operation, picture: str | None = None) -> dict[str, Any]:
+def _row(title: str, operation: _Operation, picture: str | None = None) -> dict[str, Any]:
     key = title.lower().replace(" ", "_")
     if picture is None:
         picture = f"{_WEB}{key}.png" if (package_path() / PICTURES / f"{key}.png").is_file() else ""

@@ -1,4 +1,4 @@
-"""The page's scene editor: what browsers ask goes to the node, which has the scene; what changes goes to all."""
+"""Backend of the page's scene editor: forwards edits to the simulator and its changes to all browsers."""
 
 from __future__ import annotations
 
@@ -24,119 +24,119 @@ from drone_sim.ros.cockpit.server.page_socket import Answer
 from drone_sim.ros.core.simulator import FAILURES
 
 _Message = Mapping[str, Any]
-_Told = Callable[[_Message], None]
 _LINE = re.compile(r"\bline (\d+)\b")
-_TREE, _WAITING = "scene_objects", 50
-_UPLOADED = (".ttm", ".obj", ".stl", ".dae", ".urdf", ".yaml")
-_LARGEST = 6 << 20  # bytes of an uploaded model: of a message of 8 MiB
+_TREE, _QUEUE_SIZE = "scene_objects", 50
+_UPLOAD_SUFFIXES = (".ttm", ".obj", ".stl", ".dae", ".urdf", ".yaml")
+_MAX_SIZE = 6 << 20  # bytes of an uploaded model: in base64 it must fit into a message of 8 MiB
 
 
 class SceneEditing:
-    """Relays edits, and keeps the tree of objects for browsers that come later."""
+    """Forwards edits to the simulator, and keeps the object tree for browsers that connect later."""
 
-    def __init__(self, node: str, folder: Path, tell: _Told):
-        """Edit the scene of `node`; the user's scenes and models are in `folder`; `tell` sends to all browsers."""
-        self._node, self._folder, self._tell = node, folder, tell
-        self._listening: rospy.Subscriber | None = None
-        self._has_missed = False  # a message, without which the later ones say nothing
+    def __init__(self, node: str, folder: Path, broadcast: Callable[[_Message], None]):
+        """`node` is the simulator's name, `folder` that of the user's scenes; `broadcast` sends to all browsers."""
+        self._node, self._folder, self._broadcast = node, folder, broadcast
+        self._subscriber: rospy.Subscriber | None = None
+        self._has_gap = False  # a change was lost, so that later changes cannot be applied
         self._lock = threading.Lock()
         self._rows: dict[int, _Message] = {}
-        self._said: dict[str, Any] = {}
+        self._header: dict[str, Any] = {}  # of the last message: all keys except its rows
         self._models, self._recent = ModelList(folder), RecentScenes(folder)
 
-    def listen(self, wanted: bool) -> None:
-        """Hear of the tree while a browser is open; called again and again."""
-        if self._has_missed and self._listening is not None:
-            self._listening.unregister()
-            self._listening = None  # the node tells a new listener all
-        if wanted and self._listening is None:
-            self._has_missed = False
-            self._listening = rospy.Subscriber(f"{self._node}/{_TREE}", String, self._on_tree, queue_size=_WAITING)
-        elif not wanted and self._listening is not None:
-            self._listening.unregister()
-            self._listening = None
+    def subscribe(self, wanted: bool) -> None:
+        """Subscribe to the object tree while `wanted` (a browser is open); to be called repeatedly."""
+        if self._has_gap and self._subscriber is not None:
+            self._subscriber.unregister()
+            self._subscriber = None  # a new subscriber gets the whole tree
+        if wanted and self._subscriber is None:
+            self._has_gap = False
+            self._subscriber = rospy.Subscriber(f"{self._node}/{_TREE}", String, self._on_tree, queue_size=_QUEUE_SIZE)
+        elif not wanted and self._subscriber is not None:
+            self._subscriber.unregister()
+            self._subscriber = None
             with self._lock:
-                self._rows, self._said = {}, {}
+                self._rows, self._header = {}, {}
 
     def _on_tree(self, message: Any) -> None:
-        said = json.loads(message.data)
+        change = json.loads(message.data)
         with self._lock:
-            if said["since"] is None:
+            if change["since"] is None:
                 self._rows = {}
-            elif said["since"] != self._said.get("version"):
-                self._has_missed = True
+            elif change["since"] != self._header.get("version"):
+                self._has_gap = True
                 return
-            for handle in said["gone"]:
+            for handle in change["gone"]:
                 self._rows.pop(handle, None)
-            self._rows.update((row["handle"], row) for row in said["objects"])
-            self._said = {key: value for key, value in said.items() if key not in ("objects", "gone")}
-        self._tell({"tree": said})
+            self._rows.update((row["handle"], row) for row in change["objects"])
+            self._header = {key: value for key, value in change.items() if key not in ("objects", "gone")}
+        self._broadcast({"tree": change})
 
     def picture(self, path: str) -> Content:
-        """Return the picture of a model, by its path; None where it is none."""
+        """Return a model's picture by its path; None if the path is none of them."""
         return self._models.picture(path)
 
     @property
     def answers(self) -> dict[str, Answer]:
-        """What answers each question."""
+        """The handler of each request."""
         return {
             "tree": lambda _: self._tree(),
-            "edit": lambda one: self._ask({key: one[key] for key in ("edit", "name", "merge") if key in one}),
-            "undo": lambda one: self._ask({"undo": True, **{key: one[key] for key in ("merge",) if key in one}}),
-            "redo": lambda _: self._ask({"redo": True}),
+            "edit": lambda message: self._call(_pick(message, "edit", "name", "merge")),
+            "undo": lambda message: self._call({"undo": True, **_pick(message, "merge")}),
+            "redo": lambda _: self._call({"redo": True}),
             "properties": lambda _: {"types": properties()},
             "models": lambda _: {"groups": self._models.groups()},
             "upload_model": self._upload,
-            "scene_files": lambda _: {**self._recent.listed(), **self._now("file", "draft")},
-            "new_scene": lambda _: self._ask({"new": True}),
+            "scene_files": lambda _: {**self._recent.listed(), **self._state("file", "draft")},
+            "new_scene": lambda _: self._call({"new": True}),
             "open_scene": self._open,
             "save_scene": self._save,
-            "save_model": lambda one: self._ask({"save_model": one.get("object"), "file": self._path(one, "file")}),
-            "scene_text": lambda _: self._ask({"text": True}),
-            "objects_text": lambda one: self._ask({"text_of": one.get("objects")}),
+            "save_model": self._save_model,
+            "scene_text": lambda _: self._call({"text": True}),
+            "objects_text": lambda message: self._call({"text_of": message.get("objects")}),
             "write_scene_text": self._write,
-            "draft": lambda one: self._ask({"draft": one.get("draft")}),
+            "draft": lambda message: self._call({"draft": message.get("draft")}),
         }
 
-    def _now(self, *keys: str) -> dict[str, Any]:
+    def _state(self, *keys: str) -> dict[str, Any]:
         with self._lock:
-            return {key: self._said.get(key) for key in keys}
+            return {key: self._header.get(key) for key in keys}
 
     def _tree(self) -> dict[str, Any]:
         with self._lock:
             rows = [self._rows[handle] for handle in sorted(self._rows)]
-            return {"tree": {"version": -1, **self._said, "since": None, "objects": rows, "gone": []}}
+            return {"tree": {"version": -1, **self._header, "since": None, "objects": rows, "gone": []}}
 
-    def _ask(self, request: _Message) -> dict[str, Any]:
-        """Return the node's answer. Raises ValueError with its complaint."""
+    def _call(self, request: _Message) -> dict[str, Any]:
+        """Return the simulator's reply to `edit_scene`. Raises ValueError with its error."""
         try:
-            answer = rospy.ServiceProxy(f"{self._node}/edit_scene", AddDiagnostics)(json.dumps(request))
+            response = rospy.ServiceProxy(f"{self._node}/edit_scene", AddDiagnostics)(json.dumps(request))
         except FAILURES as error:
             raise ValueError(f"the simulation does not answer: {error}") from None
-        if not answer.success:
-            raise ValueError(answer.message)
-        made: dict[str, Any] = json.loads(answer.message)
-        return made
+        if not response.success:
+            raise ValueError(response.message)
+        reply: dict[str, Any] = json.loads(response.message)
+        return reply
 
     def _open(self, message: _Message) -> dict[str, Any]:
-        answer = self._ask({"open": self._path(message, "file")})
-        self._recent.add(answer["file"])
-        return answer
+        reply = self._call({"open": self._path(message, "file")})
+        self._recent.add(reply["file"])
+        return reply
 
     def _save(self, message: _Message) -> dict[str, Any]:
-        if "file" not in message:
-            return self._saved(self._ask({"save": True}))
-        path = self._path(message, "file")
-        if Path(path).exists() and message.get("over") is not True and path != self._now("file")["file"]:
-            raise ValueError(f"{message['file']} is there already")
-        return self._saved(self._ask({"save": path}))
+        path: str | bool = self._path(message, "file") if "file" in message else True  # true: to its own file
+        if isinstance(path, str):
+            is_own = message.get("over") is True or path == self._state("file")["file"]
+            if Path(path).exists() and not is_own:
+                raise ValueError(f"{message['file']} is there already")
+        reply = self._call({"save": path})
+        self._recent.add(reply["file"])
+        return reply
 
-    def _saved(self, answer: dict[str, Any]) -> dict[str, Any]:
-        self._recent.add(answer["file"])
-        return answer
+    def _save_model(self, message: _Message) -> dict[str, Any]:
+        return self._call({"save_model": message.get("object"), "file": self._path(message, "file")})
 
     def _path(self, message: _Message, key: str) -> str:
-        """Return a file that a browser names, in the user's folder where it has none; with .yaml."""
+        """Return the path of a file named by a browser: relative to the user's folder, with .yaml as default suffix."""
         name = message.get(key)
         if not isinstance(name, str) or not name.strip():
             raise ValueError(f"{key}: must be the name of a file")
@@ -145,22 +145,22 @@ class SceneEditing:
 
     def _write(self, message: _Message) -> dict[str, Any]:
         try:
-            return self._ask({"write": message.get("text"), "revision": message.get("revision")})
+            return self._call({"write": message.get("text"), "revision": message.get("revision")})
         except ValueError as error:
-            found = _LINE.search(str(error))
-            return {"error": str(error), "line": int(found[1]) if found else None}
+            match = _LINE.search(str(error))
+            return {"error": str(error), "line": int(match[1]) if match else None}
 
     def _upload(self, message: _Message) -> dict[str, Any]:
-        """Keep a model of the user's. Raises ValueError."""
+        """Save an uploaded model in the user's folder; return the operation that adds it. Raises ValueError."""
         name = message.get("name")
-        if not isinstance(name, str) or Path(name).name != name or Path(name).suffix.lower() not in _UPLOADED:
-            raise ValueError(f"name: must end in {', '.join(_UPLOADED[:-1])} or {_UPLOADED[-1]}")
+        if not isinstance(name, str) or Path(name).name != name or Path(name).suffix.lower() not in _UPLOAD_SUFFIXES:
+            raise ValueError(f"name: must end in {', '.join(_UPLOAD_SUFFIXES[:-1])} or {_UPLOAD_SUFFIXES[-1]}")
         try:
             content = base64.b64decode(str(message.get("content")), validate=True)
         except binascii.Error:
             raise ValueError("content: must be in base64") from None
-        if len(content) > _LARGEST:
-            raise ValueError(f"{name}: is larger than {_LARGEST >> 20} MiB")
+        if len(content) > _MAX_SIZE:
+            raise ValueError(f"{name}: is larger than {_MAX_SIZE >> 20} MiB")
         try:
             self._models.folder.mkdir(parents=True, exist_ok=True)
             writing.write_new(self._models.folder / name, content)
@@ -169,3 +169,7 @@ class SceneEditing:
         except OSError as error:
             raise ValueError(str(error)) from None
         return {"model": self._models.operation(self._models.folder / name)}
+
+
+def _pick(message: _Message, *keys: str) -> dict[str, Any]:
+    return {key: message[key] for key in keys if key in message}

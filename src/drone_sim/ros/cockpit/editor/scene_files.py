@@ -1,4 +1,4 @@
-"""The scene files that can be flown in: those on offer, a task's plan as one, and the switch from one to another."""
+"""Scene files for the page: the list, the scene of a task, and switching between scenes."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from drone_sim.vrep_files.model import SUFFIXES
 
 _TASK_SCENES = Path("~/.ros/drone_sim/tasks")
 _DRONE = "drone"
-_KNOWN = ("scene", *BESIDE, *EquipmentParameters.model_fields)  # what a scene file can hold
+_SCENE_KEYS = ("scene", *BESIDE, *EquipmentParameters.model_fields)  # of a config, that a scene file can hold
 _KEY = "scene_file"
-_NONE = "none"  # as the launch file says it
+_NONE = "none"  # as in the launch file
 _MINE = "mine/"
 _SHIPPED = "config/scenes"
-_MOST = 200  # of the user's
+_MAX_OWN = 200  # scenes of the user's
 _KINDS = {".yaml", ".yml", *SUFFIXES}
 
 
 def scene_of(plan: Plan, folder: Path | None = None) -> str:
-    """Return the scene file of a plan: its own where that says everything, or one that is written to `folder`.
+    """Return the scene file of a plan: its own if it has no config, otherwise one that is written to `folder`.
 
     Raises ParameterError and OSError, in one line.
     """
@@ -51,13 +51,16 @@ def scene_of(plan: Plan, folder: Path | None = None) -> str:
 
 
 def describe_scene_of(plan: Plan) -> str:
-    """Return what the scene of a plan is, in one line. Raises ParameterError and FileNotFoundError."""
+    """Return a description of a plan's scene, in one line. Raises ParameterError and FileNotFoundError."""
     config = _config(plan)
-    lacks = [key for key in config if key not in _KNOWN]
-    said = [f"in the scene of the task {plan.name}", *_flat({key: config[key] for key in config if key in _KNOWN})]
-    said += [f"but without {', '.join(lacks)}, which can only be set at launch"] if lacks else []
-    said += ["with the events of its plan"] if plan.timeline else []
-    return ", ".join(said)
+    missing = [key for key in config if key not in _SCENE_KEYS]
+    parts = [
+        f"in the scene of the task {plan.name}",
+        *_flat({key: config[key] for key in config if key in _SCENE_KEYS}),
+    ]
+    parts += [f"but without {', '.join(missing)}, which can only be set at launch"] if missing else []
+    parts += ["with the events of its plan"] if plan.timeline else []
+    return ", ".join(parts)
 
 
 def _config(plan: Plan) -> dict[str, Any]:
@@ -76,33 +79,32 @@ def _content(config: Mapping[str, Any], scene: Mapping[str, Any]) -> dict[str, A
     Equipment goes into the entry of each vehicle; without vehicles, into a single entry with the drone's name, which
     means the drone.
     """
-    whole = merged({key: value for key, value in config.items() if key in ("scene", *BESIDE)}, dict(scene))
-    carried = {key: value for key, value in config.items() if key in EquipmentParameters.model_fields}
-    vehicles = whole.get("vehicles") or {}
-    if carried and isinstance(vehicles, Mapping):
-        drone = whole.get("drone")
-        alone = str(drone.get("name", _DRONE)) if isinstance(drone, Mapping) else _DRONE
-        entries = vehicles or {alone: {}}
-        whole = {**whole, "vehicles": {name: merged(carried, entry) for name, entry in entries.items()}}
-    inside = whole.pop("scene", {})
-    return {**inside, **whole}
+    content = merged({key: value for key, value in config.items() if key in ("scene", *BESIDE)}, dict(scene))
+    equipment = {key: value for key, value in config.items() if key in EquipmentParameters.model_fields}
+    vehicles = content.get("vehicles") or {}
+    if equipment and isinstance(vehicles, Mapping):
+        drone = content.get("drone")
+        name_alone = str(drone.get("name", _DRONE)) if isinstance(drone, Mapping) else _DRONE
+        entries = vehicles or {name_alone: {}}
+        content = {**content, "vehicles": {name: merged(equipment, entry) for name, entry in entries.items()}}
+    scene_values = content.pop("scene", {})
+    return {**scene_values, **content}
 
 
 def _flat(values: Any, above: str = "") -> list[str]:
-    """Return values by name, such as `weather/wind = [2, 0, 0]`."""
+    """Return nested values in lines such as `weather/wind = [2, 0, 0]`."""
     if isinstance(values, Mapping):
-        return [one for key, value in values.items() for one in _flat(value, f"{above}{key}/")]
+        return [line for key, value in values.items() for line in _flat(value, f"{above}{key}/")]
     return [f"{above.rstrip('/')} = {json.dumps(values, default=str)}"]
 
 
 class SceneSwitcher:
-    """Remembers the scene that the user has chosen, while tasks and stages bring theirs."""
+    """Switches to the scene of a lesson, and back to the user's scene afterwards."""
 
     def __init__(self, simulator: Simulator):
-        """Switch the scene of `simulator`."""
         self._simulator = simulator
-        self._brought = ""  # the scene that a lesson has brought
-        self._before = ""  # the user's, to come back to
+        self._lesson_scene = ""  # the scene file that the last lesson loaded
+        self._user_scene = ""  # the scene file before that
 
     def describe(self, lesson: Lesson) -> str:
         """Return the scene in which a lesson is flown, in one line; '' for no change. Raises ValueError, OSError."""
@@ -110,42 +112,44 @@ class SceneSwitcher:
             return describe_scene_of(plan_of(lesson))
         if lesson.scene:
             return f"in {lesson.scene.rpartition('/')[2]}, as the tutorial's command says"
-        return self._back() if self._is_brought(self._now()) else ""
+        return self._back() if self._is_of_lesson(self._scene_file()) else ""
 
     def fly(self, lesson: Lesson | None) -> tuple[bool, str]:
-        """Start the simulation anew where a lesson is flown; return whether that was done, and one line.
+        """Restart the simulation in the lesson's scene; return whether it started, and one line.
 
         Raises ValueError and OSError, in one line.
         """
-        now = self._now()
-        is_brought = self._is_brought(now)
+        now = self._scene_file()
+        is_of_lesson = self._is_of_lesson(now)
         wanted = _scene(lesson)
         if wanted:
-            self._before = self._before if is_brought else now
+            self._user_scene = self._user_scene if is_of_lesson else now
             return self._load(wanted, now, f"started in {_name(lesson, wanted)}")
-        if is_brought:
-            return self._load(self._before, now, f"started {self._back()}")
+        if is_of_lesson:
+            return self._load(self._user_scene, now, f"started {self._back()}")
         return self._simulator.call("restart")
 
-    def _now(self) -> str:
+    def _scene_file(self) -> str:
         return str(self._simulator.parameter(_KEY, ""))
 
-    def _is_brought(self, scene: str) -> bool:
-        return bool(self._brought) and scene == self._brought
+    def _is_of_lesson(self, scene: str) -> bool:
+        return bool(self._lesson_scene) and scene == self._lesson_scene
 
     def _back(self) -> str:
-        return f"back in {'the scene of the launch' if self._before in ('', 'none') else self._before}"
+        return f"back in {'the scene of the launch' if self._user_scene in ('', 'none') else self._user_scene}"
 
-    def _load(self, file: str, now: str, said: str) -> tuple[bool, str]:
-        _, cleanup = self._simulator.call("stop")  # an error in the cleanup of what flew must not hinder what comes
+    def _load(self, file: str, now: str, success: str) -> tuple[bool, str]:
+        _, cleanup = self._simulator.call(
+            "stop"
+        )  # an error in the cleanup of the old script must not prevent the start
         self._simulator.set_parameter(_KEY, file)
         done, answer = self._simulator.call("load_scene")
-        if not done and script_failure(answer) is None:  # the scene was not there
+        if not done and script_failure(answer) is None:  # the scene could not be loaded
             self._simulator.set_parameter(_KEY, now)
             return False, answer
-        self._brought = file if file != self._before else ""
+        self._lesson_scene = file if file != self._user_scene else ""
         failed = f"; the one before: {cleanup}" if script_failure(cleanup) else ""
-        return done, f"{said if done else answer}{failed}"
+        return done, f"{success if done else answer}{failed}"
 
 
 def plan_of(lesson: Lesson) -> Plan:
@@ -164,37 +168,37 @@ def _scene(lesson: Lesson | None) -> str:
 
 
 class SceneList:
-    """Names of scenes, and what the parameter `scene_file` is for each."""
+    """Names of scenes for the page, each with its value of the parameter `scene_file`."""
 
     def __init__(self, folder: Path):
-        """Offer the scenes in `folder`, the user's, which need not be there, after those of the package."""
+        """`folder` is that of the user's scenes, listed after those of the package; it need not exist."""
         self._folder = folder
         shipped = sorted((package_path() / _SHIPPED).glob("*.yaml"))
-        # Named so that a simulation on another machine finds its own.
-        self._shipped = {one.stem: f"package://drone_sim/{_SHIPPED}/{one.name}" for one in shipped}
+        # As package:// so that a simulator on another machine finds its own copy.
+        self._shipped = {file.stem: f"package://drone_sim/{_SHIPPED}/{file.name}" for file in shipped}
 
-    def offered(self, flown: str) -> tuple[tuple[str, ...], str]:
-        """Return the names, and that of the scene that is flown: one of them, or the file where it is another."""
+    def names(self, current: str) -> tuple[tuple[str, ...], str]:
+        """Return all names, and the name of the scene file `current`, which is its path if it is not in the list."""
         files = self._files()
-        place = _place(flown)
-        name = next((name for name, file in files.items() if _place(file) == place), place)
+        path = _path(current)
+        name = next((name for name, file in files.items() if _path(file) == path), path)
         return tuple(dict.fromkeys((*files, name))), name
 
     def file(self, name: str) -> str:
-        """Return what `scene_file` must be for a name that was offered."""
+        """Return the value of the parameter `scene_file` for a name."""
         return self._files().get(name, name)
 
     def _files(self) -> dict[str, str]:
-        own = (one for one in self._folder.glob("*") if one.suffix.lower() in _KINDS and one.is_file())
-        mine = {f"{_MINE}{one.name}": str(one) for one in sorted(own)[:_MOST]}
+        own = (file for file in self._folder.glob("*") if file.suffix.lower() in _KINDS and file.is_file())
+        mine = {f"{_MINE}{file.name}": str(file) for file in sorted(own)[:_MAX_OWN]}
         return {_NONE: _NONE, **self._shipped, **mine}
 
 
-def _place(flown: str) -> str:
-    """Return a scene's file as its path, however it was named."""
-    if flown in ("", _NONE):
+def _path(scene_file: str) -> str:
+    """Return the path of a scene file, which may be given as package:// or relative; `none` for none."""
+    if scene_file in ("", _NONE):
         return _NONE
     try:
-        return str(resolve(flown))
+        return str(resolve(scene_file))
     except (OSError, ValueError):
-        return flown
+        return scene_file

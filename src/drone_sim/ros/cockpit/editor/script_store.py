@@ -1,4 +1,4 @@
-"""The scripts that the editor may open: those of the package, to be copied, and those in a folder of the user's."""
+"""Scripts that the editor may open: those of the package, read-only, and those in the user's folder."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from drone_sim.scripting.python.helpers import BUILT_IN
 
 OWN, SOLUTIONS = "mine", "solutions"
 _ENDINGS = (".py", ".lua")
-_LONGEST = 100  # characters of a name
-_MOST = 1000  # scripts of one kind
-_MOST_REMOVED = 20  # deleted scripts that are kept, in memory
-_START = "start.py"  # what a task begins with
-_LAST_STAGE = "6_ros.py"  # the tutorial's whole controller
+_MAX_NAME = 100  # characters of a name
+_MAX_SCRIPTS = 1000  # in one group
+_MAX_REMOVED = 20  # deleted scripts kept in memory
+_START = "start.py"  # starting point of a task
+_LAST_STAGE = "6_ros.py"  # the tutorial's complete controller
 LARGEST = 1 << 20  # bytes
-_LARGEST_COPY = 1 << 26  # bytes of what another program has made of a script
+_LARGEST_COPY = 1 << 26  # bytes of a script that another program has replaced
 
 
 class ScriptStoreError(ValueError):
-    """What was asked of the script store cannot be done; one line."""
+    """A request to the script store that cannot be executed; its message has one line."""
 
 
 class NoSuchScript(ScriptStoreError):
-    """There is none of that name any more."""
+    """No script has this name (any more)."""
 
 
 @dataclass(frozen=True)
 class ScriptFile:
-    """A script: the name by which a browser asks for it, and its file."""
+    """A script's name in the browser, and its file."""
 
     name: str  # such as tutorial/1_thrust.py
     path: Path
@@ -45,56 +45,55 @@ class ScriptFile:
 
     @property
     def group(self) -> str:
-        """Which kind it is of: built-in, tutorial, solutions, tasks or mine."""
+        """The script's group: built-in, tutorial, solutions, tasks or mine."""
         return self.name.partition("/")[0]
 
     @property
     def file_name(self) -> str:
-        """The name without its kind, such as 1_thrust.py."""
+        """The name without its group, such as 1_thrust.py."""
         return self.name.partition("/")[2]
 
 
 class ScriptStore:
-    """Scripts by name, such as `built-in/pilot.py` or `mine/first.lua`. Nothing else is read or written."""
+    """Scripts by name, such as `built-in/pilot.py` or `mine/first.lua`; no other file is read or written."""
 
     def __init__(self, folder: Path, shipped: Mapping[str, Callable[[], dict[str, Path]]] | None = None):
-        """Keep the user's in `folder`, made by the first copy; `shipped` gives the package's of each kind, by name."""
+        """`folder` is the user's, created by the first copy; `shipped` lists the package's scripts of each group."""
         self.folder = folder
         self._shipped = shipped_with_the_package() if shipped is None else shipped
-        self._originals: dict[str, str] = {}  # of the user's own, as they were before the first change
-        self._removed: dict[str, bytes] = {}  # what the last ones held that were deleted, by name
+        self._originals: dict[str, str] = {}  # text of the user's scripts before the first change
+        self._removed: dict[str, bytes] = {}  # content of the scripts deleted last, by name
         self._writing = threading.Lock()  # two browsers may save at once
 
-    # ---- what there is
+    # ---- list
 
     def scripts(self) -> list[ScriptFile]:
-        """Return all that there are now."""
         shipped = [
-            ScriptFile(f"{kind}/{name}", path, False)
-            for kind, files in self._shipped.items()
+            ScriptFile(f"{group}/{name}", path, False)
+            for group, files in self._shipped.items()
             for name, path in files().items()
         ]
         return [*shipped, *(self._own(name) for name in scripts_in(self.folder))]
 
     def find(self, name: Any) -> ScriptFile:
         """Return a script by its name. Raises ScriptStoreError."""
-        found = next((script for script in self.scripts() if script.name == name), None)
-        if found is None:
+        script = next((script for script in self.scripts() if script.name == name), None)
+        if script is None:
             raise NoSuchScript(f"{str(name)[:80]!r}: no such script")
-        self._place(found)
-        return found
+        self._resolve(script)
+        return script
 
-    def _place(self, script: ScriptFile) -> Path:
-        """Return where a script is: a link in the folder may lead to another file there. Raises ScriptStoreError."""
+    def _resolve(self, script: ScriptFile) -> Path:
+        """Return a script's file, with links resolved. Raises ScriptStoreError if it is outside the user's folder."""
         if not script.is_own:
             return script.path
         try:
-            place = Path(os.path.realpath(script.path))
+            path = Path(os.path.realpath(script.path))
         except ValueError as error:
             raise ScriptStoreError(f"{script.name!r}: {error}") from None
-        if place.parent != self.folder.resolve():
+        if path.parent != self.folder.resolve():
             raise ScriptStoreError(f"{script.name}: is a link to a file outside of {self.folder}, so it is not changed")
-        return place
+        return path
 
     def of_file(self, path: str) -> ScriptFile | None:
         """Return the script stored in a file, None if there is none."""
@@ -106,21 +105,21 @@ class ScriptStore:
         return hashlib.sha1(names.encode("utf-8", "surrogatepass"), usedforsecurity=False).hexdigest()[:12]
 
     def version(self, name: Any) -> str:
-        """Return the version of a script's file now, '' where it is gone."""
-        found = next((script for script in self.scripts() if script.name == name), None)
-        return _version_of(found.path) if found else ""
+        """Return the current version of a script's file; '' if it was deleted."""
+        script = next((script for script in self.scripts() if script.name == name), None)
+        return _version_of(script.path) if script else ""
 
     # ---- text
 
     def read(self, script: ScriptFile) -> tuple[str, str]:
-        """Return a script's text, and its version, which changes when the file does. Raises ScriptStoreError."""
+        """Return a script's text and its version, which changes with the file. Raises ScriptStoreError."""
         return _read_text(script.name, script.path)
 
     def save(self, script: ScriptFile, text: str, version: str) -> tuple[ScriptFile, str] | None:
-        """Write a script whose version the editor has; one of the package becomes a copy in the user's folder.
+        """Write a script; a script of the package is copied to the user's folder.
 
-        Return what has been written, and its version; None where another has changed the file, and nothing was
-        written. Raises ScriptStoreError.
+        Return the written script and its version. Return None, without writing, if the file no longer has `version`.
+        Raises ScriptStoreError.
         """
         with self._writing:
             if not script.is_own:
@@ -130,13 +129,13 @@ class ScriptStore:
                 return script, written
             if version != _version_of(script.path):
                 return None
-            place = self._place(script)
+            path = self._resolve(script)
             self._originals.setdefault(script.name, self.read(script)[0])
-            return script, _write_text(script.name, place, text)
+            return script, _write_text(script.name, path, text)
 
     def save_as(self, name: Any, text: str) -> tuple[ScriptFile, str]:
-        """Write a new script of the user's; return it, and its version. Raises ScriptStoreError."""
-        script = self._own(_checked(name))
+        """Write a new script of the user's; return it and its version. Raises ScriptStoreError."""
+        script = self._own(_valid_name(name))
         with self._writing:
             if os.path.lexists(script.path):
                 raise ScriptStoreError(f"{script.name}: is there already; take another name")
@@ -145,45 +144,45 @@ class ScriptStore:
             return script, version
 
     def keep_both(self, name: Any, text: str, mine: bool) -> tuple[ScriptFile, str, str]:
-        """End a conflict about a script of the user's: `text`, or what the file holds, goes into another file.
+        """Resolve a conflict about a user's script: either `text` or the file's content goes into a second file.
 
-        If `mine` is true, or there was no file, `text` is written to the script's own file; otherwise this file does
-        not change. Return the script, its version, and the name of the other script, '' where there is none. Raises
+        If `mine` is true, or there is no file, `text` is written to the script's own file; otherwise this file does
+        not change. Return the script, its version, and the name of the second script ('' for none). Raises
         ScriptStoreError.
         """
         file_name = str(name).removeprefix(f"{OWN}/")
-        script = self._own(file_name if file_name in scripts_in(self.folder) else _checked(file_name))
+        script = self._own(file_name if file_name in scripts_in(self.folder) else _valid_name(file_name))
         with self._writing:
-            place = self._place(script)
-            if not os.path.lexists(place):
-                return script, _write_text(script.name, place, text, is_new=True), ""
+            path = self._resolve(script)
+            if not os.path.lexists(path):
+                return script, _write_text(script.name, path, text, is_new=True), ""
             second = self._copy_of(script)
             if mine:
-                with _naming_errors(script.name):  # whatever it holds
-                    writing.write_new(second.path, read_bytes(place, _LARGEST_COPY))
-                return script, _write_text(script.name, place, text), second.name
+                with _naming_errors(script.name):  # as bytes: it need not be text
+                    writing.write_new(second.path, read_bytes(path, _LARGEST_COPY))
+                return script, _write_text(script.name, path, text), second.name
             _write_text(second.name, second.path, text, is_new=True)
             return script, _version_of(script.path), second.name
 
     # ---- files
 
     def rename(self, script: ScriptFile, name: Any) -> tuple[ScriptFile, str]:
-        """Give a script of the user's another name; return it, and its version. Raises ScriptStoreError."""
-        new = self._own(_checked(name))
+        """Rename a script of the user's; return it and its version. Raises ScriptStoreError."""
+        new = self._own(_valid_name(name))
         with self._writing:
-            place = self._own_place(script)
+            path = self._own_path(script)
             with _naming_errors(script.name):
                 try:
-                    os.link(place, new.path, follow_symlinks=False)  # which takes the place of nothing
+                    os.link(path, new.path, follow_symlinks=False)  # unlike rename, replaces no file
                 except FileExistsError:
                     raise ScriptStoreError(f"{new.name}: is there already; take another name") from None
-                os.unlink(place)
+                os.unlink(path)
             if script.name in self._originals:
                 self._originals[new.name] = self._originals.pop(script.name)
             return new, _version_of(new.path)
 
     def duplicate(self, script: ScriptFile, text: str) -> tuple[ScriptFile, str]:
-        """Write `text`, what a browser shows of a script, into a new one beside it; return that, and its version.
+        """Write `text`, a browser's version of a script, to a new script; return it and its version.
 
         Raises ScriptStoreError.
         """
@@ -192,15 +191,15 @@ class ScriptStore:
             return copy, _write_text(copy.name, copy.path, text, is_new=True)
 
     def remove(self, script: ScriptFile) -> None:
-        """Delete a script of the user's, of which `bring_back` knows. Raises ScriptStoreError."""
+        """Delete a script of the user's; `bring_back` restores it. Raises ScriptStoreError."""
         with self._writing:
-            place = self._own_place(script)
+            path = self._own_path(script)
             with _naming_errors(script.name):
-                content = read_bytes(place, LARGEST)
-                os.unlink(place)
+                content = read_bytes(path, LARGEST)
+                os.unlink(path)
             self._removed.pop(script.name, None)
             self._removed[script.name] = content
-            for oldest in list(self._removed)[:-_MOST_REMOVED]:
+            for oldest in list(self._removed)[:-_MAX_REMOVED]:
                 del self._removed[oldest]
 
     def bring_back(self, name: Any) -> tuple[ScriptFile, str]:
@@ -221,33 +220,33 @@ class ScriptStore:
                 writing.write_new(script.path, self._removed.pop(name))
             return script, _version_of(script.path)
 
-    def _own_place(self, script: ScriptFile) -> Path:
-        """Return the file of a script of the user's, or the link that it is. Raises ScriptStoreError."""
+    def _own_path(self, script: ScriptFile) -> Path:
+        """Return the path of a user's script, links not resolved. Raises ScriptStoreError."""
         if not script.is_own:
             raise ScriptStoreError(f"{script.name}: belongs to the package and cannot be changed; duplicate it")
-        self._place(script)
+        self._resolve(script)
         return script.path
 
     def original(self, script: ScriptFile) -> str:
-        """Return what a script was before the first change, to go back to. Raises ScriptStoreError."""
-        known = self._originals.get(script.name)
-        return self.read(script)[0] if known is None else known
+        """Return a script's text before its first change. Raises ScriptStoreError."""
+        original = self._originals.get(script.name)
+        return self.read(script)[0] if original is None else original
 
     def _own(self, file_name: str) -> ScriptFile:
         return ScriptFile(f"{OWN}/{file_name}", self.folder / file_name, True)
 
     def _copy_of(self, script: ScriptFile) -> ScriptFile:
-        """Return a script of the user's that does not exist yet, named as another one."""
+        """Return a new script of the user's, with the name of `script` and a number if it is taken."""
         stem, ending = Path(script.file_name).stem, script.path.suffix
-        names = [stem, *(f"{stem}_{number}" for number in range(2, _MOST))]
-        name = next((one for one in names if not os.path.lexists(self.folder / f"{one}{ending}")), None)
+        names = [stem, *(f"{stem}_{number}" for number in range(2, _MAX_SCRIPTS))]
+        name = next((name for name in names if not os.path.lexists(self.folder / f"{name}{ending}")), None)
         if name is None:
             raise ScriptStoreError(f"{script.name}: there are too many copies in {self.folder}")
         return self._own(f"{name}{ending}")
 
 
 def shipped_with_the_package() -> dict[str, Callable[[], dict[str, Path]]]:
-    """Return what gives the package's scripts of each kind, by name."""
+    """Return for each group a function that lists the package's scripts by name."""
     package = package_path()
     return {
         "built-in": lambda: scripts_in(BUILT_IN),
@@ -258,31 +257,31 @@ def shipped_with_the_package() -> dict[str, Callable[[], dict[str, Path]]]:
 
 
 def scripts_in(folder: Path) -> dict[str, Path]:
-    """Return the scripts in a folder, by name."""
+    """Return the scripts in a folder by name."""
     try:
-        files = sorted(folder.iterdir())[: 10 * _MOST]
-    except OSError:  # there is none yet
+        files = sorted(folder.iterdir())[: 10 * _MAX_SCRIPTS]
+    except OSError:  # it does not exist yet
         return {}
     named = {file.name: file for file in files if file.suffix in _ENDINGS and not file.name.startswith(("_", "."))}
-    return dict(list(named.items())[:_MOST])
+    return dict(list(named.items())[:_MAX_SCRIPTS])
 
 
 def _stages(folder: Path) -> dict[str, Path]:
-    """Return the tutorial's stages, whose names begin with their numbers; the folder holds tools, too."""
+    """Return the tutorial's stages: files whose names begin with a digit; the folder also holds tools."""
     return {name: path for name, path in scripts_in(folder).items() if name[0].isdigit()}
 
 
 def _starts(last_stage: Path) -> dict[str, Path]:
-    """Return what each task begins with, by the task's name: a file of its own, or the whole of the tutorial."""
+    """Return the starting script of each task: its start.py, or the tutorial's last stage."""
     own = {name: tasks.folder() / name / _START for name in tasks.names()}
-    found = {f"{name}.py": file if file.is_file() else last_stage for name, file in own.items()}
-    return {name: file for name, file in found.items() if file.is_file()}
+    starts = {f"{name}.py": file if file.is_file() else last_stage for name, file in own.items()}
+    return {name: file for name, file in starts.items() if file.is_file()}
 
 
-def _checked(name: Any) -> str:
-    """Return the name of a file that may be made. Raises ScriptStoreError."""
-    if not isinstance(name, str) or not 0 < len(name) <= _LONGEST:
-        raise ScriptStoreError(f"{str(name)[:80]!r}: a name has 1 to {_LONGEST} characters")
+def _valid_name(name: Any) -> str:
+    """Return `name` if a script may have it. Raises ScriptStoreError."""
+    if not isinstance(name, str) or not 0 < len(name) <= _MAX_NAME:
+        raise ScriptStoreError(f"{str(name)[:80]!r}: a name has 1 to {_MAX_NAME} characters")
     if Path(name).suffix not in _ENDINGS:
         raise ScriptStoreError(f"{name!r}: a script's name ends in {' or '.join(_ENDINGS)}")
     if "/" in name or name.startswith(("_", ".")) or not name.isprintable():
@@ -293,7 +292,7 @@ def _checked(name: Any) -> str:
 
 
 def _read_text(name: str, path: Path) -> tuple[str, str]:
-    r"""Return the text in a file, its lines ended by \n, and its version. Raises ScriptStoreError."""
+    r"""Return the text of a file, with \n as line ends, and its version. Raises ScriptStoreError."""
     version = _version_of(path)
     with _naming_errors(name):
         content = read_bytes(path, LARGEST)
@@ -305,9 +304,9 @@ def _read_text(name: str, path: Path) -> tuple[str, str]:
 
 
 def _write_text(name: str, path: Path, text: str, is_new: bool = False) -> str:
-    r"""Write a file, with lines ended by \r\n where most were, and return its version.
+    r"""Write a file and return its version; most lines ended by \r\n stay so.
 
-    Links are not followed, even if `path` becomes one meanwhile. With `is_new` no existing file is replaced. Raises
+    Links are not followed, even if `path` becomes one meanwhile. `is_new`: an existing file is not replaced. Raises
     ScriptStoreError.
     """
     try:
@@ -328,7 +327,7 @@ def _write_text(name: str, path: Path, text: str, is_new: bool = False) -> str:
 
 
 def _version_of(path: Path) -> str:
-    """Return a text that changes whenever the file does, '' if there is no file."""
+    """Return a text that changes whenever the file does; '' if there is no file."""
     try:
         state = path.stat()
     except (OSError, ValueError):
@@ -346,11 +345,11 @@ def _has_windows_line_ends(path: Path) -> bool:
 
 @contextlib.contextmanager
 def _naming_errors(name: str) -> Iterator[None]:
-    """Turn errors of a file into a ScriptStoreError with one line: errno's message with the file, or our own."""
+    """Convert errors of a file to a ScriptStoreError with one line."""
     try:
         yield
     except OSError as error:
-        said = f"{error.filename}: {os.strerror(error.errno)}" if error.errno and error.filename else str(error)
-        raise ScriptStoreError(f"{name}: {said}") from None
+        message = f"{error.filename}: {os.strerror(error.errno)}" if error.errno and error.filename else str(error)
+        raise ScriptStoreError(f"{name}: {message}") from None
     except ValueError as error:
         raise ScriptStoreError(f"{name}: {error}") from None

@@ -100,7 +100,7 @@ class Panel:
         self.board.show("vehicles", {"all": vehicles, "now": self._commands.vehicle})
 
     def _show_scenes(self, scene: str) -> None:
-        scenes, now = self._scenes.offered(scene)
+        scenes, now = self._scenes.names(scene)
         self.board.show("scenes", {"all": list(scenes), "now": now})
 
     def follow(self, vehicle: str) -> None:
