@@ -122,8 +122,8 @@ def test_a_path_out_of_its_folder_is_refused(tmp_path, removed, name):
     (folder / "a").mkdir(parents=True)
     (folder / "link").symlink_to("/usr/share")
     (folder / "a/link").symlink_to("/usr/share/")
-    for action in (lambda: containment.below(folder, name), lambda: containment.remove(folder / name, folder)):
-        with pytest.raises(containment.Outside):
+    for action in (lambda: containment.path_below(folder, name), lambda: containment.remove(folder / name, folder)):
+        with pytest.raises(containment.OutsideFolder):
             action()
     assert removed == []
 

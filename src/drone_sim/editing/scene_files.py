@@ -115,7 +115,7 @@ def _is_read_only(path: Path) -> bool:
 
 def _is_writable(path: Path) -> bool:
     try:
-        writing.check(path)
+        writing.check_writable(path)
     except OSError:
         return False
     return True

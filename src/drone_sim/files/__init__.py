@@ -1,1 +1,1 @@
-"""Files from outside, read once, with limits, and checked before anything else sees them; and how ours are written."""
+"""Reading of files from outside, with limits and checks, and writing of the package's own files."""

@@ -1,4 +1,4 @@
-"""Paths that must lie below a folder: checked before a file is written there, or a file or tree is removed."""
+"""Check that a path is inside a folder, before a file is written there, or a file or tree is removed."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ import shutil
 from pathlib import Path
 
 
-class Outside(ValueError):
-    """A path does not lie below the folder that it must lie in; one line."""
+class OutsideFolder(ValueError):
+    """A path is not inside the folder that must contain it. The message is one line."""
 
 
-def below(folder: str | Path, *names: str | Path) -> Path:
-    """Return the path that `names` lead to from a folder, with links in its parents resolved; the last is not followed.
+def path_below(folder: str | Path, *names: str | Path) -> Path:
+    """Return the path of `names` in a folder. Links in its parents are resolved; the path itself may be a link.
 
-    Raises Outside for a path that is the folder itself or is not in it.
+    Raises OutsideFolder if the path is the folder itself or is not in it.
     """
-    path, around = Path(folder, *names), os.path.realpath(folder)
-    place = Path(os.path.realpath(path.parent), path.name)
-    if path.name in ("", "..") or str(place) == around or not place.is_relative_to(around):
-        raise Outside(f"{path}: is not below the folder {around}")
-    return place
+    path, root = Path(folder, *names), os.path.realpath(folder)
+    resolved = Path(os.path.realpath(path.parent), path.name)
+    if path.name in ("", "..") or str(resolved) == root or not resolved.is_relative_to(root):
+        raise OutsideFolder(f"{path}: is not below the folder {root}")
+    return resolved
 
 
 def remove(path: str | Path, within: str | Path) -> None:
-    """Remove a file, a link, or a folder with everything in it; a path where nothing is, is left alone.
+    """Remove a file, a link, or a folder with its content, if it exists.
 
-    Raises Outside for a path that does not lie below the folder `within`, and OSError.
+    Raises OutsideFolder if the path is not inside the folder `within`, and OSError.
     """
-    place = below(within, Path(path).absolute())
-    if not os.path.lexists(place):  # also for a name that no file can have
+    resolved = path_below(within, Path(path).absolute())
+    if not os.path.lexists(resolved):  # false also for a name that no file can have
         return
-    if place.is_dir() and not place.is_symlink():
-        shutil.rmtree(place)
+    if resolved.is_dir() and not resolved.is_symlink():
+        shutil.rmtree(resolved)
     else:
-        place.unlink(missing_ok=True)
+        resolved.unlink(missing_ok=True)

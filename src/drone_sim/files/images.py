@@ -1,4 +1,4 @@
-"""Pictures from files, for textures: their size is looked at before anything is unpacked."""
+"""Image files for textures. The size is checked in the header, before the image is decoded."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ FORMATS = ("BMP", "JPEG", "PNG", "PPM", "TIFF", "WEBP")
 
 
 def read(path: str) -> np.ndarray:
-    """Return an 8-bit picture (h, w, 3 or 4) RGB or RGBA, top row first; not to be written to.
+    """Return an 8-bit image (h, w, 3 or 4), RGB or RGBA, top row first. The array is read-only.
 
-    Raises ValueError, in one line that names the file.
+    Raises ValueError, in one line with the file's name.
     """
     return _CACHE.get(path)
 
 
 def check(content: bytes) -> None:
-    """Raise ValueError, in one line without a name, for a picture that is too large; look at its header only."""
+    """Raise ValueError, in one line without a file name, if the header says that an image is too large."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)
         try:
@@ -38,7 +38,7 @@ def check(content: bytes) -> None:
 
 
 def png(image: np.ndarray) -> bytes:
-    """Return an 8-bit picture (h, w, 3 or 4), top row first, as a PNG file."""
+    """Return the PNG file of an 8-bit image (h, w, 3 or 4), top row first."""
     content = io.BytesIO()
     Image.fromarray(image).save(content, "PNG")
     return content.getvalue()
@@ -52,7 +52,7 @@ def _read(path: str) -> ReadFile:
         raise ValueError(f"texture {path}: cannot be read as an 8-bit image ({', '.join(FORMATS)})") from None
     except OSError as error:
         raise ValueError(f"texture {path}: cannot be read ({error.strerror or error})") from None
-    except Exception as error:  # PIL's readers raise whatever a broken header leads to
+    except Exception as error:  # for a broken header, PIL's readers raise exceptions of any type
         raise ValueError(f"texture {path}: {' '.join(str(error).split()):.200}") from None
     image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None or image.dtype != np.uint8:

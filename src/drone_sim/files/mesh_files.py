@@ -1,37 +1,66 @@
-"""Meshes from files, read once for whoever needs them: the renderer draws them, the world makes bodies."""
+"""Meshes from files: limits, a cache shared by the renderer and the world, and conversion to STL."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from drone_sim.files.mesh_part import MeshPart
 from drone_sim.files.resources import MEBIBYTE, FileCache, ReadFile
 
-_HULL = 256  # corners that a hull may have
+KINDS = (".obj", ".stl", ".dae")
+MAX_SIZE = 32 * MEBIBYTE  # bytes of a mesh file, and of each file that it refers to
+MAX_TRIANGLES = 200_000  # of a file
+MAX_PARTS = 256  # materials, or nodes of a COLLADA scene
+MAX_COORDINATE = 1e6  # m from the mesh's origin
+WHITE = (1.0, 1.0, 1.0, 1.0)
+Colour = tuple[float, float, float, float]
+
+_MAX_HULL_POINTS = 256
+
+
+class MeshPart(NamedTuple):
+    """Triangles of one material, in metres.
+
+    vertices: (n, 3) float64; faces: (m, 3); uv: (n, 2), v upwards, or None; rgba: 0..1; texture: (h, w, 3 or 4)
+    uint8, top row first, or None.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray | None
+    rgba: Colour
+    texture: np.ndarray | None
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the arrays, in bytes."""
+        arrays = (self.vertices, self.faces, self.uv, self.texture)
+        return sum(array.nbytes for array in arrays if array is not None)
 
 
 def read(path: str) -> tuple[MeshPart, ...]:
-    """Return a mesh file's parts, placed as the file says. Raises ValueError, in one line that names the file."""
+    """Return the parts of a mesh file in its root frame. Raises ValueError, in one line with the file's name."""
     return _CACHE.get(path)
 
 
 def triangles(path: str) -> int:
-    """Return how many triangles a mesh file holds. Raises what `read` raises."""
+    """Return the number of triangles in a mesh file. Raises what `read` raises."""
     return sum(len(part.faces) for part in read(path))
 
 
 def reach(path: str) -> np.ndarray:
-    """Return how far a mesh file's vertices are from its origin along x, y and z, (3,), m; raises what `read` does."""
+    """Return the largest absolute x, y and z of a mesh file's vertices, (3,), m. Raises what `read` raises."""
     return np.max([np.abs(part.vertices).max(axis=0) for part in read(path)], axis=0)
 
 
 def as_stl(path: str, hull: bool = False) -> bytes:
-    """Return a mesh file as a binary STL, all parts in one; of a `hull` only its corners matter.
+    """Return all parts of a mesh file as one binary STL. If `hull`, only the STL's convex hull is that of the mesh.
 
     Raises what `read` raises.
     """
     corners = np.concatenate([part.vertices[part.faces] for part in read(path)])
-    return stl(_hull(corners) if hull else corners)
+    return stl(_reduce_hull(corners) if hull else corners)
 
 
 def stl(corners: np.ndarray) -> bytes:
@@ -43,15 +72,15 @@ def stl(corners: np.ndarray) -> bytes:
     return bytes(80) + np.uint32(len(records)).tobytes() + records.tobytes()
 
 
-def _hull(corners: np.ndarray) -> np.ndarray:
-    """Return triangles (m, 3, 3) with the same convex hull; of a body with many corners, with nearly the same.
+def _reduce_hull(corners: np.ndarray) -> np.ndarray:
+    """Return triangles (m, 3, 3) with the same convex hull; above _MAX_HULL_POINTS points, with nearly the same.
 
-    Bullet asks every point of a hull again and again: 100 000 of them bring a step to a standstill.
+    Bullet visits every point of a hull in each collision test: with 100 000 points a step takes minutes.
     """
     points = np.unique(corners.reshape(-1, 3), axis=0) if len(corners) < 20_000 else corners.reshape(-1, 3)
-    if len(points) <= _HULL:
+    if len(points) <= _MAX_HULL_POINTS:
         return corners
-    import trimesh  # which has read the file
+    import trimesh  # slow import
 
     directions = trimesh.creation.icosphere(subdivisions=2).vertices
     farthest = np.unique([np.argmax(points @ direction) for direction in directions])
@@ -59,7 +88,7 @@ def _hull(corners: np.ndarray) -> np.ndarray:
 
 
 def _read(path: str) -> ReadFile:
-    from drone_sim.files import mesh_reader  # trimesh
+    from drone_sim.files import mesh_reader  # slow import: trimesh
 
     return mesh_reader.read(path)
 

@@ -1,4 +1,4 @@
-"""Reads mesh files by trimesh, which takes long to import: this is imported for the first mesh only."""
+"""Reading of mesh files with trimesh. The import is slow, so it is done only when the first mesh is read."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from PIL import Image
 from trimesh.resolvers import Resolver
 
 from drone_sim.files import images
-from drone_sim.files.mesh_part import (
+from drone_sim.files.mesh_files import (
     KINDS,
     MAX_COORDINATE,
     MAX_PARTS,
@@ -26,8 +26,8 @@ from drone_sim.files.mesh_part import (
 )
 from drone_sim.files.resources import ReadFile, read_bytes
 
-# How often a word may stand in a file; each <instance_node> may double what is drawn.
-_MOST = {
+# How often a word may occur in a file. Nested <instance_node> elements can double the drawn meshes each time.
+_MAX_OCCURRENCES = {
     ".obj": {"usemtl": (rb"usemtl", MAX_PARTS), "f": (rb"\nf", MAX_TRIANGLES)},
     ".dae": {
         "instance_node": (rb"<(?:\w+:)?instance_node", 16),
@@ -36,17 +36,16 @@ _MOST = {
 }
 
 
-class _Beside(Resolver):
-    """Gives trimesh the files that a mesh names: regular ones, of a size that can be meant."""
+class _FolderResolver(Resolver):
+    """Reads, for trimesh, the materials and textures that a mesh refers to; only regular files up to MAX_SIZE."""
 
     def __init__(self, folder: Path):
-        """Take the mesh's folder."""
         self._folder = folder
         self.files: list[str] = []
         self.problem = ""
 
     def get(self, key: str) -> bytes:
-        """Return what is in a file. One that is missing is no problem: the mesh is white."""
+        """Return the content of a file. Without a missing file the mesh is white, which is no problem."""
         path = self._folder / key.strip().strip('"')
         self.files.append(str(path))
         try:
@@ -54,78 +53,75 @@ class _Beside(Resolver):
             try:
                 images.check(content)
             except Image.UnidentifiedImageError:  # a list of materials
-                content = _utf8(content)
+                content = _as_utf8(content)
         except FileNotFoundError:
             raise
-        except Exception as error:  # kept, for trimesh goes on without the file
+        except Exception as error:  # trimesh ignores the exception and continues without the file
             self.problem = f"{key:.100}: {getattr(error, 'strerror', None) or error}"
             raise
         return content
 
     def write(self, name: str, data: Any) -> None:
-        """Refuse: reading writes nothing."""
         raise NotImplementedError
 
     def namespaced(self, namespace: str) -> Resolver:
-        """Return the resolver of a folder below."""
         raise NotImplementedError
 
     def keys(self) -> list[str]:
-        """Return nothing: files are asked for by name."""
         return []
 
 
 def read(path: str) -> ReadFile:
-    """Return a mesh file's parts, placed as the file says. Raises ValueError, in one line that names the file."""
+    """Return the parts of a mesh file in its root frame. Raises ValueError, in one line with the file's name."""
     kind = Path(path).suffix.lower()
     if kind not in KINDS:
         raise ValueError(f"mesh {path}: must be one of {', '.join(KINDS)}")
-    beside = _Beside(Path(path).parent)
+    resolver = _FolderResolver(Path(path).parent)
     try:
         content = read_bytes(path, MAX_SIZE)
         _check_text(content, kind)
         if kind == ".obj":
-            content = _utf8(content)
-        loaded = trimesh.load(io.BytesIO(content), file_type=kind[1:], resolver=beside, process=False)
-        parts = tuple(_part(one) for one in _placed(loaded))
-        if beside.problem:
-            raise ValueError(beside.problem)
-        _check(parts)
+            content = _as_utf8(content)
+        loaded = trimesh.load(io.BytesIO(content), file_type=kind[1:], resolver=resolver, process=False)
+        parts = tuple(map(_to_part, _transformed_meshes(loaded)))
+        if resolver.problem:
+            raise ValueError(resolver.problem)
+        _check_parts(parts)
     except (MemoryError, RecursionError):
         raise ValueError(f"mesh {path}: cannot be read (too large)") from None
-    except Exception as error:  # trimesh's readers raise whatever their parser raised
-        said = str(getattr(error, "strerror", None) or error)
+    except Exception as error:  # trimesh's readers raise exceptions of any type
+        reason = str(getattr(error, "strerror", None) or error)
         if not isinstance(error, (ValueError, OSError, IndexError)):
-            said = "it is broken"
-        raise ValueError(f"mesh {path}: cannot be read ({' '.join(said.split()):.200})") from error
-    return ReadFile(parts, sum(part.nbytes for part in parts), beside.files)
+            reason = "it is broken"
+        raise ValueError(f"mesh {path}: cannot be read ({' '.join(reason.split()):.200})") from error
+    return ReadFile(parts, sum(part.nbytes for part in parts), resolver.files)
 
 
-def _utf8(text: bytes) -> bytes:
-    """Return a text that trimesh reads without guessing at its encoding: names may be in any, numbers are not."""
+def _as_utf8(text: bytes) -> bytes:
+    """Replace bytes that are not UTF-8, which occur only in names, so that trimesh need not guess the encoding."""
     return text.decode("utf-8", errors="replace").encode()
 
 
 def _check_text(content: bytes, kind: str) -> None:
-    """Refuse what would keep trimesh busy before it can be counted."""
+    """Raise ValueError for a file that trimesh would take very long to read."""
     if kind == ".dae":
         if not content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") or b"\0" in content:
             raise ValueError("must be XML in UTF-8")
         if b"<!DOCTYPE" in content:
             raise ValueError("must have no DOCTYPE")
-    for word, (pattern, most) in _MOST.get(kind, {}).items():
-        if len(re.findall(pattern, content)) > most:
-            raise ValueError(f"must not contain more than {most} `{word}`")
+    for word, (pattern, limit) in _MAX_OCCURRENCES.get(kind, {}).items():
+        if len(re.findall(pattern, content)) > limit:
+            raise ValueError(f"must not contain more than {limit} `{word}`")
 
 
-def _placed(loaded: Any) -> Iterator[trimesh.Trimesh]:
-    """The file's meshes, placed as its scene graph says."""
+def _transformed_meshes(loaded: Any) -> Iterator[trimesh.Trimesh]:
+    """Yield the meshes of a file in metres, in its root frame."""
     if isinstance(loaded, trimesh.Trimesh):
         if len(loaded.faces):
             yield loaded
         return
     if not isinstance(loaded, trimesh.Scene):
-        return  # points or lines: nothing that covers a pixel
+        return  # points or lines, which are not drawn
     metres = trimesh.units.unit_conversion(loaded.units, "meters") if loaded.units else 1.0  # COLLADA has units
     nodes = loaded.graph.nodes_geometry
     if len(nodes) > MAX_PARTS:
@@ -140,7 +136,7 @@ def _placed(loaded: Any) -> Iterator[trimesh.Trimesh]:
             yield part
 
 
-def _part(mesh: trimesh.Trimesh) -> MeshPart:
+def _to_part(mesh: trimesh.Trimesh) -> MeshPart:
     vertices = np.array(mesh.vertices, dtype=np.float64)
     faces = np.array(mesh.faces)
     if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
@@ -158,7 +154,7 @@ def _part(mesh: trimesh.Trimesh) -> MeshPart:
     return MeshPart(vertices, faces, uv, rgba, None if uv is None else texture)
 
 
-def _check(parts: tuple[MeshPart, ...]) -> None:
+def _check_parts(parts: tuple[MeshPart, ...]) -> None:
     count = sum(len(part.faces) for part in parts)
     if not count:
         raise ValueError("holds no triangles")
@@ -169,10 +165,10 @@ def _check(parts: tuple[MeshPart, ...]) -> None:
 
 
 def _material(part: Any) -> tuple[np.ndarray | None, Colour, np.ndarray | None]:
-    """Vertex uv (n, 2) or None, base colour and texture of a trimesh part, as far as it has them."""
+    """Return uv (n, 2) or None, base colour, and texture or None, of a trimesh part."""
     kind = getattr(part.visual, "kind", None)
     if kind in ("vertex", "face"):
-        return None, _colour(part.visual.main_color), None
+        return None, _to_colour(part.visual.main_color), None
     if kind != "texture":
         return None, WHITE, None
     uv = part.visual.uv
@@ -190,13 +186,13 @@ def _base_colour(material: Any) -> Colour:
         factor = getattr(material, "diffuse", None)
     if factor is None:
         return WHITE
-    red, green, blue, alpha = _colour(factor)
-    own: dict[str, Any] = getattr(material, "kwargs", None) or {}
-    opacity = own.get("d")  # MTL's dissolve; trimesh leaves it unread
+    red, green, blue, alpha = _to_colour(factor)
+    options: dict[str, Any] = getattr(material, "kwargs", None) or {}
+    opacity = options.get("d")  # MTL's dissolve, which trimesh does not use
     return (red, green, blue, min(1.0, max(0.0, float(opacity[0]))) if opacity else alpha)
 
 
-def _colour(values: Any) -> Colour:
+def _to_colour(values: Any) -> Colour:
     values = np.asarray(values)
     scaled = values / 255.0 if values.dtype == np.uint8 else np.clip(np.nan_to_num(values.astype(float)), 0, 1)
     red, green, blue, alpha = (float(value) for value in scaled[:4])

@@ -1,4 +1,4 @@
-"""Files: where they are, what is in them, and what was read of them, kept while they stay as they are."""
+"""Paths of the package, its cache and `package://` files; reading with limits; a cache of what has been read."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ MEBIBYTE = 2**20
 
 
 def package_path() -> Path:
-    """Return the folder that holds config/, urdf/ and package.xml. Needs no ROS environment."""
-    # src/drone_sim/files/resources.py, or lib/python3/dist-packages/drone_sim/files/resources.py when installed.
-    # A checkout directly below / has no sixth parent.
+    """Return the folder that contains config/, urdf/ and package.xml. Needs no ROS environment."""
+    # This file is src/drone_sim/files/resources.py, or, if installed, lib/python3/dist-packages/drone_sim/files/….
+    # The slices allow for a checkout directly below /, which has no sixth parent.
     for folder in (*_HERE.parents[3:4], *(prefix / "share" / "drone_sim" for prefix in _HERE.parents[5:6])):
         if (folder / "package.xml").is_file():
             return folder
@@ -27,30 +27,30 @@ def package_path() -> Path:
 
 
 def python_path(*others: str) -> str:
-    """Return a PYTHONPATH with which another process of this python imports this package, and what it needs, as here.
+    """Return a PYTHONPATH with which a child process imports this package and its dependencies as this process does.
 
-    Where the package is installed, the system's packages lie beside it, and are older than those of our environment.
+    The environment's packages come first: an installed package is in the folder of the system's older packages.
     """
     return os.pathsep.join(filter(None, (sysconfig.get_path("purelib"), str(_HERE.parents[2]), *others)))
 
 
 def cache_path() -> Path:
-    """Return the folder for what may be deleted at any time: of ours, below ~/.cache or XDG_CACHE_HOME."""
+    """Return the folder for files that may be deleted at any time, below XDG_CACHE_HOME or ~/.cache."""
     return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "drone_sim"
 
 
 def is_file(path: Path) -> bool:
-    """Tell whether there is a regular file of this name; False also for a name that no file can have."""
+    """Return whether `path` is a regular file; False also for a name that no file can have."""
     try:
         return path.is_file()
-    except (OSError, ValueError):  # too long a name, a NUL in it
+    except (OSError, ValueError):  # the name is too long, or contains a NUL
         return False
 
 
 def locate(name: str) -> Path:
-    """Return the path behind `package://PACKAGE/...` or `~/...`; any other path as it is.
+    """Return the path of `package://PACKAGE/...` or `~/...`; any other path unchanged.
 
-    Raises FileNotFoundError, in one line, where there is no such package or home.
+    Raises FileNotFoundError, in one line, if the package or the home folder does not exist.
     """
     if name.startswith("package://"):
         return _in_package(name)
@@ -61,27 +61,27 @@ def locate(name: str) -> Path:
 
 
 def resolve(name: str) -> Path:
-    """Return the absolute path of a regular file, given as for `locate`.
+    """Return the absolute path of a regular file; `name` is as for `locate`.
 
-    Raises FileNotFoundError, in one line, where there is no such package or file.
+    Raises FileNotFoundError, in one line, if the package or the file does not exist.
     """
     path = locate(name)
     try:
         if path.is_file():
             return path.resolve()
         odd = " (it is not a regular file)" if path.exists() else ""
-    except (OSError, ValueError):  # too long a name, a NUL in it
+    except (OSError, ValueError):  # the name is too long, or contains a NUL
         odd = ""
-    named = f": {name}" if name.isprintable() and len(name) < 300 else ""
-    raise FileNotFoundError(f"no such file{named}{odd}")
+    shown_name = f": {name}" if name.isprintable() and len(name) < 300 else ""
+    raise FileNotFoundError(f"no such file{shown_name}{odd}")
 
 
 def read_bytes(path: str | Path, limit: int) -> bytes:
-    """Return what a file holds. It must be a regular one, not larger than `limit` bytes.
+    """Return the content of a regular file of at most `limit` bytes.
 
     Raises OSError and, in one line without the file's name, ValueError.
     """
-    # A FIFO without a writer would hold up a plain open(), and os.fdopen keeps a folder open that it refuses.
+    # open() would block on a FIFO without a writer, and os.fdopen does not close a folder that it refuses.
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     try:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
@@ -110,11 +110,11 @@ def _in_package(name: str) -> Path:
 
 
 T = TypeVar("T")
-ObjectLabel = tuple[int, int, int] | None  # modification time (ns), size (bytes), inode
+FileIdentity = tuple[int, int, int] | None  # modification time (ns), size (bytes), inode
 
 
 class ReadFile(NamedTuple):
-    """What a file held, how much memory it takes (bytes), and what other files it depends on."""
+    """Value read from a file, its memory in bytes, and the other files that it depends on."""
 
     value: Any
     size: int
@@ -122,31 +122,33 @@ class ReadFile(NamedTuple):
 
 
 class FileCache(Generic[T]):
-    """Reads files by path; the ones used last stay, up to `limit` bytes."""
+    """Least recently used cache of what `read` returns for a path, up to `limit` bytes.
+
+    A file is read again if it, or a file that it depends on, has changed.
+    """
 
     def __init__(self, read: Callable[[str], ReadFile], limit: int):
-        """Take what reads a file."""
         self._read = read
         self._limit = limit
-        self._kept: OrderedDict[str, tuple[ReadFile, dict[str, ObjectLabel]]] = OrderedDict()
+        self._cached: OrderedDict[str, tuple[ReadFile, dict[str, FileIdentity]]] = OrderedDict()
 
     def get(self, path: str) -> T:
-        """Return what is in a file now. Raises what `read` raises."""
-        kept = self._kept.get(path)
-        if kept is None or any(identity_of(file) != identity for file, identity in kept[1].items()):
+        """Return the value of a file as it is now. Raises what `read` raises."""
+        cached = self._cached.get(path)
+        if cached is None or any(identity_of(file) != identity for file, identity in cached[1].items()):
             before = identity_of(path)
-            reading = self._read(path)
-            kept = (reading, {path: before, **{file: identity_of(file) for file in reading.files}})
-            self._kept[path] = kept
-        self._kept.move_to_end(path)
-        while len(self._kept) > 1 and sum(one.size for one, _ in self._kept.values()) > self._limit:
-            self._kept.popitem(last=False)
-        value: T = kept[0].value
+            file_read = self._read(path)
+            cached = (file_read, {path: before, **{file: identity_of(file) for file in file_read.files}})
+            self._cached[path] = cached
+        self._cached.move_to_end(path)
+        while len(self._cached) > 1 and sum(entry.size for entry, _ in self._cached.values()) > self._limit:
+            self._cached.popitem(last=False)
+        value: T = cached[0].value
         return value
 
 
-def identity_of(path: str) -> ObjectLabel:
-    """Return what changes when a file is written anew; None where there is no such file."""
+def identity_of(path: str) -> FileIdentity:
+    """Return a value that changes when the file is written; None if there is no such file."""
     try:
         status = os.stat(path)
     except (OSError, ValueError):

@@ -1,18 +1,19 @@
-"""URDF files, checked and cleaned: what PyBullet is given holds known elements, a tree of links and sane numbers.
+"""Reading of URDF files: the result has only known elements, a tree of links, and numbers in range.
 
-PyBullet trusts its input: two roots, an empty name or a circle of joints crash it or never end.
+PyBullet does not check URDFs: two roots, an empty name or a circle of joints crash it or make it hang.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as Xml
 
-from drone_sim.files.mesh_part import KINDS
+from drone_sim.files.mesh_files import KINDS
 from drone_sim.files.resources import MEBIBYTE, is_file, locate, read_bytes
 from drone_sim.message_text import MAX_NAME, shown
 
@@ -23,23 +24,23 @@ JOINTS = ("fixed", "continuous", "revolute", "prismatic")
 
 
 class _Numbers(NamedTuple):
-    """So many numbers of one attribute, from `low` to `high` or 0."""
+    """Range check of an attribute with `count` numbers."""
 
-    many: int
+    count: int
     low: float
     high: float
     or_zero: bool = False
     default: str = ""
 
     def check(self, text: str) -> str:
-        """Return the numbers as PyBullet reads them. Raises ValueError."""
+        """Return the text of the numbers in a form that PyBullet reads. Raises ValueError."""
         words = text[:1000].split()
         try:
             numbers = [float(word) for word in words]
         except ValueError:
             numbers = []
-        if len(numbers) != self.many or not all(map(math.isfinite, numbers)):
-            raise ValueError(f"{shown(text)}: must be {self.many} finite numbers")
+        if len(numbers) != self.count or not all(map(math.isfinite, numbers)):
+            raise ValueError(f"{shown(text)}: must be {self.count} finite numbers")
         for number in numbers:
             if not (self.low <= number <= self.high or (self.or_zero and number == 0)):
                 zero = "0, or " if self.or_zero else ""
@@ -58,7 +59,7 @@ _INERTIA: _Attributes = {
     **{name: _PRODUCT for name in ("ixy", "ixz", "iyz")},
 }
 _SHAPES: dict[str, _Attributes] = {
-    "box": {"size": _LENGTH._replace(many=3)},
+    "box": {"size": _LENGTH._replace(count=3)},
     "cylinder": {"radius": _LENGTH, "length": _LENGTH},
     "capsule": {"radius": _LENGTH, "length": _LENGTH},
     "sphere": {"radius": _LENGTH},
@@ -81,29 +82,27 @@ _CONTACT: dict[str, _Attributes] = {
 
 class _Builder(Xml.TreeBuilder):
     def doctype(self, *_: str | None) -> None:
-        """Refuse it, for it may name entities that grow without end."""
+        """Raise ValueError: a DOCTYPE can define entities that expand without limit."""
         raise ValueError("must have no DOCTYPE")
 
 
 def read(path: str, kinds: Sequence[str] = JOINTS) -> Xml.Element:
-    """Return a URDF's <robot>, checked, with absolute paths of its meshes; what is unknown is left out.
+    """Return a URDF's <robot>, checked, without unknown elements, and with absolute paths of its meshes.
 
-    `kinds` are the types that a joint may have.
-
-    Raises OSError, and ValueError in one line without the file's name.
+    `kinds` are the allowed types of joints. Raises OSError, and ValueError in one line without the file's name.
     """
-    return parsed(read_bytes(path, MAX_SIZE), Path(path).parent, kinds)
+    return parse(read_bytes(path, MAX_SIZE), Path(path).parent, kinds)
 
 
-def parsed(content: bytes, folder: Path, kinds: Sequence[str]) -> Xml.Element:
-    """Do so with what a file in a folder holds. Raises the same."""
+def parse(content: bytes, folder: Path, kinds: Sequence[str]) -> Xml.Element:
+    """Return the <robot> of a URDF in `folder`, as `read` does. Raises the same."""
     parser = Xml.XMLParser(target=_Builder())
     try:
         parser.feed(content)
         robot = parser.close()
     except Xml.ParseError as error:
         raise ValueError(str(error)) from None
-    except (LookupError, UnicodeError) as error:  # an encoding that nobody knows
+    except (LookupError, UnicodeError) as error:  # an unknown encoding
         raise ValueError(str(error)) from None
     if robot.tag != "robot":
         raise ValueError(f"its outermost element must be <robot>, not <{robot.tag:.60}>")
@@ -114,20 +113,23 @@ def parsed(content: bytes, folder: Path, kinds: Sequence[str]) -> Xml.Element:
     clean = Xml.Element("robot", name="robot")
     colors = {material.get("name"): material.find("color") for material in robot.findall("material")}
     for link in links:
-        _within(_called(link), _add_link, link, clean, folder, colors)
+        with _place_in_errors(_label(link)):
+            _add_link(link, clean, folder, colors)
     for joint in joints:
-        _within(_called(joint), _add_joint, joint, clean)
+        with _place_in_errors(_label(joint)):
+            _add_joint(joint, clean)
     return clean
 
 
-def _within(where: str, add: Callable[..., None], *arguments: object) -> None:
+@contextlib.contextmanager
+def _place_in_errors(place: str) -> Iterator[None]:
     try:
-        add(*arguments)
+        yield
     except (ValueError, OSError) as error:
-        raise ValueError(f"{where}: {error}") from None
+        raise ValueError(f"{place}: {error}") from None
 
 
-def _called(element: Xml.Element) -> str:
+def _label(element: Xml.Element) -> str:
     return f"{element.tag} {element.get('name', '')}"
 
 
@@ -137,16 +139,16 @@ def _called(element: Xml.Element) -> str:
 def _check_tree(links: Sequence[Xml.Element], joints: Sequence[Xml.Element], kinds: Sequence[str]) -> None:
     if max(len(links), len(joints)) > MAX_LINKS:
         raise ValueError(f"{len(links)} links and {len(joints)} joints; at most {MAX_LINKS} are allowed")
-    names = _names(links)
-    _names(joints)
+    names = _unique_names(links)
+    _unique_names(joints)
     if not names:
         raise ValueError("must have at least one link")
     parents: dict[str, str] = {}
     for joint in joints:
         kind = joint.get("type")
         if kind not in kinds:
-            raise ValueError(f"{_called(joint)}: type {kind!s:.60}: must be {', '.join(kinds[:-1])} or {kinds[-1]}")
-        ends = {end: _end(joint, end, names) for end in ("parent", "child")}
+            raise ValueError(f"{_label(joint)}: type {kind!s:.60}: must be {', '.join(kinds[:-1])} or {kinds[-1]}")
+        ends = {end: _linked_name(joint, end, names) for end in ("parent", "child")}
         if ends["child"] in parents:
             raise ValueError(f"link {ends['child']}: is the child of two joints, one of them {joint.get('name')}")
         parents[ends["child"]] = ends["parent"]
@@ -160,7 +162,7 @@ def _check_tree(links: Sequence[Xml.Element], joints: Sequence[Xml.Element], kin
         raise ValueError(f"link {first}: its joints form a circle") from None
 
 
-def _names(elements: Sequence[Xml.Element]) -> list[str]:
+def _unique_names(elements: Sequence[Xml.Element]) -> list[str]:
     names: dict[str, None] = {}
     for element in elements:
         name = element.get("name", "")
@@ -172,13 +174,13 @@ def _names(elements: Sequence[Xml.Element]) -> list[str]:
     return list(names)
 
 
-def _end(joint: Xml.Element, end: str, links: Sequence[str]) -> str:
+def _linked_name(joint: Xml.Element, end: str, links: Sequence[str]) -> str:
     element = joint.find(end)
-    name = "" if element is None else element.get("link", "")
     if element is None:
-        raise ValueError(f"{_called(joint)}: {end} is missing")
+        raise ValueError(f"{_label(joint)}: {end} is missing")
+    name = element.get("link", "")
     if name not in links:
-        raise ValueError(f"{_called(joint)}: {end} {shown(name)}: there is no such link")
+        raise ValueError(f"{_label(joint)}: {end} {shown(name)}: there is no such link")
     return name
 
 
@@ -186,7 +188,7 @@ def _end(joint: Xml.Element, end: str, links: Sequence[str]) -> str:
 
 
 def _add(element: Xml.Element | None, attributes: _Attributes, parent: Xml.Element, tag: str) -> None:
-    """Add a copy of an element with these attributes alone."""
+    """Add a copy of an element that has only these attributes."""
     if element is None:
         return
     copied = Xml.SubElement(parent, tag)
@@ -199,7 +201,7 @@ def _add(element: Xml.Element | None, attributes: _Attributes, parent: Xml.Eleme
 
 
 def _add_material(material: Xml.Element, parent: Xml.Element, colors: _Colors) -> None:
-    """Add its colour, under a name that no other colour has; its texture is left out, for it shows nowhere."""
+    """Add a material with only its colour, named after that colour; textures of URDFs are not drawn."""
     color = material.find("color")
     color = colors.get(material.get("name")) if color is None else color
     if color is not None:
@@ -212,23 +214,24 @@ def _add_link(link: Xml.Element, robot: Xml.Element, folder: Path, colors: _Colo
     copied = Xml.SubElement(robot, "link", name=link.get("name", ""))
     inertial = link.find("inertial")
     if inertial is not None:
-        own = Xml.SubElement(copied, "inertial")
-        _add(inertial.find("origin"), _ORIGIN, own, "origin")
+        copied_inertial = Xml.SubElement(copied, "inertial")
+        _add(inertial.find("origin"), _ORIGIN, copied_inertial, "origin")
         mass = _check_mass(inertial.find("mass"))
-        Xml.SubElement(own, "mass", value=repr(mass))
+        Xml.SubElement(copied_inertial, "mass", value=repr(mass))
         inertia = inertial.find("inertia")
-        _add(Xml.Element("inertia") if inertia is None else inertia, _INERTIA, own, "inertia")
+        _add(Xml.Element("inertia") if inertia is None else inertia, _INERTIA, copied_inertial, "inertia")
     contact = link.find("contact")
     if contact is not None:
-        own = Xml.SubElement(copied, "contact")
+        copied_contact = Xml.SubElement(copied, "contact")
         for name, attributes in _CONTACT.items():
-            _add(contact.find(name), attributes, own, name)
+            _add(contact.find(name), attributes, copied_contact, name)
     for kind in ("visual", "collision"):
         for shape in link.findall(kind):
-            _within(kind, _add_shape, shape, copied, folder)
-            material = shape.find("material")
-            if material is not None and kind == "visual":
-                _within(kind, _add_material, material, copied[-1], colors)
+            with _place_in_errors(kind):
+                _add_shape(shape, copied, folder)
+                material = shape.find("material")
+                if material is not None and kind == "visual":
+                    _add_material(material, copied[-1], colors)
 
 
 def _check_mass(element: Xml.Element | None) -> float:
@@ -249,18 +252,20 @@ def _add_shape(shape: Xml.Element, link: Xml.Element, folder: Path) -> None:
     kinds = [] if geometry is None else list(geometry)
     if len(kinds) != 1 or kinds[0].tag not in _SHAPES:
         raise ValueError(f"geometry: must hold one of {', '.join(_SHAPES)}")
-    own = Xml.SubElement(copied, "geometry")
-    _add(kinds[0], _SHAPES[kinds[0].tag], own, kinds[0].tag)
-    if kinds[0].tag == "mesh":
-        own[0].set("filename", _mesh(kinds[0].get("filename", ""), folder))
-        scale = own[0].get("scale", "")
+    (source,) = kinds
+    copied_geometry = Xml.SubElement(copied, "geometry")
+    _add(source, _SHAPES[source.tag], copied_geometry, source.tag)
+    target = copied_geometry[0]
+    if source.tag == "mesh":
+        target.set("filename", _mesh_path(source.get("filename", ""), folder))
+        scale = target.get("scale", "")
         if any(abs(float(word)) < 1e-6 for word in scale.split()):
             raise ValueError(f"mesh scale = {scale}: must not be smaller than 1e-06")
-    if kinds[0].tag == "plane" and not any(float(word) for word in own[0].get("normal", "").split()):
+    if source.tag == "plane" and not any(float(word) for word in target.get("normal", "").split()):
         raise ValueError("plane normal: must not be 0 0 0")
 
 
-def _mesh(name: str, folder: Path) -> str:
+def _mesh_path(name: str, folder: Path) -> str:
     plain = name[len("file://") :] if name.startswith("file://") else name
     path = locate(plain) if plain.startswith("package://") else folder / plain
     if not is_file(path):
@@ -280,16 +285,11 @@ def _add_joint(joint: Xml.Element, robot: Xml.Element) -> None:
             Xml.SubElement(copied, end, link=element.get("link", ""))
     for name, attributes in _JOINT.items():
         _add(joint.find(name), attributes, copied, name)
-    _check_axis(copied)
+    axis = copied.find("axis")
+    if axis is not None and math.hypot(*map(float, axis.get("xyz", "").split())) < 1e-3:
+        raise ValueError("axis xyz: must not be 0 0 0")
     limit = copied.find("limit")
     if kind in ("revolute", "prismatic") and limit is None:
         raise ValueError("no limit")
     if limit is not None and float(limit.get("lower", "0")) > float(limit.get("upper", "0")):
         raise ValueError(f"limit: lower {limit.get('lower')} is more than upper {limit.get('upper')}")
-
-
-def _check_axis(joint: Xml.Element) -> None:
-    axis = joint.find("axis")
-    numbers = [1.0] if axis is None else [float(word) for word in axis.get("xyz", "").split()]
-    if math.hypot(*numbers) < 1e-3:
-        raise ValueError("axis xyz: must not be 0 0 0")

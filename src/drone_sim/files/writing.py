@@ -1,4 +1,4 @@
-"""Files are written whole or not at all: what was there before stays until the new one is safe on the disk."""
+"""Atomic writing of files: an old file stays until the new one is complete and on the disk."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from typing import IO, Any
 
 @contextlib.contextmanager
 def replacing(path: str | Path, binary: bool = False, through_links: bool = True) -> Iterator[IO[Any]]:
-    """Give a file to write, which takes the place of `path` at the end; on an OSError the old one stays.
+    """Yield a temporary file in the folder of `path`, and replace `path` by it at the end.
 
-    It is a temporary file in the same folder until then. Another exception (a flight that fails) keeps what was
-    written up to there. A `path` that is not a regular file, such as /dev/stdout or a FIFO, is written directly. Text
-    is UTF-8 with \\n. Where not `through_links`, a link or a FIFO of that name is replaced itself, and nothing behind
-    it is touched. Raises OSError, in one line that names the file.
+    After an OSError the old file stays. After another exception, such as that of a failed flight, the new file has
+    what was written before it. A `path` that is not a regular file, such as /dev/stdout or a FIFO, is written directly.
+    Text is UTF-8 with \\n. If not `through_links`, a link or FIFO at `path` is itself replaced, not written through.
+    Raises OSError, in one line with the file's name.
     """
     options: Any = {"mode": "xb"} if binary else {"mode": "x", "encoding": "utf-8", "newline": "\n"}
-    with naming(path):
-        check(path)
+    with name_in_errors(path):
+        check_writable(path)
         if through_links and _is_special(path):
             with open(path, **{**options, "mode": options["mode"].replace("x", "w")}) as file:
                 yield file
             return
         folder, name = os.path.split(os.path.realpath(path) if through_links else os.path.abspath(path))
         target = os.path.join(folder, name)
-        stem, ending = os.path.splitext(name)  # libraries that write by name look at the ending
+        stem, ending = os.path.splitext(name)  # some libraries choose the format by the ending
         temporary = os.path.join(folder, f".{stem:.100}.{secrets.token_hex(4)}{ending:.20}")
         try:
             with open(temporary, **options) as file:
@@ -48,14 +48,17 @@ def replacing(path: str | Path, binary: bool = False, through_links: bool = True
 
 
 def write(path: str | Path, content: str, through_links: bool = True) -> None:
-    """Write a text file whole or not at all, as `replacing`. Raises OSError, in one line that names the file."""
+    """Write a text file with `replacing`. Raises OSError, in one line with the file's name."""
     with replacing(path, through_links=through_links) as file:
         file.write(content)
 
 
 def write_new(path: str | Path, content: str | bytes) -> None:
-    """Write a file, text in UTF-8, where nothing is of that name, no link either. Raises FileExistsError, OSError."""
-    with naming(path), open(path, "xb") as file:  # which follows no link
+    """Write a file (text in UTF-8) at a path where there is neither a file nor a link.
+
+    Raises FileExistsError, and OSError.
+    """
+    with name_in_errors(path), open(path, "xb") as file:  # the mode "x" follows no link
         try:
             file.write(content.encode("utf-8") if isinstance(content, str) else content)
             file.flush()
@@ -65,9 +68,9 @@ def write_new(path: str | Path, content: str | bytes) -> None:
             raise
 
 
-def check(path: str | Path) -> None:
-    """Raise OSError, in one line, where `path` cannot become a file."""
-    with naming(path):
+def check_writable(path: str | Path) -> None:
+    """Raise OSError, in one line, if no file can be written at `path`."""
+    with name_in_errors(path):
         if os.path.isdir(path):
             raise IsADirectoryError(0, "is a folder")
         folder = os.path.dirname(os.path.realpath(path))
@@ -78,9 +81,9 @@ def check(path: str | Path) -> None:
 
 
 def _is_special(path: str | Path) -> bool:
-    # /dev/stdout may lead to a regular file, to which somebody else writes, too.
-    named = os.path.abspath(path).startswith(("/dev/", "/proc/"))
-    return named or (os.path.exists(path) and not os.path.isfile(path))
+    # /dev/stdout may be a link to a regular file, which other programs write to, too.
+    is_system = os.path.abspath(path).startswith(("/dev/", "/proc/"))
+    return is_system or (os.path.exists(path) and not os.path.isfile(path))
 
 
 def _finish(file: IO[Any], temporary: str, target: str) -> None:
@@ -97,8 +100,8 @@ def _finish(file: IO[Any], temporary: str, target: str) -> None:
 
 
 @contextlib.contextmanager
-def naming(path: str | Path) -> Iterator[None]:
-    """Let an OSError be one line that names the file; so is a ValueError for a name with a NUL in it."""
+def name_in_errors(path: str | Path) -> Iterator[None]:
+    """Turn an OSError, or the ValueError for a NUL in a path, into an OSError in one line with the file's name."""
     try:
         yield
     except OSError as error:

@@ -205,7 +205,7 @@ def _check_outputs(options: argparse.Namespace, scripts: int) -> None:
     """Raise ValueError or OSError for what cannot be written, before anything is flown."""
     for option in (*_WRITERS, "marks"):
         if path := getattr(options, option):
-            writing.check(path)
+            writing.check_writable(path)
     if options.gradescope and scripts > 1:
         raise ValueError(f"--gradescope: is for one script, not {scripts}")
     if options.html:

@@ -129,7 +129,7 @@ class _Sweep:
             for value in dict.fromkeys(one.ends if options.optimize else one.values):
                 self._plan.parameters(changes=_changes([one], [value]))
         for path in filter(None, (options.csv, options.plot)):
-            writing.check(path)
+            writing.check_writable(path)
         if options.plot:
             self._check_plot(options.plot)
 

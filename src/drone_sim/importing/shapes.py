@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from drone_sim.files import images
-from drone_sim.files.mesh_part import MAX_PARTS, MAX_TRIANGLES
+from drone_sim.files.mesh_files import MAX_PARTS, MAX_TRIANGLES
 from drone_sim.importing.folder import Folder, numbers, pose_keys, shade
 from drone_sim.mechanics.frames import IDENTITY, Matrix
 from drone_sim.vrep_files.model import Rgba, VrepMesh, VrepPrimitive, VrepShape, VrepTexture

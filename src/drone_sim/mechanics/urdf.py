@@ -72,7 +72,7 @@ def read(path: str) -> RigidBody:
 @lru_cache(maxsize=_MAX_CACHED)  # all flights of a plan have the same vehicle
 def _merged(content: bytes, folder: Path) -> tuple[RigidBody, list[Path]]:
     """Return the body of a URDF, and the meshes that must exist for it."""
-    robot = urdf_files.parsed(content, folder, ("fixed", "continuous"))
+    robot = urdf_files.parse(content, folder, ("fixed", "continuous"))
     return _merge(robot), [Path(mesh.attrib["filename"]) for mesh in robot.iter("mesh")]
 
 

@@ -54,7 +54,7 @@ class Dataset:
         _write_png(self._folder / "color" / f"{name}.png", picture)
         _write_png(self._folder / "instances" / f"{name}.png", mask)
         path = self._folder / "truth" / f"{name}.npz"
-        with writing.naming(path):
+        with writing.name_in_errors(path):
             np.savez_compressed(path, **arrays)  # type: ignore[arg-type]
         file = f"color/{name}.png"
         self._images.append({"id": number, "file_name": file, "width": width, "height": height, "time": round(time, 6)})
@@ -97,7 +97,7 @@ def run_lengths(mask: np.ndarray) -> dict[str, Any]:
 
 def check(folder: str) -> None:
     """Raise OSError, in one line, if `folder` cannot be created or is not empty."""
-    with writing.naming(folder):
+    with writing.name_in_errors(folder):
         if os.path.lexists(folder):
             problem = "is a file" if not os.path.isdir(folder) else "is not empty" if os.listdir(folder) else ""
             if problem:
@@ -110,7 +110,7 @@ def check(folder: str) -> None:
 def writing_to(folder: str, title: str) -> Iterator[Dataset]:
     """Yield a dataset to write; the annotations are written at the end, even after an error. Raises OSError."""
     check(folder)
-    with writing.naming(folder):
+    with writing.name_in_errors(folder):
         for name in _FOLDERS:
             os.makedirs(os.path.join(folder, name))
     dataset = Dataset(folder, title)
@@ -121,7 +121,7 @@ def writing_to(folder: str, title: str) -> Iterator[Dataset]:
 
 
 def _write_png(path: Path, picture: np.ndarray) -> None:
-    with writing.naming(path):
+    with writing.name_in_errors(path):
         path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
 
 

@@ -138,7 +138,7 @@ def _check_outputs(options: argparse.Namespace, steps: int) -> None:
         if steps > _MAX_PLOTTED_STEPS:
             raise ValueError(f"--plot: {steps} steps are too many; at most {_MAX_PLOTTED_STEPS} can be drawn")
     for output in filter(None, (options.csv, options.video)):
-        writing.check(output)
+        writing.check_writable(output)
     if options.truth:
         dataset.check(options.truth)
 

@@ -37,7 +37,7 @@ _MIN_AXIS_RANGE = 0.05  # of an axis, in its unit: a smaller range would make a 
 
 def check(path: str) -> None:
     """Raise OSError if `path` cannot be written, and ValueError for a format that matplotlib does not support."""
-    writing.check(path)
+    writing.check_writable(path)
     known = Figure().canvas.get_supported_filetypes()
     ending = Path(path).suffix[1:].lower()
     if ending and ending not in known:

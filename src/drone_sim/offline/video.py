@@ -97,7 +97,7 @@ def check(path: str) -> None:
     """Raise OSError, in one line, if `path` cannot be written, and ValueError if it does not end in .mp4."""
     if Path(path).suffix.lower() != ".mp4":
         raise ValueError(f"{path}: must end in .mp4")
-    writing.check(path)
+    writing.check_writable(path)
 
 
 @contextlib.contextmanager

@@ -9,7 +9,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from drone_sim.files.mesh_part import WHITE
+from drone_sim.files.mesh_files import WHITE
 from drone_sim.render import surfaces
 from drone_sim.render.programs import Role
 from drone_sim.render.surfaces import Surface

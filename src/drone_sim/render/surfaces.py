@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drone_sim.files import images
-from drone_sim.files.mesh_part import WHITE
+from drone_sim.files.mesh_files import WHITE
 from drone_sim.shapes.shape import Rgba, Triangles
 from drone_sim.shapes.visual import Visual
 

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from drone_sim.config.types import File, Finite, Within
 from drone_sim.files import mesh_files
-from drone_sim.files.mesh_part import WHITE
+from drone_sim.files.mesh_files import WHITE
 from drone_sim.shapes.shape import Files, Geometry, Primitive, ReportedShape, SceneShape, Triangles
 
 _Scale = Annotated[Finite, Within(1e-6, 1e6)]

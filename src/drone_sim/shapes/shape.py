@@ -16,7 +16,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from drone_sim.files.mesh_part import WHITE
+from drone_sim.files.mesh_files import WHITE
 from drone_sim.mechanics.frames import IDENTITY, Matrix
 from drone_sim.shapes.solid import Solid, hull_of
 

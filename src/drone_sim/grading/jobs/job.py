@@ -158,7 +158,7 @@ class ResultStore:
             self._tables.mkdir(exist_ok=True)
             path = self._tables / f"{flight.job.key}.csv"
             unfinished = path.with_suffix(f".{os.getpid()}")
-            with writing.naming(path):
+            with writing.name_in_errors(path):
                 try:
                     unfinished.write_bytes(flight.table)
                     unfinished.replace(path)
@@ -169,7 +169,7 @@ class ResultStore:
         before = "" if self._has_begun else "\n"  # half a line may be there
         self._has_begun = False
         # One write at the end of the file: two programs at a time mix no lines. On a full disk it may be a part only.
-        with writing.naming(self._file), open(self._file, "ab", buffering=0) as file:
+        with writing.name_in_errors(self._file), open(self._file, "ab", buffering=0) as file:
             content = (before + line).encode()
             while content:
                 content = content[file.write(content) :]

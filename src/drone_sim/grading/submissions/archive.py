@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from itertools import takewhile
 from pathlib import Path, PurePosixPath
 
-from drone_sim.files.containment import below, remove
+from drone_sim.files.containment import path_below, remove
 from drone_sim.files.resources import MEBIBYTE
 from drone_sim.grading.jobs.files import LARGEST
 from drone_sim.grading.submissions.submission import Refused
@@ -86,7 +86,7 @@ def _laid(archive: zipfile.ZipFile, folder: Path, arrange: Arrange, room: int) -
         try:
             _check_amount(members, room)
             for info, inside in members:
-                _write(archive, info, below(folder, part, *inside))
+                _write(archive, info, path_below(folder, part, *inside))
             room -= _size(members)
         except (*_BROKEN, OSError) as error:
             if isinstance(error, OSError) and error.errno not in _NAMES:

@@ -78,7 +78,7 @@ def _graded(options: argparse.Namespace) -> Result:
     if options.html:
         report.check(options.html)
     for file in filter(None, (options.csv, options.json, options.junit, options.gradescope)):
-        writing.check(file)
+        writing.check_writable(file)
     result, flown = grade(plan, options.seed, options.node, options.simulator, options.patience)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(options.csv or f"{folder}/flight.csv")

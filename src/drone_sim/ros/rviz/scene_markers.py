@@ -17,7 +17,7 @@ from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
-from drone_sim.files.mesh_part import WHITE
+from drone_sim.files.mesh_files import WHITE
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.path import Path

@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _write(options: argparse.Namespace) -> None:
     if not options.timeline.endswith((".yaml", ".yml")):
         raise ValueError(f"{options.timeline}: must end in .yaml, .yml")
-    writing.check(options.timeline)
+    writing.check_writable(options.timeline)
     with closing(Bag(options.bag)) as bag:
         flight = BagFlight(bag, options.vehicle)
         entries = sorted(_entries(bag, flight), key=lambda one: one["at"])

@@ -243,7 +243,7 @@ def _render(templates: jinja2.Environment, name: str, path: Path, **values: Any)
 
 def _write(path: Path, text: str) -> None:
     """Write a file of the report, without waiting for the disk each time: a report that is cut off is written anew."""
-    with writing.naming(path):
+    with writing.name_in_errors(path):
         path.write_bytes(text.encode("utf-8", "replace"))  # a script's name need not be UTF-8
 
 
