@@ -24,9 +24,9 @@ JOINTS = ("fixed", "continuous", "revolute", "prismatic")
 
 
 class _Numbers(NamedTuple):
-    """Range check of an attribute with `count` numbers."""
+    """Range check of an attribute with `size` numbers."""
 
-    count: int
+    size: int
     low: float
     high: float
     or_zero: bool = False
@@ -39,8 +39,8 @@ class _Numbers(NamedTuple):
             numbers = [float(word) for word in words]
         except ValueError:
             numbers = []
-        if len(numbers) != self.count or not all(map(math.isfinite, numbers)):
-            raise ValueError(f"{shown(text)}: must be {self.count} finite numbers")
+        if len(numbers) != self.size or not all(map(math.isfinite, numbers)):
+            raise ValueError(f"{shown(text)}: must be {self.size} finite numbers")
         for number in numbers:
             if not (self.low <= number <= self.high or (self.or_zero and number == 0)):
                 zero = "0, or " if self.or_zero else ""
@@ -59,7 +59,7 @@ _INERTIA: _Attributes = {
     **{name: _PRODUCT for name in ("ixy", "ixz", "iyz")},
 }
 _SHAPES: dict[str, _Attributes] = {
-    "box": {"size": _LENGTH._replace(count=3)},
+    "box": {"size": _LENGTH._replace(size=3)},
     "cylinder": {"radius": _LENGTH, "length": _LENGTH},
     "capsule": {"radius": _LENGTH, "length": _LENGTH},
     "sphere": {"radius": _LENGTH},
