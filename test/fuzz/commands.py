@@ -49,7 +49,7 @@ def send(simulation: Simulation, messages: list[tuple[str, dict[str, Any]]]) -> 
         message = _KINDS[topic]()
         _fill(message, fields)
         _CALLBACKS[f"{simulation.drone.name}/{topic}"](message)
-    inbox.empty()
+    inbox.run_jobs()
 
 
 def _fill(message: Any, fields: dict[str, Any]) -> None:

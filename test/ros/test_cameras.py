@@ -17,7 +17,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from tf2_msgs.msg import TFMessage
 
-from drone_sim.ros.core.mask_colors import painted as painted_over
+from drone_sim.ros.core.image_messages import draw_mask
 from drone_sim.ros.node.node import Node
 from drone_sim.ros.vehicle import camera_truth
 from drone_sim.run import parameters
@@ -140,7 +140,7 @@ class Cameras(unittest.TestCase):
         colors, over = (np.frombuffer(one.data, np.uint8).reshape(*size, 3) for one in (picture, overlay))
         numbers = np.frombuffer(mask.data, np.uint16).reshape(size)
         self.assertTrue(numbers.any())
-        np.testing.assert_array_equal(over, painted_over(colors, numbers))
+        np.testing.assert_array_equal(over, draw_mask(colors, numbers))
 
     def test_depth_of_the_floor(self):
         depth = self.listen("/drone/depth/image", Image)

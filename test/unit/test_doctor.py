@@ -107,7 +107,7 @@ def test_a_master_s_address_that_is_none(monkeypatch, uri):
 
 def test_a_port_that_does_not_answer(monkeypatch, port):
     monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{port}")
-    monkeypatch.setattr(network, "PATIENCE", 0.1)
+    monkeypatch.setattr(network, "TIMEOUT", 0.1)
     (line,) = Master().found()
     assert line.mark == WRONG
     assert f"port {port} of http://localhost:{port} does not answer as a master (timed out)" in line.said

@@ -31,14 +31,14 @@ def dragged(monkeypatch):
 def test_it_moves_the_vehicle_that_is_there_by_then(dragged):
     simulation, inbox = dragged
     simulation.start()
-    inbox.empty()
+    inbox.run_jobs()
     assert simulation.drone.body.state.position == pytest.approx((2, 0, 1))
 
 
 def test_it_moves_nothing_where_the_vehicle_has_gone(dragged):
     simulation, inbox = dragged
     simulation.set_vehicles({"other": {}})
-    inbox.empty()
+    inbox.run_jobs()
     assert simulation.vehicles["other"].body.state.position[0] == 0
 
 
@@ -54,7 +54,7 @@ class Hand:
         if place:
             feedback.pose.position.x, feedback.pose.position.y, feedback.pose.position.z = place
         self.shown._on_feedback(feedback)
-        self.inbox.empty()
+        self.inbox.run_jobs()
 
     def fly(self, steps):
         for _ in range(steps):

@@ -53,7 +53,7 @@ class Stage:
         self.simulation = Simulation(parameters.load(given))
         self.player = Player(self.simulation, self.simulation.step, lambda _: None, simulated_time=False)
         self.interventions = interventions.Interventions(self.simulation)
-        self.inbox = Inbox(tell=self.interventions.tell)
+        self.inbox = Inbox(on_intervention=self.interventions.tell)
         self.simulation.step()
 
     def listen(self, name, _kind, callback, **_):
@@ -65,7 +65,7 @@ class Stage:
         message._connection_header = {"callerid": sender}
         with mock.patch.object(self.inbox, "ask", self.inbox.put):
             self.callbacks[name](message)
-        self.inbox.empty()
+        self.inbox.run_jobs()
 
     def lines(self):
         found = self.said[:]

@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-from drone_sim.ros.core.startup import from_shell
+from drone_sim.ros.core.launch_parameters import from_shell
 
 
 @pytest.mark.parametrize("name", ["", "target", "/a/b.py", "~/a.py", "package://drone_sim/a.yaml"])

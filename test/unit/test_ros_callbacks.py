@@ -102,7 +102,7 @@ def test_what_a_vehicle_listens_to_is_checked_without_the_simulation(simulation,
     for topic, message in MESSAGES.items():
         in_another_thread(callbacks[f"drone/{topic}"], message)
     assert inputs.log.taken.keys() == MESSAGES.keys() - {"cmd_vel_stamped"} and not inputs.log.refused
-    inbox.empty()
+    inbox.run_jobs()
     assert simulation.drone.body.state.position[0] == pytest.approx(3.0)
 
 
@@ -127,7 +127,7 @@ def test_a_handle_is_dragged_without_the_simulation(simulation, callbacks, made)
         feedback.event_type = getattr(InteractiveMarkerFeedback, event)
         feedback.pose.position.x, feedback.pose.position.z, feedback.pose.orientation.w = 2.0, 1.0, 1.0
         in_another_thread(handles._on_feedback, feedback)
-    inbox.empty()
+    inbox.run_jobs()
     is_moved = made is vehicle_handles.VehicleHandles
     assert simulation.drone.body.state.position[0] == pytest.approx(2.0 if is_moved else 0.0, abs=1e-3)
 
@@ -140,7 +140,7 @@ def test_faults_checked_for_a_vehicle_that_was_replaced_are_refused_in_one_line(
     assert not inputs.log.refused
     for vehicles in ({"other": {}}, {"drone": {}}):
         simulation.set_vehicles(vehicles)
-    inbox.empty()
+    inbox.run_jobs()
     simulation.close()
     assert inputs.log.is_refusing("faults") and "imu" in inputs.log.refused["faults"].why
     assert not [one for one in caplog.records if one.exc_info]
@@ -151,7 +151,7 @@ def test_every_propeller_of_a_hexacopter_may_fail_by_a_message(callbacks):
     inbox = Inbox()
     inputs = VehicleInputs(simulation, simulation.drone.parameters, inbox)
     callbacks["drone/faults"](KeyValue("propellers", "[1, 1, 1, 1, 1, 0]"))
-    inbox.empty()
+    inbox.run_jobs()
     assert simulation.drone.faults.now.propellers == (1, 1, 1, 1, 1, 0)
     callbacks["drone/faults"](KeyValue("propellers", "[1, 1, 1, 1, 1]"))
     assert inputs.log.is_refusing("faults")

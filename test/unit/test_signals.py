@@ -47,8 +47,8 @@ print("ended")
 """
 WAYS = {
     "shut down": ("end_on_signals()", "rospy.is_shutdown()", "", False),
-    "asked": ("shutdown = Shutdown()", "shutdown.asked()", "shutdown.complete()", False),
-    "guarded": ("shutdown = Shutdown(watchdog)", "shutdown.asked()", "shutdown.complete()", True),
+    "asked": ("shutdown = Shutdown()", "shutdown.is_requested()", "shutdown.complete()", False),
+    "guarded": ("shutdown = Shutdown(watchdog)", "shutdown.is_requested()", "shutdown.complete()", True),
 }
 
 

@@ -14,8 +14,9 @@ from drone_sim.files.resources import locate
 from drone_sim.message_text import near_names, shown
 from drone_sim.ros.cockpit.server.address import address_file, print_to_terminal
 from drone_sim.ros.cockpit.server.page_server import PageServer
+from drone_sim.ros.core.launch_parameters import from_shell
 from drone_sim.ros.core.shutdown import end_on_signals
-from drone_sim.ros.core.startup import from_shell, init_node, reported
+from drone_sim.ros.core.startup import init_node, status_of_node
 
 _NAME = "cockpit"
 _NODE = re.compile(r"[/A-Za-z][\w/]*", re.ASCII)
@@ -52,7 +53,7 @@ def main() -> int:
     if not init_node(_NAME, anonymous=True, disable_rostime=True, disable_signals=True):
         return 1
     end_on_signals()
-    return reported(_NAME, _serve)
+    return status_of_node(_NAME, _serve)
 
 
 def _serve() -> None:

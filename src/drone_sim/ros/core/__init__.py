@@ -1,1 +1,1 @@
-"""What every node of the package uses: its start and end, messages, parameters, stamps, the simulator's services."""
+"""Shared by all nodes: start and end of a node, conversion and checks of messages, stamps, the simulator's services."""

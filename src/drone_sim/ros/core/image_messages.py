@@ -1,7 +1,8 @@
-"""Conversion between pictures and sensor_msgs/Image by cv_bridge, with the checks that cv_bridge lacks."""
+"""Conversion between images and sensor_msgs/Image by cv_bridge, with checks that cv_bridge lacks; drawing of masks."""
 
 from __future__ import annotations
 
+import colorsys
 import sys
 
 import numpy as np
@@ -10,40 +11,42 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 _BRIDGE = CvBridge()
-_COLORS = {"8UC1": "mono8", "8UC3": "bgr8", "8UC4": "bgra8"}  # these name no colors: OpenCV's order
+_COLORS = {"8UC1": "mono8", "8UC3": "bgr8", "8UC4": "bgra8"}  # these encodings name no colors: OpenCV's order is used
+_HUE_STEP = 0.618034  # golden ratio: consecutive numbers get very different hues
+_MASK_OPACITY = 0.55
 
 
 def image(picture: np.ndarray, encoding: str, header: Header | None = None) -> Image:
-    """Return a picture (height, width) or (height, width, channels), of the type of `encoding`, as a message."""
+    """Return the message of a picture (height, width) or (height, width, channels), which has the encoding's type."""
     return _BRIDGE.cv2_to_imgmsg(picture, encoding, header)
 
 
 def pixels(message: Image) -> np.ndarray:
-    """Return the pixels of a message, (height, width) or (height, width, channels), of the type of its encoding.
+    """Return the pixels of a message, (height, width) or (height, width, channels), of its encoding's type.
 
     The array may be read-only. Raises ValueError, in one line, for an unknown encoding, and for fewer bytes than the
     message needs.
     """
-    return _read(message, message.encoding, "passthrough")
+    return _convert(message, message.encoding, "passthrough")
 
 
 def bgr(message: Image) -> np.ndarray:
-    """Return a color or gray image as BGR with 8 bits, (height, width, 3). Raises ValueError for any other."""
-    return _read(message, _COLORS.get(message.encoding, message.encoding), "bgr8")
+    """Return a color or gray image as BGR with 8 bits, (height, width, 3). Raises ValueError for any other encoding."""
+    return _convert(message, _COLORS.get(message.encoding, message.encoding), "bgr8")
 
 
-def _read(message: Image, encoding: str, wanted: str) -> np.ndarray:
+def _convert(message: Image, encoding: str, target: str) -> np.ndarray:
     try:
-        return _BRIDGE.imgmsg_to_cv2(_checked(message, encoding), wanted)
+        return _BRIDGE.imgmsg_to_cv2(_normalize(message, encoding), target)
     except CvBridgeError as error:
         raise ValueError(" ".join(str(error).split())) from None
 
 
-def _checked(message: Image, encoding: str) -> Image:
-    """Return the image as `encoding`, in this machine's byte order, without bytes between its rows.
+def _normalize(message: Image, encoding: str) -> Image:
+    """Return the image as `encoding`, in this machine's byte order, without padding between its rows.
 
-    cv_bridge 1.16 ignores `step`, so it would read the bytes after each row as pixels. Its conversion of the byte order
-    fails with numpy 2. It does not check the number of bytes.
+    cv_bridge 1.16 ignores `step`, so it would read the padding as pixels. Its conversion of the byte order fails with
+    numpy 2. It does not check the number of bytes.
     """
     name, channels = _BRIDGE.encoding_to_dtype_with_channels(encoding)
     kind = np.dtype(name).newbyteorder(">" if message.is_bigendian else "<")
@@ -57,3 +60,22 @@ def _checked(message: Image, encoding: str) -> Image:
         numbers: np.ndarray = np.ndarray((height, width * channels), kind, data, strides=(step, kind.itemsize))
         data = np.ascontiguousarray(numbers, kind.newbyteorder("="))
     return Image(message.header, height, width, encoding, sys.byteorder == "big", row, data)
+
+
+# ---- masks
+
+
+def mask_color(number: int) -> tuple[float, float, float]:
+    """Return the color of a number in masks: red, green, blue, 0 to 1."""
+    return colorsys.hsv_to_rgb(number * _HUE_STEP % 1.0, 0.75, 1.0)
+
+
+def draw_mask(picture: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Return a picture (height, width, 3) uint8 RGB, tinted with the colors of a mask (height, width).
+
+    Pixels where the mask is 0 stay unchanged.
+    """
+    colors = np.array([mask_color(number) for number in range(int(mask.max(initial=0)) + 1)], np.float32)
+    result, is_masked = np.array(picture), mask > 0
+    result[is_masked] = (1 - _MASK_OPACITY) * result[is_masked] + _MASK_OPACITY * 255 * colors[mask[is_masked]]
+    return result

@@ -1,4 +1,4 @@
-"""Where ROS's threads leave work for the thread that owns the simulation."""
+"""Queue of jobs from ROS's threads to the thread that owns the simulation. ROS is not needed."""
 
 from __future__ import annotations
 
@@ -9,99 +9,105 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, wait
 from functools import partial
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
-if TYPE_CHECKING:  # it imports rospy, which this file does without
-    from drone_sim.ros.core.intervention import Intervention
-
-Gate = Callable[[str, Callable[[Any], None]], Callable[[Any], None]]  # of a topic and its callback, its new callback
-_Answer = TypeVar("_Answer")
+Gate = Callable[[str, Callable[[Any], None]], Callable[[Any], None]]  # wraps the callback of a topic
+_Result = TypeVar("_Result")
 _LOG = logging.getLogger(__name__)
-_PATIENCE = 30.0  # s; a step, or a scene that is read anew, takes far less
+_TIMEOUT = 30.0  # s; a step, or loading a scene again, takes far less
+
+
+class Intervention(NamedTuple):
+    """Change of the world from outside: its kind (grading/permissions.py), target, topic or service, and sender."""
+
+    action: str
+    what: str
+    way: str
+    by: str
 
 
 def open_gate(_topic: str, take: Callable[[Any], None]) -> Callable[[Any], None]:
-    """Let every message of a topic pass."""
+    """Return the callback itself: no message waits."""
     return take
 
 
 class Inbox:
-    """Jobs from any thread, carried out between two steps, in the order in which they came."""
+    """Jobs from any thread, which run between two steps, in the order of their arrival."""
 
     def __init__(
         self,
-        patience: float = _PATIENCE,
+        timeout: float = _TIMEOUT,
         sleep: Callable[[float], Any] | None = None,
         wake: Callable[[], Any] = lambda: None,
-        tell: Callable[[Intervention], None] = lambda _: None,
+        on_intervention: Callable[[Intervention], None] = lambda _: None,
     ):
-        """Start empty; whoever asks waits for `patience` (s).
+        """Create an empty queue; `ask` waits for at most `timeout` (s).
 
-        `wait` calls `sleep`, and a new job calls `wake` to end it: give both if something else must be heard meanwhile.
-        `tell` is called before a job that is an intervention.
+        `wait` calls `sleep`, and a new job calls `wake` to end it: give both to wait for something else at the same
+        time. `on_intervention` is called before each job that is an intervention.
         """
-        self._tell = tell
-        self._patience = patience
+        self._on_intervention = on_intervention
+        self._timeout = timeout
         self._jobs: SimpleQueue[Callable[[], None]] = SimpleQueue()
-        self._came = threading.Event()
-        self._sleep, self._wake = sleep or self._came.wait, wake
-        self._executing = 0  # the thread in which `at_once` executes jobs
+        self._has_jobs = threading.Event()
+        self._sleep, self._wake = sleep or self._has_jobs.wait, wake
+        self._direct_thread = 0  # id of the thread in `run_directly`
 
     def put(self, job: Callable[[], None], intervention: Intervention | None = None) -> None:
-        """Leave a job and go on."""
-        if threading.get_ident() == self._executing:
+        """Add a job, and return at once."""
+        if threading.get_ident() == self._direct_thread:
             if intervention is not None:
-                self._tell(intervention)
+                self._on_intervention(intervention)
             job()
             return
         if intervention is not None:
-            self._jobs.put(partial(self._tell, intervention))
+            self._jobs.put(partial(self._on_intervention, intervention))
         self._jobs.put(job)
-        self._came.set()
+        self._has_jobs.set()
         self._wake()
 
     @contextlib.contextmanager
-    def at_once(self) -> Iterator[None]:
-        """Execute jobs that the simulation's thread itself leaves in this block at once, and in this block."""
-        self._executing = threading.get_ident()
+    def run_directly(self) -> Iterator[None]:
+        """In this block, run jobs that the present thread puts immediately. Only the simulation's thread calls this."""
+        self._direct_thread = threading.get_ident()
         try:
             yield
         finally:
-            self._executing = 0
+            self._direct_thread = 0
 
-    def ask(self, job: Callable[[], _Answer], intervention: Intervention | None = None) -> _Answer:
-        """Leave a job, wait until it is done, and return its answer; raises what it raised.
+    def ask(self, job: Callable[[], _Result], intervention: Intervention | None = None) -> _Result:
+        """Add a job, wait until it has run, and return its result. Raises what the job raises.
 
-        Raises TimeoutError where the answer does not come in time; a job that has not begun by then never will.
+        Raises TimeoutError if there is no result in time; a job that has not begun by then will not run.
         """
-        answer: Future[_Answer] = Future()
+        result: Future[_Result] = Future()
 
-        def carry_out() -> None:
-            if answer.set_running_or_notify_cancel():
+        def run() -> None:
+            if result.set_running_or_notify_cancel():
                 try:
-                    answer.set_result(job())
+                    result.set_result(job())
                 except Exception as error:
-                    answer.set_exception(error)
+                    result.set_exception(error)
 
-        self.put(carry_out, intervention)
-        if not wait([answer], self._patience).done:
-            late = "it will not be executed" if answer.cancel() else "it is still being executed"
-            raise TimeoutError(f"no answer within {self._patience:g} s: {late}")
-        return answer.result()
+        self.put(run, intervention)
+        if not wait([result], self._timeout).done:
+            state = "it will not be executed" if result.cancel() else "it is still being executed"
+            raise TimeoutError(f"no answer within {self._timeout:g} s: {state}")
+        return result.result()
 
     def wait(self, seconds: float) -> None:
-        """Sleep until a job comes, or for so long."""
+        """Sleep until a job arrives, for at most `seconds`."""
         self._sleep(seconds)
 
-    def empty(self) -> None:
-        """Run all jobs that have arrived by now. The simulation's thread calls it.
+    def run_jobs(self) -> None:
+        """Run all jobs that have arrived by now. Only the simulation's thread calls this.
 
-        A job that raises an exception is logged with its traceback: a message from outside must not end the node.
+        If a job raises an exception, its traceback is logged: a message from outside must not end the node.
         """
-        if not self._came.is_set():
+        if not self._has_jobs.is_set():
             return
-        self._came.clear()
-        for _ in range(self._jobs.qsize()):  # what comes meanwhile waits: a flood must not hold up the step
+        self._has_jobs.clear()
+        for _ in range(self._jobs.qsize()):  # jobs that arrive meanwhile wait, so a flood of them cannot block the step
             try:
                 self._jobs.get_nowait()()
             except Exception:

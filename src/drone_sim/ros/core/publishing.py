@@ -1,11 +1,10 @@
-"""The stamp of a step, and /clock; new subscribers that come while nothing is published, because nothing changes."""
+"""Stamps of a step's messages, /clock, and lists of new subscribers."""
 
 from __future__ import annotations
 
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import Any, Protocol
 
 import genpy
 import rospy
@@ -15,53 +14,46 @@ from drone_sim.ros.core.message_conversion import ros_time
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 
-_CLOCK_PERIOD = 1 / 200  # s of real time, between two of /clock while nothing else is sent
-_MOST = 100  # new subscribers that wait to be told
+_CLOCK_PERIOD = 1 / 200  # s of real time, between two messages on /clock while nothing else is sent
+_MAX_NEW_SUBSCRIBERS = 100
 
-Tell = Callable[[genpy.Message], None]
-
-
-class Stamp(Protocol):
-    """Returns the stamp for a state that is `ago` old (s of simulated time)."""
-
-    def __call__(self, ago: float = 0.0) -> rospy.Time:
-        """Return the stamp."""
+Send = Callable[[genpy.Message], None]
+Stamp = Callable[..., rospy.Time]  # StepTime.stamp
 
 
 class NewSubscribers(rospy.SubscribeListener):  # type: ignore[misc] # rospy has no types
-    """New subscribers of a topic, remembered until they are taken; rospy's threads add them."""
+    """Subscribers that have connected to a topic since the last `take`. rospy's threads add them."""
 
     def __init__(self) -> None:
-        """Begin with none."""
         super().__init__()
-        self._came: deque[tuple[float, Tell]] = deque(maxlen=_MOST)  # s of the monotonic clock, and what tells them
+        self._new: deque[tuple[float, Send]] = deque(maxlen=_MAX_NEW_SUBSCRIBERS)  # with the monotonic time, s
 
-    def peer_subscribe(self, _topic: str, _publish: Tell, tell: Tell) -> None:
-        """Remember a subscriber; rospy calls this, with the function that sends a message to this subscriber alone."""
-        self._came.append((time.monotonic(), tell))
+    def peer_subscribe(self, _topic: str, _publish: Send, send: Send) -> None:
+        """Add a subscriber, by the function that sends a message to it alone. rospy calls this."""
+        self._new.append((time.monotonic(), send))
 
-    def take(self) -> list[Any]:
-        """Return a send function for each of them, and forget them. Only the thread that publishes calls this."""
-        return [self._came.popleft()[1] for _ in range(len(self._came))]
+    def take(self) -> list[Send]:
+        """Remove all and return a send function for each. Only the thread that publishes calls this."""
+        return [self._new.popleft()[1] for _ in range(len(self._new))]
 
     def have_settled(self, seconds: float) -> bool:
-        """Return True once, when the last of them came more than `seconds` ago, and forget them."""
-        settled = bool(self._came) and time.monotonic() - self._came[-1][0] > seconds
-        if settled:
-            self._came.clear()
-        return settled
+        """Return whether there are any, the last of them added more than `seconds` ago; then remove them."""
+        has_settled = bool(self._new) and time.monotonic() - self._new[-1][0] > seconds
+        if has_settled:
+            self._new.clear()
+        return has_settled
 
 
 class StepTime:
-    """What everything that belongs to a step is stamped with.
+    """Stamps of a step's messages.
 
-    In real time this is the moment at which the step began. In simulated time it is the simulation's time, and /clock
-    publishes it before any message with this stamp; if nothing is sent, /clock may skip steps. What was measured within
-    the step has an earlier stamp of its own, at the pace of the flight.
+    In real time the stamp is the moment at which the step began. In simulated time it is the simulation's time, and
+    /clock publishes it before any message with this stamp; if nothing is sent, /clock may skip steps. A measurement
+    from within the step has an earlier stamp.
     """
 
     def __init__(self, simulation: Simulation, simulated: bool):
-        """Take the simulation whose steps it is; advertise /clock, if the time is `simulated`."""
+        """Stamp the steps of `simulation`; advertise /clock if `simulated`."""
         self.simulated = simulated
         self._simulation = simulation
         self._new_subscribers = NewSubscribers()
@@ -71,38 +63,38 @@ class StepTime:
             else None
         )
         self._throttle = Throttle(_CLOCK_PERIOD)
-        self._began = rospy.Time() if simulated else rospy.Time.now()
-        self._pace = 0.0  # s of the stamps for a second of simulated time
-        self._said = 0.0  # by /clock, s; 0 is no time for ROS
+        self._step_began = rospy.Time() if simulated else rospy.Time.now()
+        self._pace = 0.0  # s between stamps for each second of simulated time
+        self._published = 0.0  # last time on /clock, s; ROS takes 0 for "no time yet"
 
     def begin(self) -> None:
-        """Say that a step begins."""
+        """Set the stamp for the step that begins now."""
         if not self.simulated:
-            before, self._began = self._began, rospy.Time.now()
+            before, self._step_began = self._step_began, rospy.Time.now()
             parameters = self._simulation.parameters
-            # After a late step the next ones come faster: then too no stamp is before those of the step before.
-            elapsed = (self._began - before).to_sec() / parameters.time_step
+            # After a late step the next ones are faster. The smaller pace keeps stamps after those of the last step.
+            elapsed = (self._step_began - before).to_sec() / parameters.time_step
             steady = 1 / (parameters.real_time_factor or 1.0)
-            self._pace = min(elapsed, steady) if elapsed >= 0 else steady  # or the machine's clock was set back
+            self._pace = min(elapsed, steady) if elapsed >= 0 else steady  # negative: the system clock was set back
 
     def stamp(self, ago: float = 0.0) -> rospy.Time:
-        """Return the stamp of a message that is sent now, about the state `ago` seconds of simulated time before."""
+        """Return the stamp of a message that is sent now, for the state `ago` seconds of simulated time before."""
         if self._clock is None:
-            return self._began - ros_time(ago * self._pace, rospy.Duration) if ago else self._began
+            return self._step_began - ros_time(ago * self._pace, rospy.Duration) if ago else self._step_began
         now = self._simulation.time
         stamp = ros_time(now)
-        if now != self._said:
-            self._said = now
+        if now != self._published:
+            self._published = now
             if now:
                 self._clock.publish(stamp)
         return ros_time(max(0.0, now - ago)) if ago else stamp
 
-    def tell_new_subscribers(self) -> None:
-        """Tell whoever has begun to listen while the clock stands still what time it is."""
-        for tell in self._new_subscribers.take() if self._said else ():
-            tell(Clock(ros_time(self._said)))
+    def publish_to_new_subscribers(self) -> None:
+        """Send the current time to new subscribers of /clock, while the simulation stands still."""
+        for send in self._new_subscribers.take() if self._published else ():
+            send(Clock(ros_time(self._published)))
 
     def end(self, at_once: bool = False) -> None:
-        """Say that the step has been shown; `at_once`: /clock tells of it in any case."""
+        """Publish /clock at the end of a step: always if `at_once`, otherwise at most every _CLOCK_PERIOD."""
         if self.simulated and (at_once or self._throttle.passes()):
             self.stamp()

@@ -1,4 +1,4 @@
-"""The simulation, as any other node reaches it: its services, its parameters, and what it says."""
+"""Access to the simulator from another node: its services, its parameters, and the failures that it logs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import rosgraph
 import rospy
 from std_srvs.srv import SetBool, Trigger
 
-FAILURES = (  # what calls raise where the node, or the master, is gone or refuses
+FAILURES = (  # raised by calls if the node or the master is gone, or refuses
     rospy.ServiceException,
     rospy.ROSException,
     rospy.exceptions.ROSInternalException,
@@ -22,48 +22,51 @@ FAILURES = (  # what calls raise where the node, or the master, is gone or refus
     xmlrpc.client.Error,
     OSError,
 )
-_ERROR = re.compile(r"\[(\w+)\] (.+?):(\d+): (.*)", re.DOTALL)
+_SCRIPT_ERROR = re.compile(r"\[(\w+)\] (.+?):(\d+): (.*)", re.DOTALL)
 
 
 class ScriptFailure(NamedTuple):
-    """Where a script failed: phase or callback, file, line (from 1), and what went wrong."""
+    """Where a script failed: phase or callback, file, line (from 1); and the error."""
 
     phase: str
     file: str
     line: int
-    said: str
+    error: str
 
 
 class Simulator:
-    """The node of a name, with its services."""
+    """Services and parameters of a simulator node."""
 
     def __init__(self, node: str):
-        """Reach the node whose name is `node`, as given to a launch."""
+        """`node` is the node's name as in a launch file, which may be relative."""
         self.node = rospy.resolve_name(node)
 
     def call(self, service: str, *request: Any) -> tuple[bool, str]:
-        """Call a service; return whether it was done, and one line. Takes as long as the simulation takes."""
+        """Call a Trigger service, or a SetBool service with `request`; return its success and its message in one line.
+
+        Blocks until the simulator replies.
+        """
         kind = SetBool if request else Trigger
         try:
-            answer = rospy.ServiceProxy(f"{self.node}/{service}", kind)(*request)
+            reply = rospy.ServiceProxy(f"{self.node}/{service}", kind)(*request)
         except FAILURES as error:
             return False, " ".join(str(error).split()) or f"no answer from {self.node}"
-        return answer.success, " ".join(answer.message.split())
+        return reply.success, " ".join(reply.message.split())
 
-    def call_aside(self, service: str, *request: Any, then: Callable[[bool, str], None]) -> None:
-        """Call a service in a thread of its own; `then` hears the answer there."""
+    def call_async(self, service: str, *request: Any, then: Callable[[bool, str], None]) -> None:
+        """Call a service in a new thread, which calls `then` with the result."""
         threading.Thread(target=lambda: then(*self.call(service, *request)), name=service, daemon=True).start()
 
     def parameter(self, name: str, default: Any = None) -> Any:
-        """Return a parameter of the node. Raises one of `FAILURES`."""
+        """Return a private parameter of the node. Raises one of `FAILURES`."""
         return rospy.get_param(f"{self.node}/{name}", default)
 
     def set_parameter(self, name: str, value: Any) -> None:
-        """Set a parameter of the node, which it reads when a service says so. Raises one of `FAILURES`."""
+        """Set a private parameter, which the node reads when a service tells it to. Raises one of `FAILURES`."""
         rospy.set_param(f"{self.node}/{name}", value)
 
 
 def script_failure(line: str) -> ScriptFailure | None:
-    """Return the script's failure that a line of the simulation tells of, None for any other line."""
-    found = _ERROR.search(line)
-    return ScriptFailure(found[1], found[2], int(found[3]), found[4]) if found else None
+    """Return the script failure in a line of the simulator's log; None for another line."""
+    match = _SCRIPT_ERROR.search(line)
+    return ScriptFailure(match[1], match[2], int(match[3]), match[4]) if match else None

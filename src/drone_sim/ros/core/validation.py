@@ -1,4 +1,4 @@
-"""What comes in by ROS, checked: parameters; poses; changes of weather and faults, which are keys of the YAML files."""
+"""Checks of messages: poses, frames, changes of weather and faults; and where a message comes from."""
 
 from __future__ import annotations
 
@@ -14,26 +14,22 @@ from drone_sim.config.types import Checked, ParameterError
 from drone_sim.files import yaml_files
 from drone_sim.mechanics.state import Pose
 from drone_sim.message_text import shown
+from drone_sim.ros.core.inbox import Intervention
 from drone_sim.ros.core.message_conversion import WORLD_FRAME, xyz, xyzw
-from drone_sim.ros.core.startup import NOT_GIVEN, from_shell, script_from_shell
-from drone_sim.run import parameters as parameters_module
-from drone_sim.run.parameters import Parameters
 from drone_sim.vehicles import checks
 from drone_sim.vehicles.checks import Refused
 from drone_sim.vehicles.parameters import EquipmentParameters
 
-_DEEPEST, _LONGEST = 4, 1000  # keys, characters
-# What a launch file's defaults leave in the parameters if the user gives no such argument.
-_DEFAULTS = {**dict.fromkeys(("script", "start", "gui", "real_time_factor"), NOT_GIVEN), "scene_file": "none"}
+_MAX_DEPTH, _MAX_LENGTH = 4, 1000  # of the keys; of key and value together, in characters
 
 
 def read_changes(message: KeyValue, model: Checked) -> dict[str, Any]:
-    """Return what a message asks for, such as {commands: {loss: 0.2}} of commands/loss and 0.2; raises Refused.
+    """Return the changes in a message: key commands/loss and value 0.2 give {commands: {loss: 0.2}}.
 
-    `model` holds values as there may be: others are refused before they reach the simulation.
+    `model` holds current values; changes that it does not allow raise Refused, before they reach the simulation.
     """
     parts = message.key.strip("/").split("/")
-    if len(parts) > _DEEPEST or len(message.key) + len(message.value) > _LONGEST:
+    if len(parts) > _MAX_DEPTH or len(message.key) + len(message.value) > _MAX_LENGTH:
         raise Refused(f"key {shown(message.key)}: too long")
     try:
         value: Any = yaml_files.parse(message.value)
@@ -48,53 +44,34 @@ def read_changes(message: KeyValue, model: Checked) -> dict[str, Any]:
 
 
 def check_changes(changes: Mapping[str, Any], model: Checked) -> None:
-    """Raise Refused for what the parameters do not allow."""
+    """Raise Refused for changes that the parameters do not allow."""
     try:
         changed(model, changes)
     except ParameterError as error:
         raise Refused(error.text) from None
 
 
-def checked_pose(frame: str, message: PoseMessage, parameters: EquipmentParameters, lowest: float = 0.0) -> Pose:
-    """Return a pose that came in a frame, at `lowest` or above (m); raises Refused."""
+def read_pose(frame: str, message: PoseMessage, parameters: EquipmentParameters, lowest: float = 0.0) -> Pose:
+    """Return the pose of a message; its height must be at least `lowest` (m). Raises Refused."""
     check_frame(frame)
     return checks.pose(xyz(message.position), xyzw(message.orientation), parameters, lowest)
 
 
 def check_frame(frame: str) -> None:
-    """Raise Refused for any other frame than `world`."""
+    """Raise Refused for any frame other than `world`."""
     if frame.lstrip("/") not in ("", WORLD_FRAME):
         raise Refused(f"frame_id {shown(frame)}: must be '{WORLD_FRAME}'")
 
 
-def parameters_of(name: str, **others: Any) -> Parameters:
-    """Return the private parameters of the simulator that has this name, `others` in place of some.
-
-    A default of the launch file does not override a config or a scene. Raises ParameterError.
-    """
-    given: dict[str, Any] = rospy.get_param(name, {})
-    if not isinstance(given, dict):
-        raise ParameterError(f"must be a namespace with parameters such as {name}/script", (name,), str(given)[:80])
-    given = {key: value for key, value in given.items() if value != _DEFAULTS.get(key, ...)}
-    for group, argument in (("remote_api", "serve"), ("lockstep", "wait_for")):
-        values = given.get(group)
-        if isinstance(values, dict) and values.get(argument) == NOT_GIVEN:
-            given[group] = {key: value for key, value in values.items() if key != argument}
-    for key, read in (
-        ("config", from_shell),
-        ("script", script_from_shell),
-        ("scene_file", from_shell),
-        ("timeline_file", from_shell),
-    ):
-        if isinstance(given.get(key), str):
-            names = given[key].split(",") if key == "config" else [given[key]]
-            given[key] = ",".join(map(read, names))
-    return parameters_module.load({**given, **others})
+# ---- where a message comes from
 
 
-def use_sim_time() -> bool:
-    """Return ROS's parameter /use_sim_time. Raises ParameterError."""
-    given = rospy.get_param("/use_sim_time", False)
-    if not isinstance(given, bool):
-        raise ParameterError("must be true or false", ("/use_sim_time",), str(given)[:80])
-    return given
+def sender(message: Any) -> str:
+    """Return the name of the node that sent a message or a service request; "?" if rospy did not receive it."""
+    header = getattr(message, "_connection_header", None) or {}
+    return str(header.get("callerid", "?"))
+
+
+def intervention(action: str, what: str, name: str, message: Any) -> Intervention:
+    """Return the intervention of a message or request that was received on the topic or service `name`."""
+    return Intervention(action, what, rospy.resolve_name(name), sender(message))

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from types import FrameType
 
 from drone_sim.command_line import Parser
-from drone_sim.ros.core.network import PATIENCE
+from drone_sim.ros.core.network import TIMEOUT
 from drone_sim.ros.doctor import HINT, WRONG, Line, environment, packages
 from drone_sim.ros.doctor.master import Master, simulator
 
@@ -31,7 +31,7 @@ def run_checks(thorough: bool = True) -> Iterator[Line]:
     checks: list[tuple[str, Check, float]] = [
         ("Python", environment.python, _SECONDS),
         ("ROS", environment.ros, _SECONDS),
-        *([("packages", packages.packages, packages.PATIENCE + _SECONDS)] if thorough else []),
+        *([("packages", packages.packages, packages.TIMEOUT + _SECONDS)] if thorough else []),
         ("host names", environment.host_names, _SECONDS),
         ("host names", environment.across, _SECONDS),
         ("master", master.found, _SECONDS),
@@ -83,7 +83,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="skip packages, pictures and the test flight")
     given = [one for one in sys.argv[1:] if ":=" not in one]  # roslaunch's and rosrun's
     thorough = not parser.parse_args(given).quick
-    socket.setdefaulttimeout(PATIENCE)
+    socket.setdefaulttimeout(TIMEOUT)
     marks: list[str] = []
     with contextlib.suppress(BrokenPipeError):  # who reads has seen enough
         for line in run_checks(thorough):

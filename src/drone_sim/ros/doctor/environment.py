@@ -11,7 +11,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from drone_sim.files.resources import package_path
-from drone_sim.ros.core.network import MASTER, PATIENCE, addresses
+from drone_sim.ros.core.network import MASTER, TIMEOUT, addresses
 from drone_sim.ros.doctor import HINT, OK, WRONG, Line
 
 _CURE = "`export ROS_HOSTNAME=localhost` works if all nodes run on this machine"
@@ -133,7 +133,7 @@ def _reaches_itself(host: str, given: str) -> Line:
         listening.bind(("", 0))
         listening.listen(1)
         try:
-            socket.create_connection((host, listening.getsockname()[1]), timeout=PATIENCE).close()
+            socket.create_connection((host, listening.getsockname()[1]), timeout=TIMEOUT).close()
         except OSError as error:
             said = f"{given} = '{host}' does not lead back to this machine ({error}): {_CURE}"
             return Line(WRONG, "host names", said)

@@ -10,13 +10,13 @@ from collections.abc import Iterator
 from typing import Any
 from urllib.parse import urlsplit
 
-from drone_sim.ros.core.network import FAILURES, MASTER, PATIENCE, answers, call, check_master_uri
+from drone_sim.ros.core.network import FAILURES, MASTER, TIMEOUT, call, check_master_uri, is_alive
 from drone_sim.ros.doctor import HINT, OK, WRONG, Line
 
 _DIAGNOSTICS = 4.0  # s, for the /diagnostics of all simulators; each publishes once a second
 _MARKS = {0: OK, 1: HINT}
 _APART = 1.0  # s, between this machine's clock and that of the simulator
-_ANSWERS = 2 * PATIENCE  # s, for the answers of all nodes; each takes two calls
+_ANSWERS = 2 * TIMEOUT  # s, for the answers of all nodes; each takes two calls
 _START = "`roslaunch drone_sim drone.launch` starts one"
 
 Graph = dict[str, list[str]]  # nodes by topic, or by service
@@ -99,7 +99,7 @@ class Master:
         nodes, alive = self.nodes(), set()
 
         def ask(node: str) -> None:
-            if answers(self.uri, node):
+            if is_alive(self.uri, node):
                 alive.add(node)
 
         threads = [threading.Thread(target=ask, args=(node,), daemon=True) for node in nodes]

@@ -13,7 +13,7 @@ from drone_sim.files.resources import package_path, python_path
 from drone_sim.ros.doctor import HINT, OK, WRONG, Line
 from drone_sim.ros.doctor.probe import FLIGHT, RENDERER
 
-PATIENCE = 60.0  # s, for all of it; two are usual
+TIMEOUT = 60.0  # s, for all of it; two are usual
 _MODULES = {"python3-opencv": "cv2", "python3-pil": "PIL", "python3-pycollada-pip": "collada", "python3-tk": "tkinter"}
 _NO_MODULES = {"rviz"}
 _WITH_A_DISPLAY = {"tkinter"}  # `./dev.sh setup` leaves it out elsewhere
@@ -99,8 +99,8 @@ def _probed(names: Sequence[str]) -> tuple[str, str]:
     environment = {**os.environ, "PYTHONPATH": python_path(os.environ.get("PYTHONPATH", ""))}
     command = [sys.executable, "-m", "drone_sim.ros.doctor.probe", *names]
     try:
-        done = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE)
+        done = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, timeout=TIMEOUT)
     except subprocess.TimeoutExpired as late:
-        return (late.stdout or b"").decode(errors="replace"), f"did not end within {PATIENCE:g} s"
+        return (late.stdout or b"").decode(errors="replace"), f"did not end within {TIMEOUT:g} s"
     last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
     return done.stdout.decode(errors="replace"), f"ended with {done.returncode}{': ' if last else ''}{''.join(last)}"

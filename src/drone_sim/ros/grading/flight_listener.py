@@ -20,8 +20,8 @@ from drone_sim.grading.flight_record import ContactEvent, FlightRecord, ValueCha
 from drone_sim.grading.permissions import MOST_TRIED
 from drone_sim.grading.plan import Plan
 from drone_sim.message_text import printable
-from drone_sim.ros.core.intervention import sender
 from drone_sim.ros.core.message_conversion import odometry_row, xyz
+from drone_sim.ros.core.validation import sender
 from drone_sim.ros.grading.simulator import Mismatch
 from drone_sim.run.parameters import Parameters
 

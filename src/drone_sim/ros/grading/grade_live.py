@@ -30,8 +30,9 @@ from drone_sim.grading.outputs.html import report
 from drone_sim.grading.permissions import CHANGE, MOVE
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
+from drone_sim.ros.core.launch_parameters import from_shell
 from drone_sim.ros.core.shutdown import end_on_signals
-from drone_sim.ros.core.startup import from_shell, init_node, reported
+from drone_sim.ros.core.startup import init_node, status_of_node
 from drone_sim.ros.grading import seeds
 from drone_sim.ros.grading.flight_listener import FlightListener
 from drone_sim.ros.grading.rules import LiveRules
@@ -58,7 +59,7 @@ def main() -> int:
         return FAILED
     end_on_signals()
     results: list[Result] = []
-    status = reported(_NAME, lambda: results.append(_graded(options)))
+    status = status_of_node(_NAME, lambda: results.append(_graded(options)))
     return status or (0 if results[0].passed else FAILED)
 
 

@@ -15,8 +15,8 @@ from std_msgs.msg import String
 
 from drone_sim.grading.plan import Plan
 from drone_sim.message_text import shown
+from drone_sim.ros.core.launch_parameters import parameters_of, use_sim_time
 from drone_sim.ros.core.simulator import Simulator
-from drone_sim.ros.core.validation import parameters_of, use_sim_time
 from drone_sim.run.parameters import Parameters
 
 _LOOK = 0.05  # s of real time, between two looks

@@ -14,7 +14,7 @@ from std_msgs.msg import String
 
 from drone_sim.grading.permissions import CHANGE, MOST_TRIED, Actions, free
 from drone_sim.message_text import MAX_NAME, printable
-from drone_sim.ros.core.intervention import Intervention
+from drone_sim.ros.core.inbox import Intervention
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.calls import Function
 

@@ -14,7 +14,7 @@ from drone_sim.config.types import ParameterError
 from drone_sim.message_text import near_names, shown
 from drone_sim.ros.core import connections
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.core.intervention import sender
+from drone_sim.ros.core.validation import sender
 from drone_sim.ros.core.message_conversion import ros_time
 from drone_sim.run.diagnosis.finding import WARN, Finding, Problem, finding
 from drone_sim.run.lockstep_parameters import AwaitedTopic, LockstepParameters
@@ -144,7 +144,7 @@ class Lockstep:
     def _accept(self, name: str, awaited: _Awaited, take: Take, message: Any) -> None:
         """Execute an answer, unless the run has ended, or the wait for it."""
         if self._open.get(name) is awaited and self._simulation.run == self._run:
-            with self._inbox.at_once():
+            with self._inbox.run_directly():
                 take(message)
             del self._open[name]
             self._waits += 1

@@ -20,11 +20,11 @@ from std_msgs.msg import String
 from drone_sim.mechanics.frames import position, to_euler
 from drone_sim.remote.remote_api import start_server
 from drone_sim.ros.core.inbox import Inbox, open_gate
+from drone_sim.ros.core.launch_parameters import parameters_of, use_sim_time
 from drone_sim.ros.core.master_watch import MasterWatch
 from drone_sim.ros.core.publishing import StepTime
 from drone_sim.ros.core.shutdown import Shutdown
-from drone_sim.ros.core.startup import init_node, release_name, reported
-from drone_sim.ros.core.validation import parameters_of, use_sim_time
+from drone_sim.ros.core.startup import init_node, release_name, status_of_node
 from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.inspection import InspectionTopics
 from drone_sim.ros.node.interventions import Interventions
@@ -91,7 +91,7 @@ class Node:
         self._pacer = Pacer(period(parameters), sleep=self._outside.wait)
         others = self._outside  # who are to be heard while the inbox waits
         sleep = others.wait if others.address else None
-        self._inbox = Inbox(sleep=sleep, wake=others.wake, tell=self._interventions.tell)
+        self._inbox = Inbox(sleep=sleep, wake=others.wake, on_intervention=self._interventions.tell)
         is_awaited = bool(parameters.lockstep.wait_for)
         self._lockstep = Lockstep(parameters.lockstep, self.simulation, self._inbox) if is_awaited else None
         self._gate = self._lockstep.gate if self._lockstep else open_gate
@@ -172,7 +172,7 @@ class Node:
             self.player.begun = False
             self._pacer.restart()
         if self._lockstep is not None and not self._lockstep.is_ready():
-            self._time.tell_new_subscribers()
+            self._time.publish_to_new_subscribers()
             self._inbox.wait(_SOON)
             self._process_requests()
             self._pacer.excuse()  # the node may take as long as it needs
@@ -209,7 +209,7 @@ class Node:
         return list(self.simulation.vehicles.values())[:1]
 
     def _process_requests(self) -> None:
-        self._inbox.empty()
+        self._inbox.run_jobs()
         self._outside.serve()
 
     def _step_and_show(self) -> None:
@@ -228,7 +228,7 @@ class Node:
         """Paused, stopped or held from outside: wait for something to do, and show what it changed."""
         self._inbox.wait(self._until_shown())
         self._time.begin()
-        self._inbox.empty()
+        self._inbox.run_jobs()
         if self._is_running() or self._until_shown():
             return
         if self._time.simulated:
@@ -267,7 +267,7 @@ class Node:
         """Show changes with a stamp used before; transforms only to new subscribers: tf2 takes one for each stamp."""
         self._topics.follow()
         self._time.end(at_once=True)
-        self._time.tell_new_subscribers()
+        self._time.publish_to_new_subscribers()
         if self._topics.tell_new_subscribers() or self.simulation.world.pictures.changes != self._shown:
             self.simulation.look()
             self._show_state()
@@ -340,11 +340,11 @@ def main(watchdog: Watchdog) -> int:
         nodes.append(Node(parameters))
         MasterWatch(nodes[0].descriptions).start()
         release_name()
-        nodes[0].run(shutdown.asked)
+        nodes[0].run(shutdown.is_requested)
 
-    status = reported(_NAME, run)
+    status = status_of_node(_NAME, run)
     for node in nodes:
-        status = reported(_NAME, node.close) or status
+        status = status_of_node(_NAME, node.close) or status
     shutdown.complete()
     return status
 

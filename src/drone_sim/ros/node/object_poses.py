@@ -11,9 +11,8 @@ from drone_sim.grading.permissions import MOVE
 from drone_sim.mechanics.frames import to_rpy
 from drone_sim.offline.timeline import ObjectMove
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.core.intervention import intervention
 from drone_sim.ros.core.message_conversion import xyz, xyzw
-from drone_sim.ros.core.validation import check_frame
+from drone_sim.ros.core.validation import check_frame, intervention
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles import checks
 

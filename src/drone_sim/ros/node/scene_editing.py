@@ -25,7 +25,7 @@ from drone_sim.files.resources import locate, package_path
 from drone_sim.grading.permissions import CHANGE
 from drone_sim.message_text import encodable
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.core.intervention import intervention
+from drone_sim.ros.core.validation import intervention
 from drone_sim.ros.node.inspection import LatchedText
 from drone_sim.ros.node.services import Services, scene_parameter
 from drone_sim.run.pacing import Throttle

@@ -17,8 +17,9 @@ from drone_sim.offline import timeline as timelines
 from drone_sim.offline.timeline import Timeline, TimelineError
 from drone_sim.ros.core.connections import wait_until_written
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.core.intervention import intervention
-from drone_sim.ros.core.startup import MASTER_GONE, from_shell, script_from_shell
+from drone_sim.ros.core.launch_parameters import from_shell, script_from_shell
+from drone_sim.ros.core.startup import MASTER_FAILURES
+from drone_sim.ros.core.validation import intervention
 from drone_sim.run.parameters import MAX_STEP_COUNT, ParameterError, Parameters
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Snapshot
@@ -208,7 +209,7 @@ class VehiclesParameter:
 
     def close(self) -> None:
         """Put back what was given: the next simulator of this name may be given another drone."""
-        with contextlib.suppress(*MASTER_GONE, OSError):
+        with contextlib.suppress(*MASTER_FAILURES, OSError):
             self._write(self._given)
 
     def _write(self, value: Any) -> None:

@@ -12,7 +12,7 @@ import rospy
 
 from drone_sim.files.resources import package_path
 from drone_sim.message_text import near_names
-from drone_sim.ros.core.network import answers, call
+from drone_sim.ros.core.network import call, is_alive
 from drone_sim.run.parameters import ParameterError
 
 _SUFFIXES = (".launch", ".xml", ".test")
@@ -81,7 +81,7 @@ def check_others(vehicles: Iterable[str], simulated: bool) -> None:
     def others(topic: str) -> list[str]:
         """Return the simulators that publish a topic, and still answer."""
         nodes = [one for one in published.get(topic, ()) if one != own and one in services.get(f"{one}/{_OURS}", ())]
-        return [one for one in nodes if answers(uri, one)]
+        return [one for one in nodes if is_alive(uri, one)]
 
     for name in vehicles:
         there = others(rospy.resolve_name(f"{name}/{_OF_A_VEHICLE}"))

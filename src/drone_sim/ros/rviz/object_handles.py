@@ -18,8 +18,7 @@ from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.ros.core import message_conversion
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.core.intervention import intervention
-from drone_sim.ros.core.validation import checked_pose
+from drone_sim.ros.core.validation import intervention, read_pose
 from drone_sim.ros.rviz.marker_server import HeldHandles, MarkerServer, level, new_handle
 from drone_sim.ros.rviz.marker_topics import namespace
 from drone_sim.ros.rviz.scene_markers import bodiless_markers, marker_of
@@ -125,7 +124,7 @@ class ObjectHandles:
             if feedback.event_type == _Drag.POSE_UPDATE:
                 parameters = self._simulation.parameters
                 lowest = -parameters.position_limit  # what drags knows the floor
-                pose = checked_pose(feedback.header.frame_id, feedback.pose, parameters, lowest)
+                pose = read_pose(feedback.header.frame_id, feedback.pose, parameters, lowest)
                 drag.put(name, frames.multiply(pose.matrix, shown.tilt))
         except ValueError as refused:
             if self._warnings.passes():

@@ -15,8 +15,7 @@ from drone_sim.grading.permissions import MOVE
 from drone_sim.mechanics.state import Pose
 from drone_sim.ros.core import message_conversion
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.core.intervention import intervention
-from drone_sim.ros.core.validation import checked_pose
+from drone_sim.ros.core.validation import intervention, read_pose
 from drone_sim.ros.rviz.marker_server import HeldHandles, MarkerServer, level, new_handle
 from drone_sim.ros.rviz.marker_topics import band, namespace, new_marker
 from drone_sim.run.pacing import Throttle
@@ -97,7 +96,7 @@ class VehicleHandles:
         if feedback.event_type != InteractiveMarkerFeedback.POSE_UPDATE:
             return
         try:
-            pose = checked_pose(feedback.header.frame_id, feedback.pose, handle.limits)
+            pose = read_pose(feedback.header.frame_id, feedback.pose, handle.limits)
         except checks.Refused:
             return  # dragged below the floor, or to the horizon: it stays where it was
         self._inbox.put(lambda: self._carry_out(feedback.marker_name, handle, pose), done)

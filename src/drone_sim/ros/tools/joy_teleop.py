@@ -18,8 +18,8 @@ from typing import Any
 import rospy
 from sensor_msgs.msg import Joy
 
+from drone_sim.ros.core.launch_parameters import from_shell
 from drone_sim.ros.core.shutdown import run_tool
-from drone_sim.ros.core.startup import from_shell
 from drone_sim.ros.tools import gamepad
 from drone_sim.ros.tools.commands import Command
 from drone_sim.ros.tools.gamepad import Gamepad, JoyState

@@ -22,7 +22,8 @@ import roslib.packages
 import rospkg
 
 from drone_sim.command_line import Parser, status_of
-from drone_sim.ros.core.startup import ask_master, from_shell
+from drone_sim.ros.core.launch_parameters import from_shell
+from drone_sim.ros.core.startup import poll_master
 
 _NAME = "record"
 _LARGE = r"sensor_msgs/(Image|PointCloud2?)|visualization_msgs/.*|dynamic_reconfigure/.*|theora_image_transport/.*"
@@ -88,4 +89,4 @@ def _kinds(simulator: str) -> dict[str, str]:
             return None
         return dict(master.getTopicTypes())
 
-    return ask_master(_NAME, ask, f"{simulator}, which is not running yet")
+    return poll_master(_NAME, ask, f"{simulator}, which is not running yet")

@@ -26,8 +26,9 @@ from tf2_msgs.msg import TFMessage
 from drone_sim.command_line import FAILED, SIGNALLED, Parser, status_of
 from drone_sim.files import writing
 from drone_sim.files.resources import cache_path, package_path
+from drone_sim.ros.core.launch_parameters import from_shell
 from drone_sim.ros.core.message_conversion import first_frame
-from drone_sim.ros.core.startup import ask_master, from_shell
+from drone_sim.ros.core.startup import poll_master
 
 _NAME = "show"
 INSTEAD = (
@@ -152,7 +153,7 @@ def _topics_of(simulator: str) -> str:
         own = (topic for topic, nodes in master.getSystemState()[0] if f"/{simulator}" in nodes)
         return next((str(topic)[: -len(_TOPIC)].strip("/") for topic in own if topic.endswith(_TOPIC)), None)
 
-    return ask_master(_NAME, ask, f"the node /{simulator}")
+    return poll_master(_NAME, ask, f"the node /{simulator}")
 
 
 def _first_vehicle(simulator: str) -> str:

@@ -143,7 +143,7 @@ class Teleop:
             self._calling = ""
             self.said = f"{service}: {'' if done else 'failed: '}{said}"
 
-        self._simulator.call_aside(service, *request, then=then)
+        self._simulator.call_async(service, *request, then=then)
 
     # ---- the read-out
 

@@ -15,8 +15,7 @@ from std_msgs.msg import ColorRGBA, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_sim.render.outputs import COLOR
-from drone_sim.ros.core.image_messages import image
-from drone_sim.ros.core.mask_colors import painted
+from drone_sim.ros.core.image_messages import draw_mask, image
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.sensors.camera import Camera
 from drone_sim.sensors.truth import Detection, PictureTruth, described, quaternion_of
@@ -90,7 +89,7 @@ class TruthOutput:
         if flows:
             self._publish_flow(truth, header)
         if picture is not None:
-            self._overlay.publish(image(painted(picture, truth.categories), "rgb8", header))
+            self._overlay.publish(image(draw_mask(picture, truth.categories), "rgb8", header))
         for one in heard:
             one.publish(self._made[one](truth, header))
 

@@ -17,9 +17,8 @@ from drone_sim.forces.weather import WeatherParameters
 from drone_sim.grading.permissions import CHANGE, MOVE, PUSH
 from drone_sim.mechanics.state import Pose
 from drone_sim.ros.core.inbox import Gate, Inbox, open_gate
-from drone_sim.ros.core.intervention import intervention, sender
 from drone_sim.ros.core.message_conversion import xyz
-from drone_sim.ros.core.validation import check_changes, check_frame, checked_pose, read_changes
+from drone_sim.ros.core.validation import check_changes, check_frame, intervention, read_changes, read_pose, sender
 from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
@@ -135,7 +134,7 @@ class VehicleInputs:
 
     def _posing(self, act: Callable[[Vehicle, Pose], Any]) -> Callable[[PoseStamped], _Job]:
         def read(message: PoseStamped) -> _Job:
-            pose = checked_pose(message.header.frame_id, message.pose, self._limits.vehicle)
+            pose = read_pose(message.header.frame_id, message.pose, self._limits.vehicle)
             return lambda vehicle: act(vehicle, pose)
 
         return read
@@ -146,7 +145,7 @@ class VehicleInputs:
 
     def _pose_estimate(self, message: PoseWithCovarianceStamped) -> _Job:
         """Take rviz's 2D Pose Estimate: a place on the floor, a yaw; the height stays as it is."""
-        (x, y, _), turn = checked_pose(message.header.frame_id, message.pose.pose, self._limits.vehicle)
+        (x, y, _), turn = read_pose(message.header.frame_id, message.pose.pose, self._limits.vehicle)
         return lambda vehicle: vehicle.body.move(Pose((x, y, vehicle.body.state.position[2]), turn))
 
     def _push(self, message: WrenchStamped) -> _Job:

@@ -21,7 +21,7 @@ from drone_sim.config.types import ParameterError
 from drone_sim.grading.permissions import CHANGE
 from drone_sim.hosting.tuning import TOPIC, Tuning
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.core.intervention import intervention
+from drone_sim.ros.core.validation import intervention
 from drone_sim.run.pacing import Pace
 
 _GROUPS = ("control", "weather", "faults", "cameras", "sensors", "script_parameters")

@@ -13,7 +13,7 @@ import rospy
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 
-from drone_sim.ros.core import image_messages, mask_colors
+from drone_sim.ros.core import image_messages
 
 BOXES, MASK = KINDS = ("boxes", "mask")
 _KEPT = 8  # messages, among which is that of the picture's stamp
@@ -99,13 +99,13 @@ class Overlay:
             return picture
         mask = image_messages.pixels(message)
         mask = cv2.resize(mask, image.shape[1::-1], interpolation=cv2.INTER_NEAREST)
-        over = mask_colors.painted(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), mask)
+        over = image_messages.draw_mask(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), mask)
         return bytes(cv2.imencode(".jpg", cv2.cvtColor(over, cv2.COLOR_RGB2BGR))[1])
 
 
 def color_of(number: int) -> str:
     """Return the color of a category's number, as CSS has it."""
-    return "#" + "".join(f"{round(255 * one):02x}" for one in mask_colors.color_of(number))
+    return "#" + "".join(f"{round(255 * one):02x}" for one in image_messages.mask_color(number))
 
 
 def _nearest(messages: deque[tuple[float, Any]], stamp: float) -> Any:
