@@ -23,7 +23,7 @@ from listening import Listener
 from nav_msgs.msg import Odometry
 from std_srvs.srv import Trigger
 
-from drone_sim.ros.core.validation import parameters_of
+from drone_sim.ros.core.launch_parameters import parameters_of
 from drone_sim.run.simulation_setup import script_of
 
 HANGS = 90.0  # s; nothing here takes nearly as long unless it hangs
