@@ -175,7 +175,7 @@ def test_all_nodes_are_asked_at_the_same_time(known, monkeypatch):
         everyone_is_asked.wait(timeout=60)
         return node == "/second"
 
-    monkeypatch.setattr(master_checks, "answers", answer)
+    monkeypatch.setattr(master_checks, "is_alive", answer)
     (line,) = master.dead()
     assert line.mark == HINT
     assert "/first, /third are" in line.said and "/second" not in line.said
@@ -184,7 +184,7 @@ def test_all_nodes_are_asked_at_the_same_time(known, monkeypatch):
 def test_nodes_that_never_answer_are_named_after_one_time_limit(known, monkeypatch):
     master, _ = known(published=[("/rosout", ["/first", "/second"])])
     end = threading.Event()
-    monkeypatch.setattr(master_checks, "answers", lambda *_: end.wait(HANGS))
+    monkeypatch.setattr(master_checks, "is_alive", lambda *_: end.wait(HANGS))
     monkeypatch.setattr(master_checks, "_ANSWERS", 0.05)
     (line,) = run_check("nodes", master.dead, HANGS / 10)
     end.set()
