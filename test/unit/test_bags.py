@@ -25,7 +25,7 @@ from drone_sim.ros.core import message_conversion as messages
 from drone_sim.ros.core.image_messages import image
 from drone_sim.ros.tools import bag_commands, bag_video, bags, plot_flight, record
 from drone_sim.ros.tools.bags import Bag, BagError, BagFlight
-from drone_sim.ros.tools.record import chosen
+from drone_sim.ros.tools.record import topics_to_record
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
@@ -311,8 +311,8 @@ def test_pictures_are_recorded_by_choice_and_never_raw():
         "/clock": "rosgraph_msgs/Clock",
     }
     small = ["/drone/cmd_vel", "/drone/odom", "/rosout"]
-    assert chosen(kinds, images=False) == small
-    assert chosen(kinds, images=True) == sorted([*small, "/drone/camera_info", "/drone/front/compressed"])
+    assert topics_to_record(kinds, images=False) == small
+    assert topics_to_record(kinds, images=True) == sorted([*small, "/drone/camera_info", "/drone/front/compressed"])
 
 
 def test_record_says_once_what_it_waits_for(monkeypatch, capsys):

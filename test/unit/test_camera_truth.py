@@ -174,19 +174,19 @@ def test_messages_of_one_stamp_become_a_picture_of_the_dataset(tmp_path):
     pytest.importorskip("rospy", reason="needs ROS")
     from drone_sim.ros.tools import record_truth
 
-    moments = record_truth._Moments()
+    groups = record_truth._StampGroups()
     names = ["color", "boxes", *record_truth._IMAGES]
     for name in names:
-        moments.take(name, 1.0500001, f"{name} 1")  # a stamp in JSON is rounded
-        moments.take(name, 1.1, f"{name} 2") if name != "flow" else None
-    assert moments.whole.get_nowait() == (1.05, {name: f"{name} 1" for name in names}) and moments.whole.empty()
+        groups.add(name, 1.0500001, f"{name} 1")  # a stamp in JSON is rounded
+        groups.add(name, 1.1, f"{name} 2") if name != "flow" else None
+    assert groups.complete.get_nowait() == (1.05, {name: f"{name} 1" for name in names}) and groups.complete.empty()
     for number in range(3):
         for name in names:
-            moments.take(name, 2.0 + number, name)
-    assert moments.missed == 1, "two wait at a time"
-    for number in range(record_truth._MOST):
-        moments.take("color", 10.0 + number, "alone")
-    assert moments.missed == 2, "the oldest, whose flow has never come, makes room"
+            groups.add(name, 2.0 + number, name)
+    assert groups.lost == 1, "two wait at a time"
+    for number in range(record_truth._MAX_INCOMPLETE):
+        groups.add("color", 10.0 + number, "alone")
+    assert groups.lost == 2, "the oldest, whose flow has never come, makes room"
 
 
 def test_nothing_is_drawn_for_a_truth_that_nobody_asks(simulation, monkeypatch):

@@ -21,7 +21,7 @@ class Clock:
 
 def press(in_force, key):
     command = in_force.next.after(key, COCKPIT)
-    in_force.send(command)
+    in_force.on_sent(command)
     return command
 
 
@@ -63,28 +63,28 @@ def test_the_keys_are_those_of_the_page():
 def test_quick_presses_add_up_before_the_simulator_has_answered():
     clock = Clock()
     in_force = CommandInForce(clock)
-    in_force.hear(Command())
+    in_force.on_published(Command())
     press(in_force, UP)
-    in_force.hear(Command())  # was on its way
+    in_force.on_published(Command())  # was on its way
     press(in_force, UP)
-    in_force.hear(Command(vx=0.1))
+    in_force.on_published(Command(vx=0.1))
     assert press(in_force, UP) == Command(vx=0.3)
-    assert in_force.heard == Command(vx=0.1)
-    in_force.hear(Command(vx=0.2))
-    in_force.hear(Command(vx=0.3))
-    in_force.hear(Command())  # stopped, by somebody else
+    assert in_force.published == Command(vx=0.1)
+    in_force.on_published(Command(vx=0.2))
+    in_force.on_published(Command(vx=0.3))
+    in_force.on_published(Command())  # stopped, by somebody else
     assert press(in_force, UP) == Command(vx=0.1)
 
 
 def test_a_command_that_never_comes_into_force_is_forgotten():
     clock = Clock()
     in_force = CommandInForce(clock)
-    in_force.hear(Command(vy=1.0))
+    in_force.on_published(Command(vy=1.0))
     press(in_force, UP)
     clock.now += 10.0  # the simulator is slow, and this was sent before
-    in_force.hear(Command(vy=1.0))
+    in_force.on_published(Command(vy=1.0))
     assert in_force.next == Command(0.1, 1.0)
-    in_force.hear(Command(vy=1.0))
+    in_force.on_published(Command(vy=1.0))
     assert in_force.next == Command(vy=1.0)
 
 
@@ -92,5 +92,5 @@ def test_without_an_answer_the_last_one_sent_counts():
     in_force = CommandInForce(Clock())
     press(in_force, UP)
     assert press(in_force, UP) == Command(vx=0.2)
-    in_force.forget()
+    in_force.reset()
     assert press(in_force, UP) == Command(vx=0.1)

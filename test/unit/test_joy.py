@@ -58,7 +58,7 @@ def test_a_gamepad_that_is_unplugged_is_told(device, pad):
 def test_gamepads_are_found_in_the_order_of_their_numbers(monkeypatch):
     there = ["/dev/input/js10", "/dev/input/js2", "/dev/input/js-keys"]
     monkeypatch.setattr(gamepad.glob, "glob", lambda _: there)
-    assert gamepad.found() == ["/dev/input/js2", "/dev/input/js10"]
+    assert gamepad.list_devices() == ["/dev/input/js2", "/dev/input/js10"]
 
 
 # ---- what is commanded
@@ -77,45 +77,45 @@ def stands(*buttons, **axes):
 
 def test_sticks_command_while_the_dead_mans_button_is_held(pilot):
     assert pilot.command is None
-    assert pilot.see(stands(vx=1.0)) == []
+    assert pilot.update(stands(vx=1.0)) == []
     assert pilot.command is None
-    pilot.see(stands(LB, vx=1.0, vy=0.55, vz=-0.55, wz=0.05))
+    pilot.update(stands(LB, vx=1.0, vy=0.55, vz=-0.55, wz=0.05))
     assert pilot.command == pytest.approx(Command(1.0, -1.0, -0.5, 0.0))
-    pilot.see(stands(LB))
+    pilot.update(stands(LB))
     assert pilot.command == Command()
-    pilot.see(stands(vx=1.0))
+    pilot.update(stands(vx=1.0))
     assert pilot.command is None
 
 
 def test_a_gamepad_that_comes_back_with_the_button_pressed_commands_nothing(pilot):
-    pilot.see(stands(LB, vx=1.0))
-    pilot.lose()
+    pilot.update(stands(LB, vx=1.0))
+    pilot.disconnect()
     assert pilot.command is None
-    assert pilot.see(stands(LB, A, vx=1.0)) == []
+    assert pilot.update(stands(LB, A, vx=1.0)) == []
     assert pilot.command is None
-    pilot.see(stands(vx=1.0))
-    pilot.see(stands(LB, vx=1.0))
+    pilot.update(stands(vx=1.0))
+    pilot.update(stands(LB, vx=1.0))
     assert pilot.command == Command(vx=1.0)
 
 
 def test_buttons_ask_once_and_take_off_needs_the_dead_mans(pilot):
-    assert pilot.see(stands(Y)) == []  # it may have been pressed for long
-    assert pilot.see(stands()) == []
-    assert pilot.see(stands(Y)) == []
-    assert pilot.see(stands(LB)) == []
-    assert pilot.see(stands(LB, Y)) == ["takeoff"]
-    assert pilot.see(stands(LB, Y)) == []
-    assert pilot.see(stands(A, BACK)) == ["land", "reset"]
+    assert pilot.update(stands(Y)) == []  # it may have been pressed for long
+    assert pilot.update(stands()) == []
+    assert pilot.update(stands(Y)) == []
+    assert pilot.update(stands(LB)) == []
+    assert pilot.update(stands(LB, Y)) == ["takeoff"]
+    assert pilot.update(stands(LB, Y)) == []
+    assert pilot.update(stands(A, BACK)) == ["land", "reset"]
 
 
 def test_axes_and_buttons_that_it_does_not_have_are_nothing(pilot):
-    pilot.see(JoyState((1.0,), (False,) * 4 + (True,)))
+    pilot.update(JoyState((1.0,), (False,) * 4 + (True,)))
     assert pilot.command == Command(wz=1.0)
-    assert pilot.see(JoyState()) == []
+    assert pilot.update(JoyState()) == []
     assert pilot.command is None
     less = JoyCommands(load_joy({"axes": {"wz": {"axis": -1}}, "buttons": {"land": -1}}))
-    less.see(stands())
-    assert less.see(stands(LB, *range(8), wz=1.0)) == ["reset", "takeoff"]
+    less.update(stands())
+    assert less.update(stands(LB, *range(8), wz=1.0)) == ["reset", "takeoff"]
     assert less.command == Command()
 
 

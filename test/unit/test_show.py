@@ -38,7 +38,7 @@ def texts(value):
 
 
 def test_a_fleet_with_other_names_has_its_topics_frames_and_docks():
-    text = show.renamed((FOLDER / "fleet.rviz").read_text(), {"drone1": "alpha", "drone_sim": "sim2"})
+    text = show.rename((FOLDER / "fleet.rviz").read_text(), {"drone1": "alpha", "drone_sim": "sim2"})
     view = yaml.safe_load(text)
     topics = {one for one in texts(view) if one.startswith("/")}
     assert {"/sim2/view/forces", "/sim2/markers/update", "/alpha/front", "/alpha/initialpose"} <= topics
@@ -50,7 +50,7 @@ def test_a_fleet_with_other_names_has_its_topics_frames_and_docks():
 
 
 def test_one_with_another_name_has_its_topics():
-    text = show.renamed((FOLDER / "drone.rviz").read_text(), {"drone": "hawk"})
+    text = show.rename((FOLDER / "drone.rviz").read_text(), {"drone": "hawk"})
     before, after = (yaml.safe_load(one) for one in ((FOLDER / "drone.rviz").read_text(), text))
     changed = {(one, other) for one, other in zip(texts(before), texts(after)) if one != other}
     assert ("/drone/view/forces", "/hawk/view/forces") in changed
@@ -60,7 +60,7 @@ def test_one_with_another_name_has_its_topics():
 
 def test_in_a_namespace_everything_of_it_is_below():
     names = {"drone": "a/drone", "drone_sim": "a/drone_sim"}
-    view = yaml.safe_load(show.renamed((FOLDER / "drone.rviz").read_text(), names))
+    view = yaml.safe_load(show.rename((FOLDER / "drone.rviz").read_text(), names))
     assert {one for one in texts(view) if one.startswith("/")} == {
         one.replace("/drone/", "/a/drone/")
         for one in texts(yaml.safe_load((FOLDER / "drone.rviz").read_text()))

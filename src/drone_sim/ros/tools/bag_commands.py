@@ -22,13 +22,13 @@ from drone_sim.vehicles.checks import Refused
 from drone_sim.vehicles.commands import EMPTY, POSE, REQUESTS
 
 _NAME = "bag_commands"
-_EARLY, _LATE = 2, 20  # steps, by which the recorder may have heard of a command earlier or later than the simulator
-_LEADS_TO = {"takeoff": "taking off", "land": "landing"}  # states, which are said in the step that obeys
+_MAX_EARLY, _MAX_LATE = 2, 20  # steps by which the recorder may receive a command before or after the simulator
+_NEXT_STATES = {"takeoff": "taking off", "land": "landing"}  # published in the step that executes the request
 _Action = dict[str, Any]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write it; return 0, or 1 after a line on stderr for a file that cannot be read or written."""
+    """Run the command; return 0, or 1 after a line on stderr for a file that cannot be read or written."""
     parser = Parser(prog=_NAME, description=__doc__)
     parser.add_argument("bag", metavar="BAG", help="a bag with odometry")
     parser.add_argument("timeline", metavar="OUT.yaml")
@@ -43,13 +43,13 @@ def _write(options: argparse.Namespace) -> None:
     writing.check_writable(options.timeline)
     with closing(Bag(options.bag)) as bag:
         flight = BagFlight(bag, options.vehicle)
-        entries = sorted(_entries(bag, flight), key=lambda one: one["at"])
-        begins = next((one.message.data for one in bag.read(f"{flight.namespace}/state", STATE)), "")
+        entries = sorted(_entries(bag, flight), key=lambda entry: entry["at"])
+        first_state = next((state.message.data for state in bag.read(f"{flight.namespace}/state", STATE)), "")
     if not entries:
         raise BagError(f"{options.bag}: it has no commands on {flight.namespace}/cmd_vel or another command topic")
-    landed = " --set start=landed" if begins == "landed" else ""
-    lines = [dump(entry, "line") for entry in entries]
-    writing.write(options.timeline, f"# fly --commands{landed}\n{''.join(f'- {line}' for line in lines)}")
+    landed = " --set start=landed" if first_state == "landed" else ""
+    lines = "".join(f"- {dump(entry, 'line')}" for entry in entries)
+    writing.write(options.timeline, f"# fly --commands{landed}\n{lines}")
     print(f"{_NAME}: wrote {options.timeline}, {len(entries)} commands: fly --commands {options.timeline}{landed}")
 
 
@@ -57,19 +57,20 @@ def _entries(bag: Bag, flight: BagFlight) -> Iterator[_Action]:
     """Yield the entries of the timeline. Raises BagError."""
     steps = flight.steps()
     yield from _twists(bag.read(f"{flight.namespace}/cmd_vel", TWIST), steps)
-    states = [(steps.row_after(one.at) - 1, one.message.data) for one in bag.read(f"{flight.namespace}/state", STATE)]
-    for topic, (kind, read) in _READ.items():
-        rows = [row for row, state in states if state == _LEADS_TO.get(topic)]
-        for heard in bag.read(f"{flight.namespace}/{topic}", kind):
-            action, row = read(heard.message), steps.row_after(heard.at)
-            near = [one for one in rows if row - _LATE <= one <= row + _EARLY]
-            row = min(near, key=lambda one: abs(one - row), default=row)
+    states = bag.read(f"{flight.namespace}/state", STATE)
+    state_rows = [(steps.row_after(state.at) - 1, state.message.data) for state in states]
+    for topic, (kind, read) in _READERS.items():
+        execution_rows = [row for row, state in state_rows if state == _NEXT_STATES.get(topic)]
+        for recorded in bag.read(f"{flight.namespace}/{topic}", kind):
+            action, row = read(recorded.message), steps.row_after(recorded.at)
+            near = [other for other in execution_rows if row - _MAX_LATE <= other <= row + _MAX_EARLY]
+            row = min(near, key=lambda other: abs(other - row), default=row)
             if action is not None:
                 yield {"at": steps.time(row), **action}
 
 
-class _Heard(NamedTuple):
-    """A twist: the row in which it was recorded, and its values."""
+class _RecordedTwist(NamedTuple):
+    """A twist, and the row of odometry in which it was recorded."""
 
     row: int
     linear: tuple[float, ...]
@@ -77,78 +78,79 @@ class _Heard(NamedTuple):
 
     @property
     def command(self) -> tuple[float, ...]:
-        """What is in force from it on: three velocities, and that of yaw."""
+        """Linear velocity and yaw rate that the simulator publishes while this twist is in force."""
         return *self.linear, self.angular[2]
 
 
 def _twists(messages: Iterator[RecordedMessage], steps: BagSteps) -> Iterator[_Action]:
-    """Yield twists at the step that obeyed them, as far as the commands in force tell it."""
-    told = [
-        _Heard(steps.row_after(one.at), xyz(one.message.linear), xyz(one.message.angular))
-        for one in messages
-        if _finite(*xyz(one.message.linear), *xyz(one.message.angular))
+    """Yield twists at the steps that executed them, as far as the recorded commands in force show it."""
+    twists = [
+        _RecordedTwist(steps.row_after(recorded.at), xyz(recorded.message.linear), xyz(recorded.message.angular))
+        for recorded in messages
+        if _is_finite(*xyz(recorded.message.linear), *xyz(recorded.message.angular))
     ]
-    for one, row in zip(told, _rows(told, _obeyed(told, steps))):
-        yield {"at": steps.time(row), "twist": {"linear": [*one.linear], "angular": [*one.angular]}}
+    for twist, row in zip(twists, _execution_rows(twists, _match_rows(twists, steps))):
+        yield {"at": steps.time(row), "twist": {"linear": [*twist.linear], "angular": [*twist.angular]}}
 
 
 class _Match(NamedTuple):
-    """The best match of all twists up to one that came into force in `row`."""
+    """Best match of all twists up to the one that came into force in `row`."""
 
     row: int
-    found: int
-    off: int  # rows between when they were heard and when they came into force, summed
-    rows: tuple[Any, ...] = ()  # the last twist's number and its row, and the same of those before
+    total: int  # number of matched twists
+    distance: int  # sum of the rows between when they were recorded and when they came into force
+    rows: tuple[Any, ...] = ()  # the last twist's number, its row, and this tuple of the twist before
 
 
-def _obeyed(told: Sequence[_Heard], steps: BagSteps) -> dict[int, int]:
-    """Return, by the number of each twist that came into force, the row in which it did; the twists keep their order.
+def _match_rows(twists: Sequence[_RecordedTwist], steps: BagSteps) -> dict[int, int]:
+    """Return the row in which each twist came into force, by the twist's number, where that can be found.
 
-    As many as possible are matched; of several solutions, the one whose rows are nearest to those of the recorder. A
-    twist that was replaced by another within the same step never came into force, and one equal to the last changed
-    nothing.
+    The twists keep their order, and as many as possible are matched; of several solutions, the result is the one whose
+    rows are nearest to those of the recorder. A twist that was replaced within the same step never came into force, and
+    a twist equal to the last one changed nothing.
     """
-    best = [_Match(-1, 0, 0)]  # by rows, each better than those before
-    for number, one in enumerate(told):
-        if number and one.command == told[number - 1].command:
+    best = [_Match(-1, 0, 0)]  # in the order of rows, each better than those before
+    for number, twist in enumerate(twists):
+        if number and twist.command == twists[number - 1].command:
             continue
-        found = []
-        for row in range(one.row - _LATE, one.row + _EARLY + 1):
-            before = [match for match in best if match.row < row]
-            if before and steps.begins(row, one.command):
-                last = before[-1]
-                found.append(_Match(row, last.found + 1, last.off + abs(one.row - row), (number, row, last.rows)))
-        best = _better(sorted([*best, *found]))
-    obeyed, rows = {}, best[-1].rows
+        matches = []
+        for row in range(twist.row - _MAX_LATE, twist.row + _MAX_EARLY + 1):
+            earlier = [match for match in best if match.row < row]
+            if earlier and steps.begins(row, twist.command):
+                last = earlier[-1]
+                distance = last.distance + abs(twist.row - row)
+                matches.append(_Match(row, last.total + 1, distance, (number, row, last.rows)))
+        best = _pareto_front(sorted([*best, *matches]))
+    result, rows = {}, best[-1].rows
     while rows:
         number, row, rows = rows
-        obeyed[number] = row
-    return obeyed
+        result[number] = row
+    return result
 
 
-def _better(matches: Sequence[_Match]) -> list[_Match]:
-    """Return the matches that are better than all earlier ones, in the order of their rows."""
-    kept: list[_Match] = []
-    for one in matches:
-        if not kept or (one.found, -one.off) > (kept[-1].found, -kept[-1].off):
-            kept = [*(other for other in kept[-2 * _LATE :] if other.row < one.row), one]
-    return kept
+def _pareto_front(matches: Sequence[_Match]) -> list[_Match]:
+    """Return the matches that are better than all of earlier rows, in the order of their rows."""
+    front: list[_Match] = []
+    for match in matches:
+        if not front or (match.total, -match.distance) > (front[-1].total, -front[-1].distance):
+            front = [*(other for other in front[-2 * _MAX_LATE :] if other.row < match.row), match]
+    return front
 
 
-def _rows(told: Sequence[_Heard], obeyed: dict[int, int]) -> Iterator[int]:
-    """Yield the row of each twist, in order; a twist without a known row is as late as the last one that has one."""
-    late = last = 0
-    following = sorted(obeyed.items())
-    for number, one in enumerate(told):
-        if number in obeyed:
-            last, late = obeyed[number], one.row - obeyed[number]
+def _execution_rows(twists: Sequence[_RecordedTwist], matched: dict[int, int]) -> Iterator[int]:
+    """Yield the row of each twist, in order; a twist without a match gets the delay of the last one that has one."""
+    delay = last = 0
+    following = sorted(matched.items())
+    for number, twist in enumerate(twists):
+        if number in matched:
+            last, delay = matched[number], twist.row - matched[number]
             following.pop(0)
             yield last
         else:
-            yield min([max(one.row - late, last), *(row for _, row in following[:1])])
+            yield min([max(twist.row - delay, last), *(row for _, row in following[:1])])
 
 
-# ---- messages as actions of a timeline; None for one that the simulator refused
+# ---- messages as actions of a timeline; None for a message that the simulator refused
 
 
 def _request(topic: str, _message: Any) -> _Action:
@@ -156,39 +158,39 @@ def _request(topic: str, _message: Any) -> _Action:
 
 
 def _pose(kind: str, message: Any) -> _Action | None:
-    place, quaternion = xyz(message.pose.position), xyzw(message.pose.orientation)
-    if not _in_world(message) or not _finite(*place, *quaternion) or abs(math.hypot(*quaternion) - 1) > 0.01:
+    position, quaternion = xyz(message.pose.position), xyzw(message.pose.orientation)
+    if not _is_in_world(message) or not _is_finite(*position, *quaternion) or abs(math.hypot(*quaternion) - 1) > 0.01:
         return None
     rpy = frames.to_rpy(frames.from_quaternion((0, 0, 0), quaternion))
-    return {kind: {"position": [*place], "rpy": [*rpy]}}
+    return {kind: {"position": [*position], "rpy": [*rpy]}}
 
 
 def _push(message: Any) -> _Action | None:
     force, torque = xyz(message.wrench.force), xyz(message.wrench.torque)
-    if not _in_world(message) or not _finite(*force, *torque):
+    if not _is_in_world(message) or not _is_finite(*force, *torque):
         return None
-    return {"push": {"force": [*force], "torque": [*torque], "duration": 0.2}}  # config/drone.yaml's
+    return {"push": {"force": [*force], "torque": [*torque], "duration": 0.2}}  # the duration in config/drone.yaml
 
 
 def _wind(message: Any) -> _Action | None:
     wind = xyz(message.vector)
-    return {"weather": {"wind": [*wind]}} if _in_world(message) and _finite(*wind) else None
+    return {"weather": {"wind": [*wind]}} if _is_in_world(message) and _is_finite(*wind) else None
 
 
 def _change(kind: str, message: Any) -> _Action | None:
     try:
-        return {kind: read_changes(message, _allowed()[kind])}
+        return {kind: read_changes(message, _default_parameters()[kind])}
     except Refused:
         return None
 
 
 @functools.cache
-def _allowed() -> dict[str, Checked]:
+def _default_parameters() -> dict[str, Checked]:
     default = parameters.load()
     return {"weather": default.weather, "faults": default.first.faults}
 
 
-_READ: dict[str, tuple[str, Callable[[Any], _Action | None]]] = {  # by topic: its kind of message, and what reads it
+_READERS: dict[str, tuple[str, Callable[[Any], _Action | None]]] = {  # by topic, with its type
     **{topic: (kind, functools.partial(_request, topic)) for topic, kind in REQUESTS.items() if kind == EMPTY},
     "goto": (POSE, functools.partial(_pose, "goto")),
     "set_pose": (POSE, functools.partial(_pose, "pose")),
@@ -199,9 +201,9 @@ _READ: dict[str, tuple[str, Callable[[Any], _Action | None]]] = {  # by topic: i
 }
 
 
-def _finite(*values: float) -> bool:
+def _is_finite(*values: float) -> bool:
     return all(map(math.isfinite, values))
 
 
-def _in_world(message: Any) -> bool:
+def _is_in_world(message: Any) -> bool:
     return message.header.frame_id.lstrip("/") in ("", WORLD_FRAME)

@@ -1,6 +1,6 @@
-"""Bags, read with care, and the flight of one vehicle out of a bag.
+"""Reading of bags, and of one vehicle's flight in a bag.
 
-Errors are told in one line, and no message class is generated from the definitions in the bag.
+Errors are one line, and no message class is generated from the definitions in the bag.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import contextlib
 import logging
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -28,30 +28,30 @@ from drone_sim.vehicles.commands import POSE
 ODOMETRY, TWIST, COMMAND = "nav_msgs/Odometry", "geometry_msgs/Twist", "geometry_msgs/TwistStamped"
 STATE, PUSH = "std_msgs/String", "geometry_msgs/WrenchStamped"
 _SUFFIX = "/odom"
-_TICK = 1e-6  # s, between stamps that are the same
-_UNIT = 1e-3  # by which a quaternion's norm may be off
-_PUSH = 0.2  # s, that a push lasts unless a parameter says otherwise, which a bag does not know
-_STEP = 0.05  # s, of simulations as they mostly are
-_REAL = 1e8  # s; stamps so late are of real time, which counts from 1970
+_TOLERANCE = 1e-6  # s, between equal stamps
+_NORM_TOLERANCE = 1e-3  # of a unit quaternion
+_PUSH_DURATION = 0.2  # s, the default of a parameter that is not in a bag
+_DEFAULT_STEP = 0.05  # s
+_FIRST_REAL_TIME = 1e8  # s; later stamps are of real time, which counts from 1970
 MAX_MESSAGES = 500_000  # of one topic
 MAX_CHUNK = 256 * MEBIBYTE  # of messages that are unpacked together; rosbag record makes chunks of 768 KiB
-# What is wrong with a bag is one line; of a name in it that is no text genpy would log another one.
+# genpy logs a line about a name in a bag that is not UTF-8. It would come in addition to our own line.
 logging.getLogger("rosout").addFilter(lambda record: not str(record.msg).startswith("Characters replaced"))
 
 
 class BagError(ValueError):
-    """A bag cannot be read; one line that names it and says why."""
+    """A bag cannot be read. The message is one line, with the bag's name and the reason."""
 
 
 class RecordedMessage(NamedTuple):
-    """A message, and when it was recorded (s, of the recorder's clock)."""
+    """A message, and its time by the recorder's clock (s)."""
 
     at: float
     message: Any
 
 
 class Bag:
-    """An open bag. Its messages are of the classes that are installed here; those of other versions are left out."""
+    """An open bag. Messages are read only if their type is installed here in the same version."""
 
     def __init__(self, path: str):
         """Open the file at `path`. Raises OSError and BagError."""
@@ -64,87 +64,89 @@ class Bag:
         with self._reading():
             self._bag = rosbag.Bag(path)
             topics = self._bag.get_type_and_topic_info().topics
-            largest = max((one.uncompressed_size for one in self._bag._chunk_headers.values()), default=0)
+            largest = max((chunk.uncompressed_size for chunk in self._bag._chunk_headers.values()), default=0)
         if largest > MAX_CHUNK:
             raise BagError(f"{path}: a chunk of {largest} bytes; at most {MAX_CHUNK} are allowed")
-        self.kinds: dict[str, str] = {name: one.msg_type for name, one in topics.items()}
-        self._counts = {name: one.message_count for name, one in topics.items()}
+        self.kinds: dict[str, str] = {name: topic.msg_type for name, topic in topics.items()}
+        self._counts = {name: topic.message_count for name, topic in topics.items()}
 
     def close(self) -> None:
-        """Close it."""
         self._bag.close()
 
     def topics(self, *kinds: str) -> list[str]:
-        """Return the names of the topics of these kinds of message."""
+        """Return the names of the topics with these message types, sorted."""
         return sorted(name for name, kind in self.kinds.items() if kind in kinds)
 
     def read(self, topic: str, kind: str) -> Iterator[RecordedMessage]:
-        """Yield what was recorded of a topic, in the order of time; nothing for one that is not there.
+        """Yield the messages of a topic in the order of time; none if the topic is missing or has another type.
 
-        `kind` is a message type, such as nav_msgs/Odometry; messages of other types are left out. Raises BagError.
+        `kind` is a message type, such as nav_msgs/Odometry. Raises BagError.
         """
         if self._counts.get(topic, 0) > MAX_MESSAGES:
             raise BagError(f"{self.path}: {self._counts[topic]} messages on {topic}; at most {MAX_MESSAGES} are read")
         if self.kinds.get(topic) != kind:
             return
-        sum_of_ours = message_class(kind)._md5sum
-        rosbag.bag._message_types[sum_of_ours] = message_class(kind)  # or rosbag would run code made from the bag's own
+        installed_md5sum = message_class(kind)._md5sum
+        # With an entry here, rosbag does not generate and run a class from the definition in the bag.
+        rosbag.bag._message_types[installed_md5sum] = message_class(kind)
         messages = self._bag.read_messages(
-            [topic], connection_filter=lambda _topic, _type, md5sum, *_: md5sum == sum_of_ours
+            [topic], connection_filter=lambda _topic, _type, md5sum, *_: md5sum == installed_md5sum
         )
         while True:
             with self._reading():
-                found = next(messages, None)
-            if found is None:
+                record = next(messages, None)
+            if record is None:
                 return
-            yield RecordedMessage(found[2].to_sec(), found[1])
+            yield RecordedMessage(record[2].to_sec(), record[1])
 
-    def named(self, topic: str | None, among: list[str], what: str) -> str:
-        """Return the topic that is meant, by default the first of these. Raises BagError."""
-        if topic is None and among:
-            return among[0]
-        if topic in among:
+    def choose(self, topic: str | None, topics: list[str], what: str) -> str:
+        """Return `topic`, or the first of `topics` if it is None. Raises BagError if it is not among `topics`.
+
+        `what` names such a topic in the error.
+        """
+        if topic is None and topics:
+            return topics[0]
+        if topic in topics:
             return str(topic)
-        there = near_names(topic or "", among) if among else f"there is no {what} in it"
-        raise BagError(f"{self.path}: {f'no {what} {topic}; ' if topic else ''}{there}")
+        hint = near_names(topic or "", topics) if topics else f"there is no {what} in it"
+        raise BagError(f"{self.path}: {f'no {what} {topic}; ' if topic else ''}{hint}")
 
     @contextlib.contextmanager
     def _reading(self) -> Iterator[None]:
-        """Turn any error that a broken file causes into a BagError with one line."""
+        """Turn any error that a broken file causes into a BagError."""
         try:
             yield
         except OSError:
             raise
         except rosbag.ROSBagUnindexedException:
-            why = "was cut off while it was recorded; `rosbag reindex` repairs a copy of it"
-            raise BagError(f"{self.path}: {why}") from None
-        except Exception as error:  # rosbag lets through what struct, bz2, genpy and the like raise
-            said = " ".join(str(error).split()) or type(error).__name__
-            raise BagError(f"{self.path}: cannot be read as a bag: {said:.120}") from None
+            reason = "was cut off while it was recorded; `rosbag reindex` repairs a copy of it"
+            raise BagError(f"{self.path}: {reason}") from None
+        except Exception as error:  # rosbag does not catch the exceptions of struct, bz2, genpy and others
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise BagError(f"{self.path}: cannot be read as a bag: {reason:.120}") from None
 
 
 class BagFlight:
-    """What a bag knows of one vehicle. Times are in s since its first odometry, by its stamps."""
+    """Flight of one vehicle in a bag. Times are in s since the stamp of its first odometry."""
 
     def __init__(self, bag: Bag, vehicle: str | None = None):
-        """Read the odometry in `bag` of a vehicle, by default of the first. Raises BagError."""
+        """Read the odometry of a vehicle (default: the first). Raises BagError."""
         self._bag = bag
         topics = [name for name in bag.topics(ODOMETRY) if name.endswith(_SUFFIX)]
-        wanted = None if vehicle is None else f"/{vehicle.strip('/')}{_SUFFIX}"
-        topic = bag.named(wanted, topics, "odometry")
+        requested = None if vehicle is None else f"/{vehicle.strip('/')}{_SUFFIX}"
+        topic = bag.choose(requested, topics, "odometry")
         self.namespace = topic.removesuffix(_SUFFIX)
-        rows = {
-            _stamp(heard): (heard.at, *_state(heard.message)) for heard in bag.read(topic, ODOMETRY)
-        }  # of one stamp the last
+        # Of several messages with one stamp, the last one counts.
+        rows = {_stamp(odometry): (odometry.at, *_state(odometry.message)) for odometry in bag.read(topic, ODOMETRY)}
         stamps = [stamp for stamp in sorted(rows) if len(rows[stamp]) > 1]
         if not stamps:
             raise BagError(f"{bag.path}: no readable message on {topic}")
         table = np.array([rows[stamp] for stamp in stamps])
-        self._stamps, self._came, self._rows = np.array(stamps), table[:, 0], table[:, 1:]
+        self._stamps, self._recorded_at, self._rows = np.array(stamps), table[:, 0], table[:, 1:]
         self.start = stamps[0]
 
     def recording(self) -> Recording:
-        """Return the flight as a table, NaN where the propellers were not recorded. Raises BagError."""
+        """Return the flight as a table, with NaN where no propeller velocities were recorded. Raises BagError."""
         columns = ((self._stamps - self.start)[:, None], self._rows, self._commands(), self._propellers())
         recording = Recording()
         recording.clock = "time by the stamps"
@@ -154,109 +156,113 @@ class BagFlight:
         return recording
 
     def _commands(self) -> np.ndarray:
-        """Return, for every row, the command in force or, where those were not recorded, the last that was sent."""
+        """Return, for each row, the command in force or, if that was not recorded, the last command that was sent."""
         in_force = f"{self.namespace}/command"
         if self._bag.kinds.get(in_force) == COMMAND:
-            heard = [(_stamp(one), _command(one.message.twist)) for one in self._bag.read(in_force, COMMAND)]
-            return _held(heard, self._stamps + _TICK, 0.0)
-        sent = [(one.at, _command(one.message)) for one in self._bag.read(f"{self.namespace}/cmd_vel", TWIST)]
-        return _held(sent, self._stamps, 0.0)
+            commands = [
+                (_stamp(recorded), _command(recorded.message.twist)) for recorded in self._bag.read(in_force, COMMAND)
+            ]
+            return _hold(commands, self._stamps + _TOLERANCE, 0.0)
+        sent = self._bag.read(f"{self.namespace}/cmd_vel", TWIST)
+        return _hold([(recorded.at, _command(recorded.message)) for recorded in sent], self._stamps, 0.0)
 
     def _propellers(self) -> np.ndarray:
-        """Return, for every row, the propellers' velocities, which are published right after it, without a stamp."""
-        heard = self._bag.read(f"{self.namespace}/propellers", "std_msgs/Float32MultiArray")
-        told = [(one.at, list(one.message.data)) for one in heard if len(one.message.data) == 4]
-        steps = np.diff(self._came)
-        late = float(np.median(steps)) / 2 if len(steps) else _STEP
-        return _held(told, self._came + late, math.nan)
+        """Return, for each row, the propellers' velocities. They are published right after it, without a stamp."""
+        recorded = self._bag.read(f"{self.namespace}/propellers", "std_msgs/Float32MultiArray")
+        velocities = [(each.at, list(each.message.data)) for each in recorded if len(each.message.data) == 4]
+        periods = np.diff(self._recorded_at)
+        delay = float(np.median(periods)) / 2 if len(periods) else _DEFAULT_STEP
+        return _hold(velocities, self._recorded_at + delay, math.nan)
 
     def timeline(self) -> Timeline:
-        """Return the poses that it was put to, and the pushes. Raises BagError."""
+        """Return the poses that the vehicle was set to, and the pushes. Raises BagError."""
         entries = []
         for name, kind in (("set_pose", POSE), ("initialpose", "geometry_msgs/PoseWithCovarianceStamped")):
-            for one in self._bag.read(f"{self.namespace}/{name}", kind):
-                pose = getattr(one.message.pose, "pose", one.message.pose)
-                entries.append(Entry(one.at - self.start, Pose((pose.position.x, pose.position.y, pose.position.z))))
-        for one in self._bag.read(f"{self.namespace}/push", PUSH):
-            wrench = one.message.wrench
-            entries.append(Entry(one.at - self.start, Push(xyz(wrench.force), xyz(wrench.torque), _PUSH)))
+            for recorded in self._bag.read(f"{self.namespace}/{name}", kind):
+                pose = getattr(recorded.message.pose, "pose", recorded.message.pose)
+                entries.append(Entry(recorded.at - self.start, Pose(xyz(pose.position))))
+        for recorded in self._bag.read(f"{self.namespace}/push", PUSH):
+            wrench = recorded.message.wrench
+            push = Push(xyz(wrench.force), xyz(wrench.torque), _PUSH_DURATION)
+            entries.append(Entry(recorded.at - self.start, push))
         end = float(self._stamps[-1]) - self.start
-        return Timeline([one for one in entries if 0 <= one.at <= end], _STEP)
+        return Timeline([entry for entry in entries if 0 <= entry.at <= end], _DEFAULT_STEP)
 
     def sensors(self) -> list[SensorSeries]:
-        """Return what the vehicle's sensors measured. Raises BagError."""
-        found = []
-        for topic in self._bag.topics(*_MEASURED):
+        """Return the measurements of the vehicle's sensors. Raises BagError."""
+        series = []
+        for topic in self._bag.topics(*_QUANTITIES):
             name = topic.removeprefix(f"{self.namespace}/")
-            if name != topic and name not in _NO_SENSORS and not name.endswith("_raw"):
-                heard = list(self._bag.read(topic, self._bag.kinds[topic]))
-                found += [self._series(name, what, heard) for what in _MEASURED[self._bag.kinds[topic]] if heard]
-        return found
-
-    def _series(self, name: str, what: _Measured, heard: Iterable[RecordedMessage]) -> SensorSeries:
-        times = np.array([_stamp(one) - self.start for one in heard])
-        values = np.array([what.read(one.message) for one in heard], dtype=float) * what.scale
-        return SensorSeries(name, what.unit, times, values, ("x", "y", "z")[: values.shape[1]] if what.axes else ())
-
-    # ---- at a moment
+            if name == topic or name in _NOT_SENSORS or name.endswith("_raw"):
+                continue
+            recorded = list(self._bag.read(topic, self._bag.kinds[topic]))
+            times = np.array([_stamp(each) - self.start for each in recorded])
+            for quantity in _QUANTITIES[self._bag.kinds[topic]] if recorded else ():
+                values = np.array([quantity.read(each.message) for each in recorded], dtype=float) * quantity.scale
+                axes = ("x", "y", "z")[: values.shape[1]] if quantity.has_axes else ()
+                series.append(SensorSeries(name, quantity.label, times, values, axes))
+        return series
 
     def steps(self) -> BagSteps:
-        """Return the simulation's steps. Raises BagError where it was started anew meanwhile."""
-        if np.any(np.diff(self._came) < 0):
+        """Return the simulation's steps. Raises BagError if the simulation was restarted during the recording."""
+        if np.any(np.diff(self._recorded_at) < 0):
             raise BagError(f"{self._bag.path}: time jumps back in it, as at a restart: a bag must hold one flight")
         return BagSteps(self._stamps, self._commands())
 
     def row_at(self, stamp: float) -> tuple[float, ...]:
-        """Return time, position, quaternion and velocities as of a stamp (s)."""
-        index = max(0, int(np.searchsorted(self._stamps, stamp + _TICK, "right")) - 1)
+        """Return time, position, quaternion and velocities at a stamp (s)."""
+        index = max(0, int(np.searchsorted(self._stamps, stamp + _TOLERANCE, "right")) - 1)
         return stamp - self.start, *self._rows[index]
 
 
 class BagSteps:
-    """The steps of a flight: a row for each that was recorded, numbered from 0.
+    """Steps of a flight: a row for each recorded step, numbered from 0.
 
-    In simulated time a stamp says which step it was; in real time the first one that was recorded counts as the first.
+    In simulated time the stamp gives the number of the simulation's step; in real time the first recorded step counts
+    as the simulation's first.
     """
 
     def __init__(self, stamps: np.ndarray, commands: np.ndarray):
-        """Take the stamps (s), and the commands in force, one for each."""
+        """`stamps` (s) and `commands`, which are those in force, have a row for each step."""
         self._stamps, self._commands = stamps, commands
-        self._step = float(np.median(np.diff(stamps))) if len(stamps) > 1 and stamps[0] < _REAL else _STEP
-        self._before = round(float(stamps[0]) / self._step) - 1 if stamps[0] < _REAL else 0
+        self._is_simulated = bool(stamps[0] < _FIRST_REAL_TIME)
+        has_period = len(stamps) > 1 and self._is_simulated
+        self._step = float(np.median(np.diff(stamps))) if has_period else _DEFAULT_STEP
+        self._first_number = round(float(stamps[0]) / self._step) - 1 if self._is_simulated else 0
 
     def row_after(self, moment: float) -> int:
         """Return the first row that is later than a moment (s, of the recorder's clock)."""
-        return int(np.searchsorted(self._stamps, moment + _TICK, "right"))
+        return int(np.searchsorted(self._stamps, moment + _TOLERANCE, "right"))
 
     def begins(self, row: int, command: Sequence[float]) -> bool:
-        """Tell whether a command came into force in a row."""
+        """Return whether a command came into force in a row."""
         if not 0 <= row < len(self._commands):
             return False
         before = self._commands[row - 1] if row else np.zeros(4)
         return np.array_equal(self._commands[row], command) and not np.array_equal(before, command)
 
     def time(self, row: int) -> float:
-        """Return the simulated time (s) at which the step of a row began; rows beyond the last one go on."""
-        if row < len(self._stamps) and self._stamps[0] < _REAL:
+        """Return the simulated time (s) at which the step of a row began; `row` may be after the last one."""
+        if row < len(self._stamps) and self._is_simulated:
             number = round(float(self._stamps[row]) / self._step) - 1
         else:
-            number = self._before + row
+            number = self._first_number + row
         return round(number * self._step, 9)
 
 
-def _held(values: list[tuple[float, list[float]]], times: np.ndarray, before: float) -> np.ndarray:
-    """Return the four numbers of `values` in force at each of `times` (s); `before` where there are none yet."""
-    held = np.full((len(times), 4), before)
+def _hold(values: list[tuple[float, list[float]]], times: np.ndarray, before: float) -> np.ndarray:
+    """Return, for each of `times` (s), the last four numbers in `values`; `before` where there are none yet."""
+    result = np.full((len(times), 4), before)
     if values:
-        values.sort(key=lambda one: one[0])
-        given = np.array([numbers for _, numbers in values])
+        values.sort(key=lambda value: value[0])
+        numbers = np.array([numbers for _, numbers in values])
         last = np.searchsorted([at for at, _ in values], times, "right") - 1
-        held[last >= 0] = given[last[last >= 0]]
-    return held
+        result[last >= 0] = numbers[last[last >= 0]]
+    return result
 
 
-def _stamp(heard: RecordedMessage) -> float:
-    return float(heard.message.header.stamp.to_sec())
+def _stamp(recorded: RecordedMessage) -> float:
+    return float(recorded.message.header.stamp.to_sec())
 
 
 def _command(twist: Any) -> list[float]:
@@ -264,36 +270,36 @@ def _command(twist: Any) -> list[float]:
 
 
 def _state(message: Any) -> tuple[float, ...]:
-    """Return position, quaternion and velocities in the world; an empty tuple where they are not valid."""
+    """Return position, quaternion and velocities in the world; an empty tuple if they are not valid."""
     pose, twist = message.pose.pose, message.twist.twist
     values = (*xyz(pose.position), *xyz(twist.linear), *xyz(twist.angular))
-    is_unit = abs(math.hypot(*xyzw(pose.orientation)) - 1) < _UNIT
+    is_unit = abs(math.hypot(*xyzw(pose.orientation)) - 1) < _NORM_TOLERANCE
     return odometry_row(message) if is_unit and all(abs(value) < LARGEST for value in values) else ()
 
 
 # ---- sensors
 
 
-class _Measured(NamedTuple):
-    unit: str
+class _Quantity(NamedTuple):
+    label: str  # with the unit
     read: Callable[[Any], tuple[float, ...]]
     scale: float = 1.0
-    axes: bool = False
+    has_axes: bool = False
 
 
-_NO_SENSORS = ("push",)  # but what is done to the vehicle
-_MEASURED = {
+_NOT_SENSORS = ("push",)  # has the type of a sensor, but is a command
+_QUANTITIES = {
     "sensor_msgs/Imu": (
-        _Measured("acceleration [m/s²]", lambda message: xyz(message.linear_acceleration), axes=True),
-        _Measured("turning [rad/s]", lambda message: xyz(message.angular_velocity), axes=True),
+        _Quantity("acceleration [m/s²]", lambda message: xyz(message.linear_acceleration), has_axes=True),
+        _Quantity("turning [rad/s]", lambda message: xyz(message.angular_velocity), has_axes=True),
     ),
-    "sensor_msgs/Range": (_Measured("range [m]", lambda message: (message.range,)),),
+    "sensor_msgs/Range": (_Quantity("range [m]", lambda message: (message.range,)),),
     "sensor_msgs/MagneticField": (
-        _Measured("field [µT]", lambda message: xyz(message.magnetic_field), 1e6, axes=True),
+        _Quantity("field [µT]", lambda message: xyz(message.magnetic_field), 1e6, has_axes=True),
     ),
-    "sensor_msgs/FluidPressure": (_Measured("pressure [hPa]", lambda message: (message.fluid_pressure,), 1e-2),),
-    "sensor_msgs/NavSatFix": (_Measured("altitude [m]", lambda message: (message.altitude,)),),
-    "sensor_msgs/BatteryState": (_Measured("voltage [V]", lambda message: (message.voltage,)),),
-    "geometry_msgs/PointStamped": (_Measured("height [m]", lambda message: (message.point.z,)),),
-    "geometry_msgs/WrenchStamped": (_Measured("force [N]", lambda message: xyz(message.wrench.force), axes=True),),
+    "sensor_msgs/FluidPressure": (_Quantity("pressure [hPa]", lambda message: (message.fluid_pressure,), 1e-2),),
+    "sensor_msgs/NavSatFix": (_Quantity("altitude [m]", lambda message: (message.altitude,)),),
+    "sensor_msgs/BatteryState": (_Quantity("voltage [V]", lambda message: (message.voltage,)),),
+    "geometry_msgs/PointStamped": (_Quantity("height [m]", lambda message: (message.point.z,)),),
+    "geometry_msgs/WrenchStamped": (_Quantity("force [N]", lambda message: xyz(message.wrench.force), has_axes=True),),
 }

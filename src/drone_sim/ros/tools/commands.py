@@ -1,7 +1,4 @@
-"""From the bytes that a terminal sends to keys, the command that they change, and which one is in force.
-
-Neither a terminal nor ROS is needed.
-"""
+"""Keys decoded from a terminal's bytes, and the velocity commands that they change. Needs no terminal and no ROS."""
 
 from __future__ import annotations
 
@@ -13,64 +10,60 @@ from typing import NamedTuple
 
 UP, DOWN, LEFT, RIGHT, ENTER, BACKSPACE = "up", "down", "left", "right", "enter", "backspace"
 ESCAPE, UNKNOWN = "escape", "unknown"
-KEY_PATIENCE = 0.5  # s, for what may follow an ESC; a slow line sends a sequence in pieces
+KEY_PATIENCE = 0.5  # s, to wait after an ESC; a slow connection sends an escape sequence in pieces
 
 # ECMA-48: ESC [ parameters final, or ESC O final. The Linux console adds ESC [ [ final, and Alt an ESC before a key.
-_WHOLE = re.compile(rb"\x1b+(?:\[\[.|\[[0-?]*[ -/]*[@-Z\\-~]|O[0-9;]*[@-~]|[^\x1b\[O])", re.DOTALL)
-_BEGINNING = re.compile(rb"\x1b+(?:\[\[?|\[[0-?]*[ -/]*|O[0-9;]*)?")
+_SEQUENCE = re.compile(rb"\x1b+(?:\[\[.|\[[0-?]*[ -/]*[@-Z\\-~]|O[0-9;]*[@-~]|[^\x1b\[O])", re.DOTALL)
+_PREFIX = re.compile(rb"\x1b+(?:\[\[?|\[[0-?]*[ -/]*|O[0-9;]*)?")
 _ARROW = re.compile(rb"\x1b+[\[O][0-9;]*([ABCD])")
 _ARROWS = {b"A": UP, b"B": DOWN, b"C": RIGHT, b"D": LEFT}
 _CHARACTER = re.compile(rb"[\xc0-\xff][\x80-\xbf]*|.", re.DOTALL)  # UTF-8
 _PLAIN = {b"\x7f": BACKSPACE, b"\x08": BACKSPACE, b"\r": ENTER, b"\n": ENTER}
 _STEP = 0.1  # m/s, per key press
 _TURN_STEP = 0.2  # rad/s, per key press
-_FAST = 2.5  # times, of a capital letter
-_PATIENCE = 0.5  # s, until what was sent should be in force
+_CAPITAL_FACTOR = 2.5  # of the steps of a capital letter
+_COMMAND_TIMEOUT = 0.5  # s, until a sent command should be in force
 
 
 class KeyDecoder:
-    """Takes bytes as they come, in pieces of any size, and tells the keys: a character, or one of the names above."""
+    """Decodes a stream of bytes to keys: printable characters, and the names above for other keys."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
-        """Take a monotonic clock."""
+        """`clock` must be monotonic (s)."""
         self._clock = clock
-        self.clear()
-
-    def clear(self) -> None:
-        """Forget what has begun."""
         self._bytes = b""
-        self._came = self._clock()
+        self._received_at = clock()
 
     def feed(self, data: bytes) -> list[str]:
-        """Return the keys that are complete with `data`, which may be empty; call it at least now and then.
+        """Return the keys that are complete with `data`. Call this regularly, with b"" if nothing has come.
 
-        An ESC after which nothing comes for KEY_PATIENCE is the key itself; another beginning of a sequence is dropped.
+        An ESC that is followed by nothing for KEY_PATIENCE is the Escape key; another incomplete sequence is UNKNOWN.
         """
         keys = []
         if data:
             self._bytes += data
-            self._came = self._clock()
-        while self._bytes and not _BEGINNING.fullmatch(self._bytes):
-            keys.append(self._take())
-        if self._bytes and self._clock() - self._came >= KEY_PATIENCE:
+            self._received_at = self._clock()
+        while self._bytes and not _PREFIX.fullmatch(self._bytes):
+            keys.append(self._take_key())
+        if self._bytes and self._clock() - self._received_at >= KEY_PATIENCE:
             keys.append(UNKNOWN if self._bytes.strip(b"\x1b") else ESCAPE)
             self._bytes = b""
         return keys
 
-    def _take(self) -> str:
-        found = _WHOLE.match(self._bytes) or _BEGINNING.match(self._bytes) or _CHARACTER.match(self._bytes)
-        assert found
-        taken, self._bytes = found.group(), self._bytes[found.end() :]
-        if taken.startswith(b"\x1b"):
-            arrow = _ARROW.fullmatch(taken)
+    def _take_key(self) -> str:
+        match = _SEQUENCE.match(self._bytes) or _PREFIX.match(self._bytes) or _CHARACTER.match(self._bytes)
+        assert match
+        code, self._bytes = match.group(), self._bytes[match.end() :]
+        if code.startswith(b"\x1b"):
+            arrow = _ARROW.fullmatch(code)
             return _ARROWS[arrow.group(1)] if arrow else UNKNOWN
-        if taken in _PLAIN:
-            return _PLAIN[taken]
-        return taken.decode() if taken.isascii() and taken.decode().isprintable() else UNKNOWN
+        if code in _PLAIN:
+            return _PLAIN[code]
+        return code.decode() if code.isascii() and code.decode().isprintable() else UNKNOWN
 
 
 class Command(NamedTuple):
-    """Speeds forward, left and up (m/s), and turning left (rad/s)."""
+    """Velocities forward, left and up (m/s), and yaw rate to the left (rad/s)."""
 
     vx: float = 0.0
     vy: float = 0.0
@@ -78,24 +71,23 @@ class Command(NamedTuple):
     wz: float = 0.0
 
     def after(self, key: str, keys: Mapping[str, Command]) -> Command | None:
-        """Return the command after a key press of a map, or None for a key that commands nothing.
+        """Return the command after a key press; None for a key that is not in `keys` and not the space bar.
 
-        A capital letter, as with Shift, changes it by more.
+        A capital letter, as with Shift, makes a larger step.
         """
         if key == " ":
             return Command()
         change = keys.get(key) or keys.get(key.lower())
         if change is None:
             return None
-        times = 1.0 if key in keys else _FAST
-        return Command(*(old + times * more for old, more in zip(self, change))).rounded()
+        factor = 1.0 if key in keys else _CAPITAL_FACTOR
+        return Command(*(old + factor * step for old, step in zip(self, change))).rounded()
 
     def rounded(self) -> Command:
-        """Return it without the last digits, that sums of steps have wrong."""
+        """Return the command without the rounding errors of summed steps."""
         return Command(*(round(value, 6) for value in self))
 
     def __str__(self) -> str:
-        """Return it with its units."""
         return "vx {:+.2f}  vy {:+.2f}  vz {:+.2f} m/s   wz {:+.2f} rad/s".format(*self)
 
 
@@ -105,8 +97,8 @@ _ARROW_KEYS = {
     LEFT: Command(vy=_STEP),
     RIGHT: Command(vy=-_STEP),
 }
-# What each key changes, by the name of the map: the cockpit's keys, and those of demo_teleop, the course's own node,
-# with two more for the height. web/src/teleop.js has the first map once more.
+# The change by each key, for the cockpit's keys and for those of demo_teleop, the course's own node, with two more
+# keys for the height. web/src/teleop.js has a copy of the cockpit's map.
 KEY_MAPS: Mapping[str, Mapping[str, Command]] = {
     "cockpit": {
         **_ARROW_KEYS,
@@ -130,43 +122,44 @@ KEY_MAPS: Mapping[str, Mapping[str, Command]] = {
 
 
 class CommandInForce:
-    """What the simulator says is in force, and what was sent and cannot be in force yet. Any thread may call it."""
+    """The command that the simulator publishes as in force, and the command last sent. Thread-safe."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
-        """Begin knowing nothing; take a monotonic clock."""
+        """`clock` must be monotonic (s)."""
         self._clock = clock
         self._lock = threading.Lock()
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
-        """Know nothing: the simulator has gone, or another one has come."""
+    def reset(self) -> None:
+        """Forget both commands, because the simulator is gone or was replaced."""
         with self._lock:
-            self.heard: Command | None = None
+            self.published: Command | None = None
             self.sent = Command()
-            self._awaited = False
-            self._others = 0
-            self._since = self._clock()
+            self._is_pending = False  # `sent` is not in force yet
+            self._received = 0  # since `sent`
+            self._sent_at = self._clock()
 
     @property
     def next(self) -> Command:
-        """The command that a key press changes: that in force, or what was sent a moment ago."""
+        """The command that a key press changes: the one in force, or the one sent if it is not in force yet."""
         with self._lock:
-            return self.sent if self._awaited or self.heard is None else self.heard
+            return self.sent if self._is_pending or self.published is None else self.published
 
-    def send(self, command: Command) -> None:
-        """Say that a command is being sent."""
+    def on_sent(self, command: Command) -> None:
+        """Store a command that is being sent."""
         with self._lock:
-            self.sent, self._awaited = command, True
-            self._others, self._since = 0, self._clock()
+            self.sent, self._is_pending = command, True
+            self._received, self._sent_at = 0, self._clock()
 
-    def hear(self, command: Command) -> None:
-        """Take the command in force.
+    def on_published(self, command: Command) -> None:
+        """Store the command that the simulator has published as in force.
 
-        A command other than the one sent may be an older one that arrives late; if it stays, another node has sent it.
+        If it differs from the one sent, it may be an older one that arrives late; after a while it must be from another
+        node.
         """
         with self._lock:
-            self.heard = command.rounded()
-            self._others += 1
-            late = self._others > 1 and self._clock() - self._since > _PATIENCE
-            if self.heard == self.sent or late:
-                self._awaited = False
+            self.published = command.rounded()
+            self._received += 1
+            is_overdue = self._received > 1 and self._clock() - self._sent_at > _COMMAND_TIMEOUT
+            if self.published == self.sent or is_overdue:
+                self._is_pending = False

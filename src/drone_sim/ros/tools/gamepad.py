@@ -1,6 +1,6 @@
-"""A gamepad, as Linux' joystick interface has it; numbered and signed as in sensor_msgs/Joy. ROS is not needed.
+"""Gamepads by Linux' joystick interface, with the numbers and signs of sensor_msgs/Joy. ROS is not needed.
 
-The interface (joystick-api in the kernel's documentation): events of 8 bytes, the first of which tell how things stand.
+The interface (joystick-api in the kernel's documentation) has events of 8 bytes; the first ones give the initial state.
 """
 
 from __future__ import annotations
@@ -17,32 +17,31 @@ from typing import NamedTuple
 
 _EVENT = struct.Struct("=IhBB")  # time (ms), value, kind, number
 _BUTTON, _AXIS, _IS_INITIAL = 0x01, 0x02, 0x80
-_FULL = 32767.0  # an axis at its end; down and to the right are positive
-_READ = 64 * _EVENT.size  # bytes at once
-_NAME = 128  # bytes
-_GET_NAME = 0x80006A13 + (_NAME << 16)  # JSIOCGNAME
+_AXIS_MAX = 32767.0  # at the end of an axis; down and right are positive
+_READ_SIZE = 64 * _EVENT.size  # bytes
+_NAME_SIZE = 128  # bytes
+_GET_NAME = 0x80006A13 + (_NAME_SIZE << 16)  # JSIOCGNAME
 
 
 class JoyState(NamedTuple):
-    """How axes (-1 to 1, +1 to the left and up) and buttons stand."""
+    """Positions of axes (-1 to 1; left and up are +1), and whether buttons are pressed."""
 
     axes: tuple[float, ...] = ()
     buttons: tuple[bool, ...] = ()
 
     def axis(self, number: int) -> float:
-        """Return how an axis stands; 0 for one that the pad does not have."""
+        """Return the position of an axis; 0 if there is no such axis."""
         return self.axes[number] if 0 <= number < len(self.axes) else 0.0
 
     def button(self, number: int) -> bool:
-        """Return whether a button is pressed; one that the pad does not have is not."""
+        """Return whether a button is pressed; False if there is no such button."""
         return self.buttons[number] if 0 <= number < len(self.buttons) else False
 
 
-def found() -> list[str]:
-    """Return the devices of the gamepads that are plugged in, in the order of their numbers."""
-    devices = glob.glob("/dev/input/js*")
-    numbers = {int(one.partition("js")[2]): one for one in devices if re.search(r"js[0-9]+$", one)}
-    return [numbers[number] for number in sorted(numbers)]
+def list_devices() -> list[str]:
+    """Return the device files of all gamepads, in the order of their numbers."""
+    devices = [path for path in glob.glob("/dev/input/js*") if re.search(r"js[0-9]+$", path)]
+    return sorted(devices, key=lambda path: int(path.partition("js")[2]))
 
 
 class Gamepad:
@@ -58,39 +57,38 @@ class Gamepad:
         self.name = self._read_name()
 
     def _read_name(self) -> str:
-        told = bytearray(_NAME)
+        buffer = bytearray(_NAME_SIZE)
         with contextlib.suppress(OSError):
-            fcntl.ioctl(self._file, _GET_NAME, told)
-        name = told.split(b"\0")[0].decode(errors="replace")
+            fcntl.ioctl(self._file, _GET_NAME, buffer)
+        name = buffer.split(b"\0")[0].decode(errors="replace")
         return name if name.isprintable() and name else "gamepad"
 
     def fileno(self) -> int:
-        """Return what select() waits for."""
+        """Return the file descriptor, for select()."""
         return self._file
 
     def close(self) -> None:
-        """Close it."""
         os.close(self._file)
 
     def read(self) -> Iterator[JoyState]:
-        """Yield how it stood after each event that has come. Raises OSError when it has been unplugged."""
+        """Yield the state after each new event. Raises OSError if the gamepad was unplugged."""
         try:
-            read = os.read(self._file, _READ)
+            received = os.read(self._file, _READ_SIZE)
         except BlockingIOError:
             return
-        if not read:
+        if not received:
             raise OSError(errno.ENODEV, os.strerror(errno.ENODEV), self.device)
-        data = self._rest + read
+        data = self._rest + received
         whole = len(data) - len(data) % _EVENT.size
         self._rest = data[whole:]
         for _, value, kind, number in _EVENT.iter_unpack(data[:whole]):
-            self._take(value, kind & ~_IS_INITIAL, number)
+            self._update(value, kind & ~_IS_INITIAL, number)
             yield JoyState(tuple(self._axes), tuple(self._buttons))
 
-    def _take(self, value: int, kind: int, number: int) -> None:
+    def _update(self, value: int, kind: int, number: int) -> None:
         if kind == _AXIS:
             self._axes += [0.0] * (number + 1 - len(self._axes))
-            self._axes[number] = min(1.0, -value / _FULL)  # -32768 is possible
+            self._axes[number] = min(1.0, -value / _AXIS_MAX)  # value may be -32768
         elif kind == _BUTTON:
             self._buttons += [False] * (number + 1 - len(self._buttons))
             self._buttons[number] = bool(value)

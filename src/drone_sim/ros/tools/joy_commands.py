@@ -1,4 +1,4 @@
-"""config/joy.yaml, and how a gamepad's state becomes a command to the drone. Neither a gamepad nor ROS is needed."""
+"""Parameters of config/joy.yaml, and the commands for a gamepad's states. Needs neither a gamepad nor ROS."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _Number = Annotated[int, Within(-1, 255)]
 
 
 class AxisParameters(Checked):
-    """Which axis, and the speed (m/s or rad/s) at its end."""
+    """Number of an axis, and the velocity (m/s or rad/s) at its end."""
 
     axis: _Number
     scale: Annotated[Finite, Within(-20, 20)]
 
 
 class AxesParameters(Checked):
-    """What the axes command."""
+    """Axes for the components of the velocity command."""
 
     vx: AxisParameters
     vy: AxisParameters
@@ -35,7 +35,7 @@ class AxesParameters(Checked):
 
 
 class ButtonParameters(Checked):
-    """Which buttons ask for what."""
+    """Numbers of the buttons for requests; -1 for no button."""
 
     takeoff: _Number
     land: _Number
@@ -43,7 +43,7 @@ class ButtonParameters(Checked):
 
 
 class JoyParameters(Checked):
-    """Everything in config/joy.yaml."""
+    """Parameters of config/joy.yaml."""
 
     device: FileName
     dead_man: Annotated[int, Within(0, 255)]
@@ -55,7 +55,7 @@ class JoyParameters(Checked):
 
 
 def load_joy(given: Mapping[str, Any]) -> JoyParameters:
-    """Return config/joy.yaml with the file under the key `config`, and the other keys, laid over it.
+    """Return config/joy.yaml, overridden by the file under the key `config` of `given`, then by its other keys.
 
     Raises ParameterError.
     """
@@ -75,45 +75,45 @@ def load_joy(given: Mapping[str, Any]) -> JoyParameters:
 
 
 class JoyCommands:
-    """The commands of a gamepad. The drone obeys only while the dead-man's button is held.
+    """Commands of a gamepad. There is a command only while the dead man's button is pressed.
 
-    After a gamepad was lost, this button must be released first: a gamepad that comes back with it pressed commands
-    nothing.
+    After a gamepad was disconnected, this button must be released first: a gamepad that is connected again with the
+    button pressed gives no command.
     """
 
     def __init__(self, parameters: JoyParameters):
-        """Take the parameters of joy.yaml; begin without a gamepad."""
+        """Start without a gamepad."""
         self._parameters = parameters
         self._buttons = {name: number for name, number in parameters.buttons if number >= 0}
-        self.lose()
-        self._armed = True
+        self.disconnect()
+        self._is_armed = True
 
-    def lose(self) -> None:
-        """Have no gamepad any more."""
-        self._pad = JoyState()
-        self._armed = False
-        self._pressed: frozenset[str] | None = None  # None before the first look
+    def disconnect(self) -> None:
+        """Release all buttons and axes, because the gamepad is gone."""
+        self._state = JoyState()
+        self._is_armed = False
+        self._pressed: frozenset[str] | None = None  # None before the first state
 
     @property
     def command(self) -> Command | None:
-        """What the drone is to do; None while the dead-man's button is not held."""
-        if not (self._armed and self._pad.button(self._parameters.dead_man)):
+        """The velocity command; None while the dead man's button is not pressed."""
+        if not (self._is_armed and self._state.button(self._parameters.dead_man)):
             return None
         axes = self._parameters.axes
-        return Command(*(self._speed(one) for one in (axes.vx, axes.vy, axes.vz, axes.wz)))
+        return Command(*(self._velocity(axis) for axis in (axes.vx, axes.vy, axes.vz, axes.wz)))
 
-    def see(self, pad: JoyState) -> list[str]:
-        """Take the gamepad's present state; return what newly pressed buttons ask for: takeoff, ..."""
-        self._pad = pad
-        if not pad.button(self._parameters.dead_man):
-            self._armed = True
+    def update(self, state: JoyState) -> list[str]:
+        """Store the gamepad's state; return the requests of newly pressed buttons, such as "takeoff"."""
+        self._state = state
+        if not state.button(self._parameters.dead_man):
+            self._is_armed = True
         before = self._pressed
-        self._pressed = frozenset(name for name, number in self._buttons.items() if pad.button(number))
-        news = self._pressed - before if before is not None else frozenset()
-        allowed = self.command is not None
-        return sorted(name for name in news if allowed or name not in _NEEDS_DEAD_MAN)
+        self._pressed = frozenset(name for name, number in self._buttons.items() if state.button(number))
+        new = self._pressed - before if before is not None else frozenset()
+        is_flying = self.command is not None
+        return sorted(name for name in new if is_flying or name not in _NEEDS_DEAD_MAN)
 
-    def _speed(self, wanted: AxisParameters) -> float:
-        value, zone = self._pad.axis(wanted.axis), self._parameters.dead_zone
-        beyond = max(0.0, abs(value) - zone) / (1 - zone)
-        return wanted.scale * math.copysign(min(1.0, beyond), value) + 0.0
+    def _velocity(self, parameters: AxisParameters) -> float:
+        value, zone = self._state.axis(parameters.axis), self._parameters.dead_zone
+        deflection = max(0.0, abs(value) - zone) / (1 - zone)
+        return parameters.scale * math.copysign(min(1.0, deflection), value) + 0.0

@@ -1,8 +1,8 @@
-"""Fly from a gamepad: a device of this machine or, without one, the topic `joy` (sensor_msgs/Joy).
+"""Fly with a gamepad: a device of this machine or, without one, the topic `joy` (sensor_msgs/Joy).
 
-While the dead-man's button is held its sticks are commanded, at a steady rate; releasing it, a gamepad that vanishes,
-and the end of the node send a stop. Buttons ask for take-off, landing and reset (std_msgs/Empty). config/joy.yaml says
-which.
+While the dead man's button is pressed, the sticks give velocity commands at a constant rate. When it is released, the
+gamepad is disconnected, or the node ends, the node sends a stop. Other buttons request take-off, landing and reset
+(std_msgs/Empty). config/joy.yaml has the numbers of axes and buttons.
 """
 
 from __future__ import annotations
@@ -27,129 +27,125 @@ from drone_sim.ros.tools.joy_commands import JoyCommands, JoyParameters, load_jo
 from drone_sim.ros.tools.teleop import Teleop
 
 _NAME = "joy_teleop"
-_LOOKING = 1.0  # s, between two looks for a gamepad
-_OTHERS = ("drone", "simulator")  # private parameters that Teleop reads
+_SEARCH_PERIOD = 1.0  # s, between two searches for a gamepad
+_TELEOP_PARAMETERS = ("drone", "simulator")  # private parameters that Teleop reads
 
 
 class JoyTeleop:
-    """Reads a gamepad and commands, until somebody ends it."""
+    """Sends the commands of a gamepad to the drone."""
 
     def __init__(self, parameters: JoyParameters, teleop: Teleop):
-        """Listen to the topic; take the parameters of joy.yaml, and the teleop that sends the commands."""
+        """Subscribe to the topic `joy`; `teleop` sends the commands."""
         self._parameters, self._teleop = parameters, teleop
-        self._pilot = JoyCommands(parameters)
+        self._joy_commands = JoyCommands(parameters)
         self._gamepad: Gamepad | None = None
-        self._looked = -math.inf
-        self._missed = ""  # a device that has been told of
-        self._heard = -math.inf  # when something came on the topic
+        self._searched_at = -math.inf
+        self._reported = ""  # the last warning about a missing gamepad
+        self._received_at = -math.inf  # time of the last message on the topic
         self._messages: queue.SimpleQueue[Joy] = queue.SimpleQueue()
-        self._flew = False
+        self._is_flying = False
         self._due = 0.0
         self._topic = rospy.Subscriber("joy", Joy, self._on_joy, queue_size=10)
 
     def run(self, over: Callable[[], bool]) -> None:
-        """Fly until it is over."""
+        """Send commands until `over` returns True."""
         rospy.loginfo(f"{_NAME}: hold button {self._parameters.dead_man} to fly; commands on {self._teleop.topic}")
         while not over():
-            self._look_for_gamepad()
-            for pad in self._states(max(0.0, self._due - time.monotonic())):
-                for name in self._pilot.see(pad):
-                    heard = self._teleop.ask_for(name)
-                    rospy.loginfo(f"{_NAME}: {name}{'' if heard else f': {self._teleop.said}'}")
+            self._find_gamepad()
+            for state in self._states(max(0.0, self._due - time.monotonic())):
+                for name in self._joy_commands.update(state):
+                    is_sent = self._teleop.request(name)
+                    rospy.loginfo(f"{_NAME}: {name}{'' if is_sent else f': {self._teleop.status}'}")
                 self._command()
-            self._watch_topic()
+            self._check_topic()
             self._command()
 
     def _command(self) -> None:
-        """Send the command when it is due, and a stop as soon as nothing is commanded any more."""
-        command, now = self._pilot.command, time.monotonic()
-        if command is None and self._flew:
+        """Send the command if it is due, and a stop as soon as there is no command any more."""
+        command, now = self._joy_commands.command, time.monotonic()
+        if command is None and self._is_flying:
             self._send(Command())
-        elif command is not None and (now >= self._due or not self._flew):
+        elif command is not None and (now >= self._due or not self._is_flying):
             self._send(command)
         if now >= self._due:
             self._due = now + 1 / self._parameters.rate
-        self._flew = command is not None
+        self._is_flying = command is not None
 
     def _send(self, command: Command) -> None:
         if not self._teleop.send(command):
-            rospy.logwarn_throttle(5, f"{_NAME}: {self._teleop.said}")
+            rospy.logwarn_throttle(5, f"{_NAME}: {self._teleop.status}")
 
-    # ---- where it comes from
+    # ---- sources
 
     def _on_joy(self, message: Joy) -> None:
         if self._gamepad is None:
             self._messages.put(message)
 
     def _states(self, seconds: float) -> Iterable[JoyState]:
-        """Wait so long at most; return how the gamepad stood after each thing that happened."""
+        """Wait for at most `seconds`; return the gamepad's state after each event."""
         if self._gamepad is None:
             with contextlib.suppress(queue.Empty):
                 message = self._messages.get(timeout=seconds)
-                self._heard = time.monotonic()
-                return [_pad(message)]
+                self._received_at = time.monotonic()
+                return [_joy_state(message)]
             return []
         select.select([self._gamepad], [], [], seconds)
         try:
             return list(self._gamepad.read())
         except OSError as error:
-            self._lose(f"{self._gamepad.device}: {error.strerror or error}")
+            self._disconnect(f"{self._gamepad.device}: {error.strerror or error}")
             self._gamepad.close()
             self._gamepad = None
             return []
 
-    def _lose(self, why: str) -> None:
-        said = ": the drone is stopped" if self._pilot.command is not None else ""
-        rospy.logwarn(f"{_NAME}: {why}{said}")
-        self._pilot.lose()
+    def _disconnect(self, reason: str) -> None:
+        effect = ": the drone is stopped" if self._joy_commands.command is not None else ""
+        rospy.logwarn(f"{_NAME}: {reason}{effect}")
+        self._joy_commands.disconnect()
 
-    def _watch_topic(self) -> None:
-        """Treat the topic as a lost gamepad if it commands the drone and has fallen silent."""
+    def _check_topic(self) -> None:
+        """If the drone flies by the topic, and it has no publisher or no messages, treat that as a lost gamepad."""
         timeout = self._parameters.timeout
-        if self._gamepad is not None or self._pilot.command is None:
+        if self._gamepad is not None or self._joy_commands.command is None:
             return
-        silent = time.monotonic() - self._heard
         if not self._topic.get_num_connections():
-            self._lose(f"{self._topic.resolved_name} has no publisher any more")
-        elif timeout and silent > timeout:
-            self._lose(
+            self._disconnect(f"{self._topic.resolved_name} has no publisher any more")
+        elif timeout and time.monotonic() - self._received_at > timeout:
+            self._disconnect(
                 f"no message on {self._topic.resolved_name} for {timeout:g} s (autorepeat_rate of the joy node?)"
             )
 
-    def _look_for_gamepad(self) -> None:
-        wanted = self._parameters.device
-        if self._gamepad is not None or wanted == "none" or time.monotonic() - self._looked < _LOOKING:
+    def _find_gamepad(self) -> None:
+        device = self._parameters.device
+        if self._gamepad is not None or device == "none" or time.monotonic() - self._searched_at < _SEARCH_PERIOD:
             return
-        self._looked = time.monotonic()
-        devices = gamepad.found() if wanted == "auto" else [wanted]
+        self._searched_at = time.monotonic()
+        devices = gamepad.list_devices() if device == "auto" else [device]
         try:
             self._gamepad = Gamepad(devices[0])
         except (OSError, IndexError) as error:
-            why = f"{devices[0]}: {error}" if devices else "there is no /dev/input/js*"
-            missed = f"no gamepad found ({why}); listening on {self._topic.resolved_name}"
-            if missed != self._missed:
-                rospy.logwarn(f"{_NAME}: {missed}")
-            self._missed = missed
+            reason = f"{devices[0]}: {error}" if devices else "there is no /dev/input/js*"
+            warning = f"no gamepad found ({reason}); listening on {self._topic.resolved_name}"
+            if warning != self._reported:
+                rospy.logwarn(f"{_NAME}: {warning}")
+            self._reported = warning
             return
-        self._missed = ""
-        self._pilot.lose()
+        self._reported = ""
+        self._joy_commands.disconnect()
         rospy.loginfo(f"{_NAME}: {self._gamepad.name} on {self._gamepad.device}")
 
 
-def _pad(message: Joy) -> JoyState:
+def _joy_state(message: Joy) -> JoyState:
     axes = (value if math.isfinite(value) else 0.0 for value in message.axes[:256])
     return JoyState(tuple(max(-1.0, min(1.0, value)) for value in axes), tuple(map(bool, message.buttons[:256])))
 
 
-def _parameters() -> JoyParameters:
-    given: dict[str, Any] = {key: value for key, value in rospy.get_param("~", {}).items() if key not in _OTHERS}
+def _fly(over: Callable[[], bool]) -> None:
+    private: dict[str, Any] = rospy.get_param("~", {})
+    given = {key: value for key, value in private.items() if key not in _TELEOP_PARAMETERS}
     if isinstance(given.get("config"), str):
         given["config"] = from_shell(given["config"])
-    return load_joy(given)
-
-
-def _fly(over: Callable[[], bool]) -> None:
-    parameters, teleop = _parameters(), Teleop()
+    parameters, teleop = load_joy(given), Teleop()
     try:
         JoyTeleop(parameters, teleop).run(over)
     finally:
@@ -158,5 +154,5 @@ def _fly(over: Callable[[], bool]) -> None:
 
 
 def main() -> int:
-    """Run the node until a signal comes; return its exit status."""
+    """Run the node until a signal; return its exit status."""
     return run_tool(_NAME, _fly)

@@ -1,7 +1,6 @@
-"""Fly from the keyboard: the cockpit's keys, or those of the course's own node, the simulation's toolbar, a read-out.
+"""Fly with the keyboard, and start, pause and stop the simulation; the terminal shows the drone's state.
 
-A command holds until the next key, as on the topic. A key that means nothing stops the drone, and so does leaving in
-any way.
+A command holds until the next key. An unknown key stops the drone, and so does the end of the program.
 """
 
 from __future__ import annotations
@@ -22,11 +21,11 @@ from drone_sim.ros.tools.commands import ESCAPE, KeyDecoder
 from drone_sim.ros.tools.teleop import Teleop
 
 _NAME = "key_teleop"
-_PERIOD = 0.1  # s between read-outs
-_CONNECTING = 1.0  # s at most, before the first key counts
-# Ctrl-C, Ctrl-\ and Ctrl-Z among them: a command would hold while nobody is at the keys.
+_PERIOD = 0.1  # s, between two updates of the screen
+_CONNECT_TIMEOUT = 1.0  # s
+# Also the signals of Ctrl-\ and Ctrl-Z: otherwise the last command would hold while the program is suspended.
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
-_INPUT_FLAGS = 0  # where they stand in what termios tells
+_INPUT_FLAGS = 0  # index in the result of tcgetattr
 
 _TOOLBAR = (
     "Enter      start / stop the simulation",
@@ -51,51 +50,51 @@ _FLYING = {
         "space, any other    stop the drone",
     ),
 }
-HELP = {name: [f"{one:<52}{other}" for one, other in zip(keys, _TOOLBAR)] for name, keys in _FLYING.items()}
+HELP = {name: [f"{keys:<52}{tools}" for keys, tools in zip(lines, _TOOLBAR)] for name, lines in _FLYING.items()}
 
 
 class Screen:
-    """Reads keys and shows the read-out, until somebody wants to leave or the terminal is gone."""
+    """Curses screen that reads keys and shows the drone's state, until Escape or until the terminal is closed."""
 
     def __init__(self, teleop: Teleop, over: Callable[[], bool]):
-        """Take the teleop that does the work, and what tells that it is over."""
+        """`over` returns whether the node must end."""
         self._teleop, self._over = teleop, over
         self._decoder = KeyDecoder()
         self._terminal = sys.stdin.fileno()
-        self._unknown = False  # whether the last key was
-        self._help = HELP[teleop.map]
+        self._is_key_unknown = False
+        self._help = HELP[teleop.key_map]
 
     def run(self, screen: Any) -> None:
         """Run in a curses screen."""
         self._screen = screen
         with contextlib.suppress(OSError, termios.error):  # the terminal is gone
-            _ignore_control_s(self._terminal)
+            _disable_flow_control(self._terminal)
             self._connect()
             self._fly()
 
     def _fly(self) -> None:
         is_ready = False
         while not self._over():
-            if self._teleop.connected and not is_ready:
-                is_ready, self._teleop.said = True, "ready"
+            if self._teleop.is_connected and not is_ready:
+                is_ready, self._teleop.status = True, "ready"
             self._draw()
-            for key in self._read():
+            for key in self._read_keys():
                 if key == ESCAPE:
                     return
-                self._unknown = not self._teleop.press(key)
+                self._is_key_unknown = not self._teleop.press(key)
 
     def _connect(self) -> None:
-        """Give the topics a moment to connect, and forget what was typed meanwhile, sequences cut in two among it."""
-        deadline = time.monotonic() + _CONNECTING
-        while not self._teleop.connected and time.monotonic() < deadline and not self._over():
-            self._teleop.said = "connecting ..."
+        """Wait for a subscriber, at most _CONNECT_TIMEOUT, and discard the keys that were typed meanwhile."""
+        deadline = time.monotonic() + _CONNECT_TIMEOUT
+        while not self._teleop.is_connected and time.monotonic() < deadline and not self._over():
+            self._teleop.status = "connecting ..."
             self._draw()
             time.sleep(_PERIOD / 2)
-        self._teleop.said = ""
+        self._teleop.status = ""
         termios.tcflush(self._terminal, termios.TCIFLUSH)
 
-    def _read(self) -> list[str]:
-        """Wait a little for keys, and return them. Raises OSError when there will be none any more."""
+    def _read_keys(self) -> list[str]:
+        """Return the keys typed within _PERIOD. Raises OSError if the terminal was closed."""
         if not select.select([self._terminal], [], [], _PERIOD)[0]:
             return self._decoder.feed(b"")
         data = os.read(self._terminal, 1024)
@@ -109,45 +108,44 @@ class Screen:
             curses.resizeterm(size.lines, size.columns)
         height, width = self._screen.getmaxyx()
         lines = self._teleop.lines()
-        room = height > len(self._help) + len(lines)
-        if self._unknown:
-            where = "the keys are above" if room else "a larger window shows the keys"
-            lines[-1] = f"no such key: the drone is stopped; {where}"
-        if not room:
-            lines = [line for line in (lines[-1], *lines[:-1]) if line]  # what there is to say comes first
+        has_room = height > len(self._help) + len(lines)
+        if self._is_key_unknown:
+            hint = "the keys are above" if has_room else "a larger window shows the keys"
+            lines[-1] = f"no such key: the drone is stopped; {hint}"
+        if not has_room:
+            lines = [line for line in (lines[-1], *lines[:-1]) if line]  # the status comes first
         self._screen.erase()
-        if room:
-            self._write(0, self._help, width, curses.A_BOLD if self._unknown else curses.A_NORMAL)
-        self._write(len(self._help) + 1 if room else 0, lines[:height], width, curses.A_NORMAL)
+        if has_room:
+            self._write(0, self._help, width, curses.A_BOLD if self._is_key_unknown else curses.A_NORMAL)
+        self._write(len(self._help) + 1 if has_room else 0, lines[:height], width, curses.A_NORMAL)
         self._screen.refresh()
 
-    def _write(self, first: int, lines: list[str], width: int, look: int) -> None:
+    def _write(self, first: int, lines: list[str], width: int, attributes: int) -> None:
         for row, line in enumerate(lines, start=first):
-            with contextlib.suppress(curses.error):  # how much fits into a tiny screen is curses' to know
-                self._screen.addnstr(row, 0, line, width - 1, look)  # which cannot fill the last corner
+            with contextlib.suppress(curses.error):  # the screen is too small for this line
+                self._screen.addnstr(row, 0, line, width - 1, attributes)  # curses cannot fill the last corner
 
 
-def _ignore_control_s(terminal: int) -> None:
-    """Let Ctrl-S not hold up the output, and with it the keys, while the drone flies on."""
+def _disable_flow_control(terminal: int) -> None:
+    """Disable Ctrl-S, which would block the output, and with it the keys, while the drone flies on."""
     settings = termios.tcgetattr(terminal)
     settings[_INPUT_FLAGS] &= ~termios.IXON
     termios.tcsetattr(terminal, termios.TCSANOW, settings)
 
 
 def _fly(over: Callable[[], bool]) -> None:
-    """Show the screen until it is left in any way, and stop the drone."""
     teleop = Teleop()
     try:
-        with contextlib.suppress(curses.error):  # there is no terminal any more to leave
+        with contextlib.suppress(curses.error):  # the terminal is gone, so curses cannot restore it
             curses.wrapper(Screen(teleop, over).run)
     finally:
         teleop.stop()
-        rest_of_line = (curses.tigetstr("el") or b"").decode()  # what was typed before it began stands there
-        print(f"\r{rest_of_line}{_NAME}: {teleop.farewell}", flush=True)
+        erase_line = (curses.tigetstr("el") or b"").decode()  # keys typed before the start may be on this line
+        print(f"\r{erase_line}{_NAME}: {teleop.farewell}", flush=True)
 
 
 def main() -> int:
-    """Run the node until ESC, a signal, or the terminal closes; return its exit status."""
+    """Run the node until Escape, a signal, or the end of the terminal; return its exit status."""
     if not sys.stdin.isatty() or not sys.stdout.isatty():
         print(f"{_NAME}: must run in a terminal, to read its keys", file=sys.stderr)
         return 1

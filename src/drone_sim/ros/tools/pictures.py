@@ -1,4 +1,4 @@
-"""Pictures of messages, as a screen shows them, and several of them in one."""
+"""Decoding of image messages for display, and tiling of several images."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from drone_sim.offline.pictures import depth_to_grey
 from drone_sim.ros.core import image_messages
 
 _GREY, _WHITE = (60, 60, 60), (255, 255, 255)
-_EMPTY = (240, 320)  # px, height and width of what is not there yet
+_BLANK_SHAPE = (240, 320)  # px, height and width
 _CAPTION = 24  # px, height
-_DEPTHS = ("32FC1", "16UC1")
+_DEPTH_ENCODINGS = ("32FC1", "16UC1")
 _MILLIMETRES = 1e-3  # ROS's unit of depth in 16UC1
 
 Size = tuple[int, int]
 
 
 def decode(message: Image | CompressedImage) -> np.ndarray:
-    """Return a message's picture, BGR (height, width, 3); depth is the darker the farther, and black where it is none.
+    """Return a message's image as BGR (height, width, 3). Greater depth is darker; unknown depth is black.
 
-    Raises ValueError, in one line, for one that cannot be shown.
+    Raises ValueError, in one line, for an image that cannot be shown.
     """
     if hasattr(message, "encoding"):
         return _decode_raw(message)
     if "compressedDepth" in message.format:
         raise ValueError("compressedDepth is not shown")
     if message.data:
-        with contextlib.suppress(OSError):  # of no kind that is known there
+        with contextlib.suppress(OSError):  # PIL does not know the format; OpenCV may
             images.check(message.data)
     picture = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR) if message.data else None
     if picture is None:
@@ -42,7 +42,7 @@ def decode(message: Image | CompressedImage) -> np.ndarray:
 
 def _decode_raw(message: Image) -> np.ndarray:
     try:
-        if message.encoding not in _DEPTHS:
+        if message.encoding not in _DEPTH_ENCODINGS:
             return image_messages.bgr(message)
         depth = image_messages.pixels(message).astype(float)
     except (ValueError, cv2.error) as error:
@@ -53,25 +53,30 @@ def _decode_raw(message: Image) -> np.ndarray:
 
 
 def blank(text: str) -> np.ndarray:
-    """Return a grey picture that says something, BGR."""
-    picture = np.full((*_EMPTY, 3), _GREY, np.uint8)
-    _write(picture, text, _EMPTY[0] // 2)
+    """Return a grey BGR image with a text."""
+    picture = np.full((*_BLANK_SHAPE, 3), _GREY, np.uint8)
+    _write(picture, text, _BLANK_SHAPE[0] // 2)
     return picture
 
 
 def tile(pictures: list[tuple[str, np.ndarray]], largest: Size | None = None) -> np.ndarray:
-    """Return named pictures (BGR) side by side and below each other, no larger than `largest` (width, height)."""
+    """Return BGR images with captions in a grid, which is at most as large as `largest` (width, height)."""
     columns = math.ceil(math.sqrt(len(pictures)))
     width = max(picture.shape[1] for _, picture in pictures)
     height = max(picture.shape[0] for _, picture in pictures)
     cells = [_cell(name, picture, width, height) for name, picture in pictures]
     cells += [np.zeros_like(cells[0])] * (-len(cells) % columns)
     rows = [np.hstack(cells[first : first + columns]) for first in range(0, len(cells), columns)]
-    return _shrunk(np.vstack(rows), largest)
+    grid = np.vstack(rows)
+    factor = min(largest[0] / grid.shape[1], largest[1] / grid.shape[0]) if largest else 1.0
+    if factor >= 1:
+        return grid
+    size = max(1, int(grid.shape[1] * factor)), max(1, int(grid.shape[0] * factor))
+    return cv2.resize(grid, size, interpolation=cv2.INTER_AREA)
 
 
 def _cell(name: str, picture: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Return a picture as large as fits, in the middle, below its name."""
+    """Return an image scaled to fit into width x height, in the middle, below its caption."""
     cell = np.zeros((_CAPTION + height, width, 3), np.uint8)
     _write(cell, name, _CAPTION - 7)
     factor = min(width / picture.shape[1], height / picture.shape[0])
@@ -80,14 +85,6 @@ def _cell(name: str, picture: np.ndarray, width: int, height: int) -> np.ndarray
     fitted = picture if factor == 1 else cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST)
     cell[top : top + size[1], left : left + size[0]] = fitted
     return cell
-
-
-def _shrunk(picture: np.ndarray, largest: Size | None) -> np.ndarray:
-    factor = min(largest[0] / picture.shape[1], largest[1] / picture.shape[0]) if largest else 1.0
-    if factor >= 1:
-        return picture
-    size = max(1, int(picture.shape[1] * factor)), max(1, int(picture.shape[0] * factor))
-    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
 def _write(picture: np.ndarray, text: str, row: int) -> None:

@@ -17,7 +17,7 @@ _TABLES, _BAG = (".csv", ".txt"), ".bag"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw; return 0, or 1 after a line on stderr for a file that cannot be read or written."""
+    """Run the command; return 0, or 1 after a line on stderr for a file that cannot be read or written."""
     parser = Parser(prog=_NAME, description=__doc__)
     parser.add_argument("flight", metavar="FLIGHT", help="the recording: a .bag, or a .csv of fly")
     parser.add_argument(
@@ -25,10 +25,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--vehicle", metavar="NAME", help="which of several vehicles in a bag (default: the first)")
     options = parser.parse_args(arguments)
-    return status_of(_NAME, lambda: _draw(options))
+    return status_of(_NAME, lambda: _plot(options))
 
 
-def _draw(options: argparse.Namespace) -> None:
+def _plot(options: argparse.Namespace) -> None:
     flight = Path(options.flight)
     ending = flight.suffix.lower()
     if ending not in (*_TABLES, _BAG):
@@ -37,7 +37,7 @@ def _draw(options: argparse.Namespace) -> None:
         raise ValueError(
             f"--vehicle {shown(options.vehicle)}: only works with a bag, because a table holds one vehicle"
         )
-    from drone_sim.offline import plot  # matplotlib takes a while to import
+    from drone_sim.offline import plot  # slow import: matplotlib
 
     out = options.plot or f"{flight.stem}.png"
     plot.check(out)
@@ -47,6 +47,6 @@ def _draw(options: argparse.Namespace) -> None:
         from drone_sim.ros.tools.bags import Bag, BagFlight  # needs ROS, which a table does not
 
         with closing(Bag(options.flight)) as bag:
-            one = BagFlight(bag, options.vehicle)
-            plot.save(out, one.recording(), one.timeline(), one.sensors())
+            bag_flight = BagFlight(bag, options.vehicle)
+            plot.save(out, bag_flight.recording(), bag_flight.timeline(), bag_flight.sensors())
     print(f"{_NAME}: wrote {out}", flush=True)

@@ -1,7 +1,7 @@
 """Open rviz with all vehicles, whatever their names are, seen from behind the first one.
 
-It waits for the simulator, asks the master where the topics for rviz are and /tf_static which vehicle is the first,
-lays those names over rviz/drone.rviz, or over rviz/fleet.rviz where several fly, and then runs rviz.
+The command waits for the simulator, gets the namespace of the topics for rviz from the master, and the first vehicle
+from /tf_static. It runs rviz with rviz/drone.rviz, or with rviz/fleet.rviz for several vehicles, with these names.
 """
 
 from __future__ import annotations
@@ -35,32 +35,33 @@ INSTEAD = (
     "`apt install rviz` installs it (Debian testing has none);"
     " `roslaunch drone_sim drone.launch web:=true` shows the simulation in a browser"
 )
-_RVIZ = "rviz"  # which need not be there
+_RVIZ = "rviz"
 _CRASHES = (-signal.SIGSEGV, -signal.SIGABRT)
-_STARTS, _STARTING = 3, 20.0  # how often rviz is started, if it has crashed within so many s
+_MAX_STARTS, _EARLY_CRASH = 3, 20.0  # rviz is started again only after a crash within so many s
 _PATHS = "ROS_PACKAGE_PATH"
-_PATIENCE = 5.0  # s, for the frame that rviz follows
-_TOPIC = "/view/state"  # that the simulator advertises for rviz: the last one
-_ALONE, _FIRST, _SIMULATOR = "drone", "drone1", "drone_sim"  # as the files of the package name them
+_FRAME_TIMEOUT = 5.0  # s, for the frame that rviz follows
+_TOPIC = "/view/state"  # the last topic that the simulator advertises for rviz
+_ALONE, _FIRST, _SIMULATOR = "drone", "drone1", "drone_sim"  # names in the package's rviz files
 _NAMES = re.compile(rf"\b{_FIRST}\b|(?<=/)(?:{_ALONE}|{_SIMULATOR})(?=/)|(?<= ){_SIMULATOR}(?=/first$)", re.MULTILINE)
 _TITLES = re.compile(rf"^ *Name: (.*\b{_FIRST})$", re.MULTILINE)
 
 
 def main() -> int:
-    """Run rviz, and return its exit status; return 1, after a line on stderr, where that cannot be.
+    """Run rviz and return its exit status; return 1, after a line on stderr, if that fails.
 
-    Where there is no rviz, a launch goes on without it: roslaunch gets 0, and reports no process that has died.
+    If rviz is not installed, return 0 to a roslaunch, so that it does not report a process that has died.
     """
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is to be put in order
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until rviz runs, there is nothing to clean up
     parser = Parser(prog=_NAME, description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--config", metavar="FILE", default="", help="your own rviz file instead")
     parser.add_argument("--simulator", metavar="NODE", default=_SIMULATOR, help="(default: %(default)s)")
     options = parser.parse_args(rosgraph.myargv(sys.argv)[1:])
-    remappings = [one for one in sys.argv[1:] if ":=" in one]
+    remappings = [argument for argument in sys.argv[1:] if ":=" in argument]
     rviz = find_rviz()
     if rviz is None:
         print(f"{_NAME}: rviz is not installed: {INSTEAD}", file=sys.stderr, flush=True)
-        return 0 if any(one.startswith("__log:=") for one in remappings) else FAILED
+        is_launched = any(argument.startswith("__log:=") for argument in remappings)
+        return 0 if is_launched else FAILED
     return status_of(_NAME, lambda: _show(rviz, options, remappings))
 
 
@@ -70,117 +71,116 @@ def _show(rviz: str, options: argparse.Namespace, remappings: Sequence[str]) -> 
     if config and not Path(config).is_file():
         raise OSError(f"--config {config}: no such file")
     simulator = rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(), options.simulator)
-    config = config or str(_fitting(simulator.strip("/")))
+    config = config or str(_config_for(simulator.strip("/")))
     return run([rviz, "-d", config, *remappings], with_media_export(os.environ))
 
 
 def run(command: Sequence[str], environment: Mapping[str, str]) -> int:
-    """Run rviz; return its exit status. If it crashes at the start, as it does at times without a GPU, start it again.
+    """Run rviz and return its exit status. If it crashes early, as sometimes without a GPU, start it again.
 
-    A signal that ends this process ends rviz.
+    SIGINT and SIGTERM are forwarded to rviz.
     """
-    ends: list[int] = []
-    started: list[subprocess.Popen[bytes]] = []
+    signals: list[int] = []
+    processes: list[subprocess.Popen[bytes]] = []
 
-    def end(number: int, _frame: object) -> None:
-        ends.append(number)
-        for one in started:
-            one.send_signal(number)
+    def forward(number: int, _frame: object) -> None:
+        signals.append(number)
+        for process in processes:
+            process.send_signal(number)
 
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, end)
-    for start in range(_STARTS):
+        signal.signal(number, forward)
+    for start in range(_MAX_STARTS):
         began = time.monotonic()
         rviz = subprocess.Popen(command, env=environment)
-        started.append(rviz)
-        for asked in ends:  # before rviz could be told
-            rviz.send_signal(asked)
+        processes.append(rviz)
+        for received in signals:  # before rviz ran
+            rviz.send_signal(received)
         status = rviz.wait()
-        is_early = time.monotonic() - began < _STARTING
-        if status not in _CRASHES or ends or not is_early or start + 1 == _STARTS:
+        is_early = time.monotonic() - began < _EARLY_CRASH
+        if status not in _CRASHES or signals or not is_early or start + 1 == _MAX_STARTS:
             break
         print(f"{_NAME}: rviz crashed ({signal.strsignal(-status)}): starting it again", file=sys.stderr, flush=True)
     return SIGNALLED - status if status < 0 else status
 
 
 def with_media_export(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return an environment in which rviz finds the package media_export, the installed one before ours.
+    """Return the environment with the package's own, empty media_export as the last place on ROS_PACKAGE_PATH.
 
-    It holds nothing, but without it, as on Debian, rviz begins with an error.
+    Without a package media_export, as on Debian, rviz starts with an error.
     """
     paths = filter(None, [environment.get(_PATHS), str(package_path() / "rviz" / "packages")])
     return {**environment, _PATHS: os.pathsep.join(paths)}
 
 
-def _fitting(simulator: str) -> Path:
-    """Return a file for what flies: one of the package's, or one made of it."""
-    above = _topics_of(simulator)
-    alone = above != simulator
-    names = {_SIMULATOR: simulator, **({_ALONE: above} if alone else {_FIRST: _first_vehicle(simulator) or _FIRST})}
-    template = package_path() / "rviz" / ("drone.rviz" if alone else "fleet.rviz")
-    if all(name == given for name, given in names.items()):
+def _config_for(simulator: str) -> Path:
+    """Return an rviz file with the names of this simulator and its vehicles. Raises OSError."""
+    namespace = _wait_for_namespace(simulator)
+    is_alone = namespace != simulator
+    names = {_SIMULATOR: simulator, **({_ALONE: namespace} if is_alone else {_FIRST: _first_vehicle(simulator)})}
+    template = package_path() / "rviz" / ("drone.rviz" if is_alone else "fleet.rviz")
+    if all(new == old for old, new in names.items()):
         return template
-    made = cache_path() / "rviz" / template.name
-    made.parent.mkdir(parents=True, exist_ok=True)
-    writing.write(made, renamed(template.read_text(encoding="utf-8"), names))
-    return made
+    config = cache_path() / "rviz" / template.name
+    config.parent.mkdir(parents=True, exist_ok=True)
+    writing.write(config, rename(template.read_text(encoding="utf-8"), names))
+    return config
 
 
-def renamed(text: str, names: Mapping[str, str]) -> str:
-    """Return the text of a file of rviz with other names in its topics, frames and titles.
+def rename(text: str, names: Mapping[str, str]) -> str:
+    """Return the text of an rviz file with other names in its topics, frames and titles.
 
-    The file also holds the layout of the docks: Qt writes their titles as UTF-16 in hexadecimal digits, each after its
+    The file also has the layout of the docks: Qt writes their titles as UTF-16 in hexadecimal digits, each after its
     length.
     """
+
+    def replace(part: str) -> str:
+        return _NAMES.sub(lambda match: names.get(match[0], match[0]), part)
+
+    def dock(title: str) -> str:
+        encoded = title.encode("utf-16-be")
+        return f"{len(encoded):08x}{encoded.hex()}"
+
     for title in _TITLES.findall(text):
-        text = text.replace(_as_dock(title), _as_dock(_renamed(title, names)))
-    return _renamed(text, names)
+        text = text.replace(dock(title), dock(replace(title)))
+    return replace(text)
 
 
-def _renamed(text: str, names: Mapping[str, str]) -> str:
-    return _NAMES.sub(lambda found: names.get(found[0], found[0]), text)
-
-
-def _as_dock(title: str) -> str:
-    coded = title.encode("utf-16-be")
-    return f"{len(coded):08x}{coded.hex()}"
-
-
-def _topics_of(simulator: str) -> str:
+def _wait_for_namespace(simulator: str) -> str:
     """Wait for the simulator, and return the namespace of its topics for rviz. Raises OSError without a master."""
 
-    def ask(master: rosgraph.Master) -> str | None:
-        own = (topic for topic, nodes in master.getSystemState()[0] if f"/{simulator}" in nodes)
-        return next((str(topic)[: -len(_TOPIC)].strip("/") for topic in own if topic.endswith(_TOPIC)), None)
+    def namespace(master: rosgraph.Master) -> str | None:
+        topics = (topic for topic, nodes in master.getSystemState()[0] if f"/{simulator}" in nodes)
+        return next((str(topic)[: -len(_TOPIC)].strip("/") for topic in topics if topic.endswith(_TOPIC)), None)
 
-    return poll_master(_NAME, ask, f"the node /{simulator}")
+    return poll_master(_NAME, namespace, f"the node /{simulator}")
 
 
 def _first_vehicle(simulator: str) -> str:
-    """Return the name of the vehicle, one of several, that the view follows, '' for none. Raises OSError."""
-    first = first_frame(simulator)
-    found: list[str] = []
-    come = threading.Event()
+    """Return the name of the vehicle that the view follows, one of several. Raises OSError."""
+    frame = first_frame(simulator)
+    vehicles: list[str] = []
+    is_received = threading.Event()
 
-    def look(message: TFMessage) -> None:
-        for one in message.transforms:
-            if one.child_frame_id == first:
-                found.append(one.header.frame_id.rpartition("/")[0])
-                come.set()
+    def on_transforms(message: TFMessage) -> None:
+        for transform in message.transforms:
+            if transform.child_frame_id == frame:
+                vehicles.append(transform.header.frame_id.rpartition("/")[0])
+                is_received.set()
 
     rospy.init_node(_NAME, argv=[], anonymous=True, disable_signals=True)
-    rospy.Subscriber("/tf_static", TFMessage, look)
-    in_time = come.wait(_PATIENCE)
+    rospy.Subscriber("/tf_static", TFMessage, on_transforms)
+    is_in_time = is_received.wait(_FRAME_TIMEOUT)
     rospy.signal_shutdown("done")
-    if not in_time:
-        raise OSError(f"no node publishes the frame {first}")
-    return found[-1]
+    if not is_in_time:
+        raise OSError(f"no node publishes the frame {frame}")
+    return vehicles[-1] or _FIRST
 
 
 def find_rviz() -> str | None:
-    """Return the file of rviz, None where it is not installed."""
+    """Return the path of rviz's program; None if it is not installed."""
     try:
-        found: list[str] = find_node(_RVIZ, _RVIZ)
+        paths: list[str] = find_node(_RVIZ, _RVIZ)
     except rospkg.ResourceNotFound:
         return None
-    return found[0] if found else None
+    return paths[0] if paths else None
