@@ -26,12 +26,12 @@ _SCRIPT_ERROR = re.compile(r"\[(\w+)\] (.+?):(\d+): (.*)", re.DOTALL)
 
 
 class ScriptFailure(NamedTuple):
-    """Where a script failed: phase or callback, file, line (from 1); and the error."""
+    """Where a script failed: phase or callback, file, line (from 1); and the error. The page gets it with these keys."""
 
     phase: str
     file: str
     line: int
-    error: str
+    said: str
 
 
 class Simulator:
