@@ -259,10 +259,10 @@ class Interface(unittest.TestCase):
         self.assertEqual(marks["master"], OK, lines)
         self.assertEqual(marks["clock"], OK, lines)
         self.assertEqual(marks["vehicle drone"], WRONG, lines)
-        self.assertIn("script error", next(line.said for line in lines if line.what == "vehicle drone"))
+        self.assertIn("script error", next(line.text for line in lines if line.what == "vehicle drone"))
         hint = next(line for line in lines if line.what == "commands")
         self.assertEqual(hint.mark, HINT)
-        self.assertIn("start it with cmd_vel:=/drone/cmd_vel", hint.said)
+        self.assertIn("start it with cmd_vel:=/drone/cmd_vel", hint.text)
 
 
 def links(message):

@@ -71,7 +71,7 @@ def _known(monkeypatch):
         server.register_instance(answers)
         monkeypatch.setenv("ROS_MASTER_URI", served(server))
         found = Master()
-        assert [line.mark for line in found.found()] == [OK]
+        assert [line.mark for line in found.connection()] == [OK]
         return found, answers
 
     yield make
@@ -101,16 +101,16 @@ def test_without_a_master_it_ends_with_a_line_for_each_check(closed):
 @pytest.mark.parametrize("uri", ["garbage", "http://localhost:99999", "https://localhost:11311", ""])
 def test_a_master_s_address_that_is_none(monkeypatch, uri):
     monkeypatch.setenv("ROS_MASTER_URI", uri)
-    (line,) = Master().found()
+    (line,) = Master().connection()
     assert line == Line(WRONG, "master", f"ROS_MASTER_URI = '{uri}': must be like http://localhost:11311")
 
 
 def test_a_port_that_does_not_answer(monkeypatch, port):
     monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{port}")
     monkeypatch.setattr(network, "TIMEOUT", 0.1)
-    (line,) = Master().found()
+    (line,) = Master().connection()
     assert line.mark == WRONG
-    assert f"port {port} of http://localhost:{port} does not answer as a master (timed out)" in line.said
+    assert f"port {port} of http://localhost:{port} does not answer as a master (timed out)" in line.text
 
 
 class NoMaster(BaseHTTPRequestHandler):
@@ -126,9 +126,9 @@ class NoMaster(BaseHTTPRequestHandler):
 def test_a_port_with_something_else_on_it(monkeypatch):
     server = HTTPServer(("localhost", 0), NoMaster)
     monkeypatch.setenv("ROS_MASTER_URI", served(server))
-    (line,) = Master().found()
+    (line,) = Master().connection()
     assert line.mark == WRONG
-    assert "does not answer as a master (HTTP 404)" in line.said
+    assert "does not answer as a master (HTTP 404)" in line.text
     server.shutdown()
     server.server_close()
 
@@ -148,7 +148,7 @@ def test_clocks(known, graph, mark, said):
     master, _ = known(**graph)
     (line,) = master.clocks()
     assert line.mark == mark
-    assert said in line.said
+    assert said in line.text
 
 
 def test_commands_that_nobody_hears(known):
@@ -156,15 +156,15 @@ def test_commands_that_nobody_hears(known):
     master, _ = known(published=published, subscribed=[("/drone/cmd_vel", ["/drone_sim"])])
     (line,) = master.commands()
     assert line.mark == HINT
-    assert line.said.startswith("/teleop publishes /cmd_vel,") and "cmd_vel:=/drone/cmd_vel" in line.said
+    assert line.text.startswith("/teleop publishes /cmd_vel,") and "cmd_vel:=/drone/cmd_vel" in line.text
 
 
 def test_nodes_that_have_gone(known, closed):
     master, answers = known(published=[("/rosout", ["/gone"])])
     answers.node = f"http://localhost:{closed}"
-    (line,) = master.dead()
+    (line,) = master.dead_nodes()
     assert line.mark == HINT
-    assert line.said.startswith("/gone ") and "`rosnode cleanup`" in line.said
+    assert line.text.startswith("/gone ") and "`rosnode cleanup`" in line.text
 
 
 def test_all_nodes_are_asked_at_the_same_time(known, monkeypatch):
@@ -176,20 +176,20 @@ def test_all_nodes_are_asked_at_the_same_time(known, monkeypatch):
         return node == "/second"
 
     monkeypatch.setattr(master_checks, "is_alive", answer)
-    (line,) = master.dead()
+    (line,) = master.dead_nodes()
     assert line.mark == HINT
-    assert "/first, /third are" in line.said and "/second" not in line.said
+    assert "/first, /third are" in line.text and "/second" not in line.text
 
 
 def test_nodes_that_never_answer_are_named_after_one_time_limit(known, monkeypatch):
     master, _ = known(published=[("/rosout", ["/first", "/second"])])
     end = threading.Event()
     monkeypatch.setattr(master_checks, "is_alive", lambda *_: end.wait(HANGS))
-    monkeypatch.setattr(master_checks, "_ANSWERS", 0.05)
+    monkeypatch.setattr(master_checks, "_NODES_TIMEOUT", 0.05)
     (line,) = run_check("nodes", master.dead, HANGS / 10)
     end.set()
     assert line.mark == HINT
-    assert "/first, /second" in line.said
+    assert "/first, /second" in line.text
 
 
 def test_one_wait_for_the_diagnostics_of_all_simulators(known, monkeypatch):
@@ -199,7 +199,7 @@ def test_one_wait_for_the_diagnostics_of_all_simulators(known, monkeypatch):
     monkeypatch.setattr(master_checks, "_wait_for_diagnostics", lambda nodes: waits.append(nodes) or {})
     lines = list(master_checks.simulator(master))
     assert waits == [["/blue", "/red"]]
-    assert [(line.mark, line.said.split()[0]) for line in lines] == [(WRONG, "/blue"), (WRONG, "/red")]
+    assert [(line.mark, line.text.split()[0]) for line in lines] == [(WRONG, "/blue"), (WRONG, "/red")]
 
 
 def test_a_node_s_address_that_others_cannot_use(monkeypatch):
@@ -209,17 +209,17 @@ def test_a_node_s_address_that_others_cannot_use(monkeypatch):
     monkeypatch.setenv("ROS_HOSTNAME", "no.such.host.invalid")
     (line,) = environment.host_names()
     assert line.mark == WRONG
-    assert "ROS_HOSTNAME = 'no.such.host.invalid'" in line.said
+    assert "ROS_HOSTNAME = 'no.such.host.invalid'" in line.text
 
 
 def test_a_shell_without_ros(monkeypatch):
     monkeypatch.setenv("PATH", "")
     (line,) = environment.ros()
     assert line.mark == WRONG
-    assert line.said.startswith("no roslaunch, rosrun, rosmaster on the PATH: `source ")
+    assert line.text.startswith("no roslaunch, rosrun, rosmaster on the PATH: `source ")
     monkeypatch.setenv("ROS_VERSION", "2")
     (line,) = environment.ros()
-    assert "ROS 2 is sourced" in line.said
+    assert "ROS 2 is sourced" in line.text
 
 
 @pytest.mark.ros
@@ -227,7 +227,7 @@ def test_a_machine_without_rviz(monkeypatch):
     monkeypatch.setattr("drone_sim.ros.tools.show._RVIZ", "no_such_package")
     (line,) = (one for one in environment.ros() if one.what == "rviz")
     assert line.mark == HINT
-    assert "is not installed" in line.said and "web:=true" in line.said
+    assert "is not installed" in line.text and "web:=true" in line.text
 
 
 def test_a_module_that_is_missing_and_one_that_kills(tmp_path, monkeypatch):
@@ -236,7 +236,7 @@ def test_a_module_that_is_missing_and_one_that_kills(tmp_path, monkeypatch):
     (tmp_path / "versioned.py").write_text("__version__ = '1.2'\nprint('ok')\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     names = ["versioned", "kills", "no_such_module", "fails", "json"]
-    found = packages.results(names)
+    found = packages.probe_all(names)
     assert found["versioned"] == ("ok", "1.2")
     assert found["json"][0] == "ok"
     assert found["fails"] == ("failed", "RuntimeError: compiled for another numpy")

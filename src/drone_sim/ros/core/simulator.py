@@ -26,7 +26,7 @@ _SCRIPT_ERROR = re.compile(r"\[(\w+)\] (.+?):(\d+): (.*)", re.DOTALL)
 
 
 class ScriptFailure(NamedTuple):
-    """Where a script failed: phase or callback, file, line (from 1); and the error. The page gets it with these keys."""
+    """Where a script failed: phase or callback, file, line (from 1); and the error. The page gets these keys."""
 
     phase: str
     file: str

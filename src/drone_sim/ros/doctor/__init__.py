@@ -1,6 +1,6 @@
-"""`rosrun drone_sim doctor`: is all there that drone_sim needs?
+"""`rosrun drone_sim doctor`: checks of the machine and the shell that drone_sim runs in.
 
-A module here imports what may be missing only where it finds that out.
+Modules here import packages that may be missing only in the functions that check for them.
 """
 
 from __future__ import annotations
@@ -8,17 +8,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 OK, HINT, WRONG = "ok", "hint", "WRONG"
-_LONGEST = 400  # characters
+_MAX_LENGTH = 400  # characters
 
 
 class Line(NamedTuple):
-    """`mark` is OK, HINT (it works, but), or WRONG; `said` tells what is so and, unless it is well, what to do."""
+    """Result of a check: OK, HINT (it works, but could be better) or WRONG; subject; and facts with a cure, if any."""
 
     mark: str
     what: str
-    said: str
+    text: str
 
     def __str__(self) -> str:
-        """Return it as it is printed."""
-        said = " ".join(self.said.split())
-        return f"{self.mark:5}  {self.what:14}  {said[:_LONGEST]}"
+        text = " ".join(self.text.split())
+        return f"{self.mark:5}  {self.what:14}  {text[:_MAX_LENGTH]}"

@@ -1,4 +1,4 @@
-"""`rosrun drone_sim doctor`: checks the set-up; each line says ok, or what to do."""
+"""Check the set-up. Each line says ok, or what to do."""
 
 from __future__ import annotations
 
@@ -16,86 +16,86 @@ from drone_sim.ros.core.network import TIMEOUT
 from drone_sim.ros.doctor import HINT, WRONG, Line, environment, packages
 from drone_sim.ros.doctor.master import Master, simulator
 
-_SECONDS = 10.0  # for a check
-_AT_THE_END = 2.0  # s, for saying goodbye to the master
-_SOON = 1e-3  # s; 0 would be never
+_TIMEOUT = 10.0  # s, for a check
+_END_TIMEOUT = 2.0  # s, for unregistering from the master
+_MIN_TIMER = 1e-3  # s; 0 would disable the timer
 _EPILOG = "The exit status is 0, or 1 if something is WRONG. It works without a master."
-
-
 Check = Callable[[], Iterable[Line]]
 
 
 def run_checks(thorough: bool = True) -> Iterator[Line]:
-    """Yield what the checks find, as it is found; with `thorough` those that take long, too. Main thread only."""
+    """Yield the lines of all checks, each as soon as it is known; `thorough` adds slow checks. Main thread only."""
     master = Master()
     checks: list[tuple[str, Check, float]] = [
-        ("Python", environment.python, _SECONDS),
-        ("ROS", environment.ros, _SECONDS),
-        *([("packages", packages.packages, packages.TIMEOUT + _SECONDS)] if thorough else []),
-        ("host names", environment.host_names, _SECONDS),
-        ("host names", environment.across, _SECONDS),
-        ("master", master.found, _SECONDS),
-        ("clock", master.clocks, _SECONDS),
-        ("nodes", master.dead, _SECONDS),
-        ("commands", master.commands, _SECONDS),
-        ("simulator", lambda: simulator(master), _SECONDS),
+        ("Python", environment.python, _TIMEOUT),
+        ("ROS", environment.ros, _TIMEOUT),
+        *([("packages", packages.packages, packages.TIMEOUT + _TIMEOUT)] if thorough else []),
+        ("host names", environment.host_names, _TIMEOUT),
+        ("host names", environment.remote_master, _TIMEOUT),
+        ("master", master.connection, _TIMEOUT),
+        ("clock", master.clocks, _TIMEOUT),
+        ("nodes", master.dead_nodes, _TIMEOUT),
+        ("commands", master.commands, _TIMEOUT),
+        ("simulator", lambda: simulator(master), _TIMEOUT),
     ]
     for what, check, seconds in checks:
         yield from run_check(what, check, seconds)
 
 
-class _TooLongError(Exception):
+class _CheckTimeout(Exception):
     pass
 
 
 def run_check(what: str, check: Check, seconds: float) -> list[Line]:
-    """Return what a check finds; where it fails or takes longer than `seconds` (real time), that. Main thread only."""
+    """Return the lines of a check, or one line if it fails or takes longer than `seconds`. Main thread only."""
     try:
-        with _limited(seconds):
-            found = list(check())
-    except _TooLongError:
-        found = [Line(WRONG, what, f"no answer within {seconds:g} s")]
-    except Exception as error:  # whatever is broken here is what the user wants to know
-        found = [Line(WRONG, what, f"cannot be checked: {type(error).__name__}: {error}")]
-    return found
+        with _time_limit(seconds):
+            return list(check())
+    except _CheckTimeout:
+        return [Line(WRONG, what, f"no answer within {seconds:g} s")]
+    except Exception as error:  # an error of any type may be the fault that the user is looking for
+        return [Line(WRONG, what, f"cannot be checked: {type(error).__name__}: {error}")]
 
 
 @contextlib.contextmanager
-def _limited(seconds: float) -> Iterator[None]:
-    def expire(_number: int, _frame: FrameType | None) -> None:
-        raise _TooLongError
+def _time_limit(seconds: float) -> Iterator[None]:
+    """Raise _CheckTimeout after `seconds` (real time); restore another timer, such as a test's, at the end."""
 
-    before = signal.signal(signal.SIGALRM, expire)
-    left, again = signal.setitimer(signal.ITIMER_REAL, seconds)  # of a timer that somebody else has set
+    def expire(_number: int, _frame: FrameType | None) -> None:
+        raise _CheckTimeout
+
+    handler = signal.signal(signal.SIGALRM, expire)
+    remaining, interval = signal.setitimer(signal.ITIMER_REAL, seconds)
     began = time.monotonic()
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
-        if left:
-            signal.setitimer(signal.ITIMER_REAL, max(left - (time.monotonic() - began), _SOON), again)
+        signal.signal(signal.SIGALRM, handler)
+        if remaining:
+            remaining = max(remaining - (time.monotonic() - began), _MIN_TIMER)
+            signal.setitimer(signal.ITIMER_REAL, remaining, interval)
 
 
 def main() -> int:
-    """Print the lines; return the exit status."""
+    """Print the lines and return the exit status."""
     parser = Parser(prog="doctor", description=__doc__, epilog=_EPILOG)
     parser.add_argument("--quick", action="store_true", help="skip packages, pictures and the test flight")
-    given = [one for one in sys.argv[1:] if ":=" not in one]  # roslaunch's and rosrun's
-    thorough = not parser.parse_args(given).quick
+    arguments = [argument for argument in sys.argv[1:] if ":=" not in argument]  # those are roslaunch's
+    thorough = not parser.parse_args(arguments).quick
     socket.setdefaulttimeout(TIMEOUT)
     marks: list[str] = []
-    with contextlib.suppress(BrokenPipeError):  # who reads has seen enough
+    with contextlib.suppress(BrokenPipeError):  # the reader has closed the pipe, as `head` does
         for line in run_checks(thorough):
             marks.append(line.mark)
             print(line, flush=True)
         wrong, hints = marks.count(WRONG), marks.count(HINT)
         print(f"{wrong} wrong, {hints} hints" if wrong or hints else "everything is ok", flush=True)
-    run_check("the end", _goodbye, _AT_THE_END)
-    os._exit(1 if WRONG in marks else 0)  # a thread of rospy's may wait for a master that has gone
+    run_check("the end", _unregister, _END_TIMEOUT)
+    os._exit(1 if WRONG in marks else 0)  # at a normal exit, a thread of rospy may wait for a master that is gone
 
 
-def _goodbye() -> list[Line]:
+def _unregister() -> list[Line]:
     rospy = sys.modules.get("rospy")
     if rospy is not None and rospy.core.is_initialized():
         rospy.signal_shutdown("ended")

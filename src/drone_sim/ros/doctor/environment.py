@@ -1,4 +1,4 @@
-"""The shell that the doctor was called from: Python, ROS, folders, the names under which nodes are reached."""
+"""Checks of the shell: Python, ROS, the log folder, and the host names by which nodes reach each other."""
 
 from __future__ import annotations
 
@@ -15,23 +15,20 @@ from drone_sim.ros.core.network import MASTER, TIMEOUT, addresses
 from drone_sim.ros.doctor import HINT, OK, WRONG, Line
 
 _CURE = "`export ROS_HOSTNAME=localhost` works if all nodes run on this machine"
-_OLDEST = (3, 10)
+_MIN_VERSION = (3, 10)
 _COMMANDS = ("roslaunch", "rosrun", "rosmaster")
 
 
 def python() -> Iterator[Line]:
-    """Is it a Python that will do, and the one that other packages' nodes find?"""
+    """Check the version of Python, and whether the shell's python3 has the package's modules."""
     version = "{}.{}.{}".format(*sys.version_info)
-    if sys.version_info < _OLDEST:
+    if sys.version_info < _MIN_VERSION:
         yield Line(WRONG, "Python", f"{version} is too old: 3.10 or newer is needed")
         return
     first, own = shutil.which("python3"), package_path() / ".venv/bin"
     if own.is_dir() and Path(sys.executable).parent != own:
-        yield Line(
-            WRONG,
-            "Python",
-            f"the doctor runs with {sys.executable}, but the package's modules are installed in {own.parent}",
-        )
+        problem = f"the doctor runs with {sys.executable}, but the package's modules are installed in {own.parent}"
+        yield Line(WRONG, "Python", problem)
     else:
         yield Line(OK, "Python", f"{version}, {sys.executable}")
     if own.is_dir() and (first is None or Path(first).parent != own):
@@ -40,18 +37,21 @@ def python() -> Iterator[Line]:
 
 
 def ros() -> Iterator[Line]:
-    """Is a ROS 1 sourced, and this package in it?"""
+    """Check that ROS 1 is sourced with this package in it, whether rviz is installed, and the log folder."""
     cure = f"`source {package_path()}/devel/setup.bash`"
     if os.environ.get("ROS_VERSION", "1") != "1":
-        said = f"ROS {os.environ['ROS_VERSION']} is sourced: open a new terminal and run only {cure}"
-        yield Line(WRONG, "ROS", said)
+        version = os.environ["ROS_VERSION"]
+        yield Line(WRONG, "ROS", f"ROS {version} is sourced: open a new terminal and run only {cure}")
         return
-    missing = [one for one in _COMMANDS if shutil.which(one) is None]
+    missing = [command for command in _COMMANDS if shutil.which(command) is None]
     if missing:
         yield Line(WRONG, "ROS", f"no {', '.join(missing)} on the PATH: {cure}, or install ROS with `./dev.sh setup`")
         return
     yield _package(cure)
-    yield _rviz()
+    from drone_sim.ros.tools import show
+
+    rviz = show.find_rviz()
+    yield Line(OK, "rviz", rviz) if rviz else Line(HINT, "rviz", f"is not installed: {show.INSTEAD}")
     yield _log_folder()
 
 
@@ -59,98 +59,76 @@ def _package(cure: str) -> Line:
     import rospkg
 
     try:
-        found = Path(rospkg.RosPack().get_path("drone_sim"))
+        folder = Path(rospkg.RosPack().get_path("drone_sim"))
     except rospkg.ResourceNotFound:
         return Line(WRONG, "ROS", f"ROS does not find the package drone_sim: {cure}")
-    if found.resolve() != package_path().resolve():
-        return Line(WRONG, "ROS", f"roslaunch would start drone_sim from {found}, not from this folder: {cure}")
-    return Line(OK, "ROS", f"{os.environ.get('ROS_DISTRO', 'ROS 1')}, drone_sim in {found}")
-
-
-def _rviz() -> Line:
-    from drone_sim.ros.tools import show
-
-    found = show.find_rviz()
-    if found is None:
-        return Line(HINT, "rviz", f"is not installed: {show.INSTEAD}")
-    return Line(OK, "rviz", found)
+    if folder.resolve() != package_path().resolve():
+        return Line(WRONG, "ROS", f"roslaunch would start drone_sim from {folder}, not from this folder: {cure}")
+    return Line(OK, "ROS", f"{os.environ.get('ROS_DISTRO', 'ROS 1')}, drone_sim in {folder}")
 
 
 def _log_folder() -> Line:
     home = os.environ.get("ROS_HOME") or "~/.ros"
     folder = Path(os.environ.get("ROS_LOG_DIR") or Path(home) / "log").expanduser()
-    there = next(one for one in (folder, *folder.parents) if one.exists())
-    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
-        return Line(
-            WRONG,
-            "log folder",
-            f"{there} is not writable, so roslaunch will not start: make it writable, or set ROS_LOG_DIR",
-        )
-    free = shutil.disk_usage(there).free / 2**20
+    existing = next(parent for parent in (folder, *folder.parents) if parent.exists())
+    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
+        problem = f"{existing} is not writable, so roslaunch will not start"
+        return Line(WRONG, "log folder", f"{problem}: make it writable, or set ROS_LOG_DIR")
+    free = shutil.disk_usage(existing).free / 2**20
     if free < 100:
         return Line(HINT, "log folder", f"{folder} has {free:.0f} MiB left: `rosclean purge` frees what old runs left")
     return Line(OK, "log folder", str(folder))
 
 
 def own_host() -> tuple[str, str]:
-    """Return the name under which nodes of this shell tell others to reach them, and what says so."""
-    for given in ("ROS_HOSTNAME", "ROS_IP"):
-        if given in os.environ:
-            return os.environ[given], given
+    """Return the host name that nodes of this shell register with the master, and its source for messages."""
+    for variable in ("ROS_HOSTNAME", "ROS_IP"):
+        if variable in os.environ:
+            return os.environ[variable], variable
     return socket.gethostname(), "the name of this machine"
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host's name means this machine, from inside only. Raises OSError for one that is not known."""
-    return all(one.startswith("127.") or one == "::1" for one in addresses(host))
+    """Return whether a host name resolves to loopback addresses only. Raises OSError for an unknown name."""
+    return all(address.startswith("127.") or address == "::1" for address in addresses(host))
 
 
 def host_names() -> Iterator[Line]:
-    """Does `localhost` mean this machine, and can its own nodes be reached under their name?"""
+    """Check that `localhost` is this machine, and that nodes can be reached by the name that they register."""
     try:
         if not is_loopback("localhost"):
             raise OSError
     except OSError:
-        yield Line(
-            WRONG,
-            "host names",
-            "'localhost' does not resolve to this machine: add the line '127.0.0.1 localhost' to /etc/hosts",
-        )
-    host, given = own_host()
+        cure = "add the line '127.0.0.1 localhost' to /etc/hosts"
+        yield Line(WRONG, "host names", f"'localhost' does not resolve to this machine: {cure}")
+    host, source = own_host()
     if {"ROS_HOSTNAME", "ROS_IP"} <= os.environ.keys():
         yield Line(HINT, "host names", f"ROS_IP = '{os.environ['ROS_IP']}' has no effect, because ROS_HOSTNAME is set")
     try:
         addresses(host)
     except OSError:
-        yield Line(WRONG, "host names", f"{given} = '{host}' cannot be resolved: {_CURE}")
+        yield Line(WRONG, "host names", f"{source} = '{host}' cannot be resolved: {_CURE}")
         return
-    yield _reaches_itself(host, given)
-
-
-def _reaches_itself(host: str, given: str) -> Line:
-    """Listen on a free port and connect to it, as another node would."""
-    with socket.socket() as listening:
-        listening.bind(("", 0))
-        listening.listen(1)
+    with socket.socket() as server:  # connect to a free port of this machine, as another node would
+        server.bind(("", 0))
+        server.listen(1)
         try:
-            socket.create_connection((host, listening.getsockname()[1]), timeout=TIMEOUT).close()
+            socket.create_connection((host, server.getsockname()[1]), timeout=TIMEOUT).close()
         except OSError as error:
-            said = f"{given} = '{host}' does not lead back to this machine ({error}): {_CURE}"
-            return Line(WRONG, "host names", said)
-    return Line(OK, "host names", f"nodes from here are reached at {host} ({given})")
+            problem = f"{source} = '{host}' does not lead back to this machine ({error})"
+            yield Line(WRONG, "host names", f"{problem}: {_CURE}")
+            return
+    yield Line(OK, "host names", f"nodes from here are reached at {host} ({source})")
 
 
-def across() -> Iterator[Line]:
-    """Where the master is on another machine: can nodes there reach those from here?"""
+def remote_master() -> Iterator[Line]:
+    """If the master is on another machine, check that nodes there can reach the nodes of this shell."""
     master = urlsplit(os.environ.get("ROS_MASTER_URI", MASTER)).hostname or "localhost"
-    host, given = own_host()
+    host, source = own_host()
     try:
         if is_loopback(host) and not is_loopback(master):
+            problem = f"the master is on {master}, and nodes there cannot reach {source} = '{host}'"
             cure = "`unset ROS_HOSTNAME`, and `export ROS_IP=` with an address of this machine that they can reach"
-            yield Line(
-                WRONG,
-                "host names",
-                f"the master is on {master}, and nodes there cannot reach {given} = '{host}': {cure}",
-            )
-    except OSError:  # said by others
+            yield Line(WRONG, "host names", f"{problem}: {cure}")
+    except OSError:  # reported by other checks
         return

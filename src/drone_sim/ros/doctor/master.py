@@ -1,4 +1,4 @@
-"""The checks of the ROS master, its nodes and topics, and the /diagnostics of the simulator."""
+"""Checks of the ROS master, its nodes and topics, and the simulators' /diagnostics."""
 
 from __future__ import annotations
 
@@ -13,49 +13,46 @@ from urllib.parse import urlsplit
 from drone_sim.ros.core.network import FAILURES, MASTER, TIMEOUT, call, check_master_uri, is_alive
 from drone_sim.ros.doctor import HINT, OK, WRONG, Line
 
-_DIAGNOSTICS = 4.0  # s, for the /diagnostics of all simulators; each publishes once a second
-_MARKS = {0: OK, 1: HINT}
-_APART = 1.0  # s, between this machine's clock and that of the simulator
-_ANSWERS = 2 * TIMEOUT  # s, for the answers of all nodes; each takes two calls
+_DIAGNOSTICS_TIMEOUT = 4.0  # s, for all simulators; each publishes once a second
+_MARKS = {0: OK, 1: HINT}  # by the level of a DiagnosticStatus
+_MAX_CLOCK_DIFFERENCE = 1.0  # s, between this machine and that of the simulator
+_NODES_TIMEOUT = 2 * TIMEOUT  # s, for all nodes; each needs two calls
 _START = "`roslaunch drone_sim drone.launch` starts one"
 
 Graph = dict[str, list[str]]  # nodes by topic, or by service
 
 
 class Master:
-    """The master of this shell. The checks ask it; where `there` is False, they have nothing to ask."""
+    """Checks of the shell's master. Without a connection to it, all checks but that of the connection yield nothing."""
 
     def __init__(self) -> None:
-        """Know nothing yet but where it should be."""
         self.uri = os.environ.get("ROS_MASTER_URI", MASTER)
-        self.there = False
+        self.is_connected = False
         self.published: Graph = {}
         self.subscribed: Graph = {}
         self.services: Graph = {}
 
-    def found(self) -> Iterator[Line]:
-        """Is it there?"""
+    def connection(self) -> Iterator[Line]:
+        """Get all topics and services from the master, and yield a line about the connection."""
         try:
             check_master_uri(self.uri)
         except ValueError as error:
             yield Line(WRONG, "master", str(error))
             return
-        yield self._asked()
-
-    def _asked(self) -> Line:
         port = urlsplit(self.uri).port or 80
         try:
-            graph = call(self.uri, "getSystemState")
-            self.published, self.subscribed, self.services = (dict(one) for one in graph)
+            graphs = call(self.uri, "getSystemState")
+            self.published, self.subscribed, self.services = map(dict, graphs)
         except ConnectionRefusedError:
-            return Line(HINT, "master", f"no master runs at {self.uri}: {_START}")
+            yield Line(HINT, "master", f"no master runs at {self.uri}: {_START}")
         except FAILURES as error:
-            why = f"HTTP {error.errcode}" if isinstance(error, xmlrpc.client.ProtocolError) else str(error)
-            said = f"port {port} of {self.uri} does not answer as a master ({why or type(error).__name__})"
+            reason = f"HTTP {error.errcode}" if isinstance(error, xmlrpc.client.ProtocolError) else str(error)
+            problem = f"port {port} of {self.uri} does not answer as a master ({reason or type(error).__name__})"
             cure = "end the program that listens there, or `export ROS_MASTER_URI=` with another port"
-            return Line(WRONG, "master", f"{said}: {cure}")
-        self.there = True
-        return Line(OK, "master", f"at {self.uri}, with {len(self.nodes())} nodes")
+            yield Line(WRONG, "master", f"{problem}: {cure}")
+        else:
+            self.is_connected = True
+            yield Line(OK, "master", f"at {self.uri}, with {len(self.nodes())} nodes")
 
     def nodes(self) -> list[str]:
         """Return the names of all nodes."""
@@ -63,65 +60,64 @@ class Master:
         return sorted({node for graph in graphs for nodes in graph.values() for node in nodes})
 
     def clocks(self) -> Iterator[Line]:
-        """Does somebody tell the time that nodes go by?"""
-        if not self.there:
+        """Check that the publishers of /clock fit to /use_sim_time."""
+        if not self.is_connected:
             return
         try:
-            simulated = call(self.uri, "getParam", "/use_sim_time")
+            is_simulated = call(self.uri, "getParam", "/use_sim_time") is True
         except FAILURES:
-            simulated = False
-        tellers = self.published.get("/clock", [])
-        if simulated is True and not tellers:
+            is_simulated = False
+        publishers = self.published.get("/clock", [])
+        names = ", ".join(publishers)
+        if is_simulated and not publishers:
+            problem = "/use_sim_time is true, but no node publishes /clock, so nodes wait forever"
             cure = "`rosparam set /use_sim_time false`, or use_sim_time:=true for drone.launch; then restart the nodes"
-            yield Line(
-                WRONG, "clock", f"/use_sim_time is true, but no node publishes /clock, so nodes wait forever: {cure}"
-            )
-        elif simulated is True and len(tellers) > 1:
-            yield Line(WRONG, "clock", f"{', '.join(tellers)} all publish /clock, so time jumps: stop all but one")
-        elif simulated is True:
-            yield Line(OK, "clock", f"simulated time, published by {tellers[0]}")
-        elif tellers:
-            said = f"{', '.join(tellers)} publishes /clock, but /use_sim_time is not true, so nodes use real time"
-            yield Line(HINT, "clock", f"{said}: `rosparam set /use_sim_time true` before they start")
+            yield Line(WRONG, "clock", f"{problem}: {cure}")
+        elif is_simulated and len(publishers) > 1:
+            yield Line(WRONG, "clock", f"{names} all publish /clock, so time jumps: stop all but one")
+        elif is_simulated:
+            yield Line(OK, "clock", f"simulated time, published by {names}")
+        elif publishers:
+            problem = f"{names} publishes /clock, but /use_sim_time is not true, so nodes use real time"
+            yield Line(HINT, "clock", f"{problem}: `rosparam set /use_sim_time true` before they start")
         else:
             yield Line(OK, "clock", "real time")
 
-    def dead(self) -> Iterator[Line]:
-        """Yield a line that names the registered nodes that do not answer."""
-        dead = self._unanswered() if self.there else []
-        if dead:
-            nodes = f"{', '.join(dead)} {'is' if len(dead) == 1 else 'are'} registered and"
-            cure = "`rosnode cleanup` removes dead nodes; a node on a machine that you cannot reach may be alive"
-            yield Line(HINT, "nodes", f"{nodes} did not answer within {_ANSWERS:g} s: {cure}")
-
-    def _unanswered(self) -> list[str]:
-        """Ask all nodes at the same time: looking up the name of a host that is gone may block for 20 s."""
+    def dead_nodes(self) -> Iterator[Line]:
+        """Yield a line with the registered nodes that do not answer."""
+        if not self.is_connected:
+            return
         nodes, alive = self.nodes(), set()
 
         def ask(node: str) -> None:
             if is_alive(self.uri, node):
                 alive.add(node)
 
+        # One thread for each node: looking up the name of a host that is gone may block for 20 s.
         threads = [threading.Thread(target=ask, args=(node,), daemon=True) for node in nodes]
         for thread in threads:
             thread.start()
-        end = time.monotonic() + _ANSWERS
+        deadline = time.monotonic() + _NODES_TIMEOUT
         for thread in threads:
-            thread.join(max(end - time.monotonic(), 0.0))
-        return [node for node in nodes if node not in alive]
+            thread.join(max(deadline - time.monotonic(), 0.0))
+        dead = [node for node in nodes if node not in alive]
+        if dead:
+            problem = f"{', '.join(dead)} {'is' if len(dead) == 1 else 'are'} registered and did not answer"
+            cure = "`rosnode cleanup` removes dead nodes; a node on a machine that you cannot reach may be alive"
+            yield Line(HINT, "nodes", f"{problem} within {_NODES_TIMEOUT:g} s: {cure}")
 
     def commands(self) -> Iterator[Line]:
-        """Are there commands that nobody hears?"""
-        heard = [topic for topic in self.subscribed if topic.endswith("/cmd_vel")]
+        """Yield a line for each cmd_vel topic that is published without a subscriber."""
+        received = [topic for topic in self.subscribed if topic.endswith("/cmd_vel")]
         for topic, nodes in self.published.items():
             if topic.endswith("cmd_vel") and topic not in self.subscribed:
-                cure = f"start it with cmd_vel:={heard[0]}" if heard else "no simulator with a drone is running"
+                cure = f"start it with cmd_vel:={received[0]}" if received else "no simulator with a drone is running"
                 yield Line(HINT, "commands", f"{', '.join(nodes)} publishes {topic}, which has no subscriber: {cure}")
 
 
 def simulator(master: Master) -> Iterator[Line]:
-    """Yield what the simulators publish on /diagnostics."""
-    if not master.there:
+    """Yield the lines that the simulators publish on /diagnostics."""
+    if not master.is_connected:
         return
     nodes = sorted({node for name, nodes in master.services.items() if name.endswith("/save_scene") for node in nodes})
     if not nodes:
@@ -130,14 +126,14 @@ def simulator(master: Master) -> Iterator[Line]:
     messages = _wait_for_diagnostics(nodes)
     for node in nodes:
         if node in messages:
-            yield from _diagnosed(node, messages[node])
+            yield from _diagnostics_lines(node, messages[node])
         else:
-            said = f"{node} published nothing on /diagnostics within {_DIAGNOSTICS:g} s: stop and restart it"
-            yield Line(WRONG, "simulator", said)
+            problem = f"{node} published nothing on /diagnostics within {_DIAGNOSTICS_TIMEOUT:g} s"
+            yield Line(WRONG, "simulator", f"{problem}: stop and restart it")
 
 
 def _wait_for_diagnostics(nodes: list[str]) -> dict[str, Any]:
-    """Return the first message of each node; without those that publish none within _DIAGNOSTICS."""
+    """Return the first message of each node that publishes one within _DIAGNOSTICS_TIMEOUT."""
     import rospy
     from diagnostic_msgs.msg import DiagnosticArray
 
@@ -154,18 +150,18 @@ def _wait_for_diagnostics(nodes: list[str]) -> dict[str, Any]:
             complete.set()
 
     subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, take)
-    complete.wait(_DIAGNOSTICS)
+    complete.wait(_DIAGNOSTICS_TIMEOUT)
     subscriber.unregister()
     return dict(received)
 
 
-def _diagnosed(node: str, message: Any) -> Iterator[Line]:
-    simulated = False
-    for one in message.status:
-        what = one.name.removeprefix(f"{node[1:]}: ")
-        yield Line(_MARKS.get(one.level, WRONG), what, one.message)
-        simulated |= any(pair.key == "stamps" and pair.value.startswith("simulated") for pair in one.values)
-    apart = time.time() - message.header.stamp.to_sec()
-    if not simulated and abs(apart) > _APART:
-        said = f"the clocks of this machine and of {node} differ by {apart:.1f} s: run chrony on both"
-        yield Line(HINT, "clock", said)
+def _diagnostics_lines(node: str, message: Any) -> Iterator[Line]:
+    is_simulated = False
+    for status in message.status:
+        what = status.name.removeprefix(f"{node[1:]}: ")
+        yield Line(_MARKS.get(status.level, WRONG), what, status.message)
+        is_simulated |= any(pair.key == "stamps" and pair.value.startswith("simulated") for pair in status.values)
+    difference = time.time() - message.header.stamp.to_sec()
+    if not is_simulated and abs(difference) > _MAX_CLOCK_DIFFERENCE:
+        problem = f"the clocks of this machine and of {node} differ by {difference:.1f} s"
+        yield Line(HINT, "clock", f"{problem}: run chrony on both")

@@ -1,6 +1,6 @@
-"""Tries one thing after the other, in a process of its own that may die: what cannot be imported, EGL, a flight.
+"""Program that imports modules, creates a renderer and flies, in a process that may crash.
 
-Prints `NAME begins`, then `NAME ok TEXT` or `NAME failed TEXT`, with tabs in between.
+For each name it prints `NAME begins`, then `NAME ok TEXT` or `NAME failed TEXT`, separated by tabs.
 """
 
 from __future__ import annotations
@@ -13,25 +13,24 @@ import sys
 from collections.abc import Iterator
 
 RENDERER, FLIGHT = "renderer", "flight"
-_HEIGHT, _ERROR = 0.8, 0.05  # m: config/drone.yaml's, and what is near enough
+_HEIGHT, _TOLERANCE = 0.8, 0.05  # m; the height is that of config/drone.yaml
 _STEPS = 20
 
 
-def _module(name: str) -> str:
-    made = importlib.import_module(name)
-    version = getattr(made, "__version__", "")
-    return str(version) if isinstance(version, str) else ""
+def _import(name: str) -> str:
+    version = getattr(importlib.import_module(name), "__version__", "")
+    return version if isinstance(version, str) else ""
 
 
-def _renderer() -> str:
+def _create_renderer() -> str:
     from drone_sim.render import context
 
     with context.create(0) as gl:
-        by = "the processor draws" if context.is_software(gl) else "a graphics card draws"
-        return f"{gl.info['GL_RENDERER']}: {by}"
+        processor = "the processor draws" if context.is_software(gl) else "a graphics card draws"
+        return f"{gl.info['GL_RENDERER']}: {processor}"
 
 
-def _flight() -> str:
+def _fly() -> str:
     from drone_sim.run import parameters
     from drone_sim.run.simulation import Simulation
 
@@ -42,42 +41,40 @@ def _flight() -> str:
         height, seconds = simulation.drone.body.state.position[2], simulation.time
     finally:
         simulation.close()
-    if not abs(height - _HEIGHT) < _ERROR:
+    if not abs(height - _HEIGHT) < _TOLERANCE:
         raise RuntimeError(f"after {seconds:g} s its height was {height:.2f} m, not {_HEIGHT} m")
     return f"hovers at {height:.2f} m"
 
 
-_SPECIAL = {RENDERER: _renderer, FLIGHT: _flight}
+_PROBES = {RENDERER: _create_renderer, FLIGHT: _fly}
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep what C code prints while it is imported away from what is printed here."""
+def _no_output() -> Iterator[None]:
+    """Discard the output of Python and C code, which would mix with the results."""
     sys.stdout.flush()
-    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
+    stdout, null = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)
     try:
         with contextlib.redirect_stdout(io.StringIO()):
             yield
     finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nowhere)
-
-
-def _tried(name: str) -> tuple[str, str]:
-    try:
-        with _quiet():
-            return "ok", _SPECIAL[name]() if name in _SPECIAL else _module(name)
-    except BaseException as error:  # an import may end the process, or be interrupted
-        return "failed", f"{type(error).__name__}: {error}"
+        os.dup2(stdout, 1)
+        os.close(stdout)
+        os.close(null)
 
 
 def main(names: list[str]) -> None:
-    """Try all of them."""
+    """Print the results for these names: modules, RENDERER and FLIGHT."""
     for name in names:
         print(name, "begins", "", sep="\t", flush=True)
-        state, text = _tried(name)
+        state = "failed"
+        try:
+            with _no_output():
+                text = _PROBES[name]() if name in _PROBES else _import(name)
+            state = "ok"
+        except BaseException as error:  # an import may raise SystemExit or KeyboardInterrupt
+            text = f"{type(error).__name__}: {error}"
         print(name, state, " ".join(text.split()), sep="\t", flush=True)
 
 
