@@ -333,5 +333,5 @@ def test_record_says_once_what_it_waits_for(monkeypatch, capsys):
     monkeypatch.setattr(record.rosgraph, "Master", Master)
     monkeypatch.setattr(record.time, "sleep", lambda _: None)
     monkeypatch.setattr(record.time, "monotonic", lambda: 0.1 * Master.asked)
-    assert record._kinds("/drone_sim") == {}
+    assert record._wait_for_topics("/drone_sim") == {}
     assert capsys.readouterr().err.startswith("record: waiting for /drone_sim")
