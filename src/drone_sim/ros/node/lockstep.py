@@ -14,8 +14,8 @@ from drone_sim.config.types import ParameterError
 from drone_sim.message_text import near_names, shown
 from drone_sim.ros.core import connections
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.core.validation import sender
 from drone_sim.ros.core.message_conversion import ros_time
+from drone_sim.ros.core.validation import sender
 from drone_sim.run.diagnosis.finding import WARN, Finding, Problem, finding
 from drone_sim.run.lockstep_parameters import AwaitedTopic, LockstepParameters
 from drone_sim.run.pacing import Throttle
