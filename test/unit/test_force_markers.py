@@ -23,13 +23,13 @@ STANDING = {"start": "landed"}
 class Topic:
     """What is sent; somebody listens, or nobody."""
 
-    watched = True
+    has_subscribers = True
 
     def __init__(self, name, _period):
         self.name, self.messages = name, []
 
-    def due(self):
-        return self.watched
+    def is_due(self):
+        return self.has_subscribers
 
     def show(self, markers):
         self.messages.append(markers)
@@ -188,10 +188,10 @@ def test_whoever_looks_changes_nothing_and_nothing_is_read_for_nobody(shown, mon
     read = Queries.contacts
     monkeypatch.setattr(Queries, "contacts", lambda *of: (next(asked), read(*of))[1])
     wall = {"scene": {"objects": [WALL]}}
-    monkeypatch.setattr(Topic, "watched", False)
+    monkeypatch.setattr(Topic, "has_subscribers", False)
     states = crashed(*shown(**wall))
     assert next(asked) == 0
-    monkeypatch.setattr(Topic, "watched", True)
+    monkeypatch.setattr(Topic, "has_subscribers", True)
     seen = shown(**wall)
     assert crashed(*seen) == states
     assert sum(message[4] is not None for message in seen[1]._topic.messages) > 30, "it lay there"

@@ -6,7 +6,7 @@ pytest.importorskip("visualization_msgs", reason="needs ROS")
 
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
-from drone_sim.ros.rviz.marker_server import PATIENCE, HeldHandles
+from drone_sim.ros.rviz.marker_server import TIMEOUT, HeldHandles
 
 TAKEN, HELD, LET_GO = (
     InteractiveMarkerFeedback.MOUSE_DOWN,
@@ -42,11 +42,11 @@ def test_a_hand_that_says_nothing_has_let_go():
     held = HeldHandles(clock)
     told(held, TAKEN, "rviz")
     for _ in range(10):
-        clock.now += 0.75 * PATIENCE
+        clock.now += 0.75 * TIMEOUT
         assert held.names() == {"Drone"}
         told(held, HELD, "rviz")
         told(held, HELD, "another rviz, which does not hold it")
-    clock.now += PATIENCE
+    clock.now += TIMEOUT
     assert held.names() == set()
     told(held, HELD, "rviz")
     assert held.names() == set(), "it comes back only when it is taken again"

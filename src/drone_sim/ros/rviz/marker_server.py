@@ -1,4 +1,4 @@
-"""Handles that slide level, rise and turn, as rviz knows them: interactive markers; and who holds which of them."""
+"""Interactive markers: a server, handles that slide level, rise and turn, and the handles that clients hold."""
 
 from __future__ import annotations
 
@@ -16,16 +16,15 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.ros.core.message_conversion import WORLD_FRAME
 
-PATIENCE = 1.0  # s; while a handle is held, rviz says so every 0.25 s
-_UPRIGHT = Quaternion(0, 2**-0.5, 0, 2**-0.5)  # a control acts along, about, or across its x axis: turned to z
+TIMEOUT = 1.0  # s; while a handle is held, rviz sends feedback every 0.25 s
+_UPRIGHT = Quaternion(0, 2**-0.5, 0, 2**-0.5)  # turns a control's x axis, along or about which it acts, to z
 
 
 class MarkerServer(InteractiveMarkerServer):
     """An interactive marker server whose timer may still publish while rospy closes the topic at the node's end."""
 
     @property
-    def watched(self) -> bool:
-        """Whether somebody listens."""
+    def has_subscribers(self) -> bool:
         return bool(self.update_pub.get_num_connections())
 
     def publish(self, update: Any) -> None:
@@ -44,14 +43,17 @@ class MarkerServer(InteractiveMarkerServer):
         super().processFeedback(feedback)
 
 
-def new_handle(name: str, looks: Sequence[Marker], scale: float = 0.5, arrows: bool = True) -> InteractiveMarker:
-    """Return a handle that slides level when its looks are dragged; with `arrows`, of `scale` m, it rises and turns."""
+def new_handle(name: str, markers: Sequence[Marker], scale: float = 0.5, arrows: bool = True) -> InteractiveMarker:
+    """Return a handle that slides level if its markers are dragged.
+
+    With `arrows`, it also has arrows and a ring of size `scale` (m), by which it rises and turns.
+    """
     handle = InteractiveMarker(name=name, scale=scale)
     handle.header.frame_id = WORLD_FRAME
     handle.pose.orientation.w = 1.0
     slide = InteractiveMarkerControl(name="slide", orientation=_UPRIGHT, always_visible=True)
     slide.interaction_mode = InteractiveMarkerControl.MOVE_PLANE
-    slide.markers = list(looks)
+    slide.markers = list(markers)
     handle.controls = [slide]
     if arrows:
         lift = InteractiveMarkerControl(name="lift", orientation=_UPRIGHT)
@@ -68,29 +70,26 @@ def level(matrix: Matrix) -> Matrix:
 
 
 class HeldHandles:
-    """The handles that clients hold; a client that has been silent for PATIENCE has released its handle, or has died.
-
-    Any thread may call all of it.
-    """
+    """Handles that clients hold. A client without feedback for TIMEOUT no longer holds its handle. Thread-safe."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
-        """Begin with none; take a monotonic clock."""
+        """`clock` must be monotonic (s)."""
         self._clock = clock
         self._lock = threading.Lock()
-        self._heard: dict[tuple[str, str], float] = {}  # by handle and client, s
+        self._received_at: dict[tuple[str, str], float] = {}  # by handle and client, s
 
     def on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
-        """Take a client's feedback on a handle; only a client that has pressed the mouse on it can hold it."""
-        held = feedback.marker_name, feedback.client_id
+        """Process a client's feedback on a handle. The client holds the handle from MOUSE_DOWN on."""
+        key = feedback.marker_name, feedback.client_id
         with self._lock:
             if feedback.event_type == InteractiveMarkerFeedback.MOUSE_UP:
-                self._heard.pop(held, None)
-            elif feedback.event_type == InteractiveMarkerFeedback.MOUSE_DOWN or held in self._heard:
-                self._heard[held] = self._clock()
+                self._received_at.pop(key, None)
+            elif feedback.event_type == InteractiveMarkerFeedback.MOUSE_DOWN or key in self._received_at:
+                self._received_at[key] = self._clock()
 
     def names(self) -> set[str]:
-        """Return the handles that are held."""
+        """Return the names of the handles that are held."""
         with self._lock:
-            since = self._clock() - PATIENCE
-            self._heard = {one: heard for one, heard in self._heard.items() if heard > since}
-            return {name for name, _ in self._heard}
+            since = self._clock() - TIMEOUT
+            self._received_at = {key: time for key, time in self._received_at.items() if time > since}
+            return {name for name, _ in self._received_at}

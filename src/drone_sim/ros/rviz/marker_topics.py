@@ -1,4 +1,4 @@
-"""Markers on one topic for rviz: made while somebody listens, and not more often than eyes need."""
+"""Topics of markers for rviz, which are drawn only if there are subscribers, with a limited rate; and their shapes."""
 
 from __future__ import annotations
 
@@ -17,120 +17,113 @@ from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.vehicle import Vehicle
 
-EYES = 0.03  # s of real time, between two messages about what moves
-_SETTLED = 3.0  # s, after which rviz has started
-WORDS = 0.19  # s, between two texts: numbers that change faster cannot be read
-
-
+MOTION_PERIOD = 0.03  # s of real time, between two messages with moving markers
+TEXT_PERIOD = 0.19  # s, between two texts: numbers that change faster cannot be read
+_START_TIME = 3.0  # s, within which rviz starts
 _Point = TypeVar("_Point")
 
 
 def namespace(simulation: Simulation) -> str:
-    """Return where the topics on all that flies are: in the only vehicle's namespace, or in the node's."""
-    alone = [one.name for one in simulation.vehicles.values() if one.parameters.is_alone]
+    """Return the namespace of topics about all vehicles: that of the only vehicle, or the node's."""
+    alone = [vehicle.name for vehicle in simulation.vehicles.values() if vehicle.parameters.is_alone]
     return alone[0] if alone else str(rospy.get_name())
 
 
 class MarkerTopic:
-    """A latched MarkerArray, in the frame `world` unless a marker has another; ids are places in the list."""
+    """A latched MarkerArray. Markers without a frame are in `world`; their ids are their indices in the list."""
 
     def __init__(self, topic: str, period: float):
-        """Advertise `topic`; `period` is in s of real time."""
+        """Advertise `topic`; `period` between two messages is in s of real time."""
         self._name = topic.rpartition("/")[2]
         self._throttle = Throttle(period)
         self._new_subscribers = NewSubscribers()
         self._publisher = rospy.Publisher(
             topic, MarkerArray, subscriber_listener=self._new_subscribers, queue_size=1, latch=True
         )
-        self._shown: list[Marker] = []
+        self._published: list[Marker] = []
 
     @property
-    def watched(self) -> bool:
-        """Whether somebody listens."""
+    def has_subscribers(self) -> bool:
         return bool(self._publisher.get_num_connections())
 
-    def due(self) -> bool:
-        """Tell whether it is time for another message; it counts as sent then."""
-        return self.watched and self._throttle.passes()
+    def is_due(self) -> bool:
+        """Return whether there are subscribers and the period has passed; if so, a new period begins."""
+        return self.has_subscribers and self._throttle.passes()
 
     def repeat(self) -> None:
-        """Show what stands still once more, a while after somebody has come.
-
-        While it starts, rviz may forget what it has been sent.
-        """
-        if self._new_subscribers.have_settled(_SETTLED) and self._shown:
-            self._publisher.publish(MarkerArray(self._shown))
+        """Publish the last message again, _START_TIME after a subscriber has come: rviz loses messages at its start."""
+        if self._new_subscribers.have_settled(_START_TIME) and self._published:
+            self._publisher.publish(MarkerArray(self._published))
 
     def show(self, markers: Sequence[Marker | None]) -> None:
-        """Publish; None deletes the marker with that id, and so does a list that is shorter than the last one."""
-        shown = [marker or Marker(action=Marker.DELETE) for marker in markers]
-        if not shown or shown[0].action != Marker.DELETEALL:
-            shown += [Marker(action=Marker.DELETE) for _ in self._shown[len(shown) :]]
-        for number, marker in enumerate(shown):
+        """Publish markers. None deletes the marker with that index; so does a list shorter than the last one."""
+        message = [marker or Marker(action=Marker.DELETE) for marker in markers]
+        if not message or message[0].action != Marker.DELETEALL:
+            message += [Marker(action=Marker.DELETE) for _ in self._published[len(message) :]]
+        for number, marker in enumerate(message):
             marker.header.frame_id, marker.id = marker.header.frame_id or WORLD_FRAME, number
-            before = self._shown[number].ns if number < len(self._shown) else ""
+            before = self._published[number].ns if number < len(self._published) else ""
             marker.ns = marker.ns or (marker.action == Marker.DELETE and before) or self._name
-        self._shown = shown
-        self._publisher.publish(MarkerArray(shown))
+        self._published = message
+        self._publisher.publish(MarkerArray(message))
 
 
 class FleetMarkers:
-    """What is drawn of each vehicle, on a topic `view/NAME`: anew where it has changed, while somebody listens."""
+    """Base class of markers for each vehicle, on the topic `view/NAME`, published when they change."""
 
     name = ""
-    period = EYES  # s of real time
+    period = MOTION_PERIOD  # s of real time
 
     def __init__(self, simulation: Simulation):
         """Advertise for the vehicles of `simulation`."""
         self._simulation = simulation
         self._topic = MarkerTopic(f"{namespace(simulation)}/view/{self.name}", self.period)
-        self._shown: list[Any] = []
+        self._published: list[Any] = []  # the inputs of the markers
 
     def update(self) -> None:
-        """Publish what has changed, if anybody listens."""
-        if not self._topic.due():
+        """Publish the markers if they have changed and there are subscribers."""
+        if not self._topic.is_due():
             return
         vehicles = list(self._simulation.vehicles.values())
-        seen = [self._look(vehicle) for vehicle in vehicles]
-        if seen != self._shown:
-            self._shown = seen
-            self._topic.show([one for pair in zip(vehicles, seen) for one in self._draw(*pair)])
+        inputs = [self._inputs(vehicle) for vehicle in vehicles]
+        if inputs != self._published:
+            self._published = inputs
+            self._topic.show([marker for pair in zip(vehicles, inputs) for marker in self._markers(*pair)])
 
-    def _look(self, vehicle: Vehicle) -> Any:
-        """Return what its markers are made of."""
+    def _inputs(self, vehicle: Vehicle) -> Any:
+        """Return the values that a vehicle's markers depend on."""
         raise NotImplementedError
 
-    def _draw(self, vehicle: Vehicle, seen: Any) -> Sequence[Marker | None]:
-        """Return its markers: always as many, None for what is not there."""
+    def _markers(self, vehicle: Vehicle, inputs: Any) -> Sequence[Marker | None]:
+        """Return a vehicle's markers, always the same number; None for a marker that is not drawn."""
         raise NotImplementedError
 
 
 def new_marker(
     kind: int, rgba: Sequence[float], scale: Sequence[float], points: Sequence[Sequence[float]] = (), ns: str = ""
 ) -> Marker:
-    """Return a marker at the world's origin, of points in m where its kind has some, in the namespace `ns`."""
-    points = [Point(*one) for one in points]
+    """Return a marker at its frame's origin, in the namespace `ns`; `points` (m) are for kinds that need them."""
+    points = [Point(*point) for point in points]
     marker = Marker(type=kind, ns=ns, color=ColorRGBA(*rgba), scale=Vector3(*scale), points=points)
     marker.pose.orientation.w = 1.0
     return marker
 
 
 def fan(middle: _Point, rim: Sequence[_Point]) -> list[_Point]:
-    """Return the triangles from a point to the sides of a closed rim, corner by corner."""
-    return [corner for one, other in zip(rim, [*rim[1:], rim[0]]) for corner in (middle, one, other)]
+    """Return the corners of the triangles between a point and the sides of a closed rim."""
+    return [corner for first, second in zip(rim, [*rim[1:], rim[0]]) for corner in (middle, first, second)]
 
 
 def band(left: Sequence[_Point], right: Sequence[_Point]) -> list[_Point]:
-    """Return the triangles between two lines of as many points, corner by corner."""
+    """Return the corners of the triangles between two lines with the same number of points."""
     squares = zip(left, right, right[1:], left[1:])
     return [corner for a, b, c, d in squares for corner in (a, b, c, a, c, d)]
 
 
-def beside(vehicle: Vehicle, marker: Marker) -> Marker:
-    """Let a marker, which is given in world axes from the vehicle's place, follow the vehicle in rviz.
+def attach_upright(vehicle: Vehicle, marker: Marker) -> Marker:
+    """Attach a marker, whose pose has the vehicle's position and the world's axes, to the vehicle's frame.
 
-    It is attached to the vehicle's frame and turned back upright: rviz shows it where the vehicle is now, but a marker
-    in `world` where the vehicle was when it was sent.
+    In this frame rviz draws it at the vehicle's present position; in `world`, at that of the last message.
     """
     back = frames.invert(frames.from_quaternion((0, 0, 0), vehicle.body.state.orientation))
     marker.header.frame_id, marker.frame_locked = frame(vehicle.parameters, BASE_LINK), True

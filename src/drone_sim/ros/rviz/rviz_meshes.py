@@ -1,39 +1,37 @@
-"""What has a texture, as files that rviz can read: OBJ, its materials, PNG."""
+"""Files of textured visuals for rviz: OBJ, its materials, and PNG."""
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Hashable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 
+from drone_sim.files.resources import identity_of
 from drone_sim.render import surfaces
 from drone_sim.render.surfaces import Surface
 from drone_sim.shapes.visual import Visual
 
-_SEEN_THROUGH = 0.98  # opacity below which rviz looks at a texture's own alpha
+_MAX_TRANSPARENT = 0.98  # opacity below which rviz uses the alpha of a texture
 
 
 class RvizMeshes:
-    """Writes visuals into a folder of its own, each once: rviz keeps for ever what it has read under a name."""
+    """Temporary folder with files of visuals, each with a new name: rviz never reads a file of one name again."""
 
     def __init__(self) -> None:
-        """Begin without a folder; the first file makes it."""
-        self._folder: tempfile.TemporaryDirectory | None = None
+        self._folder: tempfile.TemporaryDirectory | None = None  # made for the first file
         self._written: dict[Hashable, str] = {}
 
     def resource(self, visual: Visual, glow: float) -> str:
-        """Return the URL of a visual's mesh, laid with its texture as the cameras lay it, tinted with its rgba.
+        """Return the URL of a visual's mesh, textured as in the cameras' pictures, and tinted with its rgba.
 
-        `glow` is the share of its light (0..1) that does not depend on the viewpoint: rviz's only lamp moves with the
-        viewpoint. Raises ValueError for what cannot be read, OSError for what cannot be written.
+        `glow` (0..1) is the share of light that does not depend on the viewpoint; rviz's only lamp moves with the
+        viewpoint. Raises ValueError for a file that cannot be read, OSError for one that cannot be written.
         """
-        key = (replace(visual, key=None), glow, *map(_age, (*visual.shape.files, visual.texture)))
+        key = (replace(visual, key=None), glow, *map(identity_of, (*visual.shape.files, visual.texture)))
         if key not in self._written:
             self._written[key] = self._write(visual, glow)
         return self._written[key]
@@ -62,14 +60,6 @@ class RvizMeshes:
         return f"file://{stem}.obj"
 
 
-def _age(file: str) -> tuple[int, int]:
-    """Return a value that changes when a file is written again."""
-    if not file:
-        return (0, 0)
-    state = os.stat(file)
-    return state.st_mtime_ns, state.st_size
-
-
 def _write_image(path: Path, image: np.ndarray) -> None:
     order = cv2.COLOR_RGBA2BGRA if image.shape[2] == 4 else cv2.COLOR_RGB2BGR
     if not cv2.imwrite(str(path), cv2.cvtColor(image, order)):
@@ -79,22 +69,18 @@ def _write_image(path: Path, image: np.ndarray) -> None:
 def _material(number: int, surface: Surface, tint: tuple[float, ...], glow: float, image: str) -> list[str]:
     red, green, blue, alpha = np.multiply(tint, surface.rgba)
     if surface.transparent:
-        alpha = min(alpha, _SEEN_THROUGH)
+        alpha = min(alpha, _MAX_TRANSPARENT)
     lines = [f"newmtl {number}", "Ka 0 0 0", "Ks 0 0 0", f"d {alpha:g}", "illum 1"]
     for name, share in (("Kd", 1 - glow), ("Ke", glow)):
         lines.append(f"{name} {red * share:g} {green * share:g} {blue * share:g}")
     return [*lines, f"map_Kd {image}"] if image else lines
 
 
-def _rows(array: np.ndarray) -> Any:
-    return array.tolist()
-
-
 def _triangles(surface: Surface, first: int) -> list[str]:
-    """Return the lines of a surface whose vertices count from `first`."""
+    """Return the OBJ lines of a surface; its vertices are numbered from `first`."""
     uv = np.zeros((len(surface.vertices), 2)) if surface.uv is None else surface.uv
-    lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in _rows(surface.vertices)]
-    lines += [f"vt {u:.7g} {v:.7g}" for u, v in _rows(uv)]
-    lines += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in _rows(surface.normals)]
-    lines += [f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}" for a, b, c in _rows(surface.faces.astype(int) + first)]
+    lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in surface.vertices.tolist()]
+    lines += [f"vt {u:.7g} {v:.7g}" for u, v in uv.tolist()]
+    lines += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in surface.normals.tolist()]
+    lines += [f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}" for a, b, c in (surface.faces.astype(int) + first).tolist()]
     return lines

@@ -1,7 +1,7 @@
-"""The scene's objects and the vehicles as they look, in rviz: `<drone>/scene` and `view/bodies`, latched MarkerArrays.
+"""Markers of the scene's objects on `<drone>/scene`, and of the vehicles on `view/bodies`, both latched MarkerArrays.
 
-Dummies are small balls, paths are lines. Triangles are lit by the same sun as in the cameras' pictures: rviz's own lamp
-moves with the viewpoint, and leaves sides black.
+Dummies are small balls, paths are lines. Triangles are lit by the same sun as in the cameras' pictures, because rviz's
+own lamp moves with the viewpoint, and leaves some sides black.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from drone_sim.mechanics.path import Path
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.render.programs import TO_SUN
 from drone_sim.ros.core import message_conversion
-from drone_sim.ros.rviz.marker_topics import WORDS, MarkerTopic, namespace, new_marker
+from drone_sim.ros.rviz.marker_topics import TEXT_PERIOD, MarkerTopic, namespace, new_marker
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.kinds.dummy import Dummy
@@ -32,8 +32,8 @@ from drone_sim.shapes.shape import Corner, Primitive, Rgba
 from drone_sim.shapes.visual import Visual
 from drone_sim.vehicles.vehicle import Vehicle
 
-_PERIOD = 0.19  # s of real time, between two looks at what has moved
-_GLOW = 0.6  # of what is seen from behind the lamp
+_PERIOD = 0.19  # s of real time, between two messages
+_GLOW = 0.6  # share of light that does not depend on the viewpoint
 _KINDS = {
     "cube": Marker.CUBE,
     "sphere": Marker.SPHERE,
@@ -41,43 +41,44 @@ _KINDS = {
     "mesh": Marker.MESH_RESOURCE,
     "triangles": Marker.TRIANGLE_LIST,
 }
-_FROM_ITS_FILE = (0.0, 0.0, 0.0, 0.0)  # the color by which rviz keeps a mesh's own
+_KEEP_MATERIALS = (0.0, 0.0, 0.0, 0.0)  # with this color rviz uses the materials of the mesh file
 _DUMMY = (0.9, 0.9, 0.95, 0.8)
 _PATH = (0.2, 0.5, 0.9, 0.8)
 _WIDTH = 0.01  # m, of a line
-_MOST = 2000  # points of a line
+_MAX_POINTS = 2000  # of a line
 _SUN = np.array(TO_SUN) / np.linalg.norm(TO_SUN)
-_FROM_BELOW, _FROM_ABOVE, _FROM_SUN = np.array([(0.42, 0.41, 0.40), (0.52, 0.54, 0.57), (0.54, 0.52, 0.48)])
+_LIGHT_BELOW, _LIGHT_ABOVE, _LIGHT_SUN = np.array([(0.42, 0.41, 0.40), (0.52, 0.54, 0.57), (0.54, 0.52, 0.48)])
 
 
 class SceneMarkers:
-    """Shows the objects of the scene as they stand, each in a namespace of its name. The floor is not among them."""
+    """Publisher of all objects in the scene but the floor. Each marker's namespace is the object's name."""
 
     def __init__(self, simulation: Simulation, files: RvizMeshes):
-        """Advertise for the scene of `simulation`; what has a texture is written among `files`."""
+        """Advertise for the scene of `simulation`; textured visuals are written to `files`."""
         self._simulation = simulation
         self._files = files
-        self._shown: tuple[list[Visual], list[str], np.ndarray] | None = None
-        self._frames: list[Marker] = []  # of what has no body
+        self._published: tuple[list[Visual], list[str], np.ndarray] | None = None
+        self._published_bodiless: list[Marker] = []
         self._topic = MarkerTopic(f"{namespace(simulation)}/scene", _PERIOD)
 
     def update(self) -> None:
-        """Publish what has moved, come or gone, if anybody listens."""
+        """Publish the objects if any has changed and there are subscribers."""
         self._topic.repeat()
-        if not self._topic.due():
+        if not self._topic.is_due():
             return
         (visuals, poses), names = self._simulation.scene.visuals(), self._simulation.scene.visual_names()
         bodiless = [*bodiless_markers(self._simulation.scene.objects.values())]
-        same = self._shown and (visuals, names) == self._shown[:2] and np.array_equal(poses, self._shown[2])
-        if same and bodiless == self._frames:
+        before = self._published
+        is_same = before and (visuals, names) == before[:2] and np.array_equal(poses, before[2])
+        if is_same and bodiless == self._published_bodiless:
             return
-        self._shown, self._frames = (visuals, names, poses), copy.deepcopy(bodiless)
+        self._published, self._published_bodiless = (visuals, names, poses), copy.deepcopy(bodiless)
         markers = [Marker(action=Marker.DELETEALL)]
         for name, visual, pose in zip(names, visuals, poses):
-            made = markers_of(visual, tuple(pose[:3].ravel().tolist()), self._files)
-            for marker in made:
+            of_visual = markers_of(visual, tuple(pose[:3].ravel().tolist()), self._files)
+            for marker in of_visual:
                 marker.ns = name
-            markers += made
+            markers += of_visual
         markers += bodiless
         for marker in markers:
             marker.frame_locked = True
@@ -85,27 +86,24 @@ class SceneMarkers:
 
 
 class VehicleMarkers:
-    """Shows every vehicle; published when one has come or gone.
-
-    Each part hangs on the frame of its link, and so moves with it.
-    """
+    """Publisher of the vehicles, when one is added or removed. Markers move with the frames of links."""
 
     def __init__(self, simulation: Simulation, files: RvizMeshes):
-        """Advertise for the vehicles of `simulation`; what has a texture is written among `files`."""
+        """Advertise for the vehicles of `simulation`; textured visuals are written to `files`."""
         self._simulation = simulation
         self._files = files
-        self._topic = MarkerTopic(f"{namespace(simulation)}/view/bodies", WORDS)
-        self._shown = -1  # topology version
+        self._topic = MarkerTopic(f"{namespace(simulation)}/view/bodies", TEXT_PERIOD)
+        self._published = -1  # topology version
 
     def update(self) -> None:
-        """Publish what is new, if anybody listens."""
+        """Publish the vehicles if any was added or removed and there are subscribers."""
         self._topic.repeat()
-        if self._simulation.topology_version != self._shown and self._topic.due():
-            self._shown = self._simulation.topology_version
-            looks = [one for vehicle in self._simulation.vehicles.values() for one in self._looks(vehicle)]
-            self._topic.show([Marker(action=Marker.DELETEALL), *looks])  # some have gone, or have another name
+        if self._simulation.topology_version != self._published and self._topic.is_due():
+            self._published = self._simulation.topology_version
+            markers = [marker for vehicle in self._simulation.vehicles.values() for marker in self._markers(vehicle)]
+            self._topic.show([Marker(action=Marker.DELETEALL), *markers])
 
-    def _looks(self, vehicle: Vehicle) -> list[Marker]:
+    def _markers(self, vehicle: Vehicle) -> list[Marker]:
         markers = []
         for visual, (link, matrix) in zip(
             self._simulation.world.pictures.visuals([vehicle.body.number]), vehicle.body.visual_places
@@ -118,27 +116,27 @@ class VehicleMarkers:
 
 
 def markers_of(visual: Visual, matrix: frames.Matrix, files: RvizMeshes) -> Sequence[Marker]:
-    """Return what rviz makes of one visual at `matrix`, with its texture where the cameras show one, too."""
+    """Return the markers of a visual at the pose `matrix`, with its texture if it has one."""
     if visual.texture and visual.shape.has_uv:
         try:
-            marker = _marker(Marker.MESH_RESOURCE, matrix, (1, 1, 1), _FROM_ITS_FILE)
+            marker = _marker(Marker.MESH_RESOURCE, matrix, (1, 1, 1), _KEEP_MATERIALS)
             marker.mesh_resource, marker.mesh_use_embedded_materials = files.resource(visual, _GLOW), True
             return [marker]
         except (ValueError, OSError) as error:
             rospy.logwarn_throttle(5, f"rviz shows an object without its texture: {error}")
-    return [marker_of(one, matrix, visual.rgba) for one in visual.shape.for_rviz()]
+    return [marker_of(primitive, matrix, visual.rgba) for primitive in visual.shape.for_rviz()]
 
 
 def marker_of(primitive: Primitive, matrix: frames.Matrix, rgba: Rgba) -> Marker:
-    """Return a primitive of a shape that stands at `matrix`, world from shape."""
-    place = frames.multiply(matrix, primitive.local)
-    marker = _marker(_KINDS[primitive.kind], place, primitive.scale, rgba)
+    """Return the marker of a primitive in a shape whose pose is `matrix`."""
+    pose = frames.multiply(matrix, primitive.local)
+    marker = _marker(_KINDS[primitive.kind], pose, primitive.scale, rgba)
     if primitive.kind == "triangles":
-        _paint(marker, primitive.corners, place, rgba)
+        _set_triangles(marker, primitive.corners, pose, rgba)
     if primitive.kind == "mesh":
-        own = rgba == WHITE
-        marker.mesh_resource, marker.mesh_use_embedded_materials = f"file://{primitive.file}", own
-        marker.color = ColorRGBA(*(_FROM_ITS_FILE if own else rgba))
+        has_materials = rgba == WHITE
+        marker.mesh_resource, marker.mesh_use_embedded_materials = f"file://{primitive.file}", has_materials
+        marker.color = ColorRGBA(*(_KEEP_MATERIALS if has_materials else rgba))
     return marker
 
 
@@ -147,21 +145,21 @@ def _marker(kind: int, matrix: frames.Matrix, size: Sequence[float], rgba: Seque
 
 
 def bodiless_markers(objects: Iterable[SceneObject]) -> Iterator[Marker]:
-    """Yield a marker for each dummy and each path among some objects, in the frame `world`."""
-    for one in objects:
-        if isinstance(one, Dummy):
-            ball = new_marker(Marker.SPHERE, _DUMMY, [one.size] * 3, ns=one.name)
-            ball.pose.position = Point(*frames.position(one.matrix()))
+    """Yield a marker for each dummy and each path in `objects`, in the frame `world`."""
+    for item in objects:
+        if isinstance(item, Dummy):
+            ball = new_marker(Marker.SPHERE, _DUMMY, [item.size] * 3, ns=item.name)
+            ball.pose.position = Point(*frames.position(item.matrix()))
             yield ball
-        elif isinstance(one, Path):
-            every, matrix = -(-len(one.points) // _MOST), one.matrix()
-            points = [frames.transform(matrix, point) for point in (*one.points[:-1:every], one.points[-1])]
-            yield new_marker(Marker.LINE_STRIP, _PATH, (_WIDTH, 0, 0), points, ns=one.name)
+        elif isinstance(item, Path):
+            step, matrix = -(-len(item.points) // _MAX_POINTS), item.matrix()
+            points = [frames.transform(matrix, point) for point in (*item.points[:-1:step], item.points[-1])]
+            yield new_marker(Marker.LINE_STRIP, _PATH, (_WIDTH, 0, 0), points, ns=item.name)
 
 
-def _paint(marker: Marker, corners: tuple[Corner, ...], matrix: Matrix, rgba: Sequence[float]) -> None:
-    """Make a marker at `matrix`, as large as its scale says, these triangles (three corners each, m) of this colour."""
-    points, normals = _triangles(corners)
+def _set_triangles(marker: Marker, corners: tuple[Corner, ...], matrix: Matrix, rgba: Sequence[float]) -> None:
+    """Set the points of a marker at the pose `matrix` to triangles (three corners each, m), with lit colors."""
+    points, normals = _points_and_normals(corners)
     scale = marker.scale.x, marker.scale.y, marker.scale.z
     marker.type, marker.points = Marker.TRIANGLE_LIST, points
     colors: Any = np.minimum(_light(normals / scale, matrix) * rgba[:3], 1.0).tolist()
@@ -170,16 +168,16 @@ def _paint(marker: Marker, corners: tuple[Corner, ...], matrix: Matrix, rgba: Se
 
 
 @lru_cache
-def _triangles(corners: tuple[Corner, ...]) -> tuple[list[Point], np.ndarray]:
-    """Return the corners as rviz wants them, and the triangles' normals (m, 3), of any length."""
+def _points_and_normals(corners: tuple[Corner, ...]) -> tuple[list[Point], np.ndarray]:
+    """Return the corners as points, and the triangles' normals (m, 3), which are not unit vectors."""
     first, second, third = np.moveaxis(np.reshape(corners, (-1, 3, 3)), 1, 0)
     return [Point(*corner) for corner in corners], np.cross(second - first, third - first)
 
 
 def _light(normals: np.ndarray, matrix: Matrix) -> np.ndarray:
-    """Return what surfaces with these normals (m, 3) get of red, green and blue: as in the cameras' shaders."""
-    turned = normals @ np.reshape(matrix, (3, 4))[:, :3].T
-    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30)
-    share = 0.5 + 0.5 * turned[:, 2:]
-    ambient = (1 - share) * _FROM_BELOW + share * _FROM_ABOVE
-    return np.asarray(ambient + _FROM_SUN * np.maximum(0.85 * (turned @ _SUN)[:, None] + 0.15, 0.0))
+    """Return the RGB light (m, 3) on surfaces with these normals (m, 3), as the cameras' shaders compute it."""
+    world_normals = normals @ np.reshape(matrix, (3, 4))[:, :3].T
+    world_normals /= np.maximum(np.linalg.norm(world_normals, axis=1, keepdims=True), 1e-30)
+    above = 0.5 + 0.5 * world_normals[:, 2:]
+    ambient = (1 - above) * _LIGHT_BELOW + above * _LIGHT_ABOVE
+    return np.asarray(ambient + _LIGHT_SUN * np.maximum(0.85 * (world_normals @ _SUN)[:, None] + 0.15, 0.0))

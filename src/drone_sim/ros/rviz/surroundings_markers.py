@@ -1,4 +1,4 @@
-"""Floor, ground and sky in rviz, as the cameras show them: `<drone>/view/surroundings`."""
+"""Markers of floor, ground and sky, as the cameras show them, on `<drone>/view/surroundings`."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
 from drone_sim.render import sky
-from drone_sim.ros.rviz.marker_topics import WORDS, MarkerTopic, band, namespace, new_marker
+from drone_sim.ros.rviz.marker_topics import TEXT_PERIOD, MarkerTopic, band, namespace, new_marker
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.scene import Scene
 from drone_sim.shapes.visual import Visual
 
-_SKY = 5000.0  # m, its radius
-_BELOW = -0.06  # m, where the ground lies: the floor stands out of it
+_SKY = 5000.0  # m, radius
+_GROUND_HEIGHT = -0.06  # m; the floor is higher
 _SECTORS = 48
-# The ground, by metres beyond the floor: darker than it, and far away what the sky is at the horizon.
+# Color of the ground by distance (m) from the floor: darker than the floor; far away, as the sky at the horizon.
 _GROUND = (
     (0.0, (0.40, 0.43, 0.39)),
     (12.0, (0.45, 0.48, 0.45)),
@@ -34,24 +34,24 @@ _GREY = (0.6, 0.6, 0.6, 1.0)
 
 
 class SurroundingsMarkers:
-    """Shows what is around the scene's objects; it changes with the scene alone."""
+    """Publisher of floor, ground and sky, when the scene or its floor is replaced."""
 
     def __init__(self, simulation: Simulation, files: RvizMeshes):
-        """Advertise for the scene of `simulation`; its floor is written among `files`."""
+        """Advertise for the scene of `simulation`; its floor is written to `files`."""
         self._simulation = simulation
         self._files = files
-        self._shown: tuple[Scene, int] | None = None  # of which scene the floor, by its body
-        self._topic = MarkerTopic(f"{namespace(simulation)}/view/surroundings", WORDS)
+        self._published: tuple[Scene, int] | None = None  # scene, and the number of its floor's body
+        self._topic = MarkerTopic(f"{namespace(simulation)}/view/surroundings", TEXT_PERIOD)
 
     def update(self) -> None:
-        """Publish what is new, if anybody listens."""
+        """Publish the surroundings if they have changed and there are subscribers."""
         self._topic.repeat()
         scene = self._simulation.scene
-        if self._shown == (scene, scene.floor) or not self._topic.due():
+        if self._published == (scene, scene.floor) or not self._topic.is_due():
             return
-        self._shown = scene, scene.floor
+        self._published = scene, scene.floor
         dome: Any = sky.dome().reshape(-1, 6).tolist()
-        markers = [_painted("sky", _SKY, dome), _ground(self._simulation.parameters.scene.floor.size / 2)]
+        markers = [_colored_triangles("sky", _SKY, dome), _ground(self._simulation.parameters.scene.floor.size / 2)]
         markers += [self._floor(visual) for visual in self._simulation.world.pictures.visuals() if visual.floor]
         self._topic.show(markers)
 
@@ -67,17 +67,18 @@ class SurroundingsMarkers:
 
 
 def _ground(half: float) -> Marker:
-    """Return a disc, darker than the floor, that fades into the sky; `half` is half of the floor's side, m."""
+    """Return a disc with the colors of _GROUND; `half` is half of the floor's side, m."""
     angles = np.linspace(0.0, 2.0 * np.pi, _SECTORS + 1)
-    rings = [[(0.0, 0.0, _BELOW, *_GROUND[0][1])] * len(angles)]
-    for beyond, colour in _GROUND:
-        radius = half + beyond
-        rings.append([(radius * np.cos(a), radius * np.sin(a), _BELOW, *colour) for a in angles])
-    return _painted("ground", 1.0, [corner for near, far in itertools.pairwise(rings) for corner in band(near, far)])
+    rings = [[(0.0, 0.0, _GROUND_HEIGHT, *_GROUND[0][1])] * len(angles)]
+    for distance, color in _GROUND:
+        radius = half + distance
+        rings.append([(radius * np.cos(a), radius * np.sin(a), _GROUND_HEIGHT, *color) for a in angles])
+    corners = [corner for inner, outer in itertools.pairwise(rings) for corner in band(inner, outer)]
+    return _colored_triangles("ground", 1.0, corners)
 
 
-def _painted(name: str, scale: float, corners: Sequence[Sequence[float]]) -> Marker:
-    """Return a marker of triangles' corners: x, y, z, red, green, blue."""
+def _colored_triangles(name: str, scale: float, corners: Sequence[Sequence[float]]) -> Marker:
+    """Return a marker of triangles; each corner is x, y, z, red, green, blue."""
     points = [corner[:3] for corner in corners]
     marker = new_marker(Marker.TRIANGLE_LIST, (1, 1, 1, 1), [scale] * 3, points, ns=name)
     marker.colors = [ColorRGBA(*corner[3:], 1.0) for corner in corners]
