@@ -96,10 +96,10 @@ def measure() -> list[Row]:
         jobs = _jobs(folder)
         for workers in dict.fromkeys((1, 2, cores)):
             began = time.perf_counter()
-            with pool.opened(options, workers) as fly:
+            with pool.open_pool(options, workers) as fly:
                 rows.append(_fly(f"{workers} at a time", jobs, fly, began))
         with _cluster(2) as address:
             began = time.perf_counter()
-            with pool.opened(options, scheduler=address) as fly:
+            with pool.open_pool(options, scheduler=address) as fly:
                 rows.append(_fly("2 Dask workers", jobs, fly, began))
     return rows

@@ -145,7 +145,7 @@ class GradeLive(unittest.TestCase):
             ("config: {control: {Kzref: 3}}", r"control/Kzref = 5.0, the plan's is 3.0; see its config:="),
             ("push", r"entry at 2 s: push.duration = 0.5: a push by topic lasts push/duration = 0.2 s"),
             ("no_contact", r"criterion no_contact: needs the sensor `contacts`"),
-            ("signal", r"criterion signal: asks for seen: of signals numbers alone are heard"),
+            ("signal", r"criterion signal: needs seen: only signals that are numbers"),
         ):
             text = {
                 "push": PLAN.replace("duration: 0.2", "duration: 0.5"),

@@ -8,7 +8,7 @@ import socket
 
 import numpy as np
 
-from drone_sim.grading.flight import Flight, random_of
+from drone_sim.grading.flight import Flight, script_seed
 from drone_sim.scripting.rpc import script_process
 from drone_sim.scripting.rpc.connection import ScriptConnection
 
@@ -37,8 +37,8 @@ def flown(plan, script, seed=0, serve=None):
     """Return the result of a flight whose script is elsewhere, and whether its door was closed by then."""
 
     def serve_script(end):
-        random.seed(random_of(seed))
-        np.random.seed(random_of(seed) % 2**32)
+        random.seed(script_seed(seed))
+        np.random.seed(script_seed(seed) % 2**32)
         script_process.serve(script_process.ScriptWorker(), end, script)
 
     with process_of(serve or serve_script) as end:

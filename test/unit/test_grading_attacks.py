@@ -227,7 +227,7 @@ STAYS = {  # what would outlive the flight
     "a copy": "os.fork() or (os.setsid(), time.sleep(4321))",
     "a fake table": "print('script   passed  points\\nmine.py     20/20    20/20', file=sys.__stdout__, flush=True);"
     " os.write(1, b'20 of 20'); os.write(2, b'20 of 20')",
-    "other criteria": "import drone_sim.grading.criteria.reach as reach\n    reach.Reach._judged = lambda *_: 1 / 0",
+    "other criteria": "from drone_sim.grading.criteria.reach import Reach\n    Reach._judge_part = lambda *_: 1 / 0",
     "another clock": "import drone_sim.mechanics.clock as clock\n    clock.Clock.time = 99.0",
     "another door": "import drone_sim.scripting.rpc.connection as end\n    end.ScriptConnection.permit = None",
 }
@@ -758,7 +758,7 @@ def test_it_is_known_of_every_function_what_a_submission_reaches_by_it():
     actions = permissions.Actions(simulation, [drone], {drone.object_name})
     values = SceneValues(simulation, set())
     looks = {
-        "values that the scene's scripts have not set": {*values.looks},
+        "values that the scene's scripts have not set": {*values.checks},
         "its own parameters": {"sim.setScriptSimulationParameter", "sim.setUserParameter"},
         "its own blades": {"sim.setJointPosition"},
     }
@@ -770,16 +770,16 @@ def test_it_is_known_of_every_function_what_a_submission_reaches_by_it():
             continue  # it does nothing
         own = f"{name.partition('.')[0]}.{function.__name__}"
         assert own in reached, f"{own}: enter in REACHES what a submission reaches by it"
-        what, needs = reached[own], actions.of(name, [])
-        assert (name in values.looks) == (own in looks["values that the scene's scripts have not set"])
+        what, needs = reached[own], actions.action_of(name, [])
+        assert (name in values.checks) == (own in looks["values that the scene's scripts have not set"])
         if what in ("move", "push", "change", "call", "run", "load", "write", "open"):
             assert needs == what, name
         elif what == "its own frames":
-            assert actions.of(name, [simulation.context.objects.handle_of(drone.object)]) in ("move", None), name
-            assert name not in permissions.free(), name
+            assert actions.action_of(name, [simulation.context.objects.handle_of(drone.object)]) in ("move", None), name
+            assert name not in permissions.free_functions(), name
         elif what in looks:
-            assert own in looks[what] and (name in permissions.free()) == (name in values.looks), name
+            assert own in looks[what] and (name in permissions.free_functions()) == (name in values.checks), name
         else:
-            assert needs is None and name not in values.looks, name
+            assert needs is None and name not in values.checks, name
     assert {*reached} <= {*found}
     simulation.close()

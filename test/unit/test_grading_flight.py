@@ -202,7 +202,7 @@ def test_what_a_script_says_and_that_it_ends_the_flight(written):
     result = flight.grade(talking)
     assert {one.name for one in result.outcomes if one.passed} == {"signal", "topic", "state", "drawn"}
     assert said(result)["topic"] == "seen was 5 from 1.10 s on; expected is 5"
-    assert said(result)["mute"] == "nothing was said by counter until 2.00 s"
+    assert said(result)["mute"] == "counter has no value at 2.00 s"
     assert said(result)["low"] == "the flight was over at 2.10 s, too early for this"
     assert (result.error, round(result.flown, 9), result.points, result.of) == (None, 2.1, 4.0, 6.0)
     assert flight.grade(talking) == result  # a script that draws draws the same again

@@ -411,7 +411,7 @@ def test_a_worker_that_is_killed_loses_no_flight_and_results_are_the_same_everyw
     with two_workers() as (address, workers):
         with Client(address) as client:
             client.wait_for_workers(2, timeout=60)
-        with pool.opened(options, scheduler=address) as fly:
+        with pool.open_pool(options, scheduler=address) as fly:
             flights = []
             for flight in fly(jobs):
                 flights.append(flight)
@@ -424,7 +424,7 @@ def test_a_worker_that_is_killed_loses_no_flight_and_results_are_the_same_everyw
 def test_two_workers_here_and_files_that_are_others(plan, server):
     jobs = [job_of(plan, "", seed) for seed in range(4)]
     other = [*jobs, type(jobs[0])(jobs[0].plan, "", 9, {}, "another key")]
-    with pool.opened(FlightOptions(SETTINGS.limits, SETTINGS.batches, not no_sandbox()), workers=2) as fly:
+    with pool.open_pool(FlightOptions(SETTINGS.limits, SETTINGS.batches, not no_sandbox()), workers=2) as fly:
         flights = list(fly(jobs))
         with pytest.raises(
             PoolError, match=r"worker on .*: .*hold\.yaml, the built-in script, .* not the same as here"
@@ -452,7 +452,7 @@ def test_a_scheduler_that_is_lost_is_told_in_one_line(plan):
         closing = threading.Thread(target=close_once_it_waits)
         closing.start()
         with pytest.raises(PoolError, match="the connection to the scheduler is lost"):
-            list(pool._flown_by_dask([job], options, client))
+            list(pool._fly_with_dask([job], options, client))
         closing.join()
 
 
@@ -566,7 +566,7 @@ def test_a_full_disk_is_named_and_loses_no_result(programs, folder, tmp_path, ca
     ],
 )
 def test_a_mistake_gets_one_line_and_status_2(programs, folder, capsys, monkeypatch, arguments, said):
-    monkeypatch.setattr(pool, "_CONNECTING", 0.2)
+    monkeypatch.setattr(pool, "_CONNECT_TIMEOUT", 0.2)
     assert grade.main([one.format(plan=folder / "hold.yaml") for one in arguments]) == 2
     error = capsys.readouterr().err
     assert said in error.splitlines()[-1] and error.startswith("grade: ") and "Traceback" not in error
@@ -581,7 +581,7 @@ def test_seeds_follow_from_a_secret_and_are_nobodys_guess(tmp_path):
     assert len(set(first) | set(other)) == 1000
     assert min(first) > 1000 and max(first) <= 10**12
     assert grade.seeds_of(3, None) == [0, 1, 2]
-    with pytest.raises(ValueError, match=r"--secret .*short': holds 15 bytes; it must hold 16 at least"):
+    with pytest.raises(ValueError, match=r"--secret .*short': holds 15 bytes; it must hold at least 16"):
         grade.seeds_of(1, str(tmp_path / "short"))
 
 

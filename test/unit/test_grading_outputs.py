@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 import pytest
 from graded import EVIL, PLAN, read_plan, result
 
-from drone_sim.grading.flight import ungraded
+from drone_sim.grading.flight import ungraded_result
 from drone_sim.grading.outputs import as_json, gradescope, junit, marks, table
-from drone_sim.grading.outputs.by_script import by_script
+from drone_sim.grading.outputs.script_results import group_by_script
 from drone_sim.grading.submissions.submission import Person, Submission, names_of
 from drone_sim.message_text import escaped
 
@@ -33,13 +33,13 @@ def a_class(scripts=40, seeds=20):
 
 def test_scripts_are_told_apart_by_as_much_of_their_paths_as_it_takes():
     scripts = ["/a/my.py", "/b/my.py", "/b/other.py", ""]
-    labels = [one.label for one in by_script([result(script) for script in scripts])]
+    labels = [one.label for one in group_by_script([result(script) for script in scripts])]
     assert labels == ["a/my.py", "b/my.py", "other.py", "(built-in)"]
 
 
 def test_a_script_is_as_good_as_the_mean_of_its_flights_and_its_worst_is_named():
     flights = [result(seed=0), result(seed=2, passed=(False, False)), result(seed=1, passed=(True, False))]
-    (script,) = by_script(flights)
+    (script,) = group_by_script(flights)
     assert [one.seed for one in script.flights] == [0, 1, 2]
     assert (script.passed, script.points, script.of, script.worst.seed) == (1, pytest.approx(5 / 3), 3, 2)
     assert script.failures == [("no_contact", 2), ("forward", 1)]
@@ -129,7 +129,7 @@ def test_gradescope_gets_the_mean_over_the_flights(plan):
 
 
 def test_gradescope_grades_one_script(plan, tmp_path):
-    with pytest.raises(ValueError, match=r"is of one script; these results are of 2"):
+    with pytest.raises(ValueError, match=r"must be of one script, not 2"):
         gradescope.write(plan, [result("a.py"), result("b.py")], tmp_path / "r.json")
     assert not (tmp_path / "r.json").exists()
 
@@ -213,7 +213,7 @@ def test_marks_are_as_moodle_reads_them(tmp_path):
     ]
     names = names_of(submissions)
     flights = [result("a.py"), result("b.py", passed=(True, False)), result("b.py", 1), result("c.py", error="a\nb")]
-    marks.write(submissions, by_script(flights, names), tmp_path / "m.csv")
+    marks.write(submissions, group_by_script(flights, names), tmp_path / "m.csv")
     ada, bo, che, script = csv.DictReader((tmp_path / "m.csv").read_text().splitlines())
     # What Moodle's worksheet must have, by its importer: Identifier, Grade, Last modified (grade).
     assert (ada["Identifier"], ada["Grade"], ada["Last modified (grade)"]) == ("Participant 7", "3", "-")
@@ -225,13 +225,13 @@ def test_marks_are_as_moodle_reads_them(tmp_path):
 
 def test_the_marks_name_an_error_by_which_nothing_was_flown(plan, tmp_path):
     why = "[load] /class/b.py:1: SyntaxError: invalid syntax\x1b[31m"
-    broken = [ungraded(plan, "/class/b.py", seed, {}, why) for seed in range(3)]
+    broken = [ungraded_result(plan, "/class/b.py", seed, {}, why) for seed in range(3)]
     later = [result("c.py", seed, (False, True), error="[actuation] c.py:4: boom") for seed in range(3)]
     no_script = "'d': holds no child script"
-    none = [ungraded(plan, "/class/d", seed, {}, no_script) for seed in range(3)]
+    none = [ungraded_result(plan, "/class/d", seed, {}, no_script) for seed in range(3)]
     bos = Submission("/class/b.py", (Person("Bo"),))
     submissions = [bos, Submission("c.py"), Submission("/class/d", error=no_script)]
-    marks.write(submissions, by_script([*broken, *later, *none]), tmp_path / "m.csv")
+    marks.write(submissions, group_by_script([*broken, *later, *none]), tmp_path / "m.csv")
     bo, che, du = (row["Feedback comments"] for row in csv.DictReader((tmp_path / "m.csv").read_text().splitlines()))
     assert bo.startswith("not flown: [load] b.py:1: SyntaxError: invalid syntax") and "failed" not in bo
     assert du == "not flown: 'd': holds no child script"

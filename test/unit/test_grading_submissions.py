@@ -84,7 +84,7 @@ def test_folders_that_say_nothing_get_a_line_and_who_hands_in_too_much_pays_alon
         submissions_of(str(folder), tmp_path)
     laid(folder, dave__one_dot_py=SCRIPT, dave__two_dot_py=SCRIPT, eve__notes_dot_txt="", fay__my_dot_py=SCRIPT)
     dave, eve, fay = submissions_of(str(folder), tmp_path)
-    assert dave.error == "'dave': holds 2 child scripts (one.py, two.py); one is to be graded"
+    assert dave.error == "'dave': holds 2 child scripts (one.py, two.py); there must be only one"
     assert eve.error == "'eve': holds no child script (a file with a sysCall_ function)" and not fay.error
 
 
@@ -127,7 +127,7 @@ def test_gradescopes_zip_and_its_unpacked_folder(tmp_path):
     folder = Path(both.script).parents[1]
     assert [one.people for one in submissions_of(str(folder), tmp_path / "store")] == [both.people, che.people]
     (folder / "submission_metadata.yml").write_text("- what\n")
-    with pytest.raises(ValueError, match=r"submission_metadata.yml: does not say who the `:submitters:` are"):
+    with pytest.raises(ValueError, match=r"submission_metadata.yml: must name the `:submitters:`"):
         submissions_of(str(folder), tmp_path / "store")
 
 
@@ -179,7 +179,7 @@ HOSTILE = {  # what a student's zip holds, and what is said of it
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_hostile_zips_cost_their_own_marks_and_leave_nothing_outside(tmp_path, monkeypatch):
-    monkeypatch.setattr(archive, "LARGEST", 2**20)
+    monkeypatch.setattr(archive, "MAX_SIZE", 2**20)
     members = {f"{moodle('Good', 1)}/my.py": SCRIPT}
     for number, (what, (content, _)) in enumerate(HOSTILE.items(), start=2):
         (tmp_path / "s.zip").unlink(missing_ok=True)
@@ -236,8 +236,8 @@ def test_a_member_that_leads_out_costs_its_student_and_nobody_else(tmp_path, rem
 
 
 def test_one_bomb_of_several_parts_leaves_room_for_the_others(tmp_path, monkeypatch):
-    monkeypatch.setattr(archive, "_ROOM", 2 * 2**20)
-    monkeypatch.setattr(archive, "_RATIO", 1)
+    monkeypatch.setattr(archive, "_MIN_ROOM", 2 * 2**20)
+    monkeypatch.setattr(archive, "_MAX_RATIO", 1)
     bombs = {f"{number}/my.py": SCRIPT + "#" * 1_000_000 for number in range(4)}
     path = zipped(tmp_path / "class.zip", {**bombs, "good/my.py": SCRIPT})
     errors = {
@@ -304,8 +304,8 @@ def test_renamed_and_reordered_copies_are_found_and_own_work_is_not(tmp_path):
     copy = original.replace("self.", "me.").replace("self", "me").replace("0.", "1.").replace("home", "start")
     copy = "".join(f"{line}  # mine\n" for line in copy.splitlines() if line)
     sources = {"hover.py": original, "copy.py": copy, "line.py": solution("line"), "pad.py": solution("pad")}
-    given = similarity.given_by(read_plan(tmp_path))
-    (pair,) = similarity.similar(sources, given)
+    given = similarity.provided_sources(read_plan(tmp_path))
+    (pair,) = similarity.find_similar(sources, given)
     assert (pair.first, pair.second) == ("hover.py", "copy.py") and pair.share > 0.9
     marked = [original.splitlines()[line - 1] for line in pair.lines[0]]
     assert len(marked) > 10
@@ -313,19 +313,19 @@ def test_renamed_and_reordered_copies_are_found_and_own_work_is_not(tmp_path):
 
 def test_what_was_given_or_most_have_is_no_copy():
     text = solution("hover")
-    assert similarity.similar({"a.py": text, "b.py": text}, {}) and not similarity.similar(
+    assert similarity.find_similar({"a.py": text, "b.py": text}, {}) and not similarity.find_similar(
         {"a.py": text, "b.py": text}, {"start.py": text}
     )
-    assert not similarity.similar({f"{number}.py": text for number in range(6)}, {})
+    assert not similarity.find_similar({f"{number}.py": text for number in range(6)}, {})
 
 
 def test_lua_is_compared_as_lua_and_no_text_takes_long():
     lines = [f"local v = sim.getObjectPosition(h, -1)[3]{' * v + 1' * number}" for number in range(20)]
     other = ["-- [[ mine ]]", *(line.replace(" v", " mine") for line in lines)]
-    (pair,) = similarity.similar({"a.lua": "\n".join(lines), "b.lua": "\n".join(other)}, {})
+    (pair,) = similarity.find_similar({"a.lua": "\n".join(lines), "b.lua": "\n".join(other)}, {})
     assert pair.share == 1.0 and min(pair.lines[1]) == 2
     for hostile in ("--[[ " * 20_000, '"' * 9_999, "'''" * 9_999, "x" * 99_999, "\0" * 4_000):
-        assert not similarity.similar({"a.lua": hostile, "b.py": hostile, "c.py": ""}, {})[1:]
+        assert not similarity.find_similar({"a.lua": hostile, "b.py": hostile, "c.py": ""}, {})[1:]
 
 
 # ---- Gradescope's autograder

@@ -91,5 +91,5 @@ def test_hashes_are_of_contents(graded, tmp_path):
 
 def test_a_key_that_could_be_guessed_is_refused(tmp_path):
     (tmp_path / "key").write_bytes(b"1234")
-    with pytest.raises(ValueError, match="holds 4 bytes; it must hold 16 at least"):
-        evidence.key_in(str(tmp_path / "key"))
+    with pytest.raises(ValueError, match="holds 4 bytes; it must hold at least 16"):
+        evidence.read_key(str(tmp_path / "key"), "--key")

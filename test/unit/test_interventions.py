@@ -22,8 +22,7 @@ from drone_sim.grading import plan as plans
 from drone_sim.remote.legacy.server import LegacyServer
 from drone_sim.remote.server import RemoteApiServer
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.grading.flight_listener import FlightListener
-from drone_sim.ros.grading.rules import LiveRules
+from drone_sim.ros.grading.flight_listener import FlightListener, LiveRules
 from drone_sim.ros.node import interventions, services
 from drone_sim.ros.vehicle import inputs, tuning_server
 from drone_sim.run import parameters
@@ -223,5 +222,5 @@ def test_odometry_of_another_node_is_no_flight(stage, tmp_path):
         message.pose.pose.position.z, message.pose.pose.orientation.w = height, 1.0
         message._connection_header = {"callerid": sender}
         stage.callbacks["/drone/odom"](message)
-    assert listener.flown(1.0).rows[:, 3].tolist() == [0.5]
+    assert listener.record(1.0).rows[:, 3].tolist() == [0.5]
     assert [one.split(" at ")[0] for one in listener.forged] == ["tried to forge /drone/odom"]

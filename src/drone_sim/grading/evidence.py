@@ -1,4 +1,4 @@
-"""Evidence for results, for those who doubt them: hashes of everything that they depend on, and a signature."""
+"""Evidence for results: hashes of everything that they depend on, and a signature."""
 
 from __future__ import annotations
 
@@ -16,56 +16,56 @@ from drone_sim.grading.plan import Plan
 from drone_sim.message_text import shown
 from drone_sim.scripting.errors import ScriptError
 
-_SHORTEST_KEY, _LARGEST_KEY = 16, 2**16  # bytes
+_MIN_KEY, _MAX_KEY = 16, 2**16  # bytes
 _SIGNATURE = "signature"
 
 
 def hashes_of(plan: Plan, script: str) -> dict[str, str]:
-    """Return SHA-256 of the plan's file, of the files that it names (`config`), of the script's own, of the package.
+    """Return the SHA-256 of the plan's file, the files that it names (`config`), the script's files, and the package.
 
-    What cannot be read any more is left out. The package's hash covers its files, Python, NumPy, PyBullet and the
+    Files that can no longer be read are left out. The package's hash covers its files, Python, NumPy, PyBullet and the
     processor.
     """
-    found = {"package": version()}
+    hashes = {"package": version()}
     for name, paths in (
         ("plan", lambda: [plan.path]),
-        ("config", lambda: [one for one in files.of_plan(plan, {}) if one != plan.path]),
+        ("config", lambda: [path for path in files.of_plan(plan, {}) if path != plan.path]),
         ("script", lambda: files.of_script(plan, script)),
     ):
         try:
-            found[name] = _digest(paths())
+            hashes[name] = _digest(paths())
         except (OSError, ValueError, ScriptError):
             continue
-    return found
+    return hashes
 
 
 def _digest(paths: Iterable[Path]) -> str:
-    """Return one digest of files, by their names and contents, wherever they lie."""
+    """Return a digest of the names and contents of files, whatever their folders are."""
     digest = hashlib.sha256()
     for name, path in sorted((os.fsencode(path.name), path) for path in paths):
         digest.update(name + b"\0" + hashlib.sha256(files.read(path)).digest())
     return digest.hexdigest()
 
 
-def key_in(path: str) -> bytes:
-    """Return what the file of a key holds. Raises Unreadable, and ValueError for a key that could be guessed."""
-    key = files.read(Path(path), _LARGEST_KEY)
-    if len(key) < _SHORTEST_KEY:
-        raise ValueError(f"--key {shown(path)}: holds {len(key)} bytes; it must hold {_SHORTEST_KEY} at least")
+def read_key(path: str, option: str) -> bytes:
+    """Return the content of an option's key file. Raises Unreadable, and ValueError for a key that is too short."""
+    key = files.read(Path(path), _MAX_KEY)
+    if len(key) < _MIN_KEY:
+        raise ValueError(f"{option} {shown(path)}: holds {len(key)} bytes; it must hold at least {_MIN_KEY}")
     return key
 
 
-def signed(content: Mapping[str, Any], key: bytes) -> dict[str, Any]:
-    """Return what a file of results holds with a signature over all of it: HMAC-SHA256."""
+def sign(content: Mapping[str, Any], key: bytes) -> dict[str, Any]:
+    """Return the content of a results file with an HMAC-SHA256 signature over all of it."""
     return {**content, _SIGNATURE: _signature(content, key)}
 
 
 def is_signed(content: Mapping[str, Any], key: bytes) -> bool:
-    """Tell whether the signature in a file of results matches its content, with the same key."""
+    """Return whether the content of a results file has the right signature for a key."""
     return hmac.compare_digest(str(content.get(_SIGNATURE, "")).encode(), _signature(content, key).encode())
 
 
 def _signature(content: Mapping[str, Any], key: bytes) -> str:
-    said = {name: one for name, one in content.items() if name != _SIGNATURE}
-    text = json.dumps(said, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    unsigned = {name: value for name, value in content.items() if name != _SIGNATURE}
+    text = json.dumps(unsigned, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hmac.new(key, text.encode(), "sha256").hexdigest()

@@ -37,29 +37,33 @@ def grade(
     changes: Mapping[str, Any] | None = None,
     table: str | Path | None = None,
 ) -> Result:
-    """Fly once and return how well: the same to the bit for the same plan, script, seed and changes.
+    """Fly once and return the result, which is the same to the bit for the same plan, script, seed and changes.
 
-    `script` is as in Plan.script_of, `changes` as in Plan.parameters; `table` is a file to write, as `fly --csv` does.
-    What goes wrong in the flight is in the result's `error`. Raises OSError for a table that cannot be written.
+    `script` is as in Plan.script_of, `changes` as in Plan.parameters; `table` is the name of a file to write, in the
+    format of `fly --csv`. An error of the flight is in the result's `error`. Raises OSError if the table cannot be
+    written.
     """
     try:
         flight = Flight(plan, script, seed, changes)
     except EXPECTED as error:
-        return ungraded(plan, script, seed, changes, format_error(error))
+        return ungraded_result(plan, script, seed, changes, format_error(error))
     result = flight.grade()
     if table is not None:
-        write(flight.rows, table)
+        with writing.replacing(str(table)) as file:
+            write_table(flight.rows, file)
     return result
 
 
-def ungraded(plan: Plan, script: str | None, seed: int, changes: Mapping[str, Any] | None, why: str) -> Result:
-    """Return the result of a flight that has not been flown, or of which nothing is left; `why` is one line."""
-    outcomes = tuple(one.missed("nothing was flown") for one in plan.criteria)
-    return result_of(plan.name, plan.script_of(script), seed, changes or {}, outcomes, error=why)
+def ungraded_result(
+    plan: Plan, script: str | None, seed: int, changes: Mapping[str, Any] | None, reason: str
+) -> Result:
+    """Return the result of a flight that was not flown, or of which no row is left; `reason` is one line."""
+    outcomes = tuple(criterion.fail("nothing was flown") for criterion in plan.criteria)
+    return result_of(plan.name, plan.script_of(script), seed, changes or {}, outcomes, error=reason)
 
 
 class Flight:
-    """A flight that is ready: all is read and built, and no line of a script has run."""
+    """A flight whose simulation is built, and whose scripts are not loaded yet."""
 
     def __init__(
         self,
@@ -69,10 +73,10 @@ class Flight:
         changes: Mapping[str, Any] | None = None,
         connection: ScriptConnection | None = None,
     ):
-        """Build it; `plan`, `script`, `seed` and `changes` are as in `grade`. Raises one of EXPECTED.
+        """Build the simulation; `plan`, `script`, `seed` and `changes` are as in `grade`. Raises one of EXPECTED.
 
-        With a `connection`, the script runs in another process, and may call what the plan allows; the scene's scripts
-        run here.
+        With a `connection`, the script runs in another process and may call only what the plan allows; the scene's
+        scripts run in this process.
         """
         self._plan, self._seed, self._changes = plan, seed, changes or {}
         parameters = plan.parameters(seed, "" if script == "" else None, changes)
@@ -84,9 +88,9 @@ class Flight:
         self._simulation = Simulation(
             parameters,
             script=self._script,
-            backend=backend if backend.wanted else None,
+            backend=backend if backend.topics else None,
             started=False,
-            load_script=_loader(connection, self._script, watch),
+            load_script=_script_loader(connection, self._script, watch),
         )
         backend.clock, backend.is_scene = lambda: self._simulation.time, lambda: watch.is_scene
         try:
@@ -100,24 +104,26 @@ class Flight:
             raise
 
     def grade(self) -> Result:
-        """Fly, once, and return how well."""
-        with _seeded(self._seed):
+        """Fly, and return the result. Call this once."""
+        with _seeded_generators(self._seed):
             try:
-                failed = _failure(self._fly) or self._failed_scripts()
+                error = _error_of(self._fly)
+                if error is None and (names := self._simulation.failed_scripts):
+                    error = f"the scripts of {', '.join(names)} failed: the log says why"
             finally:
-                closed = _failure(self._simulation.close)  # cleanup may fail, too
-        plan, wrong, record = self._plan, failed or closed, self._recorder.record()
+                cleanup_error = _error_of(self._simulation.close)  # which runs the scripts' cleanup
+        plan, error, record = self._plan, error or cleanup_error, self._recorder.record()
         if record is None:
-            nothing = ungraded(plan, self._script, self._seed, self._changes, wrong or "nothing was flown")
-            return nothing.with_tried(self._permissions.tried)
-        outcomes = tuple(one.judge(record) for one in plan.criteria)
-        digest = digest_of(record.rows)
-        result = result_of(plan.name, self._script, self._seed, self._changes, outcomes, record.end, wrong, digest)
+            result = ungraded_result(plan, self._script, self._seed, self._changes, error or "nothing was flown")
+        else:
+            outcomes = tuple(criterion.judge(record) for criterion in plan.criteria)
+            digest = table_digest(record.rows)
+            result = result_of(plan.name, self._script, self._seed, self._changes, outcomes, record.end, error, digest)
         return result.with_tried(self._permissions.tried)
 
     @property
     def rows(self) -> np.ndarray:
-        """The table of what has been flown, (N, 22): see offline.recording.COLUMNS."""
+        """The flown table, (N, 22): see offline.recording.COLUMNS."""
         return self._recorder.rows
 
     def _fly(self) -> None:
@@ -127,63 +133,53 @@ class Flight:
         for step in range(self._steps):
             self._timeline.apply(step, self._simulation.vehicles)
             self._rules.accept()
-            self._simulation.step(self._recorder.look)
-            self._rules.check()  # what breaks them is not recorded: nothing is reached by it
+            self._simulation.step(self._recorder.after_sub_step)
+            self._rules.check()  # before the step is recorded, so that no criterion passes by a broken rule
             self._recorder.record_step()
             if self._recorder.is_over:
                 return
 
     def _is_quiet(self) -> bool:
-        """Tell whether no message or other script can reach the flying script before its actuation of the next step."""
+        """Return whether no message or other script can reach the flying script before its next actuation."""
         simulation = self._simulation
         scripts = len(simulation.child_scripts) + len(simulation.scene.scripts)
         return scripts == 1 and simulation.drone.commands.is_quiet and not self._timeline.is_due(simulation.steps)
 
-    def _failed_scripts(self) -> str | None:
-        names = self._simulation.failed_scripts
-        return f"the scripts of {', '.join(names)} failed: the log says why" if names else None
 
-
-def digest_of(rows: np.ndarray) -> str:
+def table_digest(rows: np.ndarray) -> str:
     """Return the SHA-256 of a table's numbers, row by row, as little-endian doubles."""
     return hashlib.sha256(np.ascontiguousarray(rows, "<f8").tobytes()).hexdigest()
 
 
-def write(rows: np.ndarray, path: str | Path) -> None:
-    """Write a table (N, 22) as `fly --csv` does. Raises OSError."""
-    with writing.replacing(str(path)) as file:
-        write_to(file, rows)
-
-
-def write_to(file: IO[str], rows: np.ndarray) -> None:
-    """Write a table (N, 22) into an open file. Raises OSError."""
+def write_table(rows: np.ndarray, file: IO[str]) -> None:
+    """Write a table (N, 22) in the format of `fly --csv`. Raises OSError."""
     recording = Recording(file)
     for row in cast("list[list[float]]", rows.tolist()):
         recording.write_row(row)
 
 
-def random_of(seed: int) -> int:
-    """Return the seed of Python's and numpy's own generators in scripts; it does not reveal `seed`."""
+def script_seed(seed: int) -> int:
+    """Return the seed of Python's and NumPy's global generators in scripts, which does not reveal `seed`."""
     return int.from_bytes(hashlib.sha256(b"what scripts draw, %d" % seed).digest()[:8], "little")
 
 
-def _loader(connection: ScriptConnection | None, submission: str, watch: ScriptWatch) -> load.Loader:
-    """Return a function that loads the submission through a connection, if there is one, and other scripts here."""
+def _script_loader(connection: ScriptConnection | None, submission: str, watch: ScriptWatch) -> load.Loader:
+    """Return a function that loads the submission through the connection, if there is one, and other scripts here."""
 
     def load_script(
         path: str, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns, breakpoints: Breakpoints | None = None
     ) -> load.Script:
-        if path == submission and connection is not None:
-            return watch.watched(ScriptProxy(connection, path, modules, limit), False)
         is_scene = path != submission
+        if not is_scene and connection is not None:
+            return watch.wrap(ScriptProxy(connection, path, modules, limit), is_scene)
         loaded = watch.run(is_scene, load.load, path, modules, limit, turns, breakpoints)
-        return watch.watched(loaded, is_scene)
+        return watch.wrap(loaded, is_scene)
 
     return load_script
 
 
-def _failure(action: Callable[[], None]) -> str | None:
-    """Return what went wrong in an action, in one line; None for nothing."""
+def _error_of(action: Callable[[], None]) -> str | None:
+    """Run an action, and return its error in one line, or None."""
     try:
         action()
     except EXPECTED as error:
@@ -192,13 +188,13 @@ def _failure(action: Callable[[], None]) -> str | None:
 
 
 @contextlib.contextmanager
-def _seeded(seed: int) -> Iterator[None]:
-    """Let scripts that draw from Python's and numpy's own generators draw the same in every flight of a seed."""
-    kept, kept_numpy = random.getstate(), np.random.get_state()
-    random.seed(random_of(seed))
-    np.random.seed(random_of(seed) % 2**32)
+def _seeded_generators(seed: int) -> Iterator[None]:
+    """Seed Python's and NumPy's global generators, so that scripts draw the same numbers in every flight of a seed."""
+    python_state, numpy_state = random.getstate(), np.random.get_state()
+    random.seed(script_seed(seed))
+    np.random.seed(script_seed(seed) % 2**32)
     try:
         yield
     finally:
-        random.setstate(kept)
-        np.random.set_state(kept_numpy)
+        random.setstate(python_state)
+        np.random.set_state(numpy_state)

@@ -1,4 +1,4 @@
-"""The record of a flight for the criteria: a table with a row per step, and what does not fit into a table."""
+"""The record of a flight that the criteria judge: a table with a row per step, contacts, values and other objects."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ import numpy as np
 
 from drone_sim.offline.recording import COLUMNS
 
-_FARTHEST = 2.0  # times as far as its speed says: a vehicle that got farther between two rows was put there
-_ALWAYS = 0.01  # m, that are no jump
+# A vehicle that moved farther between two rows than this was moved by a script or a client.
+_SPEED_MARGIN = 2.0  # times the way that its speed explains
+_DISTANCE_MARGIN = 0.01  # m
 
 
 class ContactEvent(NamedTuple):
-    """The vehicle touched something during the step that ended at `at` (s)."""
+    """The vehicle touched the object `name` during the step that ended at `at` (s)."""
 
     at: float
-    what: str  # its name, as the sensor `contacts` has it
+    name: str  # as the sensor `contacts` gives it
 
 
 class ValueChange(NamedTuple):
-    """A signal, a topic or the flight state had another value from `at` (s) on; None: a signal was cleared."""
+    """A new value of a signal, a topic or the flight state, from `at` (s) on; None for a signal that was cleared."""
 
     at: float
     value: Any
@@ -31,24 +32,24 @@ class ValueChange(NamedTuple):
 
 @dataclass(frozen=True)
 class FlightRecord:
-    """A flight of one vehicle. `rows` (N, 22) are as offline.recording.COLUMNS says, N >= 1, times increasing.
+    """A flight of one vehicle. `rows` (N, 22) have offline.recording.COLUMNS, N >= 1, times increasing.
 
-    `is_whole`: it lasted as long as the plan says. The others hold what the criteria ask for; a flight that is only
-    observed, over the topics of a node, may lack some.
+    `is_whole`: it lasted as long as the plan says. The other fields hold what the criteria need; grade_live, which only
+    listens to topics, may leave some empty.
     """
 
     rows: np.ndarray
     is_whole: bool = True
-    contacts: Sequence[ContactEvent] = ()  # by time; one for each thing and step
-    states: Sequence[ValueChange] = ()  # what the script says of its flight state: docs/states.md
+    contacts: Sequence[ContactEvent] = ()  # by time; one for each object and step
+    states: Sequence[ValueChange] = ()  # the script's flight state: docs/states.md
     values: Mapping[str, Sequence[ValueChange]] = field(default_factory=dict)  # by the names of signals and topics
-    other_poses: Mapping[str, np.ndarray] = field(default_factory=dict)  # (N, 7): position, quaternion xyzw, by name
-    found: Mapping[str, Sequence[str]] = field(default_factory=dict)  # names of objects, by the path that finds them
-    lines: Mapping[str, np.ndarray] = field(default_factory=dict)  # (K, 3): the scene's paths at the start, m, world
+    object_poses: Mapping[str, np.ndarray] = field(default_factory=dict)  # (N, 7): position, quaternion xyzw, by name
+    objects_by_path: Mapping[str, Sequence[str]] = field(default_factory=dict)  # names of the objects a path finds
+    paths: Mapping[str, np.ndarray] = field(default_factory=dict)  # (K, 3): the scene's paths at the start, m, world
 
     @cached_property
     def columns(self) -> dict[str, np.ndarray]:
-        """Every column that a criterion may be `of`, by name; each (N,)."""
+        """The columns named in UNITS, (N,) each."""
         return columns_of(self.rows)
 
     @property
@@ -57,35 +58,36 @@ class FlightRecord:
         return self.rows[:, 0]
 
     @property
-    def puts(self) -> np.ndarray:
-        """The rows (M,) where the vehicle is farther from the row before than its speed allows: it was put there."""
-        ways = np.linalg.norm(np.diff(self.rows[:, 1:4], axis=0), axis=1)
-        speeds = self.columns["speed"]
-        return np.flatnonzero(ways > _could(np.maximum(speeds[:-1], speeds[1:]), np.diff(self.times))) + 1
-
-    def begins_at(self, position: Sequence[float]) -> bool:
-        """Whether the vehicle can be at its first row's place if it was at `position` (m) at 0 s."""
-        way = np.linalg.norm(self.rows[0, 1:4] - position)
-        return bool(way <= _could(self.columns["speed"][0], self.times[0]))
-
-    def until(self, row: int) -> FlightRecord:
-        """Return the flight as it was before a row, which is not its first."""
-        others = {name: poses[:row] for name, poses in self.other_poses.items()}
-        return replace(self, rows=self.rows[:row], is_whole=False, other_poses=others)
-
-    @property
     def end(self) -> float:
         """Simulated time of the last row in s."""
         return float(self.rows[-1, 0])
 
+    @property
+    def teleports(self) -> np.ndarray:
+        """The rows (M,) that are farther from the row before than the vehicle's speed explains."""
+        distances = np.linalg.norm(np.diff(self.rows[:, 1:4], axis=0), axis=1)
+        speeds = self.columns["speed"]
+        limits = _distance_limit(np.maximum(speeds[:-1], speeds[1:]), np.diff(self.times))
+        return np.flatnonzero(distances > limits) + 1
 
-def _could(speed: Any, seconds: Any) -> Any:
-    """Return how far (m) a vehicle can get by itself at a speed (m/s) in so many seconds."""
-    return _ALWAYS + _FARTHEST * speed * seconds
+    def begins_at(self, position: Sequence[float]) -> bool:
+        """Return whether the vehicle can have flown from `position` (m) at 0 s to its first row."""
+        distance = np.linalg.norm(self.rows[0, 1:4] - position)
+        return bool(distance <= _distance_limit(self.columns["speed"][0], self.times[0]))
+
+    def until(self, row: int) -> FlightRecord:
+        """Return the flight before a row, which is not its first."""
+        poses = {name: poses[:row] for name, poses in self.object_poses.items()}
+        return replace(self, rows=self.rows[:row], is_whole=False, object_poses=poses)
 
 
-_AS_RECORDED = [name.partition(" ")[0] for name in COLUMNS]
-UNITS = {  # of the columns that a criterion may be `of`
+def _distance_limit(speed: Any, seconds: Any) -> Any:
+    """Return how far (m) a vehicle may get at a speed (m/s) in some seconds."""
+    return _DISTANCE_MARGIN + _SPEED_MARGIN * speed * seconds
+
+
+_RECORDED_NAMES = [name.partition(" ")[0] for name in COLUMNS]
+UNITS = {  # of the columns that a criterion can read
     "t": "s",
     **dict.fromkeys("xyz", "m"),
     **dict.fromkeys(("roll", "pitch", "yaw", "tilt"), "rad"),
@@ -100,18 +102,18 @@ UNITS = {  # of the columns that a criterion may be `of`
 def columns_of(rows: np.ndarray) -> dict[str, np.ndarray]:
     """Return the columns named in UNITS of a table (N, 22).
 
-    roll, pitch, yaw (rad) are ROS's, yaw without jumps; tilt is the angle between the body's and the world's z; vx, vy,
-    vz are the velocity in the track frame (at the drone, level, turned by its yaw), as commands are; world_vx,
-    world_vy, wx, wy and wz are in the world frame, as in the table.
+    roll, pitch, yaw (rad) follow ROS's convention, with yaw unwrapped. tilt is the angle between the body's and the
+    world's z. vx, vy, vz are the velocity in the track frame (at the drone, level, turned by its yaw), like commands;
+    world_vx, world_vy, wx, wy and wz are in the world frame, like the table.
     """
-    found = {name: rows[:, index] for index, name in enumerate(_AS_RECORDED)}
+    recorded = {name: rows[:, index] for index, name in enumerate(_RECORDED_NAMES)}
     x, y, z, w = rows[:, 4:8].T
     r00, r01 = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w)
     r10, r20 = 2 * (x * y + z * w), 2 * (x * z - y * w)
     r21, r22 = 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
-    turn = np.arctan2(-r01, r00)  # V-REP's gamma, by which Track_base is turned
+    turn = np.arctan2(-r01, r00)  # V-REP's gamma, the yaw of Track_base
     east, north, up = rows[:, 8:11].T
-    made = {
+    computed = {
         "roll": np.arctan2(r21, r22),
         "pitch": np.arcsin(np.clip(-r20, -1, 1)),
         "yaw": np.unwrap(np.arctan2(r10, r00)),
@@ -122,4 +124,4 @@ def columns_of(rows: np.ndarray) -> dict[str, np.ndarray]:
         "world_vy": north,
         "speed": np.sqrt(east**2 + north**2 + up**2),
     }
-    return {name: column for name, column in {**found, **made}.items() if name in UNITS}
+    return {name: column for name, column in {**recorded, **computed}.items() if name in UNITS}

@@ -1,4 +1,4 @@
-"""Records a flight, step by step: the graded vehicle, and what the plan's criteria ask for."""
+"""Recorder of a flight without ROS: the graded vehicle, and what the plan's criteria need."""
 
 from __future__ import annotations
 
@@ -21,63 +21,69 @@ from drone_sim.scripting.api import object_paths
 from drone_sim.scripting.api.backend import Ask
 from drone_sim.scripting.api.control import STOP
 
-_NOWHERE = (math.nan,) * 7
+_NO_POSE = (math.nan,) * 7
 
 
 class FlightRecorder:
-    """Keeps the rows of the graded vehicle, and beside them only what a criterion asks for."""
+    """Records the graded vehicle's table, and whatever else the plan's criteria need."""
 
     def __init__(self, plan: Plan, simulation: Simulation, backend: OfflineBackend):
-        """Record what a `plan` asks for of a `simulation` before its first step, and of its topics in the `backend`.
+        """Prepare the recording of a `simulation` before its first step; `backend` keeps the messages of its scripts.
 
-        Raises ValueError for a vehicle or object that is not there.
+        Raises ValueError for a vehicle or object that does not exist.
         """
         self._simulation = simulation
         self._duration = plan.duration
-        own = plan.vehicle_of(simulation.parameters)
-        self._vehicle = simulation.vehicles[own]
-        self._recording = Recording(vehicle=own)
-        self._contacts = simulation.world.queries.contacts  # asked ten times a step
+        vehicle_name = plan.vehicle_of(simulation.parameters)
+        self._vehicle = simulation.vehicles[vehicle_name]
+        self._recording = Recording(vehicle=vehicle_name)
+        self._find_contacts = simulation.world.queries.contacts  # a local name: this is called ten times a step
         self._body = self._vehicle.body.number
         self._contact_events: list[ContactEvent] = []
-        self._touched: set[str] = set()  # in the step that is under way
+        self._touched: set[str] = set()  # names of the objects touched in the current step
         self._values: dict[str, list[ValueChange]] = {}
-        self._other_poses: dict[str, list[tuple[float, ...]]] = {}
-        self._found: dict[str, list[str]] = {}
-        self.goals: list[int] = []  # handles of the objects that criteria name, and of such vehicles' objects
-        self.look: Callable[[int], None] | None = None  # for Simulation.step
-        self._each_step: list[Callable[[], None]] = [functools.partial(self._recording.add, simulation)]
-        self._add_recorders(plan, backend)
-        self._lines = {name: self._line(name) for one in plan.criteria for name in one.lines}
+        self._object_poses: dict[str, list[tuple[float, ...]]] = {}
+        self._objects_by_path: dict[str, list[str]] = {}
+        self.goals: list[int] = []  # handles of the objects that criteria name; for a vehicle, of its object
+        self.after_sub_step: Callable[[int], None] | None = None  # for Simulation.step
+        self._step_recorders: list[Callable[[], None]] = [functools.partial(self._recording.add, simulation)]
+        self._record_values(plan, backend)
+        self._record_objects(plan)
+        self._paths = {name: self._path_points(name) for criterion in plan.criteria for name in criterion.path_names}
 
-    def _add_recorders(self, plan: Plan, backend: OfflineBackend) -> None:
-        if any(one.needs_contacts for one in plan.criteria):
-            self.look = self._look_for_contacts
-            self._each_step.append(self._keep_contacts)
-        if any(one.needs_states for one in plan.criteria):
-            self._follow("", lambda: str(self._vehicle.flight_state))
-        for signal in dict.fromkeys(name for one in plan.criteria for name in one.signals):
-            self._follow(signal, lambda name=signal: self._simulation.context.signals.find(name))  # type: ignore[misc]
-        own = self._vehicle.bus.said
-        for topic, full in backend.wanted.items():
-            self._follow(topic, lambda name=full: backend.last.get(name, own.get(name)))  # type: ignore[misc]
-        others = dict.fromkeys(name for one in plan.criteria for name in one.others)
+    def _record_values(self, plan: Plan, backend: OfflineBackend) -> None:
+        """Record the contacts, flight states, signals and topics that criteria need."""
+        if any(criterion.needs_contacts for criterion in plan.criteria):
+            self.after_sub_step = self._collect_contacts
+            self._step_recorders.append(self._record_contacts)
+        if any(criterion.needs_states for criterion in plan.criteria):
+            self._record_changes("", lambda: str(self._vehicle.flight_state))
+        signals = self._simulation.context.signals
+        for signal in dict.fromkeys(name for criterion in plan.criteria for name in criterion.signals):
+            self._record_changes(signal, functools.partial(signals.find, signal))
+        own_topics = self._vehicle.bus.said
+        for topic, full in backend.topics.items():
+            self._record_changes(topic, lambda name=full: backend.last.get(name, own_topics.get(name)))  # type: ignore[misc]
+
+    def _record_objects(self, plan: Plan) -> None:
+        """Record the poses of the vehicles and objects that criteria name."""
+        references = dict.fromkeys(name for criterion in plan.criteria for name in criterion.object_names)
         objects = self._simulation.context.objects
-        for path in filter(object_paths.is_path, others):
-            self._found[path] = [one.name for one in object_paths.every(objects, path)] or [path]
-        named = (self._found.get(other, [other]) for other in others)
-        for other in dict.fromkeys(itertools.chain.from_iterable(named)):
-            vehicle = self._simulation.vehicles.get(other)
-            # Followed by its handle: another object may get the name later. Raises ValueError where there is none.
-            handle = objects.handle(other) if vehicle is None else objects.handle_of(vehicle.object)
+        for path in filter(object_paths.is_path, references):
+            self._objects_by_path[path] = [found.name for found in object_paths.every(objects, path)] or [path]
+        names = (self._objects_by_path.get(reference, [reference]) for reference in references)
+        for name in dict.fromkeys(itertools.chain.from_iterable(names)):
+            vehicle = self._simulation.vehicles.get(name)
+            # The handle identifies the object, because another object may get the name later.
+            handle = objects.handle(name) if vehicle is None else objects.handle_of(vehicle.object)
             self.goals.append(handle)
-            self._other_poses[other] = []
-            pose = functools.partial(self._pose, other if vehicle is not None else "", handle)
-            self._each_step.append(lambda name=other, pose=pose: self._other_poses[name].append(pose()))  # type: ignore[misc]
+            poses = self._object_poses[name] = []
+            pose = functools.partial(self._pose, name if vehicle is not None else "", handle)
+            self._step_recorders.append(lambda poses=poses, pose=pose: poses.append(pose()))  # type: ignore[misc]
 
     def record_step(self) -> None:
-        """Record what there is now: before the first step, and after each."""
-        for record in self._each_step:
+        """Record the current state: call this before the first step and after each step."""
+        for record in self._step_recorders:
             record()
 
     @property
@@ -86,7 +92,7 @@ class FlightRecorder:
         return np.array(self._recording.rows).reshape(-1, len(COLUMNS))
 
     def record(self) -> FlightRecord | None:
-        """Return the flight so far; None before there is any."""
+        """Return the flight so far, or None if there is no row yet."""
         rows = self.rows
         if not len(rows):
             return None
@@ -96,9 +102,9 @@ class FlightRecorder:
             tuple(self._contact_events),
             tuple(self._values.get("", ())),
             self._values,
-            {name: np.array(poses) for name, poses in self._other_poses.items()},
-            self._found,
-            self._lines,
+            {name: np.array(poses) for name, poses in self._object_poses.items()},
+            self._objects_by_path,
+            self._paths,
         )
 
     @property
@@ -106,106 +112,97 @@ class FlightRecorder:
         """Whether a script has stopped the simulation."""
         return self._simulation.context.control.asked == STOP
 
-    # ---- what is asked for
-
-    def _look_for_contacts(self, count: int) -> None:
-        """See after a sub-step what the vehicle touches: a blow may be over before the step is."""
-        if count and (touches := self._contacts(self._body)):
+    def _collect_contacts(self, count: int) -> None:
+        """Collect the names of touched objects after a sub-step: a short contact may end before the step does."""
+        if count and (contacts := self._find_contacts(self._body)):
             names = self._simulation.context.names
-            self._touched.update(names.get(one.body, ("", ""))[0] for one in touches)
+            self._touched.update(names.get(contact.body, ("", ""))[0] for contact in contacts)
 
-    def _keep_contacts(self) -> None:
+    def _record_contacts(self) -> None:
         if self._touched:
             now = self._simulation.time
-            self._contact_events += [ContactEvent(now, what) for what in sorted(self._touched)]
+            self._contact_events += [ContactEvent(now, name) for name in sorted(self._touched)]
             self._touched.clear()
 
-    def _follow(self, name: str, value: Callable[[], Any]) -> None:
+    def _record_changes(self, name: str, get_value: Callable[[], Any]) -> None:
         """Record a value whenever it has changed."""
-        kept = self._values[name] = []
+        changes = self._values[name] = []
 
-        def look() -> None:
-            now, last = value(), kept[-1].value if kept else None
-            if now is not last and not _same(now, last):
-                kept.append(ValueChange(self._simulation.time, now))
+        def record() -> None:
+            value, last = get_value(), changes[-1].value if changes else None
+            if value is not last and not _is_equal(value, last):
+                changes.append(ValueChange(self._simulation.time, value))
 
-        self._each_step.append(look)
+        self._step_recorders.append(record)
 
-    def _line(self, name: str) -> np.ndarray:
-        """Return the points (K, 3) of a path, in m, in the world. Raises ValueError for what is no path."""
+    def _path_points(self, name: str) -> np.ndarray:
+        """Return the points (K, 3) of a path, in m, in the world. Raises ValueError for an object that is no path."""
         objects = self._simulation.context.objects
         handle = objects.handle(name)
         path = objects[handle]
         if not isinstance(path, Path) or len(path.points) < 2:
             raise ValueError(f"'{name}' is not a path with two points or more")
         matrix = objects.matrix(handle)
-        return np.array([transform(matrix, one) for one in path.points])
+        return np.array([transform(matrix, point) for point in path.points])
 
     def _pose(self, vehicle_name: str, handle: int) -> tuple[float, ...]:
-        """Return position (m) and quaternion (xyzw) of a vehicle or object, in the world; NaN once it is gone."""
+        """Return position (m) and quaternion (xyzw) of a vehicle or object in the world, NaN once it is removed."""
         vehicle = self._simulation.vehicles.get(vehicle_name)
         if vehicle is not None:
             return (*vehicle.body.state.position, *vehicle.body.state.orientation)
         one = self._simulation.context.objects.get(handle)
         if one is None or vehicle_name:
-            return _NOWHERE
+            return _NO_POSE
         matrix = one.matrix()
         return (*position(matrix), *to_quaternion(matrix))
 
 
-def _same(first: Any, second: Any) -> bool:
-    """Tell whether two values are equal; those that cannot be compared, such as arrays in messages, are not."""
+def _is_equal(first: Any, second: Any) -> bool:
+    """Return whether two values are equal; values that cannot be compared, such as arrays in messages, are not."""
     try:
         return bool(first == second)
     except Exception:
         return False
 
 
-# ---- what scripts publish
-
-
 class OfflineBackend:
-    """A backend (scripting.api.backend) with nobody at its other end.
+    """A backend (scripting.api.backend) without ROS, which keeps the last message on each of some topics."""
 
-    It keeps the last message on each topic that is asked for.
-    """
-
-    def __init__(self, wanted: Mapping[str, str]):
-        """Keep the topics `wanted`: the full name of each, by its name in the plan."""
-        self.wanted = wanted
+    def __init__(self, topics: Mapping[str, str]):
+        """Keep the messages on `topics`: their full names, by their names in the plan."""
+        self.topics = topics
         self.last: dict[str, Any] = {}  # the last message, by the topic's full name
         self.clock: Callable[[], float] = lambda: 0.0  # simulated time in s
         self.is_scene: Callable[[], bool] = lambda: False  # whether the script that runs is one of the scene's
-        self._scenes: set[str] = set()  # topics that the scene's scripts have advertised
+        self._scene_topics: set[str] = set()  # topics that the scene's scripts have advertised
         self._parameters: dict[str, Any] = {}
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
-        """Do nothing: no message comes."""
+        """Do nothing: no message arrives."""
         return lambda: None
 
     def advertise(self, topic: str, kind: str, queue: int, latch: bool) -> OfflinePublisher:
-        """Keep what will be published, if it is asked for; of a topic of the scene's only what its scripts publish."""
+        """Return a publisher; once a script of the scene advertises a topic, only the scene's scripts may publish."""
         is_scene = self.is_scene()
-        if is_scene and topic not in self._scenes:
-            self._scenes.add(topic)
+        if is_scene and topic not in self._scene_topics:
+            self._scene_topics.add(topic)
             self.last.pop(topic, None)
-        return OfflinePublisher(
-            self.last if topic in self.wanted.values() else {}, topic, lambda: is_scene or topic not in self._scenes
-        )
+        last = self.last if topic in self.topics.values() else {}
+        return OfflinePublisher(last, topic, lambda: is_scene or topic not in self._scene_topics)
 
     def advertise_image(self, topic: str, queue: int) -> OfflinePublisher:
-        """Keep nothing: no criterion reads pictures."""
+        """Return a publisher whose messages are not kept: no criterion reads images."""
         return OfflinePublisher({}, topic, lambda: True)
 
     def time(self) -> float:
-        """Return what messages are stamped with, in s."""
+        """Return the time in s for the stamps of messages."""
         return self.clock()
 
     def send_transforms(self, transforms: Sequence[Mapping[str, Any]]) -> None:
         """Do nothing."""
 
     def parameter(self, name: str) -> Any:
-        """Return a parameter that a script has set."""
+        """Return a parameter that a script has set, or None."""
         return self._parameters.get(name)
 
     def set_parameter(self, name: str, value: Any) -> None:
@@ -213,27 +210,27 @@ class OfflineBackend:
         self._parameters[name] = value
 
     def delete_parameter(self, name: str) -> None:
-        """Forget a parameter."""
+        """Delete a parameter if it exists."""
         self._parameters.pop(name, None)
 
     def serve(self, name: str, kind: str, ask: Ask) -> Callable[[], None]:
-        """Do nothing: nobody calls."""
+        """Do nothing: there are no clients."""
         return lambda: None
 
     def call_service(self, name: str, kind: str, request: Any) -> Any:
-        """Raise ValueError: there is no service."""
+        """Raise ValueError: there are no services."""
         raise ValueError(f"no service {name}: this flight is flown without ROS")
 
 
 class OfflinePublisher:
-    """An advertised topic."""
+    """Publisher of a topic of an OfflineBackend."""
 
     def __init__(self, last: dict[str, Any], topic: str, may_publish: Callable[[], bool]):
-        """Leave the last message on `topic` in `last`."""
+        """Store each message as `last[topic]`."""
         self._last, self._topic, self._may_publish = last, topic, may_publish
 
     def publish(self, message: Any) -> None:
-        """Keep a message as it is now. Raises ValueError for a submission's on a topic of the scene's scripts."""
+        """Store a copy of a message. Raises ValueError if a submission publishes on a topic of the scene's scripts."""
         if not self._may_publish():
             raise ValueError(f"{self._topic}: scripts of the scene publish on this topic, so a submission may not")
         self._last[self._topic] = copy.deepcopy(message)

@@ -1,4 +1,4 @@
-"""A sweep as a picture: a curve over one parameter, colours over two."""
+"""Plots of a sweep: a curve over one parameter, a heat map over two."""
 
 from __future__ import annotations
 
@@ -12,26 +12,25 @@ from matplotlib.ticker import MaxNLocator
 
 from drone_sim.files import writing
 
-_FIGURES_IN_CELLS = 150  # cells at most that have room for a number
+_MAX_LABELLED_CELLS = 150  # more cells have no room for numbers
 
-
-_Trial = tuple[tuple[Any, ...], float | None]  # its values, one of each key, and a figure
+_Trial = tuple[tuple[Any, ...], float | None]  # a value for each key, and a figure
 
 
 def save(path: str, title: str, keys: Sequence[str], trials: Sequence[_Trial], label: str) -> None:
-    """Draw the trials' figures, which `label` names, over one parameter or two. Raises OSError."""
+    """Plot the trials' figures, named `label`, over one or two parameters. Raises OSError."""
     figure = Figure(figsize=(7, 5), layout="constrained")
     axes = figure.subplots()
     if len(keys) == 1:
-        _curve(axes, keys[0], trials, label)
+        _draw_curve(axes, keys[0], trials, label)
     else:
-        _map(figure, axes, keys, trials, label)
+        _draw_map(figure, axes, keys, trials, label)
     axes.set_title(title)
     with writing.replacing(path, binary=True) as file:
         figure.savefig(file, format=Path(path).suffix[1:], dpi=120)
 
 
-def _curve(axes: Any, key: str, trials: Sequence[_Trial], label: str) -> None:
+def _draw_curve(axes: Any, key: str, trials: Sequence[_Trial], label: str) -> None:
     points = sorted((values[0], np.nan if figure is None else figure) for values, figure in trials)
     axes.plot(*zip(*points), "o-")
     axes.set_xlabel(key)
@@ -39,29 +38,28 @@ def _curve(axes: Any, key: str, trials: Sequence[_Trial], label: str) -> None:
     axes.grid(alpha=0.3)
 
 
-def _map(figure: Any, axes: Any, keys: Sequence[str], trials: Sequence[_Trial], label: str) -> None:
-    """Draw a cell for every combination; of an optimiser's scattered trials, a dot for each."""
+def _draw_map(figure: Any, axes: Any, keys: Sequence[str], trials: Sequence[_Trial], label: str) -> None:
+    """Draw a cell for every combination of a grid, or a dot for every trial of an optimisation."""
     rows, columns = (sorted({values[index] for values, _ in trials}) for index in (0, 1))
     if len(rows) * len(columns) == len(trials):
         cells = np.full((len(rows), len(columns)), np.nan)
         for (row, column), value in trials:
             cells[rows.index(row), columns.index(column)] = np.nan if value is None else value
-        drawn = axes.imshow(cells, origin="lower", aspect="auto")
-        _name_cells(axes, cells, rows, columns)
+        mappable = axes.imshow(cells, origin="lower", aspect="auto")
+        _label_cells(axes, cells, rows, columns)
     else:
-        known = [(column, row, value) for (row, column), value in trials if value is not None]
-        across, up, colours = zip(*known)
-        drawn = axes.scatter(across, up, c=colours)
+        x, y, colours = zip(*((column, row, value) for (row, column), value in trials if value is not None))
+        mappable = axes.scatter(x, y, c=colours)
     axes.set_ylabel(keys[0])
     axes.set_xlabel(keys[1])
-    figure.colorbar(drawn, label=label)
+    figure.colorbar(mappable, label=label)
 
 
-def _name_cells(axes: Any, cells: np.ndarray, rows: Sequence[Any], columns: Sequence[Any]) -> None:
+def _label_cells(axes: Any, cells: np.ndarray, rows: Sequence[Any], columns: Sequence[Any]) -> None:
     for axis, values in ((axes.yaxis, rows), (axes.xaxis, columns)):
         axis.set_major_locator(MaxNLocator(nbins=min(12, len(values)), integer=True))
-        axis.set_major_formatter(lambda at, _, values=values: _named(at, values))
-    if cells.size <= _FIGURES_IN_CELLS:
+        axis.set_major_formatter(lambda at, _, values=values: _tick_label(at, values))
+    if cells.size <= _MAX_LABELLED_CELLS:
         middle = (np.nanmin(cells) + np.nanmax(cells)) / 2 if np.isfinite(cells).any() else 0.0
         for (row, column), value in np.ndenumerate(cells):
             if np.isfinite(value):
@@ -69,7 +67,7 @@ def _name_cells(axes: Any, cells: np.ndarray, rows: Sequence[Any], columns: Sequ
                 axes.text(column, row, f"{value:.3g}", ha="center", va="center", color=colour, fontsize=8)
 
 
-def _named(at: float, values: Sequence[Any]) -> str:
+def _tick_label(at: float, values: Sequence[Any]) -> str:
     if at != int(at) or not 0 <= at < len(values):
         return ""
     value = values[int(at)]

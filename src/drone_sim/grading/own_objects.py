@@ -1,4 +1,4 @@
-"""Which objects a submission may read where the plan limits it to its own vehicle (`reads: own`)."""
+"""The objects that a submission may read if the plan limits it to its own vehicle (`reads: own`)."""
 
 from __future__ import annotations
 
@@ -11,69 +11,67 @@ from typing import Any
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api import listing
-from drone_sim.scripting.api.calls import declaration_of
+from drone_sim.scripting.api.calls import methods_of
 from drone_sim.scripting.api.constants import bare
 from drone_sim.scripting.api.image_filters import ImageFilters
 from drone_sim.scripting.api.objects import Objects
 from drone_sim.scripting.api.sensors import EVERY_SENSOR, Sensors
 
-_MADE = ("dummy", "path", "script")  # what a script may make
-_IN_MAPPINGS = ("object", "relObject")  # keys of what a motion is told
+_CREATED_KINDS = ("dummy", "path", "script")  # kinds of objects that a script may create
+_OBJECT_KEYS = ("object", "relObject")  # of the mapping that describes a motion
 
 
 class OwnObjects:
-    """Tells the objects of a submission from all others: its vehicle and what hangs there, and what it has made."""
+    """The objects of a submission: its vehicles with all their children, and the objects that it has created."""
 
     def __init__(self, simulation: Simulation, names: Iterable[str]):
-        """Take the simulation before its scripts begin, and the `names` of the vehicles' objects."""
+        """Create this before the simulation's scripts begin; `names` are those of the vehicles' objects."""
         context = simulation.context
         self._objects, self._collections = context.objects, context.collections
         roots = [self._objects[self._objects.handle(name)] for name in names]
-        self._from_the_start = {*self._objects}
+        self._initial_handles = {*self._objects}
         self.handles = {  # of the vehicles' objects
             handle
-            for handle, one in ((handle, self._objects[handle]) for handle in self._objects)
-            if any(one is root or one.is_descendant_of(root) for root in roots)
+            for handle, scene_object in ((handle, self._objects[handle]) for handle in self._objects)
+            if any(scene_object is root or scene_object.is_descendant_of(root) for root in roots)
         }
 
-    def other_in(self, function: str, arguments: list[Any]) -> str | None:
-        """Return an object in a call that is not the submission's own, by its name for people; None for none."""
-        return next(filter(None, map(self._other, _entities(function, arguments))), None)
+    def foreign_object(self, function: str, arguments: list[Any]) -> str | None:
+        """Return the name of an object in a call that is not the submission's own, None if there is none."""
+        return next(filter(None, map(self._foreign_name, _entities(function, arguments))), None)
 
-    def _other(self, value: Any) -> str | None:
+    def _foreign_name(self, value: Any) -> str | None:
         if not isinstance(value, (int, float)) or not math.isfinite(value):
-            return None  # which is no handle of anything
+            return None  # not a handle
         if value in EVERY_SENSOR:
             return "all objects"
         handle = bare(int(value))
         if handle in self._collections:
             members = self._collections.objects(handle, self._objects)
-            return next(filter(None, map(self._other, members)), None)
-        one = self._objects.get(handle)
-        return None if one is None or self._is_own(handle, one) else one.name
+            return next(filter(None, map(self._foreign_name, members)), None)
+        scene_object = self._objects.get(handle)
+        return None if scene_object is None or self._is_own(handle, scene_object) else scene_object.name
 
-    def _is_own(self, handle: int, one: SceneObject) -> bool:
-        return handle in self.handles or (handle not in self._from_the_start and one.kind in _MADE)
+    def _is_own(self, handle: int, scene_object: SceneObject) -> bool:
+        return handle in self.handles or (handle not in self._initial_handles and scene_object.kind in _CREATED_KINDS)
 
 
 def _entities(function: str, arguments: list[Any]) -> Iterator[Any]:
     """Yield the handles among the arguments of a call."""
-    for place, default in _places().get(function, ()):
-        yield arguments[place] if place < len(arguments) else default
-    for one in arguments:
-        if isinstance(one, Mapping):
-            yield from (one.get(key) for key in _IN_MAPPINGS)
+    for index, default in _handle_arguments().get(function, ()):
+        yield arguments[index] if index < len(arguments) else default
+    for argument in arguments:
+        if isinstance(argument, Mapping):
+            yield from (argument.get(key) for key in _OBJECT_KEYS)
 
 
 @functools.cache
-def _places() -> dict[str, tuple[tuple[int, Any], ...]]:
-    """Return for each function, as module.name, which arguments are handles, and the default where one is left out."""
-    found = {}
+def _handle_arguments() -> dict[str, tuple[tuple[int, Any], ...]]:
+    """Return the index and the default of each argument that is a handle, by function, as module.name."""
+    handle_arguments = {}
     for kind in (*listing.classes_of_sim(), Objects, Sensors, ImageFilters):
-        for attribute in vars(kind).values():
-            declaration = declaration_of(attribute)
-            if declaration:
-                given = [*inspect.signature(attribute).parameters.values()][1:]
-                places = [(n, one.default) for n, one in enumerate(given) if one.annotation == "Handle"]
-                found.update({f"{declaration.module}.{name}": tuple(places) for name in declaration.names})
-    return found
+        for method, _, names in methods_of(kind):
+            parameters = enumerate([*inspect.signature(method).parameters.values()][1:])
+            handles = tuple((index, one.default) for index, one in parameters if one.annotation == "Handle")
+            handle_arguments.update(dict.fromkeys(names, handles))
+    return handle_arguments

@@ -1,7 +1,7 @@
-"""What a flight's seed changes: where the vehicles start, the wind, and the seeds of noise, gusts and faults.
+"""Random variation of a flight by its seed: start poses, wind, and the seeds of noise, gusts and faults.
 
-Seed 0 changes nothing. With any other, everything draws from a random generator of its own, of the seed and a name
-(`position/drone`, `wind`, ...), so that what is added to a plan changes nothing of what was there.
+Seed 0 changes nothing. With any other seed, each quantity has a random generator of its own, made from the seed and a
+name (`position/drone`, `wind`, ...), so that a new quantity in a plan does not change the values of the others.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from drone_sim.vehicles.parameters import VehicleParameters
 _Metres = Annotated[Finite, Within(0, 1000)]
 _Width = Annotated[tuple[_Metres, _Metres, _Metres], Field(description="3 numbers, [x, y, z] in m")]
 _Speed = Annotated[Finite, Within(0, 50)]
-_WINDIEST = 100.0  # m/s, as config/drone.yaml allows
+_MAX_WIND = 100.0  # m/s, the limit of config/drone.yaml
 _SEEDS = 2**63
 
 
 class Randomization(Checked):
-    """Half the width of a uniform distribution about what is given; 0, or left out: as it is given."""
+    """Half the widths of uniform distributions about the values of the plan; 0 for no variation."""
 
     position: _Width = (0, 0, 0)
     yaw: Annotated[Finite, Within(0, 3.15)] = 0.0  # rad
@@ -33,60 +33,61 @@ class Randomization(Checked):
     wind: Annotated[tuple[_Speed, _Speed, _Speed], Field(description="3 numbers, [x, y, z] in m/s")] = (0, 0, 0)
 
 
-def randomized(parameters: Parameters, spread: Randomization, seed: int) -> Parameters:
-    """Return what a flight of this seed begins with."""
+def randomize(parameters: Parameters, spread: Randomization, seed: int) -> Parameters:
+    """Return the parameters of the flight with a seed."""
     if seed == 0:
         return parameters
     weather = parameters.weather
     gusts = weather.gusts.model_copy(update={"seed": _seed(seed, "gusts", weather.gusts.seed)})
-    wind = np.clip(_about(weather.wind, spread.wind, seed, "wind"), -_WINDIEST, _WINDIEST)
-    changed = weather.model_copy(update={"gusts": gusts, "wind": tuple(wind.tolist())})
-    fleet = tuple(_vehicle(one, spread, seed) for one in parameters.fleet)
-    return parameters.varied(changed, _scene(parameters.scene, spread, seed), fleet)
+    wind = np.clip(_draw_about(weather.wind, spread.wind, seed, "wind"), -_MAX_WIND, _MAX_WIND)
+    new_weather = weather.model_copy(update={"gusts": gusts, "wind": tuple(wind.tolist())})
+    fleet = tuple(_randomize_vehicle(vehicle, spread, seed) for vehicle in parameters.fleet)
+    return parameters.varied(new_weather, _randomize_scene(parameters.scene, spread, seed), fleet)
 
 
 def check_objects(parameters: Parameters, spread: Randomization) -> None:
-    """Raise ParameterError for an object that the scene has not."""
-    known = [one.name for one in parameters.scene.objects if one.name]
+    """Raise ParameterError for an object that the scene does not have."""
+    known = [entry.name for entry in parameters.scene.objects if entry.name]
     for name in spread.objects:
         if name not in known:
-            said = f"no such object of the scene; {near_names(name, known)}" if known else "the scene has none"
-            raise ParameterError(said, ("spread", "objects", name))
+            reason = f"no such object of the scene; {near_names(name, known)}" if known else "the scene has none"
+            raise ParameterError(reason, ("spread", "objects", name))
 
 
-def _scene(scene: SceneParameters, spread: Randomization, seed: int) -> SceneParameters:
+def _randomize_scene(scene: SceneParameters, spread: Randomization, seed: int) -> SceneParameters:
     if not spread.objects:
         return scene
     objects = []
-    for one in scene.objects:
-        width = spread.objects.get(one.name)
-        place = None if width is None else _about(one.position, width, seed, f"objects/{one.name}").tolist()
-        objects.append(one if place is None else one.model_copy(update={"position": tuple(place)}))
+    for entry in scene.objects:
+        if (width := spread.objects.get(entry.name)) is not None:
+            position = _draw_about(entry.position, width, seed, f"objects/{entry.name}").tolist()
+            entry = entry.model_copy(update={"position": tuple(position)})
+        objects.append(entry)
     return scene.model_copy(update={"objects": objects})
 
 
-def _vehicle(own: VehicleParameters, spread: Randomization, seed: int) -> VehicleParameters:
-    x, y, z = map(float, _about(own.position, spread.position, seed, f"position/{own.name}"))
-    (yaw,) = map(float, _about((own.yaw,), (spread.yaw,), seed, f"yaw/{own.name}"))
-    faults = own.faults.model_copy(update={"seed": _seed(seed, f"faults/{own.name}", own.faults.seed)})
+def _randomize_vehicle(vehicle: VehicleParameters, spread: Randomization, seed: int) -> VehicleParameters:
+    x, y, z = map(float, _draw_about(vehicle.position, spread.position, seed, f"position/{vehicle.name}"))
+    (yaw,) = map(float, _draw_about((vehicle.yaw,), (spread.yaw,), seed, f"yaw/{vehicle.name}"))
+    faults = vehicle.faults.model_copy(update={"seed": _seed(seed, f"faults/{vehicle.name}", vehicle.faults.seed)})
     sensors = {
-        name: one.model_copy(update={"seed": _seed(seed, f"sensors/{own.name}/{name}", one.seed)})
-        for name, one in own.sensors.items()
+        name: sensor.model_copy(update={"seed": _seed(seed, f"sensors/{vehicle.name}/{name}", sensor.seed)})
+        for name, sensor in vehicle.sensors.items()
     }
-    place = {"position": (x, y, max(0.0, z)), "yaw": yaw}
-    return own.model_copy(update={**place, "faults": faults, "sensors": sensors})
+    pose = {"position": (x, y, max(0.0, z)), "yaw": yaw}
+    return vehicle.model_copy(update={**pose, "faults": faults, "sensors": sensors})
 
 
-def _about(middle: Any, widths: Any, seed: int, what: str) -> np.ndarray:
-    """Return numbers, each drawn from within its width of the middle; where there is no width, the middle itself."""
-    drawn = _generator(seed, what).uniform(-1.0, 1.0, len(widths))
-    return np.asarray(middle, float) + np.asarray(widths, float) * drawn
+def _draw_about(centre: Any, widths: Any, seed: int, name: str) -> np.ndarray:
+    """Return numbers drawn uniformly within `widths` about `centre`; with a width of 0, the centre itself."""
+    shares = _generator(seed, name).uniform(-1.0, 1.0, len(widths))
+    return np.asarray(centre, float) + np.asarray(widths, float) * shares
 
 
-def _seed(seed: int, what: str, given: int) -> int:
-    """Return the seed of noise, gusts or faults; it depends on the plan's own one, too."""
-    return int(_generator(seed, f"{what}/{given}").integers(_SEEDS))
+def _seed(seed: int, name: str, plan_seed: int) -> int:
+    """Return a new seed of noise, gusts or faults, which also depends on the seed in the plan."""
+    return int(_generator(seed, f"{name}/{plan_seed}").integers(_SEEDS))
 
 
-def _generator(seed: int, what: str) -> np.random.Generator:
-    return np.random.default_rng(np.random.SeedSequence([seed, *what.encode()]))
+def _generator(seed: int, name: str) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence([seed, *name.encode()]))

@@ -1,4 +1,4 @@
-"""What one graded flight gives: an outcome for each criterion, with the figure behind it."""
+"""The result of one graded flight: an outcome with a figure for each criterion."""
 
 from __future__ import annotations
 
@@ -10,63 +10,63 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one criterion came out."""
+    """The outcome of one criterion."""
 
     name: str
     kind: str
     passed: bool
-    value: float | None  # the figure, in `unit`; None where there is none, as of what never happened
+    value: float | None  # the figure, in `unit`; None if there is none
     unit: str  # '' for a count
-    allowed: str  # what the figure may be, such as 'at most 1.5 s'
-    points: float  # that it gives, of the `of` that can be had
-    of: float
-    at: float | None  # s of simulated time at which it was decided; None where it is no matter of a moment
-    said: str  # one sentence, with the figure
+    allowed: str  # the allowed figures, such as 'at most 1.5 s'
+    points: float  # awarded
+    of: float  # possible points
+    at: float | None  # the simulated time (s) of the deciding moment; None if there is no such moment
+    said: str  # a sentence with the figure
 
 
 @dataclass(frozen=True)
 class Result:
-    """How one flight of a plan came out; to and from JSON without a loss."""
+    """The result of one flight of a plan. Conversion to JSON and back loses nothing."""
 
     plan: str
-    script: str  # '' is the built-in one
+    script: str  # '' is the built-in script
     seed: int
-    changes: Mapping[str, Any]  # keys of config/drone.yaml, laid over the plan's
+    changes: Mapping[str, Any]  # keys of config/drone.yaml that override the plan's
     passed: bool
     points: float
     of: float
     flown: float  # s of simulated time
-    error: str | None  # one line; None where the flight came to its end
+    error: str | None  # one line; None if the flight came to its end
     outcomes: tuple[Outcome, ...] = field(default=())
-    digest: str = ""  # SHA-256 of the table's numbers, as little-endian doubles; '' where nothing was flown
-    tried: tuple[str, ...] = ()  # what the script tried that the plan does not allow, in one line each
+    digest: str = ""  # SHA-256 of the table's numbers, as little-endian doubles; '' if nothing was flown
+    tried: tuple[str, ...] = ()  # a line for each thing that the script tried and the plan does not allow
 
     def with_tried(self, tried: Sequence[str]) -> Result:
-        """Return the result with the forbidden things that the script tried; such a flight is not passed."""
+        """Return the result with the lines `tried`; if there are any, the flight has not passed."""
         return replace(self, tried=tuple(tried), passed=self.passed and not tried)
 
     def of_script(self, script: str) -> Result:
-        """Return it as of a script in another place, with the same contents."""
-        before, folder = os.path.dirname(self.script), os.path.dirname(script)
-        error = self.error.replace(before, folder) if self.error and before else self.error
+        """Return the same result for a script with the same contents at another path."""
+        old_folder, folder = os.path.dirname(self.script), os.path.dirname(script)
+        error = self.error.replace(old_folder, folder) if self.error and old_folder else self.error
         return replace(self, script=script, error=error)
 
     @property
     def troubles(self) -> list[str]:
-        """What went wrong beside the criteria, in one line each: the error, and what was tried."""
-        return [*filter(None, [self.error]), *(f"the script {one}" for one in self.tried)]
+        """The error, and the forbidden things that the script tried, a line each."""
+        return [*filter(None, [self.error]), *(f"the script {line}" for line in self.tried)]
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as what the module json writes: an infinite or undefined figure is None."""
+        """Return the result as a dictionary for the module json."""
         return {**asdict(self), "tried": list(self.tried)}
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Result:
-        """Return what `to_json` gave. Raises ValueError for anything else."""
+        """Return the result in the dictionary of `to_json`. Raises ValueError for any other value."""
         try:
-            outcomes = tuple(Outcome(**one) for one in values["outcomes"])
-            own = {one.name: values[one.name] for one in fields(cls)}
-            return cls(**{**own, "outcomes": outcomes, "tried": tuple(values["tried"])})
+            outcomes = tuple(Outcome(**outcome) for outcome in values["outcomes"])
+            plain = {field_.name: values[field_.name] for field_ in fields(cls)}
+            return cls(**{**plain, "outcomes": outcomes, "tried": tuple(values["tried"])})
         except (KeyError, TypeError) as error:
             raise ValueError(f"no result of a flight: {error}") from None
 
@@ -81,7 +81,7 @@ def result_of(
     error: str | None = None,
     digest: str = "",
 ) -> Result:
-    """Return the result of a flight: passed where every criterion is, and nothing went wrong."""
-    passed = error is None and all(one.passed for one in outcomes)
-    points, of = sum(one.points for one in outcomes), sum(one.of for one in outcomes)
+    """Return the result of a flight, which has passed if every criterion has and there was no error."""
+    passed = error is None and all(outcome.passed for outcome in outcomes)
+    points, of = sum(outcome.points for outcome in outcomes), sum(outcome.of for outcome in outcomes)
     return Result(plan, script, seed, dict(changes), passed, points, of, flown, error, outcomes, digest)

@@ -1,4 +1,4 @@
-"""The tasks of a course, which come with the package: tasks/<name>/plan.yaml. See tasks/README.md."""
+"""The package's own tasks: tasks/<name>/plan.yaml. See tasks/README.md."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ def folder() -> Path:
 
 
 def find(name: str) -> Path:
-    """Return the path of a plan: of a task by its name, in a folder that holds a plan.yaml, or a file as it is given.
+    """Return the path of the plan with a name: a YAML file, a folder with a plan.yaml, or a task.
 
-    Raises PlanError, in one line with near names, for a name that is none of these.
+    Raises PlanError for any other name.
     """
-    given = Path(name)
-    if given.suffix.lower() in (".yaml", ".yml"):
-        return given
-    if name and is_file(given / _PLAN):
-        return given / _PLAN
+    path = Path(name)
+    if path.suffix.lower() in (".yaml", ".yml"):
+        return path
+    if name and is_file(path / _PLAN):
+        return path / _PLAN
     known = names()
     if name in known:
         return folder() / name / _PLAN

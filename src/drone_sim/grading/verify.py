@@ -1,8 +1,9 @@
-"""`rosrun drone_sim grade --verify RESULTS.json`: fly what a file of results says once more, and compare."""
+"""`rosrun drone_sim grade --verify RESULTS.json`: fly the flights of a results file again, and compare."""
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import sys
@@ -13,9 +14,9 @@ from typing import Any
 from drone_sim.grading import evidence
 from drone_sim.grading import plan as plans
 from drone_sim.grading.arguments import GradingParser, is_sandboxed, status_of
-from drone_sim.grading.flight import ungraded
+from drone_sim.grading.flight import ungraded_result
 from drone_sim.grading.jobs import pool, settings
-from drone_sim.grading.jobs.files import Unreadable, given_script, read
+from drone_sim.grading.jobs.files import Unreadable, read, submission_path
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.jobs.pool import FlightOptions
 from drone_sim.grading.outputs import as_json
@@ -27,11 +28,11 @@ from drone_sim.scripting.errors import ScriptError
 
 PROGRAM = "grade"
 DIFFERENT = 1
-_LARGEST = 2**28  # bytes
+_MAX_SIZE = 2**28  # bytes
 
 
 def main(arguments: Sequence[str], watchdog: Watchdog | None = None) -> int:
-    """Verify; return 0 where every flight comes out as the file says, 1 where one does not, 2 for what cannot be."""
+    """Verify; return 0 if every result is that of the file, 1 if one is not, 2 after one line for a user's mistake."""
     parser = GradingParser(prog=PROGRAM, description=__doc__)
     parser.add_argument("--verify", metavar="RESULTS.json", required=True, help="a file of --json")
     parser.add_argument("--key", metavar="FILE", help="the key with which the file was signed")
@@ -42,34 +43,34 @@ def main(arguments: Sequence[str], watchdog: Watchdog | None = None) -> int:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    content = _content(options.verify)
-    if options.key and not evidence.is_signed(content, evidence.key_in(options.key)):
+    content = _read(options.verify)
+    if options.key and not evidence.is_signed(content, evidence.read_key(options.key, "--key")):
         print(f"{options.verify}: is not signed by {options.key}, or was changed since", file=sys.stderr)
         return DIFFERENT
     plan = plans.read(content["plan"]["path"])
-    for line in _changes(plan, content):
+    for line in _changed_files(plan, content):
         print(f"{PROGRAM}: {printable(line)}", file=sys.stderr)
-    said = [Result.from_json(one) for one in content["results"]]
-    again = _flown(plan, said, options)
+    results = [Result.from_json(result) for result in content["results"]]
+    new_results = _fly_again(plan, results, options)
     different = 0
-    for one, raw in zip(said, content["results"]):
-        now = as_json.finite(again[one.script, one.seed].to_json())
-        names = [name for name in now if now[name] != raw[name]]
+    for result, values in zip(results, content["results"]):
+        new_values = as_json.finite(new_results[result.script, result.seed].to_json())
+        names = [name for name in new_values if new_values[name] != values[name]]
         different += bool(names)
         for name in names:
-            where = f"{one.script}, seed {one.seed}: {name}"
-            print(printable(f"{where}: the file says {shown(raw[name])}, the flight {shown(now[name])}"))
-    print(f"{len(said) - different} of {len(said)} flights are what the file says, to the last bit")
+            where = f"{result.script}, seed {result.seed}: {name}"
+            print(printable(f"{where}: the file says {shown(values[name])}, the flight {shown(new_values[name])}"))
+    print(f"{len(results) - different} of {len(results)} flights are what the file says, to the last bit")
     return DIFFERENT if different else 0
 
 
-def _content(path: str) -> dict[str, Any]:
-    """Return what a file of results holds. Raises Unreadable and ValueError."""
+def _read(path: str) -> dict[str, Any]:
+    """Return the content of a results file. Raises Unreadable and ValueError."""
     try:
-        content = json.loads(read(Path(path), _LARGEST))
+        content = json.loads(read(Path(path), _MAX_SIZE))
         if (content["format"], content["version"]) != (as_json.FORMAT, as_json.VERSION) or not content["plan"]["path"]:
             raise ValueError
-        if any(one["changes"] for one in content["results"]):
+        if any(result["changes"] for result in content["results"]):
             raise ValueError
     except (KeyError, TypeError, UnicodeDecodeError, json.JSONDecodeError):
         raise ValueError(f"{path}: is not a file that grade --json has written") from None
@@ -78,38 +79,32 @@ def _content(path: str) -> dict[str, Any]:
     return dict(content)
 
 
-def _changes(plan: Plan, content: Mapping[str, Any]) -> Iterator[str]:
-    """Give a line for each thing that is not what it was when the file was written."""
-    for one in content["scripts"]:
-        now, before = evidence.hashes_of(plan, one["script"]), one.get("hashes", {})
-        for name in before:
-            if now.get(name) != before[name]:
-                yield f"{one['script'] or 'the built-in script'}: not what it was: {name}"
+def _changed_files(plan: Plan, content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a line for each hash that has changed since the file was written."""
+    for script in content["scripts"]:
+        hashes = evidence.hashes_of(plan, script["script"])
+        for name, old_hash in script.get("hashes", {}).items():
+            if hashes.get(name) != old_hash:
+                yield f"{script['script'] or 'the built-in script'}: not what it was: {name}"
 
 
-def _flown(plan: Plan, said: Sequence[Result], options: argparse.Namespace) -> dict[tuple[str, int], Result]:
+def _fly_again(plan: Plan, results: Sequence[Result], options: argparse.Namespace) -> dict[tuple[str, int], Result]:
+    """Return the results of new flights by script and seed; a script that cannot be flown keeps its error."""
     numbers = settings.load()
-    how = FlightOptions(numbers.limits, numbers.batches, is_sandboxed(PROGRAM, options.sandbox))
-    contents = {script: _contents(plan, script) for script in {one.script for one in said}}
-    found = {(one.script, one.seed): ungraded(plan, one.script, one.seed, {}, one.error or "") for one in said}
+    flight_options = FlightOptions(numbers.limits, numbers.batches, is_sandboxed(PROGRAM, options.sandbox))
+    contents: dict[str, str] = {}
+    for script in {result.script for result in results}:
+        with contextlib.suppress(Unreadable, ScriptError):
+            contents[script] = contents_of(plan, submission_path(script))
+    found = {
+        (result.script, result.seed): ungraded_result(plan, result.script, result.seed, {}, result.error or "")
+        for result in results
+    }
     jobs = [
-        Job(str(plan.path), one.script, one.seed, {}, key_of(contents[one.script], one.seed, {}))
-        for one in said
-        if contents[one.script]
+        Job(str(plan.path), result.script, result.seed, {}, key_of(contents[result.script], result.seed, {}))
+        for result in results
+        if result.script in contents
     ]
-    with pool.opened(how, max(1, min(options.jobs, len(jobs)))) as fly:
-        found.update({(one.job.script, one.job.seed): one.result for one in fly(jobs)})
+    with pool.open_pool(flight_options, max(1, min(options.jobs, len(jobs)))) as fly:
+        found.update({(flight.job.script, flight.job.seed): flight.result for flight in fly(jobs)})
     return found
-
-
-def _contents(plan: Plan, script: str) -> str:
-    """Return what contents_of does; '' for what cannot be flown, such as a zip that was refused."""
-    try:
-        return contents_of(plan, given_script(script))
-    except (Unreadable, ScriptError):
-        return ""
-
-
-def asks_for_it(arguments: Sequence[str]) -> bool:
-    """Tell whether a command line asks for a verification."""
-    return any(one == "--verify" or one.startswith("--verify=") for one in arguments)

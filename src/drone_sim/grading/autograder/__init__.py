@@ -1,1 +1,1 @@
-"""A zip that Gradescope takes as an autograder: this package, a plan, and what runs them there."""
+"""The autograder for Gradescope: a zip with this package, a plan, and the scripts that run them."""

@@ -1,4 +1,4 @@
-"""`rosrun drone_sim grade PLAN --autograder OUT.zip`: make the zip."""
+"""`rosrun drone_sim grade PLAN --autograder OUT.zip`: write the zip."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from drone_sim.grading.plan import Plan
 
 _FILES = Path(__file__).parent / "files"
 _SOURCE = Path(__file__).resolve().parents[2]
-_OF_PACKAGE = ("config", "urdf")  # beside the source
+_PACKAGE_FOLDERS = ("config", "urdf")  # beside the source
 _REQUIREMENTS = "requirements.txt"
 _EXECUTABLE = 0o100755 << 16
-_DATE = (2000, 1, 1, 0, 0, 0)  # the same zip for the same contents
+_DATE = (2000, 1, 1, 0, 0, 0)  # constant, so that equal contents give equal zips
 
 
 def write(plan: Plan, seeds: int, path: str | Path) -> None:
-    """Write the zip, which flies so many seeds of a plan. No solution is in it.
+    """Write the zip, which grades with the seeds 0 to `seeds` - 1 of a plan. It contains no solution.
 
-    Raises ValueError for a plan with files elsewhere, and OSError.
+    Raises OSError, and ValueError for a plan with files outside its folder.
     """
     members = {
         **{name: (_FILES / name).read_bytes() for name in ("setup.sh", "run_autograder")},
         "seeds": f"{seeds}\n".encode(),
-        **{name: one.read_bytes() for name, one in (*_package(), *_plan(plan))},
+        **{name: path.read_bytes() for name, path in (*_package_files(), *_plan_files(plan))},
     }
     with writing.replacing(path, binary=True) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in members.items():
@@ -36,24 +36,25 @@ def write(plan: Plan, seeds: int, path: str | Path) -> None:
             archive.writestr(info, content, zipfile.ZIP_DEFLATED)
 
 
-def _package() -> Iterator[tuple[str, Path]]:
-    """Give the files that a flight without ROS needs, by their names in the zip."""
+def _package_files() -> Iterator[tuple[str, Path]]:
+    """Yield the files that a flight without ROS needs, each with its name in the zip."""
     root = package_path()
     if not (root / _REQUIREMENTS).is_file():
-        raise ValueError(f"--autograder: is made from a checkout of drone_sim; {root} has no {_REQUIREMENTS}")
+        raise ValueError(f"--autograder: needs a checkout of drone_sim; {root} has no {_REQUIREMENTS}")
     yield _REQUIREMENTS, root / _REQUIREMENTS
     yield "drone_sim/package.xml", root / "package.xml"
-    for path in (*_SOURCE.rglob("*"), *(one for name in _OF_PACKAGE for one in (root / name).rglob("*"))):
+    for path in (*_SOURCE.rglob("*"), *(one for name in _PACKAGE_FOLDERS for one in (root / name).rglob("*"))):
         if path.is_file() and "__pycache__" not in path.parts:
             yield f"drone_sim/{path.relative_to(root)}", path
 
 
-def _plan(plan: Plan) -> Iterator[tuple[str, Path]]:
-    """Give the files of a plan, as plan/plan.yaml and beside it; what lies in the package comes with that."""
+def _plan_files(plan: Plan) -> Iterator[tuple[str, Path]]:
+    """Yield the files of a plan outside the package, with names below plan/ in the zip."""
+    packed_folders = (_SOURCE, *(package_path() / name for name in _PACKAGE_FOLDERS))
     for path in files.of_plan(plan, {}):
         if path == plan.path:
             yield "plan/plan.yaml", path
         elif path.is_relative_to(plan.folder):
             yield f"plan/{path.relative_to(plan.folder)}", path
-        elif not any(path.is_relative_to(one) for one in (_SOURCE, *(package_path() / name for name in _OF_PACKAGE))):
+        elif not any(path.is_relative_to(folder) for folder in packed_folders):
             raise ValueError(f"--autograder: {path}: the plan needs it, but it is not in the plan's folder")

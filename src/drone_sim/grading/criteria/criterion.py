@@ -1,13 +1,13 @@
-"""What criteria have in common: all of them, and those of a distance."""
+"""The base classes of the criteria."""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import AfterValidator, PlainValidator, TypeAdapter, ValidationError
 
 from drone_sim.config.types import Checked, Finite, Label, ParameterError, Within
 from drone_sim.grading.flight_record import UNITS, FlightRecord
@@ -18,20 +18,34 @@ from drone_sim.offline.timeline import MAX_TIME
 Seconds = Annotated[Finite, Within(0, MAX_TIME)]
 Figure = Annotated[Finite, Within(-1e9, 1e9)]
 Bound = Annotated[Finite, Within(0, 1e9)]
-_ROUNDING = 1e-9  # s, by which a row's time may miss what is meant
+ROUNDING = 1e-9  # s, tolerance when times of rows are compared with times of the plan
 
 
-def _known(column: str) -> str:
+def _check_column(column: str) -> str:
     if column not in UNITS:
         raise ValueError(f"no such column of a flight; {near_names(column, UNITS)}")
     return column
 
 
-Column = Annotated[str, AfterValidator(_known)]
+Column = Annotated[str, AfterValidator(_check_column)]
 
 
-class Missed(Exception):
-    """A flight lacks something that a criterion needs; the message is a sentence that says what."""
+def label_or(kind: Any, message: str) -> PlainValidator:
+    """Return a validator of a name or a value of another type, whose error has the given message."""
+
+    def validate(value: Any) -> Any:
+        if isinstance(value, str):
+            return TypeAdapter(Label).validate_python(value)
+        try:
+            return TypeAdapter(kind).validate_python(value)
+        except ValidationError:
+            raise ValueError(message) from None
+
+    return PlainValidator(validate)
+
+
+class CriterionFailed(Exception):
+    """The criterion fails without a figure; the message is a sentence that says why."""
 
 
 class FlightPart(NamedTuple):
@@ -51,53 +65,56 @@ class FlightPart(NamedTuple):
         return float(self.times[-1])
 
     def column(self, name: str) -> np.ndarray:
-        """Return a column, (M,). Raises Missed where it holds what is no number."""
+        """Return a column, (M,). Raises CriterionFailed if a value is not finite."""
         values = self.flight.columns[name][self.rows]
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
-            raise Missed(f"{name} is not a finite number at {self.times[bad[0]]:.2f} s")
+            raise CriterionFailed(f"{name} is not a finite number at {self.times[bad[0]]:.2f} s")
         return values
 
-    def places(self) -> np.ndarray:
-        """Return where the vehicle was, (M, 3) in m. Raises Missed where that is no place."""
-        places = self.flight.rows[self.rows, 1:4]
-        if not np.isfinite(places).all():
-            raise Missed("a row of the table has no place of the vehicle")
-        return places
+    def positions(self) -> np.ndarray:
+        """Return the vehicle's positions, (M, 3) in m. Raises CriterionFailed if one is not finite."""
+        positions = self.flight.rows[self.rows, 1:4]
+        if not np.isfinite(positions).all():
+            raise CriterionFailed("the position of the vehicle is not finite in a row of the table")
+        return positions
 
     def poses(self, name: str) -> np.ndarray:
-        """Return the poses of another vehicle or object, (M, 7); of a path the first that it finds. Raises Missed."""
-        name = self.flight.found.get(name, [name])[0]
-        if name not in self.flight.other_poses:
-            raise Missed(f"the flight has no '{name}'; {near_names(name, self.flight.other_poses)}")
-        poses = self.flight.other_poses[name][self.rows]
-        gone = np.flatnonzero(~np.isfinite(poses).all(axis=1))
-        if len(gone):
-            raise Missed(f"{name} is gone at {self.times[gone[0]]:.2f} s")
+        """Return the poses of another vehicle or object, (M, 7); for a path, those of the first object that it finds.
+
+        Raises CriterionFailed if the object does not exist, or was removed.
+        """
+        name = self.flight.objects_by_path.get(name, [name])[0]
+        if name not in self.flight.object_poses:
+            raise CriterionFailed(f"the flight has no '{name}'; {near_names(name, self.flight.object_poses)}")
+        poses = self.flight.object_poses[name][self.rows]
+        removed = np.flatnonzero(~np.isfinite(poses).all(axis=1))
+        if len(removed):
+            raise CriterionFailed(f"{name} is gone at {self.times[removed[0]]:.2f} s")
         return poses
 
 
 class Criterion(Checked):
-    """One entry of `criteria`; it looks at the flight from `after` to `until` (s), by default at all of it."""
+    """An entry of `criteria`, which judges the flight from `after` to `until` (s), by default all of it."""
 
-    kind: str  # each kind names its own
-    name: Label = ""  # the kind, where it is left out
+    kind: str  # a Literal in every subclass
+    name: Label = ""  # the default is the kind
     points: Annotated[Finite, Within(0, 1e6)] = 1.0
     after: Seconds = 0.0
     until: Seconds | None = None
 
-    is_lasting: ClassVar[bool] = True  # whether it has to hold to the end of its part
-    needs_contacts: ClassVar[bool] = False  # whether it asks for FlightRecord.contacts
-    needs_states: ClassVar[bool] = False  # whether it asks for FlightRecord.states
+    is_lasting: ClassVar[bool] = True  # whether it must hold until the end of its part
+    needs_contacts: ClassVar[bool] = False  # whether it reads FlightRecord.contacts
+    needs_states: ClassVar[bool] = False  # whether it reads FlightRecord.states
 
     def model_post_init(self, _context: Any) -> None:
-        """Refuse a part of the flight that has no time in it."""
+        """Refuse an empty part of the flight."""
         if self.until is not None and self.until <= self.after:
             raise ParameterError(f"must be later than after = {self.after:g}", ("until",), f"{self.until:g}")
 
     @property
-    def called(self) -> str:
-        """Its name."""
+    def label(self) -> str:
+        """The name, or the kind if there is no name."""
         return self.name or self.kind
 
     @property
@@ -106,66 +123,63 @@ class Criterion(Checked):
         """What passes, in words such as 'at most 1.5 s'."""
 
     @property
-    def others(self) -> tuple[str, ...]:
-        """Names and paths of vehicles and objects that it asks for in FlightRecord.other_poses."""
+    def object_names(self) -> tuple[str, ...]:
+        """Names and paths of the vehicles and objects that it needs in FlightRecord.object_poses."""
         return ()
 
     @property
-    def lines(self) -> tuple[str, ...]:
-        """Names of the scene's paths that it needs in FlightRecord.lines."""
+    def path_names(self) -> tuple[str, ...]:
+        """Names of the scene's paths that it needs in FlightRecord.paths."""
         return ()
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """Names of signals that it asks for in FlightRecord.values."""
+        """Names of the signals that it needs in FlightRecord.values."""
         return ()
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Names of topics that it asks for in FlightRecord.values."""
+        """Names of the topics that it needs in FlightRecord.values."""
         return ()
 
     def judge(self, flight: FlightRecord) -> Outcome:
-        """Return how the flight did; a criterion fails if the flight ended too early for it."""
+        """Return the outcome of a flight; the criterion fails if the flight ended too early for it."""
         until = math.inf if self.until is None else self.until
-        rows = (flight.times >= self.after - _ROUNDING) & (flight.times <= until + _ROUNDING)
+        rows = (flight.times >= self.after - ROUNDING) & (flight.times <= until + ROUNDING)
         if not rows.any():
-            return self.missed(f"the flight was over at {flight.end:.2f} s, before this began")
+            return self.fail(f"the flight was over at {flight.end:.2f} s, before this began")
         try:
-            outcome = self._judged(FlightPart(flight, rows))
-        except Missed as missed:
-            return self.missed(str(missed))
-        is_cut_off = not flight.is_whole and flight.end < until - _ROUNDING
+            outcome = self._judge_part(FlightPart(flight, rows))
+        except CriterionFailed as failure:
+            return self.fail(str(failure))
+        is_cut_off = not flight.is_whole and flight.end < until - ROUNDING
         if outcome.passed and self.is_lasting and is_cut_off:
-            return self.missed(f"the flight was over at {flight.end:.2f} s, too early for this")
+            return self.fail(f"the flight was over at {flight.end:.2f} s, too early for this")
         return outcome
 
-    def missed(self, why: str) -> Outcome:
-        """Return the outcome of a flight that did not get so far."""
-        return self._outcome(False, why)
-
     @abstractmethod
-    def _judged(self, part: FlightPart) -> Outcome:
-        """Return how a flight did in this part of it. Raises Missed."""
+    def _judge_part(self, part: FlightPart) -> Outcome:
+        """Return the outcome of a part of a flight. Raises CriterionFailed."""
 
-    def _outcome(
-        self, passed: bool, said: str, value: float | None = None, unit: str = "", at: float | None = None
+    def fail(self, reason: str) -> Outcome:
+        """Return the outcome of a flight that fails without a figure."""
+        return self._make_outcome(False, reason)
+
+    def _make_outcome(
+        self, passed: bool, sentence: str, value: float | None = None, unit: str = "", at: float | None = None
     ) -> Outcome:
-        """Return an outcome, with all points or none."""
+        """Return an outcome with all points or none; a `value` that is not finite becomes None."""
         if value is not None:
             value = float(value) if math.isfinite(value) else None
         points = self.points if passed else 0.0
         at = None if at is None else float(at)
-        return Outcome(self.called, self.kind, bool(passed), value, unit, self.allowed, points, self.points, at, said)
-
-
-def figure(value: float, unit: str = "") -> str:
-    """Return a figure as a sentence has it: four digits, and its unit."""
-    return f"{value:.4g} {unit}".rstrip()
+        return Outcome(
+            self.label, self.kind, bool(passed), value, unit, self.allowed, points, self.points, at, sentence
+        )
 
 
 class AtMostCriterion(Criterion):
-    """A figure that is not to be larger than `at_most`."""
+    """A criterion whose figure must not be larger than `at_most`."""
 
     at_most: Bound
 
@@ -173,51 +187,13 @@ class AtMostCriterion(Criterion):
 
     @property
     def allowed(self) -> str:
-        """What passes."""
-        return f"at most {figure(self.at_most, self.unit)}"
+        return f"at most {format_figure(self.at_most, self.unit)}"
 
-    def _compared(self, value: float, said: str, at: float | None = None) -> Outcome:
-        """Return the outcome of a figure; `said` is a sentence about how it came about, `at` when (s)."""
-        return self._outcome(value <= self.at_most, f"{said}; {self.allowed} is allowed", value, self.unit, at)
-
-
-# ---- distances
-
-Axes = Literal["xyz", "xy", "xz", "yz", "x", "y", "z"]
-Measure = Literal["largest", "mean", "rms"]
-_WORDS = {"largest": "up to", "mean": "in the mean", "rms": "in the root mean square"}
+    def _compare(self, value: float, sentence: str, at: float | None = None) -> Outcome:
+        """Return the outcome of a figure, which `sentence` explains and which was reached at the time `at` (s)."""
+        return self._make_outcome(value <= self.at_most, f"{sentence}; {self.allowed} is allowed", value, self.unit, at)
 
 
-class DistanceCriterion(AtMostCriterion):
-    """A distance (m) along some axes of the world that is not to be larger than `at_most`."""
-
-    axes: Axes = "xyz"
-    measure: Measure = "largest"
-
-    unit = "m"
-
-    def _along(self, vectors: np.ndarray) -> np.ndarray:
-        """Return the columns of (..., 3) that count."""
-        return vectors[..., ["xyz".index(axis) for axis in self.axes]]
-
-    def _outcome_of(self, distances: np.ndarray, times: np.ndarray, what: str) -> Outcome:
-        """Return the outcome of distances (M,) at these times (M,); `what`: what they are measured from, in words."""
-        worst = int(distances.argmax())
-        value = {
-            "largest": float(distances[worst]),
-            "mean": float(distances.mean()),
-            "rms": float(np.sqrt((distances**2).mean())),
-        }[self.measure]
-        when = f" at {times[worst]:.2f} s" if self.measure == "largest" else ""
-        said = f"was {_WORDS[self.measure]} {figure(value, 'm')} from {what}{when}"
-        return self._compared(value, said, float(times[worst]))
-
-
-def to_polyline(places: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return the distances (M,) from places (M, D) to the nearest point of a polyline with corners (K, D), K >= 2."""
-    squares = np.full(len(places), np.inf)
-    for start, way in zip(corners[:-1], np.diff(corners, axis=0)):  # in turn: a flight may have many rows
-        to, length = places - start, float(way @ way)
-        share = np.clip(to @ way / length, 0, 1) if length else np.zeros(len(places))
-        squares = np.minimum(squares, ((to - share[:, None] * way) ** 2).sum(axis=1))
-    return np.sqrt(squares)
+def format_figure(value: float, unit: str = "") -> str:
+    """Return a figure with four significant digits and its unit."""
+    return f"{value:.4g} {unit}".rstrip()

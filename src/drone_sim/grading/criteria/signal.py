@@ -1,4 +1,4 @@
-"""Signal: what a script has said, by a signal of V-REP's or on a topic, such as how many objects it has counted."""
+"""Signal: a value that a script has published, as a signal or on a topic, such as a count of objects."""
 
 from __future__ import annotations
 
@@ -8,85 +8,85 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from drone_sim.config.types import Label, ParameterError, ScriptValue
-from drone_sim.grading.criteria.criterion import Bound, Criterion, FlightPart, Missed, figure
-from drone_sim.grading.flight_record import ValueChange
+from drone_sim.grading.criteria.criterion import (
+    ROUNDING,
+    Bound,
+    Criterion,
+    CriterionFailed,
+    FlightPart,
+    format_figure,
+)
 from drone_sim.grading.result import Outcome
 from drone_sim.message_text import shown
 
-_Words = Annotated[str, Field(max_length=200)]
+_SourceName = Annotated[str, Field(max_length=200)]
 
 
-def _of_words(field: str) -> str:
+def _check_field(field: str) -> str:
     if not all(field.split(".")):
         raise ValueError("must be names with dots between them, such as pose.position.x")
     return field
 
 
 class Signal(Criterion):
-    """What `signal` or `topic` last said between `after` and `until` is to be `equals`, numbers within `tolerance`.
+    """The last value of `signal` or `topic` between `after` and `until` equals `equals`, numbers within `tolerance`.
 
-    A signal may be an integer, a float or a string; of a message `field` counts, such as pose.position.x.
+    A signal may be an integer, a float or a string. `field` selects a field of a message, such as pose.position.x.
     """
 
     kind: Literal["signal"]
-    signal: _Words = ""
-    topic: _Words = ""
-    field: Annotated[Label, AfterValidator(_of_words)] = "data"
+    signal: _SourceName = ""
+    topic: _SourceName = ""
+    field: Annotated[Label, AfterValidator(_check_field)] = "data"
     equals: ScriptValue
     tolerance: Bound = 0.0
 
     def model_post_init(self, context: Any) -> None:
-        """Check that it is one of the two."""
+        """Refuse a criterion without a source, or with two."""
         super().model_post_init(context)
         if bool(self.signal) == bool(self.topic):
             raise ParameterError("there must be a `signal` or a `topic`, and not both", ("signal",))
 
     @property
     def allowed(self) -> str:
-        """What passes."""
-        return f"{_readable(self.equals)}{f' within {figure(self.tolerance)}' if self.tolerance else ''}"
+        tolerance = f" within {format_figure(self.tolerance)}" if self.tolerance else ""
+        return f"{_format_value(self.equals)}{tolerance}"
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """What it asks for."""
         return (self.signal,) if self.signal else ()
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """What it asks for."""
         return (self.topic,) if self.topic else ()
 
-    def _judged(self, part: FlightPart) -> Outcome:
-        what = self.signal or self.topic
-        heard = [one for one in part.flight.values.get(what, ()) if self.after - 1e-9 <= one.at <= part.end + 1e-9]
-        if not heard or heard[-1].value is None:
-            raise Missed(f"nothing was said by {what} until {part.end:.2f} s")
-        said = self._inside(heard[-1])
-        passed = _equal(said, self.equals, self.tolerance)
-        sentence = f"{what} was {_readable(said)} from {heard[-1].at:.2f} s on; expected is {self.allowed}"
-        is_number = isinstance(said, (int, float)) and not isinstance(said, bool)
-        return self._outcome(passed, sentence, float(said) if is_number else None, "", heard[-1].at)
-
-    def _inside(self, heard: ValueChange) -> Any:
-        """Return a signal's value, or that of a field of a message. Raises Missed."""
-        value = heard.value
+    def _judge_part(self, part: FlightPart) -> Outcome:
+        source = self.signal or self.topic
+        begin, end = self.after - ROUNDING, part.end + ROUNDING
+        changes = [change for change in part.flight.values.get(source, ()) if begin <= change.at <= end]
+        if not changes or changes[-1].value is None:
+            raise CriterionFailed(f"{source} has no value at {part.end:.2f} s")
+        at, value = changes[-1]
         for name in self.field.split(".") if self.topic else ():
             value = value.get(name) if isinstance(value, dict) else getattr(value, name, None)
             if value is None:
-                raise Missed(f"what was said on {self.topic} at {heard.at:.2f} s has no field {self.field}")
-        return value
+                raise CriterionFailed(f"the message on {self.topic} at {at:.2f} s has no field {self.field}")
+        sentence = f"{source} was {_format_value(value)} from {at:.2f} s on; expected is {self.allowed}"
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        passed = _is_equal(value, self.equals, self.tolerance)
+        return self._make_outcome(passed, sentence, float(value) if is_number else None, "", at)
 
 
-def _readable(value: Any) -> str:
-    return figure(value) if isinstance(value, float) else shown(value)
+def _format_value(value: Any) -> str:
+    return format_figure(value) if isinstance(value, float) else shown(value)
 
 
-def _equal(said: Any, expected: Any, tolerance: float) -> bool:
-    """Tell whether two values are the same: numbers and lists of numbers within the tolerance, texts to the letter."""
+def _is_equal(value: Any, expected: Any, tolerance: float) -> bool:
+    """Return whether two texts are equal, or two numbers, or lists of numbers, differ by at most the tolerance."""
     if isinstance(expected, str):
-        return (said.decode("utf-8", "replace") if isinstance(said, bytes) else said) == expected
+        return (value.decode("utf-8", "replace") if isinstance(value, bytes) else value) == expected
     try:
-        first, second = np.asarray(said, float), np.asarray(expected, float)
+        first, second = np.asarray(value, float), np.asarray(expected, float)
     except (TypeError, ValueError):
         return False
     return first.shape == second.shape and bool((np.abs(first - second) <= tolerance).all())

@@ -1,6 +1,6 @@
-"""A job: one flight of a plan by a script; the key under which its result is kept, and where: on the disk.
+"""Jobs (single flights of a plan by a script), the keys of their results, and the store of results on the disk.
 
-Results are a line of JSON for each flight as it comes, so that a run that was interrupted can go on.
+The store appends a line of JSON after each flight, so that an interrupted run can be continued.
 """
 
 from __future__ import annotations
@@ -23,78 +23,78 @@ import numpy as np
 from drone_sim.files import writing
 from drone_sim.files.containment import remove
 from drone_sim.files.resources import cache_path, package_path
-from drone_sim.grading.flight import ungraded
+from drone_sim.grading.flight import ungraded_result
 from drone_sim.grading.jobs import files
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 
 _DAY = 86400.0  # s
-_LONGEST = 2**23  # characters of a line
-_LARGEST = 64 * 2**20  # bytes: of a larger file size and time count, not what is in it
+_MAX_LINE = 2**23  # characters
+_MAX_HASHED = 64 * 2**20  # bytes; of a larger file, size and modification time are compared instead of the content
 
 
 @dataclass(frozen=True)
 class Job:
-    """One flight: of the plan in a file, by a script as Plan.script_of gives it, with a seed and changes."""
+    """A flight of the plan in the file `plan`, by a script as Plan.script_of returns it, with a seed and changes."""
 
     plan: str
     script: str
     seed: int
     changes: Mapping[str, Any] = field(default_factory=dict, hash=False)
-    key: str = ""  # the same for the same contents of all files; see `key_of`
+    key: str = ""  # of the contents of all files, see `key_of`
     error: str = ""  # why the script cannot be flown, in one line
 
 
 @dataclass(frozen=True)
 class JobResult:
-    """A job that was flown: its result, and its table as `fly --csv` writes it, b'' where there is none."""
+    """The result of a job, and its table in the format of `fly --csv`, b'' if there is none."""
 
     job: Job
     result: Result
     table: bytes = b""
-    is_lost: bool = False  # a limit or a crash ended it: another time it may end in another way
+    is_lost: bool = False  # a limit or a crash ended it, so the next time it may end differently
 
 
-def lost(job: Job, plan: Plan, why: str) -> JobResult:
-    """Return what there is of a job of which nothing came back; `why` is one line."""
-    return JobResult(job, ungraded(plan, job.script, job.seed, job.changes, why), is_lost=True)
+def lost_flight(job: Job, plan: Plan, reason: str) -> JobResult:
+    """Return the result of a job whose flight was lost; `reason` is one line."""
+    return JobResult(job, ungraded_result(plan, job.script, job.seed, job.changes, reason), is_lost=True)
 
 
 def key_of(contents: str, seed: int, changes: Mapping[str, Any]) -> str:
-    """Return 32 hexadecimal digits for what `contents_of` gave, a seed and changes."""
+    """Return 32 hexadecimal digits for the digest of `contents_of`, a seed and changes."""
     text = json.dumps([contents, seed, changes], sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def contents_of(plan: Plan, script: str) -> str:
-    """Return a digest of all that a flight depends on beside seed and changes: its files, this package, its engine.
+    """Return a digest of all that a flight depends on besides seed and changes: its files, this package, its engine.
 
-    Of each file, its content counts, and its path relative to the plan's or the script's folder: a script that was
-    moved to another folder is the same. Raises OSError, ScriptError for one that is not there, Unreadable for one that
-    cannot be read.
+    Paths count relative to the plan's or the script's folder, so that a script can be moved with its folder. Raises
+    OSError, ScriptError for a script that does not exist, and Unreadable for a script that cannot be read.
     """
-    flown = files.of_script(plan, script)
-    digest = hashlib.sha256(f"{version()}\0{flown[0].name if flown else script}".encode(errors="surrogateescape"))
-    own = {path: hashlib.sha256(files.read(path)).hexdigest() for path in flown}
+    own_files = files.of_script(plan, script)
+    name = own_files[0].name if own_files else script
+    digest = hashlib.sha256(f"{version()}\0{name}".encode(errors="surrogateescape"))
+    own = {path: hashlib.sha256(files.read(path)).hexdigest() for path in own_files}
     for folder, digests in (
         (plan.folder, {path: _digest(path) for path in files.of_plan(plan, {})}),
-        (flown[0].parent if flown else plan.folder, own),
+        (own_files[0].parent if own_files else plan.folder, own),
     ):
-        for name, said in sorted((os.path.relpath(path, folder), said) for path, said in digests.items()):
-            digest.update(f"\0{name}\0{said}".encode(errors="surrogateescape"))
+        for name, file_digest in sorted((os.path.relpath(path, folder), one) for path, one in digests.items()):
+            digest.update(f"\0{name}\0{file_digest}".encode(errors="surrogateescape"))
     return digest.hexdigest()
 
 
 def _digest(path: Path) -> str:
     status = path.stat()
-    if status.st_size > _LARGEST:
+    if status.st_size > _MAX_HASHED:
         return f"{status.st_size} {status.st_mtime_ns}"
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 @functools.cache
 def version() -> str:
-    """Return a digest of what simulates: this package's files, Python, NumPy, PyBullet and the processor's kind."""
+    """Return a digest of the simulator: this package's files, Python, NumPy, PyBullet and the type of processor."""
     here = Path(__file__).resolve().parents[2]
     root = package_path()
     sources = sorted(
@@ -108,42 +108,39 @@ def version() -> str:
     return digest.hexdigest()
 
 
-# ---- on the disk
-
-
 def default_folder() -> Path:
     """Return the default folder of results, in the user's cache."""
     return cache_path() / "grading"
 
 
-def unpacked(folder: Path) -> Path:
-    """Return the folder, inside the folder of results, into which the zips of a class are unpacked."""
+def archives_folder(folder: Path) -> Path:
+    """Return the folder, inside the folder of results, into which archives of submissions are unpacked."""
     return folder / "submissions"
 
 
 class ResultStore:
-    """The results of a plan's flights in a folder, and their tables. Lost flights are not kept."""
+    """The stored results and tables of a plan's flights. Lost flights are not stored."""
 
     def __init__(self, folder: Path, plan: Plan):
-        """Make the `folder`, for results of a `plan` and of others. Raises OSError."""
+        """Create the `folder`, which may hold results of other plans too. Raises OSError."""
         folder.mkdir(parents=True, exist_ok=True)
-        named = hashlib.sha256(os.fsencode(plan.path)).hexdigest()[:12]
-        self._file = folder / f"{plan.name}-{named}.jsonl"
-        self._tables = folder / f"{plan.name}-{named}-tables"
-        self._has_begun = False
+        path_digest = hashlib.sha256(os.fsencode(plan.path)).hexdigest()[:12]
+        self._file = folder / f"{plan.name}-{path_digest}.jsonl"
+        self._tables = folder / f"{plan.name}-{path_digest}-tables"
+        self._is_at_line_start = False
 
-    def known(self, jobs: Sequence[Job], tables: bool) -> dict[str, Result]:
-        """Return the results that are there, by the jobs' keys; if `tables`, only those with a table.
+    def find(self, jobs: Sequence[Job], tables: bool) -> dict[str, Result]:
+        """Return the stored results by the jobs' keys; with `tables`, only those with a table.
 
-        A result names the script that was flown then; another of the same contents has the same key.
+        A result may name another script with the same contents, because it has the same key.
         """
         wanted = {job.key for job in jobs}
         found: dict[str, Result] = {}
         if not self._file.exists():
             return found
         with open(self._file, encoding="utf-8", errors="replace") as file:
-            while line := file.readline(_LONGEST):
-                key, result = _read(line)
+            while line := file.readline(_MAX_LINE):
+                key, result = _parse_line(line)
                 if result is None or key not in wanted:
                     continue
                 if not (tables and result.flown) or self.table(key) is not None:
@@ -151,7 +148,7 @@ class ResultStore:
         return found
 
     def add(self, flight: JobResult) -> None:
-        """Keep a flight, its table first. Raises OSError, in one line that names the file."""
+        """Store a flight. Raises OSError, in one line that names the file."""
         if flight.is_lost:
             return
         if flight.table:
@@ -166,38 +163,38 @@ class ResultStore:
                     unfinished.unlink(missing_ok=True)
                     raise
         line = json.dumps({"key": flight.job.key, "result": flight.result.to_json()}) + "\n"
-        before = "" if self._has_begun else "\n"  # half a line may be there
-        self._has_begun = False
-        # One write at the end of the file: two programs at a time mix no lines. On a full disk it may be a part only.
+        start = "" if self._is_at_line_start else "\n"  # an interrupted run may have left half a line
+        self._is_at_line_start = False
+        # A line is appended by one write, so that two programs do not mix their lines, unless the disk is full.
         with writing.name_in_errors(self._file), open(self._file, "ab", buffering=0) as file:
-            content = (before + line).encode()
+            content = (start + line).encode()
             while content:
                 content = content[file.write(content) :]
-        self._has_begun = True
+        self._is_at_line_start = True
 
     def table(self, key: str) -> Path | None:
-        """Return a flight's table, if it is there."""
+        """Return the path of a flight's table, or None."""
         path = self._tables / f"{key}.csv"
         return path if path.is_file() else None
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         """Remove the plan's results. Raises OSError."""
         self._file.unlink(missing_ok=True)
         for path in self._tables.glob("*.csv"):
             remove(path, within=self._tables)
 
 
-def forget_old(folder: Path, days: float) -> None:
-    """Remove files that nothing has been added to for so long; as far as that is allowed."""
+def remove_old_results(folder: Path, days: float) -> None:
+    """Remove results, tables and unpacked submissions that are older than some days, as far as permissions allow."""
     oldest = time.time() - days * _DAY
-    for path in (*folder.glob("*.jsonl"), *folder.glob("*-tables/*"), *unpacked(folder).glob("*")):
+    for path in (*folder.glob("*.jsonl"), *folder.glob("*-tables/*"), *archives_folder(folder).glob("*")):
         with contextlib.suppress(OSError):
             if path.stat().st_mtime < oldest:
                 remove(path, within=folder)
 
 
-def _read(line: str) -> tuple[str, Result | None]:
-    """Return key and result of a line; None for one that was cut off, or is none of ours."""
+def _parse_line(line: str) -> tuple[str, Result | None]:
+    """Return key and result of a line; the result is None if the line is incomplete or not in our format."""
     try:
         values: dict[str, Any] = json.loads(line)
         return str(values["key"]), Result.from_json(values["result"])

@@ -1,6 +1,6 @@
-"""The program that judges: it forks a process for each flight, which holds the world and everything that is judged.
+"""The judge: a program that forks a process for each flight, which simulates the world and judges the flight.
 
-The script that flies is in another process, behind a door (scripting.rpc); none of its lines ever runs here.
+The flying script runs in another process, behind a connection (scripting.rpc), and never in this one.
 """
 
 from __future__ import annotations
@@ -20,44 +20,44 @@ from drone_sim.command_line import format_error
 from drone_sim.files.resources import FileCache, ReadFile
 from drone_sim.grading import permissions
 from drone_sim.grading import plan as plans
-from drone_sim.grading.flight import Flight, grade, ungraded, write_to
+from drone_sim.grading.flight import Flight, grade, ungraded_result, write_table
 from drone_sim.grading.jobs.limited_process import LimitedProcess, stay_on_one_processor
-from drone_sim.grading.jobs.server import GONE, Requests
+from drone_sim.grading.jobs.server import DISCONNECTED, Requests
 from drone_sim.grading.plan import Plan, PlanError
 from drone_sim.scripting.rpc.connection import ScriptConnection
 from drone_sim.world import connect_ahead
 
 _LOG = logging.getLogger(__name__)
-_MOST = {"result": 2**22, "table": 2**28}  # bytes
-_MOST_PLANS = 8  # kept in memory
-_BESIDE = ("cv2", "drone_sim.scripting.lua.script", "drone_sim.render.renderer")  # imported where they are needed
+_OUTPUT_LIMITS = {"result": 2**22, "table": 2**28}  # bytes
+_MAX_PLANS = 8  # in the cache
+_LATE_IMPORTS = ("cv2", "drone_sim.scripting.lua.script", "drone_sim.render.renderer")  # of functions
 
 
 def main() -> None:
-    """Serve: each request names a plan, a seed, changes, and whether the table is wanted; result and table go back."""
-    for module in _BESIDE:
+    """Answer each request, which names a plan, a seed, changes and whether a table is wanted, with result and table."""
+    for module in _LATE_IMPORTS:
         importlib.import_module(module)
     requests = Requests()
-    known: FileCache[Plan] = FileCache(_read_plan, _MOST_PLANS)
-    with contextlib.suppress(*GONE):
+    plan_cache: FileCache[Plan] = FileCache(_read_plan, _MAX_PLANS)
+    with contextlib.suppress(*DISCONNECTED):
         for request, door in requests:
-            requests.reply(*_answer(request, door, requests, known))
+            requests.reply(*_answer(request, door, requests, plan_cache))
 
 
 def _answer(
-    request: dict[str, Any], door: socket.socket, requests: Requests, known: FileCache[Plan]
+    request: dict[str, Any], door: socket.socket, requests: Requests, plan_cache: FileCache[Plan]
 ) -> tuple[bytes, bytes]:
-    """Return result, or why there is none, as JSON; and the table, b'' where none is wanted or left."""
+    """Return the result, or the reason why there is none, as JSON, and the table, b'' if there is none."""
     try:
-        plan = known.get(request["plan"])
+        plan = plan_cache.get(request["plan"])
     except (OSError, PlanError) as error:
         return json.dumps({"lost": format_error(error)}).encode(), b""
     judge = functools.partial(_judge, plan, request, door)
-    process = LimitedProcess(request["limits"], judge, _MOST, [door.fileno()])
+    process = LimitedProcess(request["limits"], judge, _OUTPUT_LIMITS, [door.fileno()])
     door.close()
     with process:
         if not process.watch(requests.fileno()):
-            sys.exit(0)  # nobody wants it any more
+            sys.exit(0)  # the client has ended
     with contextlib.suppress(ValueError):
         reply = json.loads(process.output("result"))
         return json.dumps(reply).encode(), process.output("table")
@@ -65,44 +65,44 @@ def _answer(
 
 
 def _judge(plan: Plan, request: dict[str, Any], door: socket.socket, outputs: Mapping[str, int]) -> None:
-    """Fly once, in a process of its own, and write what came of it."""
+    """Fly once, in the forked process, and write result and table to the outputs."""
     script, seed, changes = request["script"], request["seed"], request["changes"]
-    end = ScriptConnection(door, processor=stay_on_one_processor())
+    connection = ScriptConnection(door, processor=stay_on_one_processor())
     rows, is_gone = None, False
     try:
-        flight = Flight(plan, script, seed, changes, end)
+        flight = Flight(plan, script, seed, changes, connection)
         result = flight.grade()
-        rows, is_gone = flight.rows if request["table"] else None, end.is_gone
+        rows, is_gone = flight.rows if request["table"] else None, connection.is_gone
     except BaseException as error:
-        result = ungraded(plan, script, seed, changes, _format_error(error))
+        result = ungraded_result(plan, script, seed, changes, _format_error(error))
     if rows is not None:
         with open(outputs["table"], "w") as file:
-            write_to(file, rows)
+            write_table(rows, file)
     with open(outputs["result"], "wb") as file:
         file.write(json.dumps({"result": result.to_json(), "is_gone": is_gone}).encode())
 
 
 def _read_plan(path: str) -> ReadFile:
-    """Return a plan, once all that a flight of it needs has been read and compiled. Raises OSError and PlanError."""
+    """Return a plan after reading and compiling everything that its flights need. Raises OSError and PlanError."""
     plan = plans.read(path)
     try:
         grade(plan.model_copy(update={"duration": 0.1}), "pilot")  # forks inherit what this reads and compiles
-    except Exception:  # an error of ours; every flight then reads and compiles for itself
+    except Exception:  # a bug of drone_sim; flights work, but each reads and compiles again
         _LOG.warning("a warm-up flight failed: flights will be slower", exc_info=True)
-    permissions.free()
-    connect_ahead()  # which forks need not do, either
+    permissions.free_functions()
+    connect_ahead()  # so that forks need not do it
     gc.collect()
     gc.freeze()
     return ReadFile(plan, 1, map(str, plan.files))
 
 
 def _format_error(error: BaseException) -> str:
-    """Return one line for what no flight should raise, such as memory that ran out."""
+    """Return one line for an unexpected error of a flight, such as MemoryError."""
     try:
-        said = format_error(error)
+        message = format_error(error)
     except Exception:
-        said = ""
-    return f"{type(error).__name__}: {said:.300}".removesuffix(": ")
+        message = ""
+    return f"{type(error).__name__}: {message:.300}".removesuffix(": ")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""Many flights at a time: on threads of this process, or by any scheduler of Dask.
+"""Pool of workers that fly jobs: threads of this process, or the workers of a Dask scheduler.
 
-A worker's thread flies one job after the other, each in a process of its own (see `flyer`): that a worker
-is only a thread here costs nothing, and it starts in no time. What a lost worker was flying, Dask gives to another.
+Threads suffice because each flight runs in its own processes (see `flyer`). Dask gives the flights of a lost worker to
+another one.
 """
 
 from __future__ import annotations
@@ -12,32 +12,32 @@ import socket
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from drone_sim.command_line import format_error
 from drone_sim.grading import plan as plans
 from drone_sim.grading.jobs.flyer import Cancelled, Flyer
-from drone_sim.grading.jobs.job import Job, JobResult, contents_of, key_of, lost
+from drone_sim.grading.jobs.job import Job, JobResult, contents_of, key_of, lost_flight
 from drone_sim.grading.jobs.settings import BatchSettings, FlightLimits
 from drone_sim.message_text import shown
 
-_CONNECTING = 10.0  # s
+_CONNECT_TIMEOUT = 10.0  # s
 _LOST = "the workers that flew the script were lost, one after the other"
 
 
 class PoolError(RuntimeError):
-    """Flights cannot be flown; one line says why."""
+    """The pool cannot fly jobs; one line says why."""
 
 
 @dataclass(frozen=True)
 class FlightOptions:
-    """How flights are flown."""
+    """Options for all flights of a pool."""
 
     limits: FlightLimits
     batches: BatchSettings
     sandboxed: bool = True
-    tables: bool = False  # whether each flight's table is wanted
+    tables: bool = False  # whether to return the flights' tables
     patience: float = 60.0  # s that a scheduler may be without a worker
 
 
@@ -45,37 +45,37 @@ Fly = Callable[[Sequence[Job]], Iterator[JobResult]]
 
 
 @contextlib.contextmanager
-def opened(options: FlightOptions, workers: int = 1, scheduler: str = "") -> Iterator[Fly]:
-    """Yield a function that flies jobs: it yields the flights as they finish, in any order, one for each job.
+def open_pool(options: FlightOptions, workers: int = 1, scheduler: str = "") -> Iterator[Fly]:
+    """Yield a function that flies jobs and yields one result for each job, in the order in which flights finish.
 
-    They are flown on `workers` threads here, or by the scheduler at an address. At the end, flights in progress are
-    ended. Raises PoolError; the function raises that, too, and what Flyer.fly raises.
+    The pool has `workers` threads, or the workers of the Dask scheduler at the address `scheduler`. Leaving the context
+    ends the flights in progress. Raises PoolError; the function raises PoolError and the errors of Flyer.fly.
     """
     if scheduler:
-        with _connected(scheduler, options.patience) as client:
-            yield lambda jobs: _flown_by_dask(jobs, options, client)
+        with _connect(scheduler, options.patience) as client:
+            yield lambda jobs: _fly_with_dask(jobs, options, client)
     elif workers == 1:
-        with contextlib.closing(Flyer(options.limits, options.sandboxed)) as server:
-            yield lambda jobs: (server.fly(job, options.tables) for job in jobs)
+        with contextlib.closing(Flyer(options.limits, options.sandboxed)) as flyer:
+            yield lambda jobs: (flyer.fly(job, options.tables) for job in jobs)
     else:
-        with _CLIENTS, ThreadPoolExecutor(workers) as executor:
+        with _FLYERS, ThreadPoolExecutor(workers) as executor:
             try:
-                yield lambda jobs: _flown(jobs, options, executor, workers)
+                yield lambda jobs: _fly_in_batches(jobs, options, executor, workers)
             finally:
                 executor.shutdown(wait=False, cancel_futures=True)
-                _CLIENTS.stop()
+                _FLYERS.stop()
 
 
-def _flown(
+def _fly_in_batches(
     jobs: Sequence[Job],
     options: FlightOptions,
     executor: Executor,
     workers: int,
-    killed: tuple[type[Exception], ...] = (),
+    lost_errors: tuple[type[Exception], ...] = (),
 ) -> Iterator[JobResult]:
-    """Fly in batches; a batch whose worker was lost (an error of a type in `killed`) is flown again, job by job."""
+    """Fly in batches; if a batch's worker is lost (an error in `lost_errors`), fly its jobs again, one by one."""
     size = options.batches.size(len(jobs), max(1, workers))
-    alone: list[Job] = []  # one of them may be to blame
+    retries: list[Job] = []  # one of them may have ended the worker
     batches = {
         executor.submit(fly_batch, batch, options): batch
         for batch in (jobs[first : first + size] for first in range(0, len(jobs), size))
@@ -87,38 +87,36 @@ def _flown(
         error = future.exception()
         if error is None:
             yield from future.result()
-        elif not isinstance(error, killed):
+        elif not isinstance(error, lost_errors):
             raise error
         elif size == 1:
-            yield lost(batch[0], plans.read(batch[0].plan), _LOST)
+            yield lost_flight(batch[0], plans.read(batch[0].plan), _LOST)
         else:
-            alone += batch
-    if alone:
-        each = options.batches.model_copy(update={"largest": 1})
-        yield from _flown(alone, replace(options, batches=each), executor, workers, killed)
+            retries += batch
+    if retries:
+        single = options.batches.model_copy(update={"largest": 1})
+        yield from _fly_in_batches(retries, replace(options, batches=single), executor, workers, lost_errors)
 
 
-# ---- with Dask
-
-
-def _flown_by_dask(jobs: Sequence[Job], options: FlightOptions, client: Any) -> Iterator[JobResult]:
+def _fly_with_dask(jobs: Sequence[Job], options: FlightOptions, client: Any) -> Iterator[JobResult]:
     from distributed import KilledWorker
 
-    return _flown(jobs, options, client.get_executor(pure=False), sum(client.nthreads().values()), (KilledWorker,))
+    workers = sum(client.nthreads().values())
+    return _fly_in_batches(jobs, options, client.get_executor(pure=False), workers, (KilledWorker,))
 
 
 @contextlib.contextmanager
-def _connected(address: str, patience: float) -> Iterator[Any]:
-    """Give a client of a scheduler that has a worker. Raises PoolError."""
+def _connect(address: str, patience: float) -> Iterator[Any]:
+    """Yield a client of a scheduler with at least one worker. Raises PoolError."""
     from distributed import Client  # takes as long to import as five flights
 
-    for name in [one for one in logging.root.manager.loggerDict if one.startswith("distributed")]:
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # a lost scheduler would be told by tracebacks
+    for name in [logger for logger in logging.root.manager.loggerDict if logger.startswith("distributed")]:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # no tracebacks if the scheduler is lost
     try:
-        client = Client(address, timeout=_CONNECTING)
+        client = Client(address, timeout=_CONNECT_TIMEOUT)
     except (OSError, ValueError, ImportError) as error:
-        said = format_error(error)
-        raise PoolError(f"--scheduler {shown(address)}: no scheduler answers there ({said:.200})") from None
+        reason = format_error(error)
+        raise PoolError(f"--scheduler {shown(address)}: no scheduler answers there ({reason:.200})") from None
     with client:
         try:
             client.wait_for_workers(1, timeout=patience)
@@ -130,52 +128,52 @@ def _connected(address: str, patience: float) -> Iterator[Any]:
 # ---- in the worker
 
 
-@dataclass
-class _Clients:
-    """The clients of the fork servers: one for each thread of this process that flies."""
+class _Flyers:
+    """One flyer for each thread of this process that flies."""
 
-    own: threading.local = field(default_factory=threading.local)
-    all: list[Flyer] = field(default_factory=list)
-    lock: threading.Lock = field(default_factory=threading.Lock)
+    def __init__(self) -> None:
+        self._local = threading.local()
+        self._all: list[Flyer] = []
+        self._lock = threading.Lock()
 
     def of_thread(self, options: FlightOptions) -> Flyer:
-        """Return that of this thread."""
-        wanted = (options.limits, options.sandboxed)
-        if getattr(self.own, "wanted", None) != wanted or self.own.client not in self.all:
-            self.own.wanted, self.own.client = wanted, Flyer(*wanted)
-            with self.lock:
-                self.all.append(self.own.client)
-        return self.own.client
+        """Return the flyer of the calling thread."""
+        arguments, local = (options.limits, options.sandboxed), self._local
+        if getattr(local, "arguments", None) != arguments or local.flyer not in self._all:
+            local.arguments, local.flyer = arguments, Flyer(*arguments)
+            with self._lock:
+                self._all.append(local.flyer)
+        return local.flyer
 
     def stop(self) -> None:
-        """Let those who fly stop."""
-        for client in self.all:
-            client.stop()
+        """Cancel the flights of all threads."""
+        for flyer in self._all:
+            flyer.stop()
 
     def __enter__(self) -> None:
-        """Begin."""
+        pass
 
     def __exit__(self, *_exception: object) -> None:
-        """End all; nobody flies any more."""
-        with self.lock:
-            while self.all:
-                self.all.pop().close()
+        """Close all flyers; no thread may fly any more."""
+        with self._lock:
+            while self._all:
+                self._all.pop().close()
 
 
-_CLIENTS = _Clients()
+_FLYERS = _Flyers()
 
 
 def fly_batch(jobs: Sequence[Job], options: FlightOptions) -> list[JobResult]:
-    """Fly a batch, in a worker. Raises PoolError where the worker's files differ from those of the jobs' sender."""
-    _check(jobs)
-    client = _CLIENTS.of_thread(options)
+    """Fly a batch in a worker. Raises PoolError if the worker's files differ from those of the jobs' sender."""
+    _check_files(jobs)
+    flyer = _FLYERS.of_thread(options)
     try:
-        return [client.fly(job, options.tables) for job in jobs]
+        return [flyer.fly(job, options.tables) for job in jobs]
     except Cancelled:
         return []
 
 
-def _check(jobs: Sequence[Job]) -> None:
+def _check_files(jobs: Sequence[Job]) -> None:
     for plan_path, script in {(job.plan, job.script) for job in jobs}:
         job = next(one for one in jobs if (one.plan, one.script) == (plan_path, script))
         try:

@@ -1,7 +1,6 @@
-"""The program that forks a process for each script: in the sandbox, where there is one.
+"""A program that forks a process for each script; it runs in the sandbox if there is one.
 
-It knows no plan, no seed, and no judge: its only connection is a door from a script's process to the process of its
-flight.
+It has neither plan nor seed: the only connection of a script's process is a door to the judge's process of the flight.
 """
 
 from __future__ import annotations
@@ -15,26 +14,28 @@ import socket
 import stat
 import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from drone_sim.files.containment import remove
 from drone_sim.grading.jobs import system_calls
-from drone_sim.grading.jobs.limited_process import LimitedProcess, open_to_itself
-from drone_sim.grading.jobs.server import GONE, HANDED_IN, HUNG_UP, Requests
+from drone_sim.grading.jobs.limited_process import LimitedProcess, drop_capabilities
+from drone_sim.grading.jobs.server import DISCONNECTED, HANDED_IN, HUNG_UP, Requests
 from drone_sim.scripting.rpc import script_process
 from drone_sim.scripting.rpc.script_process import ScriptWorker
 
-DOOR = 3  # its descriptor, beside which nothing is open
+_DOOR = 3  # the only open descriptor of a script's process besides the standard streams
 
 
 def main() -> None:
-    """Serve: each request names a script, and files to be laid down for it; how its process ended goes back.
+    """Answer each request, which names a script and its files, with a message about how the script's process ended.
 
-    A message ends the process, whatever it does; HUNG_UP says that it has closed its door, and may be ending already.
+    The next message of the client ends the process; HUNG_UP means that the process has closed its door, and may be
+    ending already.
     """
-    is_alone = sys.argv[1:] == ["alone"]  # in a sandbox, where it sees its own processes only
+    is_alone = sys.argv[1:] == ["alone"]  # in a sandbox, which shows only the sandbox's own processes
     worker = script_process.prepared()
     try:
         system_calls.forbid()
@@ -42,51 +43,46 @@ def main() -> None:
         print(f"grade: scripts can share memory and use a network: {error.strerror}", file=sys.stderr)
     requests = Requests()
     folders = [os.environ["TMPDIR"], *([HANDED_IN] if is_alone else [])]
-    with contextlib.suppress(*GONE):
+    with contextlib.suppress(*DISCONNECTED):
         for request, door in requests:
             for path in request["handed_in"]:
-                _lay(f"{HANDED_IN}{path}", requests.receive())
+                file = Path(f"{HANDED_IN}{path}")
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_bytes(requests.receive())
             run = functools.partial(_run, worker, request, door)
             process = LimitedProcess(request["limits"], run, {}, [door.fileno()], folders if is_alone else ())
             door.close()
-            end = _end_of(process, requests)
-            is_last = not all([_cleared(folder) for folder in folders])  # what cannot be removed here, its client does
+            end = _watch(process, requests)
+            is_last = not all([_clear(folder) for folder in folders])  # the client removes what is left
             requests.reply(json.dumps({"end": end, "is_last": is_last}).encode())
             if is_last:
                 break
 
 
-def _end_of(process: LimitedProcess, requests: Requests) -> str:
-    """Watch a flight's process until it has ended, or is not needed any more; return how it ended, or ''."""
+def _watch(process: LimitedProcess, requests: Requests) -> str:
+    """Watch a script's process until it ends, or the client's next message; return how it ended by itself, or ''."""
     with process:
         is_over = process.watch(requests.fileno())
-        has_ended = is_over or (requests.receive() == HUNG_UP and process.ends())
+        has_ended = is_over or (requests.receive() == HUNG_UP and process.wait_for_exit())
     if is_over:
         requests.receive()
     return process.end if has_ended else ""
 
 
 def _run(worker: ScriptWorker, request: dict[str, Any], door: socket.socket, _outputs: Mapping[str, int]) -> None:
-    """Serve the script's end of the door, in a process of its own."""
-    given = door.detach()
-    if given != DOOR:
-        os.dup2(given, DOOR, inheritable=False)
-        os.close(given)
-    open_to_itself()
+    """Serve the script's end of the door, in the forked process."""
+    descriptor = door.detach()
+    if descriptor != _DOOR:
+        os.dup2(descriptor, _DOOR, inheritable=False)
+        os.close(descriptor)
+    drop_capabilities()
     random.seed(request["random"])
     np.random.seed(request["random"] % 2**32)
-    script_process.serve(worker, socket.socket(fileno=DOOR), request["script"])
+    script_process.serve(worker, socket.socket(fileno=_DOOR), request["script"])
 
 
-def _lay(path: str, content: bytes) -> None:
-    """Write a file of the script that is to be flown."""
-    os.makedirs(os.path.dirname(path), exist_ok=True)
-    with open(path, "wb") as file:
-        file.write(content)
-
-
-def _cleared(folder: str) -> bool:
-    """Remove what a flight has left in a folder; return whether nothing is there any more."""
+def _clear(folder: str) -> bool:
+    """Remove the content of a folder; return whether it is empty."""
     os.chmod(folder, stat.S_IRWXU)
     for entry in os.scandir(folder):
         with contextlib.suppress(OSError, RecursionError):

@@ -1,4 +1,4 @@
-"""A program that forks a process for each flight (judge_server, script_server): the side that sends it requests."""
+"""The client side of a server that forks a process for each flight: judge_server or script_server."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.connection import Connection, Pipe
 from multiprocessing.reduction import send_handle
 from typing import Any
@@ -17,78 +17,79 @@ from drone_sim.files.resources import python_path
 from drone_sim.grading.jobs import sandbox
 from drone_sim.grading.jobs.server import HUNG_UP, READY
 
-_START = 60.0  # s for the imports, on a busy machine; they take one
+_START_TIMEOUT = 60.0  # s for the imports on a busy machine; usually they take 1 s
 _GRACE = 10.0  # s
-_LARGEST = 2**29  # bytes of a reply, or of a table
-# What the process knows of its surroundings; passwords and tokens are not for scripts.
-_PASSED = (
-    "PATH",
-    "HOME",
-    "LANG",
-    "LC_",
-    "PYTHON",
-    "LD_LIBRARY_PATH",
-    "ROS_",
-    "XDG_",
-    "LIBGL_",
-    "GALLIUM_",
-    "MESA_",
-    "EGL_",
+_MAX_MESSAGE = 2**29  # bytes
+# Prefixes of the environment variables that a server inherits: passwords and tokens are not for scripts.
+_INHERITED_VARIABLES = (
+    *("PATH", "HOME", "LANG", "LC_", "PYTHON", "LD_LIBRARY_PATH", "ROS_", "XDG_"),
+    *("LIBGL_", "GALLIUM_", "MESA_", "EGL_"),
 )
-# The same order of sets, and of sums, in every process.
-_THE_SAME = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-_BROKEN = (EOFError, OSError, ValueError, KeyError, TypeError)  # what a connection raises whose other end is no more
+# Make the order of sets, and of sums, the same in every process.
+_DETERMINISTIC = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+_CONNECTION_ERRORS = (EOFError, OSError, ValueError, KeyError, TypeError)  # of a connection to an ended process
 
 
 class ServerDied(Exception):
-    """The program is no more."""
+    """The server has ended."""
 
 
 class ServerProcess:
-    """Starts it, and sends and receives; one thread uses this, but `cut` may be called by any."""
+    """A server and the connection to it. All methods but `disconnect` belong to one thread."""
 
     def __init__(self, module: str):
-        """Start nothing yet: a `module` beside this one."""
+        """Set the module of this package to run; `start` starts the process."""
         self._module = module
         self._process: subprocess.Popen[bytes] | None = None
         self._connection: Connection | None = None
-        self.folder: str | None = None  # for temporary files, where it has one to itself
+        self.folder: str | None = None  # for temporary files of a server without a sandbox
 
-    def start(self, sandboxed: Callable[[], Sequence[str]] | None = None) -> None:
-        """Have it run; `sandboxed` returns what a sandbox puts before a command. Raises ServerDied, and NoSandbox."""
+    def start(self, get_sandbox: Callable[[], Sequence[str]] | None = None) -> None:
+        """Start the server if it does not run; `get_sandbox` returns the arguments that run a command in the sandbox.
+
+        Raises ServerDied and NoSandbox.
+        """
         if self._process is not None and self._process.poll() is not None:
             self.close()
         if self._process is not None:
             return
-        around, temporary = sandboxed() if sandboxed is not None else (), sandbox.TEMPORARY
-        if not around:
+        prefix, temporary = get_sandbox() if get_sandbox is not None else (), sandbox.TEMPORARY
+        if not prefix:
             temporary = self.folder = tempfile.mkdtemp(prefix="drone_sim_grading_")
-        self._connection, there = Pipe()
-        with there:
-            self._process = _started(self._module, around, temporary, there)
-        if self.receive(_START) != READY:
+        inherited = {name: value for name, value in os.environ.items() if name.startswith(_INHERITED_VARIABLES)}
+        path = python_path(inherited.get("PYTHONPATH", ""))
+        self._connection, server_end = Pipe()
+        with server_end:
+            self._process = subprocess.Popen(
+                [*prefix, sys.executable, "-m", f"{__package__}.{self._module}", *(["alone"] if prefix else [])],
+                stdin=server_end.fileno(),
+                stdout=subprocess.DEVNULL,
+                start_new_session=True,  # the terminal's Ctrl-C is for this process only
+                env={**inherited, **_DETERMINISTIC, "PYTHONPATH": path, "TMPDIR": temporary},
+            )
+        if self.receive(_START_TIMEOUT) != READY:
             raise ServerDied
 
     def send(self, request: Mapping[str, Any], door: int, *contents: bytes) -> None:
-        """Send a request, an end of a connection, and contents of files. Raises ServerDied."""
-        with _told():
+        """Send a request, the descriptor `door`, and contents of files. Raises ServerDied."""
+        with _connection_errors():
             connection = self._open()
             connection.send_bytes(json.dumps(request).encode())
             send_handle(connection, door, None)
-            for one in contents:
-                connection.send_bytes(one)
+            for content in contents:
+                connection.send_bytes(content)
 
-    def receive(self, patience: float) -> bytes:
-        """Return what comes next. Raises ServerDied, also where nothing does within so many s."""
-        with _told():
+    def receive(self, timeout: float) -> bytes:
+        """Return the next message. Raises ServerDied, also if there is none within `timeout` seconds."""
+        with _connection_errors():
             connection = self._open()
-            if not connection.poll(patience):
+            if not connection.poll(timeout):
                 raise ServerDied
-            return connection.recv_bytes(_LARGEST)
+            return connection.recv_bytes(_MAX_MESSAGE)
 
-    def end(self, has_hung_up: bool) -> dict[str, Any]:
-        """Have the process of the last request ended, which may have hung up; return the reply. Raises ServerDied."""
-        with _told():
+    def end_flight(self, has_hung_up: bool) -> dict[str, Any]:
+        """Make script_server end the process of the last request, and return the reply. Raises ServerDied."""
+        with _connection_errors():
             self._open().send_bytes(HUNG_UP if has_hung_up else b"")
         reply: dict[str, Any] = json.loads(self.receive(_GRACE))
         return reply
@@ -98,46 +99,34 @@ class ServerProcess:
             raise ServerDied
         return self._connection
 
-    def cut(self) -> None:
-        """Let everything of it end; called by any thread."""
+    def disconnect(self) -> None:
+        """Close the connection, which ends the server and its flight. Any thread may call this."""
         if self._connection is not None:
             self._connection.close()
 
     def close(self) -> None:
-        """End it, and whatever it has begun."""
+        """End the server and its flight, and remove its temporary files."""
         process, self._process = self._process, None
         if process is None:
             return
-        self.cut()
+        self.disconnect()
         try:
-            process.wait(_GRACE)  # its input has ended
+            process.wait(_GRACE)  # it ends because its input has ended
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-        if self.folder is not None:  # however deep it is, and whatever rights it has been left with
+        if self.folder is not None:  # scripts may have left deep folders, or folders without permissions
             for command in (("chmod", "-R", "u+rwX"), ("rm", "-rf")):
                 subprocess.run([*command, "--", self.folder], stderr=subprocess.DEVNULL, check=False)
             self.folder = None
 
 
 @contextlib.contextmanager
-def _told() -> Any:
+def _connection_errors() -> Iterator[None]:
+    """Raise ServerDied for an error of the connection."""
     try:
         yield
-    except _BROKEN as error:
-        if getattr(error, "filename", None) is not None:  # a full disk, a program that is not there
+    except _CONNECTION_ERRORS as error:
+        if getattr(error, "filename", None) is not None:  # of another file, such as a full disk
             raise
         raise ServerDied from error
-
-
-def _started(module: str, around: Sequence[str], temporary: str, there: Connection) -> subprocess.Popen[bytes]:
-    arguments = ["-m", f"{__package__}.{module}", *(["alone"] if around else [])]
-    passed = {name: value for name, value in os.environ.items() if name.startswith(_PASSED)}
-    path = python_path(passed.get("PYTHONPATH", ""))
-    return subprocess.Popen(
-        [*around, sys.executable, *arguments],
-        stdin=there.fileno(),
-        stdout=subprocess.DEVNULL,
-        start_new_session=True,  # the terminal's Ctrl-C is for whoever wants the flights
-        env={**passed, **_THE_SAME, "PYTHONPATH": path, "TMPDIR": temporary},
-    )

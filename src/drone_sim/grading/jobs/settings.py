@@ -1,4 +1,4 @@
-"""The numbers of config/grading.yaml, checked."""
+"""The checked values of config/grading.yaml."""
 
 from __future__ import annotations
 
@@ -11,23 +11,21 @@ from drone_sim.files.resources import package_path
 
 
 class FlightLimits(Checked):
-    """What one flight may take; see docs/grading.md."""
+    """Limits of one flight; see docs/grading.md."""
 
     seconds: Annotated[Finite, Within(1, 1e5)]  # s of processor time
-    seconds_per_second: Annotated[Finite, Within(0, 1000)]  # and for each simulated second
-    patience: Annotated[Finite, Within(1, 100)]  # times as much real time
+    seconds_per_second: Annotated[Finite, Within(0, 1000)]  # s of processor time for each simulated second
+    patience: Annotated[Finite, Within(1, 100)]  # real time divided by processor time
     memory: Annotated[int, Within(16, 2**20)]  # MiB
     files: Annotated[int, Within(1, 2**20)]  # MiB
     processes: Annotated[int, Within(1, 10000)]
     open_files: Annotated[int, Within(64, 10000)]
 
-    def processor_time(self, duration: float) -> float:
-        """Return how many s of processor time a flight of so many simulated s may take."""
-        return self.seconds + self.seconds_per_second * duration
-
-    def real_time(self, duration: float) -> float:
-        """Return how many s it may last."""
-        return self.patience * self.processor_time(duration)
+    def of_flight(self, duration: float) -> dict[str, Any]:
+        """Return the limits of a flight with a simulated duration (s), for LimitedProcess."""
+        processor_time = self.seconds + self.seconds_per_second * duration
+        plain = self.model_dump(include={"memory", "files", "processes", "open_files"})
+        return {**plain, "seconds": processor_time, "real_time": self.patience * processor_time}
 
 
 class _Results(Checked):
@@ -35,13 +33,13 @@ class _Results(Checked):
 
 
 class BatchSettings(Checked):
-    """How many flights a worker gets at a time."""
+    """The number of flights that a worker gets at a time."""
 
     largest: Annotated[int, Within(1, 1000)]
     of_a_worker: Annotated[int, Within(1, 1000)]
 
     def size(self, flights: int, workers: int) -> int:
-        """Return the size of a batch for so many flights."""
+        """Return the number of flights of a batch."""
         return max(1, min(self.largest, flights // (workers * self.of_a_worker)))
 
 
@@ -50,8 +48,6 @@ class _Workers(Checked):
 
 
 class Settings(Checked):
-    """All of them."""
-
     limits: FlightLimits
     results: _Results
     batches: BatchSettings
@@ -59,6 +55,6 @@ class Settings(Checked):
 
 
 def load(overrides: dict[str, Any] | None = None) -> Settings:
-    """Return config/grading.yaml with `overrides`, of the same shape, laid over it. Raises ParameterError."""
+    """Return config/grading.yaml with some values replaced by `overrides`. Raises ParameterError."""
     path = package_path() / "config" / "grading.yaml"
     return checked(Settings, merged(read_yaml(path), overrides or {}), yaml_files.lines(path), str(path))

@@ -1,8 +1,8 @@
 """A seccomp filter for the process of a submission, with bubblewrap or without it.
 
-The filter refuses what the resource limits do not count (memory that belongs to no process), what outlives a flight
-(System V objects, message queues, keys), and what reaches other processes and the network. A refused call raises
-PermissionError in Python.
+The filter refuses calls for memory that the resource limits do not count, for objects that outlive a flight (System V
+objects, message queues, keys), and for access to other processes and the network. In Python a refused call raises
+PermissionError.
 """
 
 from __future__ import annotations
@@ -20,18 +20,14 @@ _FORBIDDEN = {
     **{"semget": (64, 190), "semop": (65, 193), "semctl": (66, 191), "semtimedop": (220, 192)},
     **{"msgget": (68, 186), "msgsnd": (69, 189), "msgrcv": (70, 188), "msgctl": (71, 187)},
     **{"mq_open": (240, 180), "mq_unlink": (241, 181)},
-    # So do keys, and extended attributes of a folder.
+    # Keys, and extended attributes of a folder, stay in the kernel, too.
     **{"add_key": (248, 217), "request_key": (249, 218), "keyctl": (250, 219)},
     **{"setxattr": (188, 5), "lsetxattr": (189, 6), "fsetxattr": (190, 7), "setxattrat": (463, 463)},
-    # Memory that counts for no process.
+    # Memory that does not count for any process.
     **{"memfd_create": (319, 279), "memfd_secret": (447, 447), "vmsplice": (278, 75), "userfaultfd": (323, 282)},
-    # A network; io_uring can make any of the calls here.
-    **{
-        "socket": (41, 198),
-        "io_uring_setup": (425, 425),
-        "io_uring_enter": (426, 426),
-        "io_uring_register": (427, 427),
-    },
+    # The network; io_uring can make any of the calls here.
+    "socket": (41, 198),
+    **{"io_uring_setup": (425, 425), "io_uring_enter": (426, 426), "io_uring_register": (427, 427)},
     # Rights over namespaces and the kernel.
     **{"unshare": (272, 97), "setns": (308, 268), "bpf": (321, 280), "perf_event_open": (298, 241)},
     # Another process: its memory, its descriptors, and how fast it runs.
@@ -69,7 +65,7 @@ class _Program(ctypes.Structure):
 
 
 def forbid() -> None:
-    """Install the filter in this process and all that it starts, for good; on other machines do nothing.
+    """Install the filter permanently in this process and its children; on other processors do nothing.
 
     Raises OSError.
     """
@@ -81,12 +77,12 @@ def forbid() -> None:
     program = _Program(len(code) // 8, code)
     library = ctypes.CDLL(None, use_errno=True)
     library.prctl(_PR_SET_NO_NEW_PRIVS, *map(ctypes.c_ulong, (1, 0, 0, 0)))
-    for flags in (_SPECULATION_ALLOWED, 0):  # which not every kernel knows
+    for flags in (_SPECULATION_ALLOWED, 0):  # an old kernel does not know the flag
         words = map(ctypes.c_ulong, (seccomp, _SET_MODE_FILTER, flags))
         if library.syscall(*words, ctypes.byref(program)) == 0:
             return
     number = ctypes.get_errno()
-    raise OSError(number, f"the kernel takes no seccomp filter: {os.strerror(number)}")
+    raise OSError(number, f"the kernel accepts no seccomp filter: {os.strerror(number)}")
 
 
 def _instructions(index: int, architecture: int) -> Iterator[bytes]:

@@ -1,1 +1,1 @@
-"""Results in the forms that a terminal, a browser, a CI system or a program reads: one file here for each."""
+"""Output formats of results for terminals, browsers, CI systems and programs."""

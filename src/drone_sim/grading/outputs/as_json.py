@@ -1,4 +1,4 @@
-"""Everything, for programs: one JSON object with a version."""
+"""All results as one JSON object, for programs."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any
 
 from drone_sim.files import writing
 from drone_sim.grading import evidence
-from drone_sim.grading.outputs.by_script import by_script
+from drone_sim.grading.outputs.script_results import group_by_script
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 
 FORMAT = "drone_sim grades"
-VERSION = 1  # of the format: another one where a key is renamed or means something else, not where one comes
+VERSION = 1  # of the format; it changes if a key is renamed or changes its meaning, not if a key is added
 
 
 def write(
@@ -25,27 +25,27 @@ def write(
     key: bytes | None = None,
     names: Mapping[str, str] | None = None,
 ) -> None:
-    """Write the file, signed by a key if there is one. Raises OSError, in one line that names it."""
-    said = content(plan, results, names)
-    said = said if key is None else evidence.signed(said, key)
-    writing.write(path, json.dumps(said, indent=1, allow_nan=False) + "\n")
+    """Write the file, with a signature if there is a key. Raises OSError, in one line that names the file."""
+    values = content(plan, results, names)
+    values = values if key is None else evidence.sign(values, key)
+    writing.write(path, json.dumps(values, indent=1, allow_nan=False) + "\n")
 
 
 def content(plan: Plan, results: Sequence[Result], names: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """Return what the file holds; a figure that is no finite number is null."""
+    """Return the content of the file; figures that are not finite become None."""
     scripts = [
         {
-            "script": one.script,
-            "name": one.label,
-            "flights": len(one.flights),
-            "passed": one.passed,
-            "points": one.points,
-            "of": one.of,
-            "worst": {"seed": one.worst.seed, "points": one.worst.points},
-            "failed": dict(one.failures),
-            "hashes": evidence.hashes_of(plan, one.script),
+            "script": script.script,
+            "name": script.label,
+            "flights": len(script.flights),
+            "passed": script.passed,
+            "points": script.points,
+            "of": script.of,
+            "worst": {"seed": script.worst.seed, "points": script.worst.points},
+            "failed": dict(script.failures),
+            "hashes": evidence.hashes_of(plan, script.script),
         }
-        for one in by_script(results, names)
+        for script in group_by_script(results, names)
     ]
     return finite(
         {
@@ -53,15 +53,15 @@ def content(plan: Plan, results: Sequence[Result], names: Mapping[str, str] | No
             "version": VERSION,
             "plan": {"name": plan.name, "title": plan.title, "path": str(plan.path)},
             "scripts": scripts,
-            "results": [one.to_json() for one in results],
+            "results": [result.to_json() for result in results],
         }
     )
 
 
 def finite(value: Any) -> Any:
-    """Return a value as JSON can hold it."""
+    """Return a value with None for each number that is not finite, which JSON does not allow."""
     if isinstance(value, Mapping):
-        return {str(key): finite(one) for key, one in value.items()}
+        return {str(key): finite(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [finite(one) for one in value]
+        return [finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

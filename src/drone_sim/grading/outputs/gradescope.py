@@ -1,7 +1,7 @@
-"""Results of one script as Gradescope's autograder reads them: /autograder/results/results.json.
+"""Results of one script for Gradescope's autograder: /autograder/results/results.json.
 
-Format: the section "Output format" of Gradescope's autograder specifications. A test is a criterion; with several
-seeds its score is the mean over the flights, and its output names those that failed.
+The section "Output format" of Gradescope's autograder specifications defines the format. A criterion becomes a test.
+Its score is the mean over the flights, and its output names the failed flights.
 """
 
 from __future__ import annotations
@@ -12,12 +12,19 @@ from pathlib import Path
 from typing import Any
 
 from drone_sim.files import writing
-from drone_sim.grading.outputs.by_script import ScriptResults, by_script, describe, flight_label, named_outcomes, points
+from drone_sim.grading.outputs.script_results import (
+    ScriptResults,
+    describe,
+    flight_label,
+    format_points,
+    group_by_script,
+    named_outcomes,
+)
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 from drone_sim.message_text import escaped
 
-_TEXT = "text"  # not html: what a script says is shown, never obeyed; without a NUL, which a data base may refuse
+_TEXT = "text"  # not html, so that text of scripts is never interpreted
 
 
 def write(plan: Plan, results: Sequence[Result], path: str | Path) -> None:
@@ -26,12 +33,12 @@ def write(plan: Plan, results: Sequence[Result], path: str | Path) -> None:
 
 
 def content(plan: Plan, results: Sequence[Result]) -> dict[str, Any]:
-    """Return what the file holds. Raises ValueError for results of several scripts, or of none."""
-    scripts = by_script(results)
+    """Return the content of the file. Raises ValueError unless there are results of exactly one script."""
+    scripts = group_by_script(results)
     if len(scripts) != 1:
-        raise ValueError(f"Gradescope's results.json is of one script; these results are of {len(scripts)}")
+        raise ValueError(f"Gradescope's results.json must be of one script, not {len(scripts)}")
     script = scripts[0]
-    names = dict.fromkeys(name for one in script.flights for name, _ in named_outcomes(one))
+    names = dict.fromkeys(name for flight in script.flights for name, _ in named_outcomes(flight))
     return {
         "score": script.points,
         "output": escaped(_overview(plan, script)),
@@ -47,26 +54,26 @@ def content(plan: Plan, results: Sequence[Result]) -> dict[str, Any]:
 def _overview(plan: Plan, script: ScriptResults) -> str:
     lines = [
         f"{plan.title or plan.name}: {script.passed} of {len(script.flights)} flights passed, "
-        f"{points(script.points)} of {points(script.of)} points"
+        f"{format_points(script.points)} of {format_points(script.of)} points"
     ]
     if len(script.flights) > 1:
-        lines.append(f"worst: {flight_label(script.worst)}, {points(script.worst.points)} points")
-    lines += [f"{flight_label(one)}: error: {trouble}" for one in script.flights for trouble in one.troubles]
+        lines.append(f"worst: {flight_label(script.worst)}, {format_points(script.worst.points)} points")
+    lines += [f"{flight_label(flight)}: error: {trouble}" for flight in script.flights for trouble in flight.troubles]
     return "\n".join(lines)
 
 
 def _test(number: int, name: str, script: ScriptResults) -> dict[str, Any]:
-    outcomes = [(one, dict(named_outcomes(one)).get(name)) for one in script.flights]
-    there = [outcome for _, outcome in outcomes if outcome is not None]
+    outcomes = [(flight, dict(named_outcomes(flight)).get(name)) for flight in script.flights]
+    judged = [outcome for _, outcome in outcomes if outcome is not None]
     return {
         "number": str(number),
         "name": escaped(name),
-        "score": sum(one.points for one in there) / len(script.flights),
-        "max_score": max(one.of for one in there),
-        "status": "passed" if all(one.passed for one in there) else "failed",
+        "score": sum(outcome.points for outcome in judged) / len(script.flights),
+        "max_score": max(outcome.of for outcome in judged),
+        "status": "passed" if all(outcome.passed for outcome in judged) else "failed",
         "output": "\n".join(
-            escaped(f"{flight_label(result)}: {'passed' if one.passed else 'FAILED'}: {describe(one)}")
-            for result, one in outcomes
-            if one is not None
+            escaped(f"{flight_label(result)}: {'passed' if outcome.passed else 'FAILED'}: {describe(outcome)}")
+            for result, outcome in outcomes
+            if outcome is not None
         ),
     }

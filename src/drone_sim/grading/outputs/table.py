@@ -1,4 +1,4 @@
-"""The terminal's table: a row per script; of a single flight, a row per criterion."""
+"""The table in the terminal: a row per script; for a single script, also a row per criterion of its worst flight."""
 
 from __future__ import annotations
 
@@ -8,33 +8,33 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TextIO
 
-from drone_sim.grading.outputs.by_script import (
+from drone_sim.grading.outputs.script_results import (
     ScriptResults,
-    by_script,
+    align_columns,
     describe,
     flight_label,
-    in_columns,
+    format_points,
+    group_by_script,
     named_outcomes,
-    points,
 )
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 from drone_sim.message_text import printable
 
-WIDTH = 80  # columns, where the output is no terminal
-_SCRIPT = 28  # columns at most, of a script's name
+WIDTH = 80  # columns, if the output is not a terminal
+_MAX_NAME = 28  # columns
 _GREEN, _RED, _BOLD, _PLAIN = "\033[32m", "\033[31m", "\033[1m", "\033[0m"
-_NARROWEST, _SENTENCE = 40, 12  # columns
+_MIN_WIDTH, _MIN_SENTENCE = 40, 12  # columns
 
 
 def show(
     plan: Plan, results: Sequence[Result], file: TextIO | None = None, names: Mapping[str, str] | None = None
 ) -> None:
-    """Print the table; in colour, and as wide as it is, on a terminal. `names` are as in by_script."""
+    """Print the table, on a terminal in colour and with its width. `names` are as in group_by_script."""
     file = file or sys.stdout
     terminal = file.isatty()
     width = shutil.get_terminal_size((WIDTH, 24)).columns if terminal else WIDTH
-    print(text(plan, results, max(_NARROWEST, width), terminal, names), file=file, flush=True)
+    print(text(plan, results, max(_MIN_WIDTH, width), terminal, names), file=file, flush=True)
 
 
 def text(
@@ -47,7 +47,7 @@ def text(
     """Return the table, lines of at most `width` columns."""
     paint = _Paint(colour)
     lines = [paint(_cut(plan.title or plan.name, width), _BOLD)]
-    scripts = by_script(results, names)
+    scripts = group_by_script(results, names)
     if len(scripts) == 1:
         lines += _flight_lines(scripts[0], width, paint)
     if len(scripts) != 1 or len(scripts[0].flights) > 1:
@@ -56,51 +56,44 @@ def text(
 
 
 class _Paint:
-    def __init__(self, on: bool):
-        self._on = on
+    def __init__(self, has_colour: bool):
+        self._has_colour = has_colour
 
-    def __call__(self, words: str, *styles: str) -> str:
-        return f"{''.join(styles)}{words}{_PLAIN}" if self._on else words
+    def __call__(self, text: str, style: str) -> str:
+        return f"{style}{text}{_PLAIN}" if self._has_colour else text
 
-    def verdict(self, words: str, passed: bool) -> str:
-        return self(words, _GREEN if passed else _RED)
-
-
-# ---- a row per script
+    def verdict(self, text: str, passed: bool) -> str:
+        return self(text, _GREEN if passed else _RED)
 
 
 def _script_lines(scripts: Sequence[ScriptResults], width: int, paint: _Paint) -> list[str]:
     if not scripts:
         return ["no flights"]
-    name = min(_SCRIPT, max(6, *(len(printable(one.label)) for one in scripts)))
-    rows = [(_fit(one.label, name), *_figures(one)) for one in scripts]
-    heads, *starts = in_columns([("script", "passed", "points", "worst (seed)"), *rows], left=1)
+    name = min(_MAX_NAME, max(6, *(len(printable(script.label)) for script in scripts)))
+    rows = [
+        (
+            _shorten(script.label, name),
+            f"{script.passed}/{len(script.flights)}",
+            f"{format_points(script.points)}/{format_points(script.of)}",
+            f"{format_points(script.worst.points)} ({script.worst.seed})",
+        )
+        for script in scripts
+    ]
+    heads, *starts = align_columns([("script", "passed", "points", "worst (seed)"), *rows], left=1)
     lines = [paint(_cut(f"{heads}  failed in (flights)", width), _BOLD)]
-    for one, start in zip(scripts, starts):
-        line = _cut(f"{start}  {_trouble(one)}".rstrip(), width)
-        lines.append(paint.verdict(line, one.has_passed))
-    done = sum(one.has_passed for one in scripts)
+    for script, start in zip(scripts, starts):
+        line = _cut(f"{start}  {_failures(script)}".rstrip(), width)
+        lines.append(paint.verdict(line, script.has_passed))
     if len(scripts) > 1:
-        lines.append(f"{done} of {len(scripts)} scripts passed every flight")
+        passed = sum(script.has_passed for script in scripts)
+        lines.append(f"{passed} of {len(scripts)} scripts passed every flight")
     return lines
 
 
-def _figures(one: ScriptResults) -> tuple[str, str, str]:
-    worst = one.worst
-    return (
-        f"{one.passed}/{len(one.flights)}",
-        f"{points(one.points)}/{points(one.of)}",
-        f"{points(worst.points)} ({worst.seed})",
-    )
-
-
-def _trouble(one: ScriptResults) -> str:
-    """Return what went wrong: an error first, then the criteria, the most frequent first."""
-    failures = ", ".join(f"{printable(name)} {count}" for name, count in one.failures)
-    return "; ".join(filter(None, (*map(printable, one.errors[:1]), failures)))
-
-
-# ---- a row per criterion
+def _failures(script: ScriptResults) -> str:
+    """Return the first error, and the failed criteria, the most frequent first."""
+    criteria = ", ".join(f"{printable(name)} {count}" for name, count in script.failures)
+    return "; ".join(filter(None, (*map(printable, script.errors[:1]), criteria)))
 
 
 def _flight_lines(script: ScriptResults, width: int, paint: _Paint) -> list[str]:
@@ -111,28 +104,26 @@ def _flight_lines(script: ScriptResults, width: int, paint: _Paint) -> list[str]
         wrapped = textwrap.wrap(printable(f"error: {trouble}"), width)
         lines += [paint.verdict(line, False) for line in wrapped]
     named = named_outcomes(result)
-    widest = min(_SCRIPT, max((len(printable(name)) for name, _ in named), default=0))
+    widest = min(_MAX_NAME, max((len(printable(name)) for name, _ in named), default=0))
     for name, outcome in named:
         verdict = paint.verdict("ok  " if outcome.passed else "FAIL", outcome.passed)
-        start = f"{_fit(name, widest).ljust(widest)}  {points(outcome.points):>4}/{points(outcome.of):<4}  "
+        score = f"{format_points(outcome.points):>4}/{format_points(outcome.of):<4}"
+        start = f"{_shorten(name, widest).ljust(widest)}  {score}  "
         room = width - 8 - len(start)
-        first, *others = textwrap.wrap(printable(describe(outcome)), max(room, _SENTENCE)) or [""]
+        first, *others = textwrap.wrap(printable(describe(outcome)), max(room, _MIN_SENTENCE)) or [""]
         lines.append(f"  {verdict}  {start}{_cut(first, room)}".rstrip())
         lines += [f"{' ' * (8 + len(start))}{_cut(other, room)}" for other in others]
-    lines.append(paint(f"{points(result.points)} of {points(result.of)} points", _BOLD))
+    lines.append(paint(f"{format_points(result.points)} of {format_points(result.of)} points", _BOLD))
     return lines
 
 
-# ---- text of any kind in few columns
+def _cut(text: str, width: int) -> str:
+    text = printable(text)
+    return text if len(text) <= width else f"{text[: width - 1]}…"
 
 
-def _cut(words: str, width: int) -> str:
-    words = printable(words)
-    return words if len(words) <= width else f"{words[: width - 1]}…"
-
-
-def _fit(name: str, width: int) -> str:
-    """Return a name with both of its ends: the first says whose it is, the last what."""
+def _shorten(name: str, width: int) -> str:
+    """Return a name without its middle: the beginning often names the author, the end the file."""
     name = printable(name)
     if len(name) <= width:
         return name

@@ -1,1 +1,1 @@
-"""What a class has handed in: scripts, folders, zips as Moodle and Gradescope export them, a table."""
+"""The submissions of a class: scripts, folders, zips as Moodle and Gradescope export them, and tables."""

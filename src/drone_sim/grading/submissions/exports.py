@@ -1,9 +1,11 @@
-"""How Moodle and Gradescope name what they export, and what Gradescope says beside it of who has handed in."""
+"""Lists of the people of a class: names in exports of Moodle and Gradescope, and tables in CSV files."""
 
 from __future__ import annotations
 
+import csv
+import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,62 +13,107 @@ import yaml
 
 from drone_sim.grading.jobs.files import read
 from drone_sim.grading.submissions.archive import Parts
-from drone_sim.grading.submissions.submission import Person
+from drone_sim.grading.submissions.submission import Person, Submission
+from drone_sim.message_text import shown
 
 METADATA = "submission_metadata.yml"
-_LARGEST = 64 * 2**20  # bytes: it repeats what the autograder has said
-_MOST_PEOPLE = 20  # of a group
+_MAX_METADATA = 64 * 2**20  # bytes; the file repeats the autograder's output
+_MAX_GROUP = 20  # people
 _GRADESCOPE = re.compile(r"submission_\d+")
-# Moodle's folder of somebody's files, or the beginning of each file's name where the export has no folders. The name is
-# the shortest possible: a student may call a file `Bob_8_assignsubmission_file_my.py`.
+# Moodle's name of a student's folder, or the prefix of each file if the export has no folders. The name is the shortest
+# possible match, because a student may call a file `Bob_8_assignsubmission_file_my.py`.
 _MOODLE = re.compile(r"(?P<name>.+?)_(?P<number>\d+)_assignsubmission_[a-z]+(?:_(?P<file>.*))?", re.DOTALL)
-_LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # every value is text, and no tag makes anything else
+_LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # every value is text, and tags create no objects
+_MAX_TABLE = 2**20  # bytes
+_REQUIRED_COLUMNS, _OPTIONAL_COLUMNS = ("name", "path"), ("id", "email")
+_DELIMITERS = ",;\t"  # spreadsheets use the one of their country
 
 
-def arranged(paths: Sequence[Parts]) -> list[tuple[str, Parts]]:
-    """Return for each path in a class's zip the part that it belongs to, and its path in there: () for a mere file."""
-    first = {parts[0] for parts in paths}
-    if len(first) == 1 and any(len(parts) > 1 for parts in paths) and not _is_somebodys(*first):
-        paths = [parts[1:] or parts for parts in paths]  # a folder around all of them, such as Gradescope's
-    return [_arranged(parts) for parts in paths]
+def split_into_submissions(paths: Sequence[Parts]) -> list[tuple[str, Parts]]:
+    """Return for each path in a class's zip its submission, and the path inside that: () for a single file."""
+    top_level = {parts[0] for parts in paths}
+    if len(top_level) == 1 and any(len(parts) > 1 for parts in paths):
+        (name,) = top_level
+        if not (_MOODLE.fullmatch(name) or _GRADESCOPE.fullmatch(name)):
+            paths = [parts[1:] or parts for parts in paths]  # a folder around all submissions, such as Gradescope's
+    return [_split(parts) for parts in paths]
 
 
-def _is_somebodys(name: str) -> bool:
-    return bool(_MOODLE.fullmatch(name) or _GRADESCOPE.fullmatch(name))
-
-
-def _arranged(parts: Parts) -> tuple[str, Parts]:
-    found = _MOODLE.fullmatch(parts[0])
-    if found is None:
+def _split(parts: Parts) -> tuple[str, Parts]:
+    match = _MOODLE.fullmatch(parts[0])
+    if match is None:
         return parts[0], parts[1:]
-    inside = parts[1:] if len(parts) > 1 else (found["file"] or "",)
-    return f"{found['name']}_{found['number']}_assignsubmission_file_", inside
+    inside = parts[1:] if len(parts) > 1 else (match["file"] or "",)
+    return f"{match['name']}_{match['number']}_assignsubmission_file_", inside
 
 
 def person_of(name: str) -> Person | None:
-    """Return to whom a folder or a file belongs, from the name that Moodle gives it; None for another name."""
-    found = _MOODLE.fullmatch(name)
-    return None if found is None else Person(found["name"], found["number"])
+    """Return the person in Moodle's name of a folder or file; None for any other name."""
+    match = _MOODLE.fullmatch(name)
+    return None if match is None else Person(match["name"], match["number"])
 
 
 def people_in(folder: Path) -> dict[str, tuple[Person, ...]]:
-    """Return who has handed in what lies in each subfolder, as Gradescope's file in a folder says; {} without one.
+    """Return the people of each subfolder according to Gradescope's metadata file; {} if there is no such file.
 
-    Raises ValueError, in one line, for a file that says something else.
+    Raises ValueError, in one line, for a file with other content.
     """
     path = folder / METADATA
     if not path.is_file():
         return {}
     try:
-        content = yaml.load(read(path, _LARGEST), _LOADER)
-        return {str(name): tuple(map(_person, one[":submitters"][:_MOST_PEOPLE])) for name, one in content.items()}
+        content = yaml.load(read(path, _MAX_METADATA), _LOADER)
+        return {
+            str(name): tuple(map(_gradescope_person, one[":submitters"][:_MAX_GROUP])) for name, one in content.items()
+        }
     except (yaml.YAMLError, RecursionError, AttributeError, KeyError, TypeError):
-        raise ValueError(f"{path}: does not say who the `:submitters:` are, as Gradescope's file does") from None
+        raise ValueError(
+            f"{path}: must name the `:submitters:` of each submission, as Gradescope's file does"
+        ) from None
 
 
-def _person(said: Mapping[str, Any]) -> Person:
-    values = said[":name"], said.get(":sid", ""), said.get(":email", "")
-    if not all(isinstance(one, str) for one in values):  # lists of aliases of lists would be long texts
+def _gradescope_person(submitter: Mapping[str, Any]) -> Person:
+    values = submitter[":name"], submitter.get(":sid", ""), submitter.get(":email", "")
+    if not all(isinstance(value, str) for value in values):  # nested aliases of lists would be huge as text
         raise TypeError
     name, number, email = values
     return Person(name, id=number, email=email)
+
+
+def read_table(path: Path) -> list[Submission]:
+    """Return a submission for every path in a CSV with the columns `name` and `path`, and optionally `id` and `email`.
+
+    Paths are relative to the table's folder; the people of a group are rows with the same path. Raises ValueError, in
+    one line that names file and line.
+    """
+    people: dict[str, tuple[Person, ...]] = {}
+    try:
+        for person, name in _table_rows(path):
+            script = os.path.normpath(path.absolute().parent / name)
+            people[script] = (*people.get(script, ()), person)
+    except csv.Error as error:
+        raise ValueError(f"{path}: is not a table that can be read: {error}") from None
+    return [
+        Submission(script, group, "" if os.path.lexists(script) else f"{script}: no such file")
+        for script, group in people.items()
+    ]
+
+
+def _table_rows(path: Path) -> Iterator[tuple[Person, str]]:
+    try:
+        lines = read(path, _MAX_TABLE).decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise ValueError(f"{path}: must be text in UTF-8") from None
+    header = lines[0] if lines else ""
+    table = csv.DictReader(lines, delimiter=max(_DELIMITERS, key=header.count), restval="")
+    names = {(name or "").strip().lower(): name for name in table.fieldnames or ()}
+    if not {*_REQUIRED_COLUMNS} <= {*names}:
+        columns = f"{', '.join(_REQUIRED_COLUMNS)} (and may {', '.join(_OPTIONAL_COLUMNS)})"
+        raise ValueError(f"{path}: line 1: must name the columns {columns}, not {shown(header)}")
+    for row in table:
+        name, script, number, email = (
+            str(row[names[key]]).strip() if key in names else "" for key in (*_REQUIRED_COLUMNS, *_OPTIONAL_COLUMNS)
+        )
+        if not (name and script):
+            raise ValueError(f"{path}: line {table.line_num}: must have a name and a path")
+        yield Person(name, id=number, email=email), script

@@ -1,4 +1,4 @@
-"""What an argument of `grade` names: a script, or the submissions in a folder, a zip, or a table of names and paths."""
+"""The submissions that an argument of `grade` names: a script, or those in a folder, a zip, or a table."""
 
 from __future__ import annotations
 
@@ -9,119 +9,121 @@ from pathlib import Path
 
 from drone_sim.grading.jobs.files import Unreadable, is_child_script
 from drone_sim.grading.submissions import archive, exports
-from drone_sim.grading.submissions.roster import listed
-from drone_sim.grading.submissions.submission import Refused, Submission
+from drone_sim.grading.submissions.submission import Person, Refused, Submission
 from drone_sim.message_text import shown
 
-_ENDINGS = (".py", ".lua")
-_MOST = 1000
-_HIDDEN = (".", "__MACOSX", "__pycache__")
-_WHAT = "no child script (a file with a sysCall_ function)"
+_SCRIPT_SUFFIXES = (".py", ".lua")
+_MAX_SUBMISSIONS = 1000
+_IGNORED = (".", "__MACOSX", "__pycache__")  # prefixes of names
+_NO_SCRIPT = "no child script (a file with a sysCall_ function)"
 
 
-def submissions_of(given: str, store: Path) -> list[Submission]:
-    """Return what an argument names: a script itself; of a folder, a zip or a table of a class every submission.
+def submissions_of(argument: str, store: Path) -> list[Submission]:
+    """Return the submissions that an argument names: a script itself, or all in a folder, a zip or a table of a class.
 
-    In a folder each child script (a file with a sysCall_ function) is one, and each folder or zip in it is, with the
-    only child script that it has, however deep. Zips are laid out below `store`. What is wrong with a submission is
-    its `error`. Raises ValueError, in one line, for a folder, a zip or a table without any, and OSError.
+    In a folder, each child script (a file with a sysCall_ function) is a submission, and so is each folder or zip with
+    exactly one child script at any depth. Zips are unpacked below `store`. A submission's own faults are in its
+    `error`. Raises OSError, and ValueError, in one line, if there is no submission, or too many.
     """
-    path = Path(given)
+    path = Path(argument)
     if path.suffix.lower() == ".csv":
-        found = [_looked_up(one, store) for one in listed(path)]
+        submissions = [_resolve_script(submission, store) for submission in exports.read_table(path)]
     elif path.suffix.lower() == ".zip":
-        found = _of_zip(path, store)
-    elif path.is_dir() and path.suffix not in _ENDINGS:
-        found = _of_folder(path, store)
+        submissions = _in_class_zip(path, store)
+    elif path.is_dir() and path.suffix not in _SCRIPT_SUFFIXES:
+        submissions = _in_folder(path, store)
     else:
-        return [Submission(given)]
-    if not found:
-        raise ValueError(f"{shown(given)}: no submission is in it: {_WHAT}")
-    if len(found) > _MOST:
-        raise ValueError(f"{shown(given)}: holds {len(found)} submissions; {_MOST} can be graded at once")
-    return found
+        return [Submission(argument)]
+    if not submissions:
+        raise ValueError(f"{shown(argument)}: no submission is in it: {_NO_SCRIPT}")
+    if len(submissions) > _MAX_SUBMISSIONS:
+        raise ValueError(
+            f"{shown(argument)}: holds {len(submissions)} submissions; {_MAX_SUBMISSIONS} can be graded at once"
+        )
+    return submissions
 
 
-def _of_zip(path: Path, store: Path) -> list[Submission]:
+def _in_class_zip(path: Path, store: Path) -> list[Submission]:
     try:
-        folder, refused = archive.unpack(path, store, exports.arranged)
+        folder, refused = archive.unpack(path, store, exports.split_into_submissions)
     except Refused as error:
         raise ValueError(f"{shown(str(path))}: {error}") from None
     people = exports.people_in(folder)
-    left_out = [
-        Submission(str(folder / part if part else path), people.get(part, _people(part)), why)
-        for part, why in refused.items()
+    refused_submissions = [
+        Submission(str(folder / part if part else path), people.get(part, _moodle_people(part)), reason)
+        for part, reason in refused.items()
     ]
-    return sorted([*_of_folder(folder, store), *left_out], key=lambda one: one.script)
+    return sorted([*_in_folder(folder, store), *refused_submissions], key=lambda submission: submission.script)
 
 
-def _of_folder(folder: Path, store: Path) -> list[Submission]:
-    people = exports.people_in(folder)
-    entries = [one for one in sorted(folder.iterdir()) if not one.name.startswith(_HIDDEN)]
-    files = [one for one in entries if one.suffix in _ENDINGS and _may_fly(one)]
-    found = []
+def _in_folder(folder: Path, store: Path) -> list[Submission]:
+    people_by_name = exports.people_in(folder)
+    entries = [path for path in sorted(folder.iterdir()) if not path.name.startswith(_IGNORED)]
+    files = [path for path in entries if path.suffix in _SCRIPT_SUFFIXES and _may_be_child_script(path)]
+    submissions = []
     for entry in entries:
-        whose = people.get(entry.name, _people(entry.name))
+        people = people_by_name.get(entry.name, _moodle_people(entry.name))
         if entry in files:
-            found.append(Submission(str(entry), whose))
-        elif (entry.is_dir() and entry.suffix not in _ENDINGS) or entry.suffix.lower() == ".zip":
+            submissions.append(Submission(str(entry), people))
+        elif (entry.is_dir() and entry.suffix not in _SCRIPT_SUFFIXES) or entry.suffix.lower() == ".zip":
             leads_out = entry.is_symlink() and not Path(os.path.realpath(entry)).is_relative_to(folder.resolve())
             error = f"{shown(entry.name)}: is a link that leads out of its folder" if leads_out else ""
-            one = _looked_up(Submission(str(entry), whose, error), store)
-            if not one.error or whose or not files:  # beside scripts it may be a folder of theirs
-                found.append(one)
-    return found
+            submission = _resolve_script(Submission(str(entry), people, error), store)
+            if not submission.error or people or not files:  # else it may be a folder of the scripts beside it
+                submissions.append(submission)
+    return submissions
 
 
-def _people(name: str) -> tuple[exports.Person, ...]:
+def _moodle_people(name: str) -> tuple[Person, ...]:
     person = exports.person_of(name)
     return () if person is None else (person,)
 
 
-def _may_fly(path: Path) -> bool:
-    """Return whether a file is a child script; a file that cannot be read counts as one, whose flights say so."""
+def _may_be_child_script(path: Path) -> bool:
+    """Return whether a file is a child script, or cannot be read: then the results of its flights have the error."""
     try:
         return path.is_symlink() or not path.is_file() or is_child_script(path)
     except Unreadable:
         return True
 
 
-def _looked_up(one: Submission, store: Path) -> Submission:
-    """Return a submission with the only child script of the folder or zip that it is."""
-    path = Path(one.script)
-    if one.error:
-        return one
+def _resolve_script(submission: Submission, store: Path) -> Submission:
+    """Return a submission whose folder or zip is replaced by the only child script in it."""
+    path = Path(submission.script)
+    if submission.error:
+        return submission
     try:
         if path.suffix.lower() == ".zip":
             path = archive.unpack_whole(path, store)
-        if path.is_dir() and path.suffix not in _ENDINGS:
-            return replace(one, script=str(_only_script(path, store)))
-        return one
+        if path.is_dir() and path.suffix not in _SCRIPT_SUFFIXES:
+            return replace(submission, script=str(_only_script(path, store)))
+        return submission
     except (Refused, Unreadable) as error:
-        return replace(one, error=f"{shown(path.name)}: {error}")
+        reason = str(error)
     except (PermissionError, RecursionError):
-        return replace(one, error=f"{shown(path.name)}: holds a folder that cannot be read, or too many in each other")
+        reason = "holds a folder that cannot be read, or too many in each other"
+    return replace(submission, error=f"{shown(path.name)}: {reason}")
 
 
 def _only_script(folder: Path, store: Path) -> Path:
     """Return the only child script in a folder, or in the only zip in it. Raises Refused, Unreadable and OSError."""
-    files = list(_files(folder))
-    scripts = [one for one in files if one.suffix in _ENDINGS and is_child_script(one)]
-    zips = [one for one in files if one.suffix.lower() == ".zip"]
+    files = list(_files_below(folder))
+    scripts = [path for path in files if path.suffix in _SCRIPT_SUFFIXES and is_child_script(path)]
+    zips = [path for path in files if path.suffix.lower() == ".zip"]
     if not scripts and len(zips) == 1:
         folder = archive.unpack_whole(zips[0], store)
-        scripts = [one for one in _files(folder) if one.suffix in _ENDINGS and is_child_script(one)]
+        scripts = [path for path in _files_below(folder) if path.suffix in _SCRIPT_SUFFIXES and is_child_script(path)]
     if len(scripts) == 1:
         return scripts[0]
     if not scripts:
-        raise Refused(f"holds {_WHAT}")
-    names = ", ".join(str(one.relative_to(folder)) for one in scripts[:4])
-    raise Refused(f"holds {len(scripts)} child scripts ({names}); one is to be graded")
+        raise Refused(f"holds {_NO_SCRIPT}")
+    names = ", ".join(str(script.relative_to(folder)) for script in scripts[:4])
+    raise Refused(f"holds {len(scripts)} child scripts ({names}); there must be only one")
 
 
-def _files(folder: Path) -> Iterator[Path]:
-    """Give a folder's files, and those of its folders, without links."""
-    for here, folders, names in os.walk(folder):
-        folders[:] = sorted(one for one in folders if not one.startswith(_HIDDEN))
-        paths = (Path(here, name) for name in sorted(names))
-        yield from (one for one in paths if one.is_file() and not one.is_symlink())
+def _files_below(folder: Path) -> Iterator[Path]:
+    """Yield the regular files in a folder and its subfolders, without links."""
+    for current, folders, names in os.walk(folder):
+        folders[:] = sorted(name for name in folders if not name.startswith(_IGNORED))
+        paths = (Path(current, name) for name in sorted(names))
+        yield from (path for path in paths if path.is_file() and not path.is_symlink())

@@ -1,8 +1,8 @@
-"""Which scripts of a class are alike: winnowing, as MOSS does it (Schleimer, Wilkerson, Aiken, SIGMOD 2003).
+"""Search for similar scripts in a class by winnowing, as in MOSS (Schleimer, Wilkerson, Aiken, SIGMOD 2003).
 
-What counts is the order of the words of a program: names, numbers and texts that the author chose are all alike;
-comments and spaces are ignored. A hash is made of every GRAM words in a row, and of every WINDOW hashes the smallest is
-kept: two scripts with GRAM + WINDOW - 1 words in common share at least one. Similar scripts are no proof of copying.
+A program is compared as a sequence of tokens, in which all names, numbers and texts are equal, and comments and spaces
+are ignored. Every GRAM consecutive tokens give a hash, and of every WINDOW hashes the smallest is kept: two scripts
+with GRAM + WINDOW - 1 tokens in common share at least one hash. Similar scripts are no proof of copying.
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ from drone_sim.grading.jobs.files import Unreadable, read
 from drone_sim.grading.plan import Plan
 from drone_sim.scripting.python.helpers import BUILT_IN
 
-GRAM, WINDOW = 12, 8  # words, hashes
-LEAST = 0.5  # the share from which two scripts are told of
-_FEWEST = 8  # hashes in common
-_MOST_PAIRS = 100
-_LONGEST = 2**17  # characters of a submission that are looked at
-_CLASS = 6  # scripts, from which on it counts as given what most of them have
-_LUA = "end function local then elseif repeat until nil"
-_KEPT = {*keyword.kwlist, *_LUA.split()}
-_LONG = {  # comments and texts of many lines
+GRAM, WINDOW = 12, 8  # tokens, hashes
+MIN_SHARE = 0.5  # of common hashes in a reported pair
+_MIN_COMMON = 8  # hashes
+_MAX_PAIRS = 100
+_MAX_LENGTH = 2**17  # characters of a submission that are compared
+_MIN_CLASS = 6  # scripts; in a smaller class, code of most scripts is not ignored
+_LUA_KEYWORDS = "end function local then elseif repeat until nil"
+_KEYWORDS = {*keyword.kwlist, *_LUA_KEYWORDS.split()}
+_COMMENTS_AND_LONG_TEXTS = {  # patterns of comments and of texts with several lines
     "python": (r"\#[^\n]*", r"\"\"\".*?(?:\"\"\"|\Z) | '''.*?(?:'''|\Z)"),
     "lua": (r"--\[\[.*?(?:\]\]|\Z) | --[^\n]*", r"\[\[.*?(?:\]\]|\Z)"),
 }
-_WORDS = {
+_TOKENS = {
     language: re.compile(
-        rf"""(?P<nothing>\s+ | {comment}) | (?P<text>{text} | \"(?:\\.|[^\"\\\n])*\" | '(?:\\.|[^'\\\n])*')
+        rf"""(?P<ignored>\s+ | {comment}) | (?P<text>{text} | \"(?:\\.|[^\"\\\n])*\" | '(?:\\.|[^'\\\n])*')
         | (?P<number>\d[\w.]*) | (?P<name>(?<![.:])[^\W\d]\w*) | (?P<other>[^\W\d]\w*|.)""",
         re.DOTALL | re.VERBOSE,
     )
-    for language, (comment, text) in _LONG.items()
+    for language, (comment, text) in _COMMENTS_AND_LONG_TEXTS.items()
 }
-_SAME = {"text": "''", "number": "0", "name": "x"}
+_REPLACEMENTS = {"text": "''", "number": "0", "name": "x"}
 Lines = frozenset[int]
 
 
 class Pair(NamedTuple):
-    """Two scripts: the share of the shorter one's hashes that both have, and their lines (from 1) with these."""
+    """Two similar scripts: the common share of the shorter one's hashes, and the lines (from 1) with common hashes."""
 
     first: str
     second: str
@@ -55,69 +55,71 @@ class Pair(NamedTuple):
     lines: tuple[Lines, Lines]
 
 
-def given_by(plan: Plan) -> dict[str, str]:
-    """Return what everybody begins with: the built-in scripts, the tutorial's, and `start` beside the plan."""
+def provided_sources(plan: Plan) -> dict[str, str]:
+    """Return the sources that all students have: the built-in scripts, the tutorial's, and `start` beside the plan."""
     folders = BUILT_IN, package_path() / "docs" / "tutorial"
-    paths = [*(path for one in folders for path in one.rglob("*.*")), *plan.folder.glob("start.*")]
+    paths = [*(path for folder in folders for path in folder.rglob("*.*")), *plan.folder.glob("start.*")]
     return {str(path): source_of([path]) for path in paths if path.is_file()}
 
 
 def source_of(paths: Iterable[Path]) -> str:
-    """Return what scripts among files hold, one after the other, as far as it can be read."""
-    found = ""
+    """Return the concatenated sources of the readable scripts among some files."""
+    source = ""
     for path in paths:
         if path.suffix in (".py", ".lua"):
             with contextlib.suppress(Unreadable):
-                found += read(path, _LONGEST).decode(errors="replace")
-    return found[:_LONGEST]
+                source += read(path, _MAX_LENGTH).decode(errors="replace")
+    return source[:_MAX_LENGTH]
 
 
-def similar(sources: Mapping[str, str], given: Mapping[str, str]) -> list[Pair]:
-    """Return the pairs among programs, by the names of their files, that are alike, the most alike first.
+def find_similar(sources: Mapping[str, str], provided: Mapping[str, str]) -> list[Pair]:
+    """Return the similar pairs among programs, whose sources are given by file names, the most similar first.
 
-    Code in a file that everybody was `given`, or in the scripts of more than half of a class, is ignored.
+    Code of the files `provided` to everybody, or of more than half of the scripts of a class, is ignored.
     """
-    found = {name: _hashes(name, text) for name, text in sources.items()}
-    common = {one for name, text in given.items() for one in _hashes(name, text)}
-    if len(found) >= _CLASS:
-        count = Counter(one for hashes in found.values() for one in hashes)
-        common |= {one for one, number in count.items() if 2 * number > len(found)}
-    own = {name: {one: lines for one, lines in hashes.items() if one not in common} for name, hashes in found.items()}
-    pairs = (_pair(first, second, own) for first, second in itertools.combinations(own, 2))
-    alike = sorted((one for one in pairs if one is not None), key=lambda one: -one.share)
-    return alike[:_MOST_PAIRS]
+    programs = {name: _hashes(name, text) for name, text in sources.items()}
+    ignored = {value for name, text in provided.items() for value in _hashes(name, text)}
+    if len(programs) >= _MIN_CLASS:
+        count = Counter(value for hashes in programs.values() for value in hashes)
+        ignored |= {value for value, number in count.items() if 2 * number > len(programs)}
+    own = {
+        name: {value: lines for value, lines in hashes.items() if value not in ignored}
+        for name, hashes in programs.items()
+    }
+    pairs = (_compare(first, second, own) for first, second in itertools.combinations(own, 2))
+    return sorted((pair for pair in pairs if pair is not None), key=lambda pair: -pair.share)[:_MAX_PAIRS]
 
 
-def _pair(first: str, second: str, hashes: Mapping[str, Mapping[int, Lines]]) -> Pair | None:
+def _compare(first: str, second: str, hashes: Mapping[str, Mapping[int, Lines]]) -> Pair | None:
     one, other = hashes[first], hashes[second]
-    both = one.keys() & other.keys()
-    if len(both) < max(_FEWEST, LEAST * min(len(one), len(other))):
+    common = one.keys() & other.keys()
+    if len(common) < max(_MIN_COMMON, MIN_SHARE * min(len(one), len(other))):
         return None
-    lines = [frozenset(itertools.chain(*(some[key] for key in both))) for some in (one, other)]
-    return Pair(first, second, len(both) / min(len(one), len(other)), (lines[0], lines[1]))
+    lines = [frozenset(itertools.chain(*(some[key] for key in common))) for some in (one, other)]
+    return Pair(first, second, len(common) / min(len(one), len(other)), (lines[0], lines[1]))
 
 
 def _hashes(name: str, text: str) -> dict[int, Lines]:
-    """Return the hashes that are kept of a program, and the lines that each is of."""
-    words = list(_words(text, "lua" if name.endswith(".lua") else "python"))
-    grams = [words[place : place + GRAM] for place in range(len(words) - GRAM + 1)]
-    hashes = [zlib.crc32(" ".join(word for word, _ in gram).encode(errors="replace")) for gram in grams]
+    """Return the hashes of a program that winnowing keeps, with the lines of each."""
+    tokens = list(_tokens(text, "lua" if name.endswith(".lua") else "python"))
+    grams = [tokens[index : index + GRAM] for index in range(len(tokens) - GRAM + 1)]
+    hashes = [zlib.crc32(" ".join(token for token, _ in gram).encode(errors="replace")) for gram in grams]
     kept: dict[int, set[int]] = {}
     last = -1
     for start in range(max(1, len(hashes) - WINDOW + 1) if hashes else 0):
         window = hashes[start : start + WINDOW]
-        place = start + len(window) - 1 - window[::-1].index(min(window))  # of equal ones the last
-        if place != last:
-            kept.setdefault(hashes[place], set()).update(line for _, line in grams[place])
-            last = place
-    return {one: frozenset(lines) for one, lines in kept.items()}
+        index = start + len(window) - 1 - window[::-1].index(min(window))  # the last of equal hashes
+        if index != last:
+            kept.setdefault(hashes[index], set()).update(line for _, line in grams[index])
+            last = index
+    return {value: frozenset(lines) for value, lines in kept.items()}
 
 
-def _words(text: str, language: str) -> Iterator[tuple[str, int]]:
-    """Give the words of a program, each with its line."""
+def _tokens(text: str, language: str) -> Iterator[tuple[str, int]]:
+    """Yield the tokens of a program, each with its line."""
     line = 1
-    for found in _WORDS[language].finditer(text):
-        kind, word = found.lastgroup or "other", found[0]
-        if kind != "nothing":
-            yield (word if word in _KEPT else _SAME.get(kind, word)), line
-        line += word.count("\n")
+    for match in _TOKENS[language].finditer(text):
+        kind, token = match.lastgroup or "other", match[0]
+        if kind != "ignored":
+            yield (token if token in _KEYWORDS else _REPLACEMENTS.get(kind, token)), line
+        line += token.count("\n")

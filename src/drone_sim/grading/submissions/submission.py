@@ -1,4 +1,4 @@
-"""A submission: whose it is, and the script that is to be flown."""
+"""A submission: a script, and the people who have handed it in."""
 
 from __future__ import annotations
 
@@ -8,38 +8,40 @@ from dataclasses import dataclass
 
 
 class Refused(ValueError):
-    """What somebody has handed in cannot be graded; one line says why. Others' can."""
+    """A submission cannot be graded; one line says why. Other submissions can."""
 
 
 @dataclass(frozen=True)
 class Person:
-    """Somebody who has handed in, as the course's system knows them; '' stands for unknown."""
+    """A student as the course's system knows them; '' stands for unknown."""
 
     name: str
-    participant: str = ""  # Moodle's number of them in the assignment
+    participant: str = ""  # Moodle's number of the student in the assignment
     id: str = ""  # the student's number
     email: str = ""
 
 
 @dataclass(frozen=True)
 class Submission:
-    """A script, or why there is none; of a group it has several people, of a mere file none."""
+    """A script, or the reason why there is none. A group's has several people, a file without a name has none."""
 
-    script: str  # as `grade` takes it; where there is none to fly, what was looked through
+    script: str  # as `grade` accepts it; without a script, the path that was searched
     people: tuple[Person, ...] = ()
     error: str = ""  # in one line
 
     @property
     def name(self) -> str:
-        """Whose it is; '' where nobody has said."""
-        return ", ".join(one.name for one in self.people)
+        """The names of the people, '' if they are unknown."""
+        return ", ".join(person.name for person in self.people)
 
 
 def names_of(submissions: Iterable[Submission]) -> Mapping[str, str]:
-    """Return for each script the name of its author, made unique: people of the same name get a number, too."""
-    named = [one for one in submissions if one.people]
-    count = Counter(one.name for one in named)
+    """Return the unique name of each script's author; people with the same name also get a number."""
+    named = [submission for submission in submissions if submission.people]
+    count = Counter(submission.name for submission in named)
     return {
-        one.script: one.name if count[one.name] == 1 else f"{one.name} ({one.people[0].participant or place})"
-        for place, one in enumerate(named, start=1)
+        submission.script: submission.name
+        if count[submission.name] == 1
+        else f"{submission.name} ({submission.people[0].participant or number})"
+        for number, submission in enumerate(named, start=1)
     }

@@ -1,1 +1,1 @@
-"""A plan graded on a running simulator, so that what flies may be a ROS node."""
+"""Grading on a running simulator, so that a ROS node can fly."""

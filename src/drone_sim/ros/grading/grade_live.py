@@ -1,7 +1,7 @@
-"""`rosrun drone_sim grade_live PLAN`: the plan on a running simulator, flown by whatever flies there.
+"""`rosrun drone_sim grade_live PLAN`: grade the script or the node that flies on a running simulator.
 
-It starts the simulation anew, sends the plan's timeline by topics, hears what the vehicle does, and judges that by the
-same criteria as `grade`. As a <test> of rostest it writes the result that rostest reads. See docs/grading.md.
+The program restarts the simulation, sends the plan's timeline by topics, records the vehicle's topics, and judges the
+flight by the same criteria as `grade`. As a <test> of rostest it writes the result for rostest. See docs/grading.md.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import copy
 import os
+import re
 import sys
 import tempfile
 import threading
@@ -34,24 +35,24 @@ from drone_sim.ros.core.launch_parameters import from_shell
 from drone_sim.ros.core.shutdown import end_on_signals
 from drone_sim.ros.core.startup import init_node, status_of_node
 from drone_sim.ros.grading import seeds
-from drone_sim.ros.grading.flight_listener import FlightListener
-from drone_sim.ros.grading.rules import LiveRules
+from drone_sim.ros.grading.flight_listener import FlightListener, LiveRules
 from drone_sim.ros.grading.simulator import GradedSimulator, Mismatch, lookup
-from drone_sim.ros.grading.timeline_sender import TimelineSender, is_put, steps_late
+from drone_sim.ros.grading.timeline_sender import TimelineSender, moves_vehicle, steps_late
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene_parameters import find_files_beside
 
 _NAME = "grade_live"
-_XML = "--gtest_output=xml:"  # by which rostest says where it looks for the result
-_SILENT, _STANDS = 1.0, 10.0  # s of real time without a step: what is stopped has ended, whatever else waits longer
-_STANDS_IN_LOCKSTEP = 90.0  # s: more than lockstep/start_timeout and lockstep/timeout usually are
-_LOOK, _LAST = 0.05, 0.3  # s of real time, between two looks; for the last messages to come
+_ROSTEST_OUTPUT = "--gtest_output=xml:"  # prefix of rostest's argument for the file of the result
+_STOPPED_TIMEOUT, _STALLED_TIMEOUT = 1.0, 10.0  # s of real time without a step after which a flight has ended
+_LOCKSTEP_TIMEOUT = 90.0  # s: usually more than lockstep/start_timeout and lockstep/timeout
+_POLL_INTERVAL = 0.05  # s of real time
+_LAST_MESSAGES = 0.3  # s of real time until the last messages have arrived
 _PATIENCE = 30.0  # s of real time
-_IN_TIME, _LATE = 1e-6, 2.0  # s of simulated time: the timeline's own puts come some steps late on a busy machine
+_EARLY, _LATE = 1e-6, 2.0  # s of simulated time by which a move of the timeline may differ, on a busy machine
 
 
 def main() -> int:
-    """Grade; return 0 where all is passed, and 1 after the table, or one line for what cannot be graded."""
+    """Grade; return 0 if the flight passes, else 1, after the table or one line for a user's mistake."""
     options = _parser().parse_args(_arguments(rosgraph.myargv(sys.argv)[1:]))
     if options.write_config:
         return status_of(_NAME, lambda: _write_config(options.plan, options.write_config))
@@ -59,12 +60,12 @@ def main() -> int:
         return FAILED
     end_on_signals()
     results: list[Result] = []
-    status = status_of_node(_NAME, lambda: results.append(_graded(options)))
+    status = status_of_node(_NAME, lambda: results.append(_grade_and_write(options)))
     return status or (0 if results[0].passed else FAILED)
 
 
 def _write_config(file: str, path: str) -> None:
-    """Write what the simulator is to be launched with. Raises ValueError and OSError, in one line."""
+    """Write the file for the launch argument `config`. Raises ValueError and OSError, in one line."""
     plan = plans.read(from_shell(file))
     if isinstance(plan.config, str):
         raise ValueError(f"{file}: its config is a file already: {plan.config}")
@@ -73,18 +74,19 @@ def _write_config(file: str, path: str) -> None:
     writing.write(path, dump(config))
 
 
-def _graded(options: argparse.Namespace) -> Result:
-    """Raises ValueError and OSError, in one line."""
+def _grade_and_write(options: argparse.Namespace) -> Result:
+    """Grade, write the outputs, and return the result. Raises ValueError and OSError, in one line."""
     plan = plans.read(from_shell(options.plan))
     if options.html:
         report.check(options.html)
     for file in filter(None, (options.csv, options.json, options.junit, options.gradescope)):
         writing.check_writable(file)
-    result, flown = grade(plan, options.seed, options.node, options.simulator, options.patience)
+    result, record = grade(plan, options.seed, options.node, options.simulator, options.patience)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(options.csv or f"{folder}/flight.csv")
-        if flown is not None:
-            flight.write(flown.rows, file)
+        if record is not None:
+            with writing.replacing(str(file)) as opened:
+                flight.write_table(record.rows, opened)
         for write, path in (
             (as_json.write, options.json),
             (gradescope.write, options.gradescope),
@@ -94,42 +96,45 @@ def _graded(options: argparse.Namespace) -> Result:
             if path:
                 write(plan, [result], path)
         if options.html:
-            report.write(plan, [result], lambda _: file if flown is not None else None, options.html)
+            report.write(plan, [result], lambda _: file if record is not None else None, options.html)
     table.show(plan, [result])
     return result
 
 
 def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> tuple[Result, FlightRecord | None]:
-    """Fly once, and return the result and the flight.
+    """Fly once, and return the result and the record of the flight.
 
-    `node` is the one that flies, which is waited for, '' where the simulator's script does. Raises Mismatch and
-    ParameterError where the plan cannot be graded on this simulator; what goes wrong later is in the result.
+    `node` is the name of the node that flies, '' if the simulator's script does. Raises Mismatch and ParameterError if
+    the plan cannot be graded on this simulator; later errors are in the result.
     """
-    there = GradedSimulator(simulator, patience)
-    parameters = there.fit(plan)
-    live = _Live(plan, seed, there, parameters)  # which is heard from now on
-    there.wait(live.is_connected, f"{there.node} lacks topics of the plan's vehicles: launch it in the plan's scene")
+    running = GradedSimulator(simulator, patience)
+    parameters = running.fit(plan)
+    live = _LiveFlight(plan, seed, running, parameters)
+    running.wait(
+        live.is_connected, f"{running.node} lacks topics of the plan's vehicles: launch it in the plan's scene"
+    )
     if node:
-        there.wait(lambda: lookup("lookupNode", rospy.resolve_name(f"/{node.strip('/')}")), f"no node {node}")
+        running.wait(lambda: lookup("lookupNode", rospy.resolve_name(f"/{node.strip('/')}")), f"no node {node}")
     error = live.fly()
     script = node or parameters.script
-    flown = live.listener.flown(plan.duration)
-    if flown is None:
-        return flight.ungraded(plan, script, seed, {}, error or "nothing was heard of the flight"), None
-    late = steps_late(plan.timeline_of(parameters).of(plan.vehicle_of(parameters)), flown.rows, parameters.time_step)
+    record = live.listener.record(plan.duration)
+    if record is None:
+        return flight.ungraded_result(plan, script, seed, {}, error or "nothing was heard of the flight"), None
+    late = steps_late(plan.timeline_of(parameters).of(plan.vehicle_of(parameters)), record.rows, parameters.time_step)
     if late and not plan.lockstep:
         rospy.logwarn(f"the timeline came up to {late} steps late: a lower real_time_factor gives it more time")
-    flown, put = live.within_rules(flown)
-    if flown is None:
-        return flight.ungraded(plan, script, seed, {}, put).with_tried([*live.rules.tried, *live.listener.forged]), None
-    outcomes = tuple(one.judge(flown) for one in plan.criteria)
-    digest = flight.digest_of(flown.rows)
-    result = result_of(plan.name, script, seed, {}, outcomes, flown.end, put or error or None, digest)
-    return result.with_tried([*live.rules.tried, *live.listener.forged]), flown
+    record, broken_rule = live.cut_at_broken_rule(record)
+    if record is None:
+        result = flight.ungraded_result(plan, script, seed, {}, broken_rule)
+    else:
+        outcomes = tuple(criterion.judge(record) for criterion in plan.criteria)
+        digest = flight.table_digest(record.rows)
+        result = result_of(plan.name, script, seed, {}, outcomes, record.end, broken_rule or error or None, digest)
+    return result.with_tried([*live.rules.tried, *live.listener.forged]), record
 
 
-class _Live:
-    """One flight through topics."""
+class _LiveFlight:
+    """A flight that is controlled and recorded by topics."""
 
     def __init__(self, plan: Plan, seed: int, simulator: GradedSimulator, parameters: Parameters):
         """Advertise and subscribe. Raises Mismatch."""
@@ -139,90 +144,89 @@ class _Live:
         self._started = False
         wanted = plan.parameters(seed)
         simulator.check_seed(wanted, self._scene)
-        self._begin = next(one.position for one in wanted.fleet if one.name == plan.vehicle_of(wanted))
+        self._start_position = next(
+            vehicle.position for vehicle in wanted.fleet if vehicle.name == plan.vehicle_of(wanted)
+        )
         self._timeline = plan.timeline_of(wanted)
         self._timeline_file = seeds.timeline_file(plan) if plan.lockstep else ""
-        # In lockstep no message may come by chance a step later: the simulator itself executes the timeline.
+        # In lockstep the simulator itself executes the timeline, because a message could arrive a step later.
         self._sender = TimelineSender([] if plan.lockstep else self._timeline.entries, parameters, simulator.node)
-        self.listener = FlightListener(plan, parameters, simulator.node, self._follow)
+        self.listener = FlightListener(plan, parameters, simulator.node, self._after_step)
         self.rules = LiveRules(plan, simulator.node)
 
     def is_connected(self) -> bool:
-        """Whether all topics from and to the simulator are connected."""
+        """Return whether all topics from and to the simulator are connected."""
         return self._sender.is_heard and self.listener.is_connected() and self.rules.is_connected()
 
-    def _follow(self, now: float) -> None:
-        """Send what is due after a step that ended at this time (s)."""
+    def _after_step(self, now: float) -> None:
+        """Send the messages that are due after a step that ended at the simulated time `now` (s)."""
         if self._started and not self._over.is_set():
             self._sender.send(now)
             if now >= self._duration - 1e-6:
                 self._over.set()
 
     def fly(self) -> str:
-        """Fly, and return what went wrong, in one line."""
+        """Fly, and return an error in one line, or ''."""
         try:
             self._simulator.stop()
-            time.sleep(_LAST)  # what was sent before is not of this flight
+            time.sleep(_LAST_MESSAGES)  # so that clear() discards all messages from before the flight
             self.listener.clear()
             self.rules.clear()
             self._started = True
             self._simulator.start(self._scene, self._timeline_file)
-            ended = self._wait()
+            error = self._wait()
             self._over.set()
             if rospy.is_shutdown():
-                return ended
-            time.sleep(_LAST)
+                return error
+            time.sleep(_LAST_MESSAGES)
             self._simulator.stop()
-        except Mismatch as error:
-            return str(error)
-        return ended or self._simulator.error
+        except Mismatch as mismatch:
+            return str(mismatch)
+        return error or self._simulator.error
 
     def _wait(self) -> str:
-        """Wait for the end of the flight; return what ended it too early, '' for nothing."""
+        """Wait for the end of the flight; return the reason of an early end, or ''."""
         last, since = -1.0, time.monotonic()
-        while not self._over.wait(_LOOK):
+        while not self._over.wait(_POLL_INTERVAL):
             now = self.listener.time
-            self.listener.look_for_topics()
+            self.listener.find_topics()
             if now != last:
                 last, since = now, time.monotonic()
             waited = time.monotonic() - since
             if rospy.is_shutdown():
-                return f"ended from outside at {now:.2f} s"
+                return f"grade_live was ended at {now:.2f} s"
             if self.listener.went_back:
-                return "somebody else has started the simulation anew"
-            if self._simulator.state == "stopped" and waited > _SILENT:  # it may be told late that it flies
+                return "another client has restarted the simulation"
+            if self._simulator.state == "stopped" and waited > _STOPPED_TIMEOUT:  # the topic `state` may be late
                 return self._simulator.error or f"the simulation was stopped at {now:.2f} s"
             if self._simulator.state == "paused" and CHANGE not in self._plan.allowed:
                 return f"somebody has paused the simulation at {now:.2f} s; the plan does not allow that"
-            if waited > (_STANDS_IN_LOCKSTEP if self._plan.lockstep else _STANDS):
+            if waited > (_LOCKSTEP_TIMEOUT if self._plan.lockstep else _STALLED_TIMEOUT):
                 return f"the simulation stands still at {now:.2f} s, {self._simulator.state}"
         return ""
 
-    def within_rules(self, flown: FlightRecord) -> tuple[FlightRecord | None, str]:
-        """Return a flight, cut off where somebody has moved the vehicle against the rules, and what to report of that.
+    def cut_at_broken_rule(self, record: FlightRecord) -> tuple[FlightRecord | None, str]:
+        """Return the flight until somebody moved the vehicle against the rules, and an error in one line, or ''.
 
-        The flight is None if that was before the first step.
+        The record is None if that was before the first step.
         """
         if MOVE in self._plan.allowed:
-            return flown, ""
-        if not flown.begins_at(self._begin):
-            said = f"somebody moved the vehicle before {flown.times[0]:.2f} s; the plan does not allow that"
-            return None, f"{said} (allowed: [move] would)"
-        own = [one.at for one in self._timeline.entries if is_put(one)]
-        for row in flown.puts:
-            at = flown.times[row]
-            if not any(-_IN_TIME <= at - one <= _LATE for one in own):
-                said = f"somebody moved the vehicle at {at:.2f} s; the plan does not allow that"
-                return flown.until(int(row)), f"{said} (allowed: [move] would)"
-        return flown, ""
+            return record, ""
+        message = "somebody moved the vehicle {} s; the plan does not allow that (allowed: [move] would)"
+        if not record.begins_at(self._start_position):
+            return None, message.format(f"before {record.times[0]:.2f}")
+        own = [entry.at for entry in self._timeline.entries if moves_vehicle(entry)]
+        for row in record.teleports:
+            at = record.times[row]
+            if not any(-_EARLY <= at - due <= _LATE for due in own):
+                return record.until(int(row)), message.format(f"at {at:.2f}")
+        return record, ""
 
 
-# ---- arguments
-
-
-def _arguments(given: Sequence[str]) -> list[str]:
-    """Return the arguments, those that rostest adds as options of ours."""
-    return [f"--rostest={one.removeprefix(_XML)}" if one.startswith(_XML) else one for one in given if one != "--text"]
+def _arguments(words: Sequence[str]) -> list[str]:
+    """Return the command line with the option --rostest instead of the arguments that rostest adds."""
+    words = [word for word in words if word != "--text"]
+    return [re.sub(f"^{re.escape(_ROSTEST_OUTPUT)}", "--rostest=", word) for word in words]
 
 
 def _seed(text: str) -> int:
@@ -231,8 +235,8 @@ def _seed(text: str) -> int:
     return int(text)
 
 
-def _from_here(name: str) -> str:
-    """Return a file's name from where the user stands, although roslaunch runs nodes in ~/.ros."""
+def _absolute_path(name: str) -> str:
+    """Return the path of a file relative to the user's working directory, because roslaunch runs nodes in ~/.ros."""
     return str(Path(os.environ.get("PWD") or os.getcwd()) / name)
 
 
@@ -245,7 +249,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--patience", metavar="S", type=float, default=_PATIENCE, help="real seconds to wait for both (default: 30)"
     )
-    for option, metavar, said in (
+    for option, metavar, description in (
         ("--write-config", "OUT.yaml", "write the plan's config, for config:= of drone.launch, and end"),
         ("--csv", "OUT.csv", "write the flight's table, as `fly --csv`"),
         ("--json", "OUT.json", "write everything, for programs"),
@@ -253,7 +257,7 @@ def _parser() -> argparse.ArgumentParser:
         ("--gradescope", "results.json", "write the results for Gradescope"),
         ("--html", "DIR", "write a report for the browser"),
     ):
-        parser.add_argument(option, type=_from_here, metavar=metavar, help=said)
+        parser.add_argument(option, type=_absolute_path, metavar=metavar, help=description)
     parser.add_argument("--rostest", metavar="OUT.xml", help=argparse.SUPPRESS)
     return parser
 

@@ -1,4 +1,4 @@
-"""What a seed changes, as a scene file: places, wind, moved objects, and the seeds of noise, gusts and faults."""
+"""Files for the simulator: the scene with the start conditions of a seed, and the timeline of a plan."""
 
 from __future__ import annotations
 
@@ -13,33 +13,35 @@ from drone_sim.run.parameters import Parameters
 
 
 def scene_file(plan: Plan, seed: int) -> str:
-    """Return a scene file in which a flight of a seed begins; of seed 0 the plan's own. Raises OSError."""
+    """Return a scene file with the start conditions of a seed; for seed 0 the plan's own. Raises OSError."""
     if not seed:
         return plan.parameters().scene_file
-    return _written(f"{plan.name}-{seed}.yaml", _content(plan.parameters(seed)))
+    return _write(f"{plan.name}-{seed}.yaml", _content(plan.parameters(seed)))
 
 
 def timeline_file(plan: Plan) -> str:
-    """Return a file with the timeline of a plan, '' for none. Raises OSError."""
-    return _written(f"{plan.name}-timeline.yaml", plan.timeline) if plan.timeline else ""
+    """Return a file with the timeline of a plan, '' if it has none. Raises OSError."""
+    return _write(f"{plan.name}-timeline.yaml", plan.timeline) if plan.timeline else ""
 
 
-def _written(name: str, content: Any) -> str:
+def _write(name: str, content: Any) -> str:
     folder = cache_path() / "grading" / "seeds"
     folder.mkdir(parents=True, exist_ok=True)
-    path = Path(folder, name)  # stays: the simulator may be started with it once more
+    path = Path(folder, name)  # is not removed, because the simulator may be restarted with it
     writing.write(path, dump(content))
     return str(path)
 
 
-def _content(flown: Parameters) -> dict[str, Any]:
-    given = flown.model_dump(mode="json", include={"scene", "weather", "physics", "time_step", "sub_step", "gravity"})
-    own = flown.in_scene_file.get("vehicles") or {}  # who has a script of its own; the others fly the simulator's
+def _content(parameters: Parameters) -> dict[str, Any]:
+    values = parameters.model_dump(
+        mode="json", include={"scene", "weather", "physics", "time_step", "sub_step", "gravity"}
+    )
+    own = parameters.in_scene_file.get("vehicles") or {}  # a vehicle with a script of its own keeps it
     vehicles = {
-        one.name: {
-            **one.model_dump(mode="json", exclude={"name", "script"}),
-            **{key: value for key, value in own.get(one.name, {}).items() if key == "script"},
+        vehicle.name: {
+            **vehicle.model_dump(mode="json", exclude={"name", "script"}),
+            **{key: value for key, value in own.get(vehicle.name, {}).items() if key == "script"},
         }
-        for one in flown.fleet
+        for vehicle in parameters.fleet
     }
-    return {**given.pop("scene"), **given, "vehicles": vehicles}
+    return {**values.pop("scene"), **values, "vehicles": vehicles}

@@ -1,4 +1,4 @@
-"""The running simulator: there or not, as the plan wants it or not, started and stopped."""
+"""The simulator's node during a graded flight: whether it fits the plan, its start and stop."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from drone_sim.ros.core.launch_parameters import parameters_of, use_sim_time
 from drone_sim.ros.core.simulator import Simulator
 from drone_sim.run.parameters import Parameters
 
-_LOOK = 0.05  # s of real time, between two looks
-_MOST = 3  # differences in a message
-# What a plan says nothing of, or what is brought about by other means.
-_OTHER = (
+_POLL_INTERVAL = 0.05  # s of real time
+_MAX_DIFFERENCES = 3  # in a message
+# Parameters that a plan does not set, or that are set in another way.
+_IGNORED = (
     *("config", "gui", "script", "script_time_limit", "real_time_factor", "remote_api", "scene_file", "samples"),
     *("lockstep", "step_count", "timeline_file"),
 )
@@ -30,19 +30,18 @@ _SCRIPT_ERROR = "script error: "
 
 
 class Mismatch(ValueError):
-    """The plan cannot be graded on this simulator; one line."""
+    """The plan cannot be graded on this simulator; one line says why."""
 
 
 class GradedSimulator(Simulator):
-    """A node of `drone.launch` or `fleet.launch`, by its name."""
+    """The node of `drone.launch` or `fleet.launch` on which a plan is graded."""
 
     def __init__(self, name: str, patience: float):
-        """Wait for the node of that name, for `patience` s of real time at most. Raises Mismatch."""
+        """Wait for the node with a name, at most `patience` s of real time. Raises Mismatch."""
         super().__init__(f"/{name.strip('/')}")
         self._patience = patience
-        self.wait(
-            lambda: lookup("lookupService", f"{self.node}/pause"), f"no simulator {self.node}: start drone.launch"
-        )
+        service = f"{self.node}/pause"
+        self.wait(lambda: lookup("lookupService", service), f"no simulator {self.node}: start drone.launch")
         self.state = ""
         self.error = ""
         self._subscribers = [
@@ -50,42 +49,42 @@ class GradedSimulator(Simulator):
             rospy.Subscriber("/rosout", Log, self._on_log),
         ]
 
-    def wait(self, condition: Callable[[], Any], otherwise: str) -> None:
-        """Wait until something is so. Raises Mismatch with what is said `otherwise`."""
+    def wait(self, condition: Callable[[], Any], message: str) -> None:
+        """Wait until a condition is true. Raises Mismatch with `message` after too long a time."""
         end = time.monotonic() + self._patience
         while not condition():
             if rospy.is_shutdown() or time.monotonic() > end:
-                raise Mismatch(f"{otherwise} (waited for {self._patience:g} s)")
-            time.sleep(_LOOK)
+                raise Mismatch(f"{message} (waited for {self._patience:g} s)")
+            time.sleep(_POLL_INTERVAL)
 
     def fit(self, plan: Plan) -> Parameters:
-        """Return the parameters it will fly with in the plan's scene. Raises Mismatch if the plan has others."""
+        """Return the simulator's parameters in the plan's scene. Raises Mismatch if they differ from the plan's."""
         if not use_sim_time():
-            raise Mismatch("grading goes by simulated time: start the simulator with use_sim_time:=true")
+            raise Mismatch("grading needs simulated time: start the simulator with use_sim_time:=true")
         wanted = plan.parameters()
         running = parameters_of(self.node, scene_file=wanted.scene_file)
         if [*running.vehicles] == [*wanted.vehicles] == [wanted.drone.name]:
-            # Who flies is told there, with its place in the scene that is flown in now: the plan's may have another.
+            # The vehicle's start pose is that of the scene in which the simulator flies now; the plan's may differ.
             running = parameters_of(self.node, scene_file=wanted.scene_file, vehicles=0)
         if plan.lockstep and not running.lockstep.wait_for:
             raise Mismatch("the plan says lockstep: true: start the simulator with lockstep:=cmd_vel")
-        if plan.timeline and not plan.lockstep and not self._factor():
-            raise Mismatch("real_time_factor = 0: without a pace, a timeline by topics is too late; 1 to 5 works well")
-        found = [one for one in _differences(wanted.model_dump(), running.model_dump(), ()) if one]
-        if found:
-            more = f", and {len(found) - _MOST} more" if len(found) > _MOST else ""
-            told = "; ".join(found[:_MOST])
-            raise Mismatch(f"the simulator flies with other parameters than the plan: {told}{more}; see its config:=")
+        if plan.timeline and not plan.lockstep and not self._real_time_factor():
+            raise Mismatch("real_time_factor = 0: the timeline's messages would be late; 1 to 5 works well")
+        differences = list(_differences(wanted.model_dump(), running.model_dump(), ()))
+        if differences:
+            more = f", and {len(differences) - _MAX_DIFFERENCES} more" if len(differences) > _MAX_DIFFERENCES else ""
+            first = "; ".join(differences[:_MAX_DIFFERENCES])
+            raise Mismatch(f"the simulator flies with other parameters than the plan: {first}{more}; see its config:=")
         return running
 
     def check_seed(self, wanted: Parameters, scene_file: str) -> None:
-        """Raise Mismatch if a scene file would not give the start conditions that the flight needs."""
-        there = parameters_of(self.node, scene_file=scene_file, vehicles=0)
-        for found in _differences(_beginning(wanted), _beginning(there), ()):
-            raise Mismatch(f"the simulator cannot fly this seed of the plan: {found}")
+        """Raise Mismatch if a scene file does not result in the start conditions of a flight."""
+        running = parameters_of(self.node, scene_file=scene_file, vehicles=0)
+        for difference in _differences(_start_conditions(wanted), _start_conditions(running), ()):
+            raise Mismatch(f"the simulator cannot fly this seed of the plan: {difference}")
 
-    def _factor(self) -> float:
-        """Return the real-time factor in force, which the parameters of its start do not know. Raises Mismatch."""
+    def _real_time_factor(self) -> float:
+        """Return the current real-time factor, which may differ from the start parameters. Raises Mismatch."""
         try:
             message = rospy.wait_for_message(f"{self.node}/parameter_updates", Config, self._patience)
         except rospy.ROSException:
@@ -93,29 +92,29 @@ class GradedSimulator(Simulator):
         return float(decode_config(message)["real_time_factor"])
 
     def start(self, scene: str, timeline: str = "") -> None:
-        """Start anew, in the scene of a file, '' for that of the parameters. Raises Mismatch.
+        """Restart the simulation in a scene file, '' for the scene of the parameters. Raises Mismatch.
 
-        The simulator itself executes the entries in the file `timeline`.
+        The simulator itself executes the entries of the file `timeline`.
         """
         self.error = ""
         files = {"scene_file": scene, "timeline_file": timeline}
-        before = {name: self.parameter(name, "") for name in files}
+        old_files = {name: self.parameter(name, "") for name in files}
         for name, file in files.items():
             self.set_parameter(name, file)
         try:
             self._call("load_scene")
         finally:
-            for name, file in before.items():
+            for name, file in old_files.items():
                 self.set_parameter(name, file)
 
     def stop(self) -> None:
-        """Stop, which runs the script's cleanup. Raises Mismatch."""
+        """Stop the simulation, which runs the script's cleanup. Raises Mismatch."""
         self._call("stop")
 
     def _call(self, service: str) -> None:
-        done, said = self.call(service)
-        if not done:
-            raise Mismatch(f"{self.node}/{service}: {said}")
+        success, message = self.call(service)
+        if not success:
+            raise Mismatch(f"{self.node}/{service}: {message}")
 
     def _on_state(self, message: String) -> None:
         self.state = message.data
@@ -125,25 +124,25 @@ class GradedSimulator(Simulator):
             self.error = self.error or message.msg.removeprefix(_SCRIPT_ERROR)
 
 
-def _beginning(parameters: Parameters) -> dict[str, Any]:
-    """Return what a seed may change."""
-    vehicles = {one.name: one.model_dump() for one in parameters.fleet}
+def _start_conditions(parameters: Parameters) -> dict[str, Any]:
+    """Return the parameters that a seed may change."""
+    vehicles = {vehicle.name: vehicle.model_dump() for vehicle in parameters.fleet}
     return {**parameters.model_dump(include={"scene", "weather"}), "vehicles": vehicles}
 
 
 def lookup(call: str, name: str) -> str:
-    """Return where a service is ("lookupService"), or a node ("lookupNode"); '' where the master knows none."""
+    """Return the URI of a service ("lookupService") or a node ("lookupNode"), '' if the master knows none."""
     try:
         return str(getattr(rosgraph.Master(rospy.get_name()), call)(name))
     except (rosgraph.MasterError, OSError):
         return ""
 
 
-def _differences(wanted: Any, there: Any, above: tuple[str, ...]) -> Iterator[str]:
-    """Yield the keys in which two parameter trees differ, with both values."""
-    if isinstance(wanted, Mapping) and isinstance(there, Mapping):
-        for key in sorted({*wanted, *there}, key=str):
-            if key not in _OTHER or (above and above[0] != "vehicles"):
-                yield from _differences(wanted.get(key), there.get(key), (*above, str(key)))
-    elif wanted != there:
-        yield f"{'/'.join(above)} = {shown(there)}, the plan's is {shown(wanted)}"
+def _differences(wanted: Any, running: Any, above: tuple[str, ...]) -> Iterator[str]:
+    """Yield a line for each key in which two parameter trees differ, with both values."""
+    if isinstance(wanted, Mapping) and isinstance(running, Mapping):
+        for key in sorted({*wanted, *running}, key=str):
+            if key not in _IGNORED or (above and above[0] != "vehicles"):
+                yield from _differences(wanted.get(key), running.get(key), (*above, str(key)))
+    elif wanted != running:
+        yield f"{'/'.join(above)} = {shown(running)}, the plan's is {shown(wanted)}"

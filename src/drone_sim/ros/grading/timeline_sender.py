@@ -1,4 +1,4 @@
-"""A timeline's entries as the messages that ask for the same."""
+"""Sender of a timeline's entries as ROS messages."""
 
 from __future__ import annotations
 
@@ -37,78 +37,78 @@ from drone_sim.ros.core.message_conversion import WORLD_FRAME, twist
 from drone_sim.ros.grading.simulator import Mismatch
 from drone_sim.run.parameters import Parameters
 
-_HERE = 1e-9  # s
+_ROUNDING = 1e-9
 _IN_WORLD = Header(frame_id=WORLD_FRAME)
-_DEEPEST = 4  # keys that a message on `weather` or `faults` may name
+_MAX_DEPTH = 4  # keys in a message on `weather` or `faults`
 
 
 class TimelineSender:
-    """Sends what is due, each entry once, in order."""
+    """Sends the entries of a timeline when they are due."""
 
     def __init__(self, entries: list[Entry], parameters: Parameters, simulator: str):
-        """Advertise what `entries` need of the node `simulator`, by the `parameters` that are flown with.
+        """Advertise the topics of the node `simulator` for `entries`; the flight has the given parameters.
 
-        Raises Mismatch for an entry that no topic can ask for.
+        Raises Mismatch for an entry that cannot be sent as a message.
         """
         self._step = parameters.time_step
         self._first = parameters.first.name
-        push = parameters.push.duration
-        self._left: list[tuple[float, rospy.Publisher, Any]] = []
+        push_duration = parameters.push.duration
+        self._pending: list[tuple[float, rospy.Publisher, Any]] = []
         publishers: dict[str, rospy.Publisher] = {}
         for entry in entries:
-            for topic, message in _messages(entry, push):
+            for topic, message in _messages(entry, push_duration):
                 name = f"/{entry.vehicle or self._first}/{topic}" if topic else f"{simulator}/set_object_pose"
                 if name not in publishers:
                     publishers[name] = rospy.Publisher(name, type(message), queue_size=100, tcp_nodelay=True)
-                self._left.append((entry.at, publishers[name], message))
+                self._pending.append((entry.at, publishers[name], message))
         self._publishers = list(publishers.values())
 
     @property
     def is_heard(self) -> bool:
-        """Whether somebody listens to each topic."""
-        return all(one.get_num_connections() for one in self._publishers)
+        """Whether each topic has a subscriber."""
+        return all(publisher.get_num_connections() for publisher in self._publishers)
 
     def send(self, time: float) -> None:
-        """Send what is due in the step that begins at this simulated time (s), and what was due before."""
+        """Send the entries that are due in the step that begins at a simulated time (s), or earlier."""
         step = first_step(time, self._step)
-        while self._left and first_step(self._left[0][0], self._step) <= step:
-            _, publisher, message = self._left.pop(0)
+        while self._pending and first_step(self._pending[0][0], self._step) <= step:
+            _, publisher, message = self._pending.pop(0)
             publisher.publish(message)
 
     def close(self) -> None:
-        """Advertise no more."""
-        for one in self._publishers:
-            one.unregister()
+        """Unregister the publishers."""
+        for publisher in self._publishers:
+            publisher.unregister()
 
 
-def is_put(entry: Entry) -> bool:
-    """Tell whether an entry puts a vehicle elsewhere."""
+def moves_vehicle(entry: Entry) -> bool:
+    """Return whether an entry moves a vehicle to another pose."""
     return isinstance(entry.action, Pose) or (isinstance(entry.action, ScriptRequest) and entry.action.topic == "reset")
 
 
 def steps_late(timeline: Timeline, rows: np.ndarray, time_step: float) -> int:
-    """Return by how many steps the latest twist of a vehicle's timeline came into force too late.
+    """Return the largest delay, in steps, with which a twist of a vehicle's timeline took effect.
 
-    `rows` are the vehicle's table. What is due in the first step cannot be in time, and does not count; nor does what
-    never came into force, as behind a lossy link.
+    `rows` are the vehicle's table. Twists of the first step, which cannot be in time, do not count, nor do twists that
+    never took effect, such as over a lossy link.
     """
     late = 0
     for entry in timeline.entries:
         due = first_step(entry.at, time_step)
         if isinstance(entry.action, Twist) and due:
-            wanted = (*entry.action.linear, entry.action.angular[2])
+            command = (*entry.action.linear, entry.action.angular[2])
             numbers = np.rint(rows[:, 0] / time_step)  # of the steps that end with the rows, from 1
-            in_force = numbers[(np.abs(rows[:, 14:18] - wanted) < _HERE).all(axis=1) & (numbers > due)]
+            in_force = numbers[(np.abs(rows[:, 14:18] - command) < _ROUNDING).all(axis=1) & (numbers > due)]
             late = max(late, int(in_force[0]) - due - 1 if len(in_force) else 0)
     return late
 
 
-def _messages(entry: Entry, push: float) -> Iterator[tuple[str, Any]]:
-    """Yield topic ('': not a vehicle's) and message of what an entry does; a push by topic lasts `push` s."""
+def _messages(entry: Entry, push_duration: float) -> Iterator[tuple[str, Any]]:
+    """Yield the topics and messages of an entry; '' is set_object_pose. A push by topic lasts `push_duration` s."""
     action = entry.action
     if isinstance(action, ObjectMove):
-        turn = Quaternion(*to_quaternion(from_rpy((0, 0, 0), action.rpy))) if action.rpy else Quaternion()
-        yield "", TransformStamped(_IN_WORLD, action.name, Transform(Vector3(*action.position), turn))
+        rotation = Quaternion(*to_quaternion(from_rpy((0, 0, 0), action.rpy))) if action.rpy else Quaternion()
+        yield "", TransformStamped(_IN_WORLD, action.name, Transform(Vector3(*action.position), rotation))
     elif isinstance(action, Twist):
         yield "cmd_vel", twist(action.linear, action.angular)
     elif isinstance(action, Pose):
@@ -116,20 +116,20 @@ def _messages(entry: Entry, push: float) -> Iterator[tuple[str, Any]]:
     elif isinstance(action, ScriptRequest):
         yield action.topic, _pose(action.pose) if action.pose else Empty()
     elif isinstance(action, Push):
-        if abs(action.duration - push) > _HERE:
-            said = f"push.duration = {action.duration:g}: a push by topic lasts push/duration = {push:g} s"
-            raise Mismatch(f"the timeline's entry at {entry.at:g} s: {said}; put that into the plan's config")
+        if abs(action.duration - push_duration) > _ROUNDING:
+            reason = f"push.duration = {action.duration:g}: a push by topic lasts push/duration = {push_duration:g} s"
+            raise Mismatch(f"the timeline's entry at {entry.at:g} s: {reason}; set that in the plan's config")
         yield "push", WrenchStamped(_IN_WORLD, Wrench(Vector3(*action.force), Vector3(*action.torque)))
     else:
         topic = next(name for name, kind in CHANGES.items() if isinstance(action, kind))
-        for key, value in _flat(action.changes):
+        for key, value in _flatten(action.changes):
             yield topic, KeyValue(key, dump(value, "line").removesuffix("\n...\n"))
 
 
-def _flat(changes: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+def _flatten(changes: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
     for key, value in changes.items():
-        if isinstance(value, Mapping) and value and above.count("/") < _DEEPEST - 2:
-            yield from _flat(value, f"{above}{key}/")
+        if isinstance(value, Mapping) and value and above.count("/") < _MAX_DEPTH - 2:
+            yield from _flatten(value, f"{above}{key}/")
         else:
             yield f"{above}{key}", value
 

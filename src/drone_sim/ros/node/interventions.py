@@ -12,7 +12,7 @@ from typing import Any
 import rospy
 from std_msgs.msg import String
 
-from drone_sim.grading.permissions import CHANGE, MOST_TRIED, Actions, free
+from drone_sim.grading.permissions import CHANGE, MOST_TRIED, Actions, free_functions
 from drone_sim.message_text import MAX_NAME, printable
 from drone_sim.ros.core.inbox import Intervention
 from drone_sim.run.simulation import Simulation
@@ -59,15 +59,15 @@ class Interventions:
 
     def watched(self, name: str, function: Function) -> Function:
         """Return a function for clients that also publishes what it does; unchanged if it does nothing to the world."""
-        if name in free():
+        if name in free_functions():
             return function
 
         @functools.wraps(function)
         def told(*arguments: Any) -> Any:
             actions, given = self._clients(), [*arguments]
-            action = actions.of(name, given)
+            action = actions.action_of(name, given)
             if action is not None:
-                self.tell(Intervention(action, actions.what(name, given), name, _CLIENT))
+                self.tell(Intervention(action, actions.subject_of(name, given), name, _CLIENT))
             return function(*arguments)
 
         return told

@@ -18,7 +18,7 @@ import inspect
 import itertools
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -80,6 +80,15 @@ sim, simROS = Module("sim"), Module("simROS")
 def declaration_of(function: Function) -> Declaration | None:
     """Return how a function was declared, None where it was not."""
     return getattr(function, "declaration", None)
+
+
+def methods_of(kind: type) -> Iterator[tuple[Function, str, list[str]]]:
+    """Yield the declared methods of a class, each with its own name and all names of its function, as module.name."""
+    for method in vars(kind).values():
+        declaration = declaration_of(method)
+        if declaration is not None:
+            module = declaration.module
+            yield method, f"{module}.{method.__name__}", [f"{module}.{name}" for name in declaration.names]
 
 
 def functions_of(*parts: object) -> dict[str, Function]:

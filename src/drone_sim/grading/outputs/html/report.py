@@ -1,11 +1,11 @@
-"""The report's folder: the teacher's page, a folder per script, and a page for each two scripts that are alike.
+"""The folder of a report: the teacher's page, a folder per script, and a page for each pair of similar scripts.
 
     index.html  files/report.css, replay.js, ...  similar/1.html ...
     scripts/01-alice/index.html  scripts/01-alice/flights/0.js ...  scripts/01-alice/files/report.css, ..., scene.js
 
-A script's folder is whole: it can be given to whoever wrote it. Figures lie in JavaScript files, because a page from
-file:// may load those and no others; a page loads a flight's when it is looked at. All text is escaped by the
-templates, or set as text.
+A script's folder is complete, so that it can be given to the author. Figures are in JavaScript files, because a page
+from file:// may load no other data; a page loads a flight's figures when the flight is shown. The templates escape all
+text, and scripts set text only as text.
 """
 
 from __future__ import annotations
@@ -26,23 +26,30 @@ import numpy as np
 from drone_sim.files import writing
 from drone_sim.files.containment import remove
 from drone_sim.grading.flight_record import columns_of
-from drone_sim.grading.outputs import by_script as naming
-from drone_sim.grading.outputs.by_script import ScriptResults, by_script, criteria_of
 from drone_sim.grading.outputs.html.scene import scene_of
+from drone_sim.grading.outputs.script_results import (
+    ScriptResults,
+    flight_label,
+    format_figure,
+    format_points,
+    group_by_criterion,
+    group_by_script,
+    named_outcomes,
+)
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
-from drone_sim.grading.submissions.similarity import given_by, similar
+from drone_sim.grading.submissions.similarity import find_similar, provided_sources
 from drone_sim.message_text import escaped
 from drone_sim.offline import recording
 from drone_sim.offline.recording import COLUMNS
 
 _HERE = Path(__file__).parent
-_SHARED = ("replay.js", "report.css", "view.js", "plots.js", "page.js", "index.js")  # first what makes it a report
-_OURS = Path("files", "replay.js")  # a folder that has this holds a report
-_MADE_ANEW = ("scripts", "similar", "files")
-_SLUG = 40  # characters of a folder's name
+_SHARED = ("replay.js", "report.css", "view.js", "plots.js", "page.js", "index.js")  # the marker first
+_MARKER = Path("files", "replay.js")  # exists in every folder of a report
+_REPLACED_FOLDERS = ("scripts", "similar", "files")
+_MAX_SLUG = 40  # characters of a folder's name
 _BARS = 10
-_MOST_ROWS = 6000  # five minutes of the usual step; longer flights are thinned
+_MAX_ROWS = 6000  # five minutes with the usual time step; longer flights are thinned out
 _DIGITS = 4  # after the point: 0.1 mm
 _COLUMNS = (
     *("t", "x", "y", "z", "roll", "pitch", "yaw", "vx", "vy", "vz", "wz"),
@@ -54,12 +61,12 @@ Tables = Callable[[Result], Path | None]
 
 
 class FlightEntry(NamedTuple):
-    """A flight as its page shows it."""
+    """A flight on its script's page."""
 
     key: str  # in file names and links
     label: str
     result: Result
-    figures: str  # the file, '' where the flight left no table
+    figures: str  # the file, '' if there is no table
     note: str  # about the figures
 
 
@@ -69,30 +76,30 @@ class ScriptPage(NamedTuple):
     file: str
     script: ScriptResults
     flights: tuple[FlightEntry, ...]
-    rank: int  # from 1; of as many points the same
+    rank: int  # from 1; equal for equal points
 
 
-class Alike(NamedTuple):
-    """Two scripts side by side."""
+class SimilarPage(NamedTuple):
+    """The page of two similar scripts."""
 
     file: str
     share: float
     pages: tuple[ScriptPage, ScriptPage]
-    lines: tuple[list[tuple[str, bool]], list[tuple[str, bool]]]  # of each, and whether the other has it, too
+    lines: tuple[list[tuple[str, bool]], list[tuple[str, bool]]]  # of each script, and whether both have it
 
 
 class Bar(NamedTuple):
-    """How many scripts have so many points."""
+    """A bar of the distribution of points."""
 
-    said: str
+    label: str
     scripts: int
 
 
 def check(folder: str | Path) -> None:
-    """Raise ValueError or OSError, in one line, where no report may be written."""
+    """Raise ValueError or OSError, in one line, if a report cannot be written there, or would overwrite other files."""
     path = Path(folder)
     if path.is_dir():
-        if any(path.iterdir()) and not (path / _OURS).is_file():
+        if any(path.iterdir()) and not (path / _MARKER).is_file():
             raise ValueError(f"{folder}: has other files than those of a report; name an empty folder, or a new one")
     elif path.exists():
         raise ValueError(f"{folder}: is a file; a report is a folder")
@@ -108,115 +115,112 @@ def write(
     names: Mapping[str, str] | None = None,
     sources: Mapping[str, str] | None = None,
 ) -> None:
-    """Write the report; one that is there already is replaced.
+    """Write a report, which replaces an existing one.
 
-    `tables` returns the table of a result's flight, as `fly --csv` writes it, or None where none was kept. `names` are
-    as in by_script; `sources` what the scripts hold, which are held against each other. Raises ValueError and OSError,
-    in one line.
+    `tables` returns the file with a result's table in the format of `fly --csv`, or None. `names` are as in
+    group_by_script; `sources` are the sources of the scripts, which are compared with each other. Raises ValueError and
+    OSError, in one line.
     """
     check(folder)
     path = Path(folder)
-    for name in _MADE_ANEW:
+    for name in _REPLACED_FOLDERS:
         remove(path / name, within=path)
         (path / name).mkdir(parents=True)
-    _lay_shared(path / "files")
+    _write_shared_files(path / "files")
     scene = _assignment("scene", scene_of(plan.parameters().scene))
-    draw = _Drawing(plan, tables, path)
-    scripts = by_script(results, names)
-    pages = [draw.page(number, script, scripts) for number, script in enumerate(scripts, start=1)]
+    writer = _FlightWriter(plan, tables, path)
+    scripts = group_by_script(results, names)
+    pages = [writer.write_page(number, script, scripts) for number, script in enumerate(scripts, start=1)]
     templates = _templates()
     for page in pages:
         own = (path / page.file).parent
-        _lay_shared(own / "files")
+        _write_shared_files(own / "files")
         _write(own / "files" / "scene.js", scene)
         _render(templates, "script.html", own / "index.html", plan=plan, page=page)
-    alike = _alike(plan, pages, sources or {})
-    for pair in alike:
+    similar_pages = _similar_pages(plan, pages, sources or {})
+    for pair in similar_pages:
         _render(templates, "similar.html", path / pair.file, plan=plan, pair=pair)
-    made = {
-        "pages": sorted(pages, key=lambda one: one.rank),
-        "criteria": criteria_of(results),
+    values = {
+        "pages": sorted(pages, key=lambda page: page.rank),
+        "criteria": group_by_criterion(results),
         "bars": _distribution(scripts),
-        "alike": alike,
+        "similar_pages": similar_pages,
     }
-    _render(templates, "index.html", path / "index.html", plan=plan, **made)
+    _render(templates, "index.html", path / "index.html", plan=plan, **values)
 
 
-def _lay_shared(folder: Path) -> None:
+def _write_shared_files(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     for name in _SHARED:
         _write(folder / name, (_HERE / "files" / name).read_text(encoding="utf-8"))
 
 
 def _distribution(scripts: Sequence[ScriptResults]) -> list[Bar]:
-    """Return how the points of a class are distributed, in tenths of the full points."""
-    most = max((one.of for one in scripts), default=0.0) or 1.0
-    tenths = [min(_BARS - 1, int(_BARS * one.points / most)) for one in scripts]
-    bounds = [naming.points(most * tenth / _BARS) for tenth in range(_BARS + 1)]
+    """Return the distribution of the points of a class, in tenths of the possible points."""
+    possible = max((script.of for script in scripts), default=0.0) or 1.0
+    tenths = [min(_BARS - 1, int(_BARS * script.points / possible)) for script in scripts]
+    bounds = [format_points(possible * tenth / _BARS) for tenth in range(_BARS + 1)]
     return [Bar(f"{bounds[tenth]} to {bounds[tenth + 1]}", tenths.count(tenth)) for tenth in range(_BARS)]
 
 
-def _alike(plan: Plan, pages: Sequence[ScriptPage], sources: Mapping[str, str]) -> list[Alike]:
-    by_name = {one.script.script: one for one in pages}
-    found = []
-    for number, pair in enumerate(similar(sources, given_by(plan)), start=1):
+def _similar_pages(plan: Plan, pages: Sequence[ScriptPage], sources: Mapping[str, str]) -> list[SimilarPage]:
+    by_name = {page.script.script: page for page in pages}
+    similar_pages = []
+    for number, pair in enumerate(find_similar(sources, provided_sources(plan)), start=1):
         both = pair.first, pair.second
         lines = [
             [(text, line in marked) for line, text in enumerate(_lines(sources[name]), start=1)]
             for name, marked in zip(both, pair.lines)
         ]
         first, second = (by_name[name] for name in both)
-        found.append(Alike(f"similar/{number}.html", pair.share, (first, second), (lines[0], lines[1])))
-    return found
+        similar_pages.append(SimilarPage(f"similar/{number}.html", pair.share, (first, second), (lines[0], lines[1])))
+    return similar_pages
 
 
 def _lines(source: str) -> list[str]:
-    """Return a script's lines, counted as `similar` counts them: a form feed ends none."""
+    """Return the lines of a script, numbered as in find_similar: a form feed does not end a line."""
     return [line.removesuffix("\r") for line in source.removesuffix("\n").split("\n")]
 
 
-class _Drawing:
-    """Writes the figures of the flights."""
+class _FlightWriter:
+    """Writes the figures of flights into the folders of their scripts."""
 
     def __init__(self, plan: Plan, tables: Tables, folder: Path):
-        """Draw flights of a `plan`, each from what `tables` returns for it, into the report's `folder`."""
+        """Write figures from the files that `tables` returns into the report's `folder`."""
         self._plan, self._tables, self._folder = plan, tables, folder
 
-    def page(self, number: int, script: ScriptResults, scripts: Sequence[ScriptResults]) -> ScriptPage:
-        """Return a script's page; `number` is from 1 among all `scripts`."""
+    def write_page(self, number: int, script: ScriptResults, scripts: Sequence[ScriptResults]) -> ScriptPage:
+        """Write the flights of a script, and return its page; `number` counts all `scripts` from 1."""
         own = f"scripts/{number:02}-{_slug(script.label)}"
         (self._folder / own / "flights").mkdir(parents=True)
-        flights = tuple(self._flight(own, str(place), result) for place, result in enumerate(script.flights))
-        rank = 1 + sum(one.points > script.points for one in scripts)
+        flights = tuple(self._write_flight(own, str(key), result) for key, result in enumerate(script.flights))
+        rank = 1 + sum(other.points > script.points for other in scripts)
         return ScriptPage(f"{own}/index.html", script, flights, rank)
 
-    def _flight(self, own: str, key: str, result: Result) -> FlightEntry:
-        label, table = naming.flight_label(result), self._tables(result)
+    def _write_flight(self, own: str, key: str, result: Result) -> FlightEntry:
+        label, table = flight_label(result), self._tables(result)
         figures = figures_of(table) if table is not None else Figures({}, "no table of this flight was kept")
         if not figures.columns:
             return FlightEntry(key, label, result, "", figures.note)
         marks = [
-            {"name": escaped(name), "at": one.at}
-            for name, one in naming.named_outcomes(result)
-            if not one.passed and one.at is not None and math.isfinite(one.at)
+            {"name": escaped(name), "at": outcome.at}
+            for name, outcome in named_outcomes(result)
+            if not outcome.passed and outcome.at is not None and math.isfinite(outcome.at)
         ]
-        content = {**figures.columns, **self._own_scene(result), "marks": marks}
+        content = {**figures.columns, "marks": marks}
+        if self._plan.spread.objects and result.seed:  # the seed has moved objects
+            content["scene"] = scene_of(self._plan.parameters(result.seed).scene)
         file = f"flights/{key}.js"
         _write(self._folder / own / file, _assignment(f'flights["{key}"]', content))
         return FlightEntry(key, label, result, file, figures.note)
 
-    def _own_scene(self, result: Result) -> dict[str, Any]:
-        """Return the scene of a flight whose seed has moved objects."""
-        if not (self._plan.spread.objects and result.seed):
-            return {}
-        return {"scene": scene_of(self._plan.parameters(result.seed).scene)}
-
 
 def _slug(label: str) -> str:
-    """Return a name as that of a folder, with its letters and digits of any language."""
+    """Return a name for a folder, with the letters and digits of any language."""
     name = re.sub(r"\.(py|lua)$", "", unicodedata.normalize("NFC", Path(label).name))
     marks = {"_", "-"} | {letter for letter in name if unicodedata.category(letter).startswith("M")}
-    return re.sub("_+", "_", "".join(one if one.isalnum() or one in marks else "_" for one in name))[:_SLUG]
+    letters = (letter if letter.isalnum() or letter in marks else "_" for letter in name)
+    return re.sub("_+", "_", "".join(letters))[:_MAX_SLUG]
 
 
 def _assignment(name: str, value: Any) -> str:
@@ -232,7 +236,7 @@ def _templates() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    templates.filters.update(points=naming.points, figure=naming.figure, named=naming.named_outcomes)
+    templates.filters.update(points=format_points, figure=format_figure, named=named_outcomes)
     return templates
 
 
@@ -242,45 +246,42 @@ def _render(templates: jinja2.Environment, name: str, path: Path, **values: Any)
 
 
 def _write(path: Path, text: str) -> None:
-    """Write a file of the report, without waiting for the disk each time: a report that is cut off is written anew."""
+    """Write a file of the report without waiting for the disk: an incomplete report is written again anyway."""
     with writing.name_in_errors(path):
-        path.write_bytes(text.encode("utf-8", "replace"))  # a script's name need not be UTF-8
-
-
-# ---- a flight's figures for the plots and the replay, out of its table
+        path.write_bytes(text.encode("utf-8", "replace"))  # a script's name may not be UTF-8
 
 
 class Figures(NamedTuple):
-    """Columns of equal length, by their names in criteria, or none; and a note about them."""
+    """Columns of equal length for plots and replay, by their names in criteria, and a note about them."""
 
     columns: dict[str, list[float]]
     note: str = ""
 
 
 def figures_of(table: Path) -> Figures:
-    """Return the figures of a table that `fly --csv` wrote; none, and why, where it cannot be read."""
+    """Return the figures of a table in the format of `fly --csv`; without columns if it cannot be read."""
     try:
         rows = _rows(table)
     except (OSError, recording.TableRefused) as error:
         return Figures({}, " ".join(str(error).split()))
     if not len(rows):
         return Figures({}, "nothing was flown")
-    every = -(-len(rows) // _MOST_ROWS)
-    thinned = columns_of(rows[::every])
-    columns = {name: list(map(float, np.round(thinned[name], _DIGITS))) for name in _COLUMNS}
+    step = -(-len(rows) // _MAX_ROWS)
+    values = columns_of(rows[::step])
+    columns = {name: list(map(float, np.round(values[name], _DIGITS))) for name in _COLUMNS}
     first = f" of the first {len(rows)}" if len(rows) == recording.MAX_ROWS else ""
-    return Figures(columns, f"one row in {every}{first} is shown" if every > 1 else "")
+    return Figures(columns, f"one row in {step}{first} is shown" if step > 1 else "")
 
 
 def _rows(table: Path) -> np.ndarray:
-    """Return a table's rows (N, 22); numpy reads a good one ten times as fast. Raises what read_table does."""
+    """Return a table's rows (N, 22), by NumPy if possible, which is ten times as fast. Raises as read_table does."""
     with open(table, encoding="utf-8", errors="replace") as file:
-        is_ours = file.readline().rstrip("\n").split(",") == list(COLUMNS)
-        lines = list(itertools.islice(file, recording.MAX_ROWS)) if is_ours else []
-    if is_ours and not lines:
+        has_header = file.readline().rstrip("\n").split(",") == list(COLUMNS)
+        lines = list(itertools.islice(file, recording.MAX_ROWS)) if has_header else []
+    if has_header and not lines:
         return np.empty((0, len(COLUMNS)))
     with contextlib.suppress(ValueError):
         rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.empty((0, 0))
         if rows.shape[1] == len(COLUMNS) and (np.abs(rows) < recording.LARGEST).all():
             return rows
-    return np.array(recording.read_table(table).rows)  # says what is wrong
+    return np.array(recording.read_table(table).rows)  # which raises an error that explains the fault

@@ -1,4 +1,4 @@
-"""What stands in the scene, as boxes for the replay."""
+"""The objects of a scene as boxes for the replay."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ from drone_sim.scene.scene_parameters import SceneParameters
 from drone_sim.shapes.compound import Part, parts_of
 from drone_sim.shapes.shape import DrawnShape
 
-_UNKNOWN = 0.2  # m, sides of the box for a shape that only PyBullet can measure
-_DEEPEST = 32  # parents above an object; deeper ones stand where they are in the last one's frame
+_DEFAULT_SIDE = 0.2  # m, of the box of a shape that only PyBullet can measure
+_MAX_DEPTH = 32  # parents of an object that are followed
 _DIGITS = 4
 
 
 def scene_of(scene: SceneParameters) -> dict[str, Any]:
-    """Return the floor's side (m), and the bounding box of every visible shape where it stands at the start.
+    """Return the floor's side (m), and the bounding box of every visible shape at its start pose.
 
     A box has a `name`, `corners` (8 points, m, world; bit 0, 1, 2 of the index is the side along x, y, z) and a
     `color` (0 to 1).
     """
-    entries = {one.name: one for one in scene.objects if one.name}
+    entries = {entry.name: entry for entry in scene.objects if entry.name}
     boxes = []
-    for one in scene.objects:
-        if isinstance(one, ObjectParameters) and one.visible:
-            world = _world(one, entries)
-            boxes += [_box(one.shown, part, world) for part in parts_of(one.to_shape(), one.color)]
+    for entry in scene.objects:
+        if isinstance(entry, ObjectParameters) and entry.visible:
+            matrix = _world_matrix(entry, entries)
+            boxes += [_box(entry.shown, part, matrix) for part in parts_of(entry.to_shape(), entry.color)]
     return {"floor": scene.floor.size, "boxes": boxes}
 
 
-def _world(entry: EntryParameters, entries: dict[str, EntryParameters]) -> Matrix:
-    matrix, above = entry.local, entry.parent
-    for _ in range(_DEEPEST):
-        if above not in entries:
+def _world_matrix(entry: EntryParameters, entries: dict[str, EntryParameters]) -> Matrix:
+    matrix, parent = entry.local, entry.parent
+    for _ in range(_MAX_DEPTH):
+        if parent not in entries:
             break
-        matrix = frames.multiply(entries[above].local, matrix)
-        above = entries[above].parent
+        matrix = frames.multiply(entries[parent].local, matrix)
+        parent = entries[parent].parent
     return matrix
 
 
@@ -59,13 +59,13 @@ def _box(name: str, part: Part, world: Matrix) -> dict[str, Any]:
 
 
 def _bounds(part: Part) -> tuple[np.ndarray, np.ndarray]:
-    """Return the least and the greatest corner (3,) of a shape in its frame, m."""
+    """Return the lowest and the highest coordinates (3,) of a shape in its frame, in m."""
     try:
         surfaces = list(part.shape.triangles()) if isinstance(part.shape, DrawnShape) else []
-    except (OSError, ValueError):  # the flight has said it
+    except (OSError, ValueError):  # the flight has reported it
         surfaces = []
     corners = [surface.corners.reshape(-1, 3) for surface in surfaces if len(surface.corners)]
     if not corners:
-        return np.full(3, -_UNKNOWN / 2), np.full(3, _UNKNOWN / 2)
+        return np.full(3, -_DEFAULT_SIDE / 2), np.full(3, _DEFAULT_SIDE / 2)
     points = np.concatenate(corners)
     return points.min(axis=0), points.max(axis=0)

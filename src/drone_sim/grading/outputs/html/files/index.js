@@ -1,4 +1,4 @@
-// Sorting the table of scripts by a click on a heading.
+// Sort the table of scripts after a click on a heading.
 "use strict";
 
 const table = document.getElementById("scripts");

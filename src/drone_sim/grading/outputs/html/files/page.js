@@ -1,4 +1,4 @@
-// A script's page: which flight is shown, and the time in replay and plots.
+// A script's page: the selection of a flight, and the time in replay and plots.
 "use strict";
 
 const get = (id) => document.getElementById(id);

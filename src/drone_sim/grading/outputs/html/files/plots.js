@@ -1,4 +1,4 @@
-// Plots over time: what was flown, what was commanded (dashed), where a criterion failed, and the time of the replay.
+// Plots over time: states, commands (dashed), failed criteria, and the time of the replay.
 "use strict";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -10,10 +10,10 @@ const PANELS = [
   { title: "yaw rate [rad/s]", lines: ["wz"], commanded: ["command_wz"] },
   { title: "propellers [m/s]", lines: ["propeller1", "propeller2", "propeller3", "propeller4"] },
 ];
-const [HIGH, LEFT, BOTTOM] = [104, 38, 17]; // px, of the drawing and of the room for numbers
+const [HIGH, LEFT, BOTTOM] = [104, 38, 17]; // px: height of a plot, space for the numbers
 
 class Plots {
-  // `seek` is called with the time (s) that is pointed at.
+  // `seek` is called with the time (s) under the mouse.
   constructor(place, seek) {
     this.place = place;
     this.seek = seek;
@@ -29,7 +29,7 @@ class Plots {
     this.show(0);
   }
 
-  // Show a moment (s).
+  // Show a time (s).
   show(time) {
     const row = this.panels.length ? rowAt(this.flight.t, time) : 0;
     for (const panel of this.panels) {
@@ -88,7 +88,7 @@ class Plots {
     return this.flight[name].map((value, row) => `${row ? "L" : "M"}${this.x(t[row]).toFixed(2)} ${y(value).toFixed(2)}`).join("");
   }
 
-  // A command is in force during the step that ends at its row's time.
+  // A command is in force during the step that ends at the time of its row.
   steps(name, y) {
     const { t } = this.flight;
     const parts = this.flight[name].map((value, row) => `V${y(value).toFixed(2)}H${this.x(t[row]).toFixed(2)}`);
@@ -123,7 +123,7 @@ function label(svg, x, y, anchor, value) {
   svg.appendChild(drawn("text", { x, y, "text-anchor": anchor })).textContent = String(Number(value.toPrecision(6)));
 }
 
-// Return what an axis shows of columns: all of it, and no less than a tenth of a unit.
+// Return the range of an axis for some columns, at least a tenth of a unit.
 function range(columns) {
   const values = columns.flat();
   let [low, high] = values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);

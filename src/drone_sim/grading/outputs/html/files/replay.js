@@ -1,9 +1,9 @@
 // The replay: scene, path and drone on a canvas.
 "use strict";
 
-const ARM = 0.13; // m, from the middle to a rotor
-const SMALLEST = 15; // px, of an arm: farther away the drone is drawn larger than it is
-const FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]; // of corners
+const ARM = 0.13; // m, from the center to a rotor
+const SMALLEST = 15; // px, of an arm: a distant drone is drawn larger than it is
+const FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]; // indices of corners
 const INK = "#1d2733", PATH = "#1f5fa8", HUB = "#ff5a00", FAILED = "#c0392b", NOSE = "#ff8a3c";
 
 class Replay {
@@ -14,7 +14,7 @@ class Replay {
     this.time = 0;
   }
 
-  // Show a flight from its beginning.
+  // Load a flight and show its start.
   load(flight) {
     this.flight = flight;
     this.scene = flight.scene || report.scene;
@@ -25,7 +25,7 @@ class Replay {
     this.draw(0);
   }
 
-  // Return place (m) and roll, pitch, yaw (rad) at a time (s).
+  // Return position (m) and roll, pitch, yaw (rad) at a time (s).
   at(time) {
     const { t, roll, pitch, yaw } = this.flight;
     const row = rowAt(t, time);
@@ -147,7 +147,7 @@ class Replay {
     pen.fillText(mark.name, x + 9, y - 9);
   }
 
-  // A cross with rotors, and an arrow where its nose is.
+  // Draw a cross with rotors, and an arrow at its front.
   drawDrone({ place, angles }) {
     const { pen, view } = this;
     const metre = view.size(place);
@@ -194,7 +194,7 @@ class Replay {
   }
 }
 
-// Return the last row that is not after a time.
+// Return the last row at or before a time.
 function rowAt(t, time) {
   let [low, high] = [0, t.length - 1];
   while (low < high) {

@@ -1,4 +1,4 @@
-// How points of the world (m, x right, y ahead, z up) come to the screen.
+// Projection of points of the world (m, x right, y forward, z up) to the screen.
 "use strict";
 
 const VIEWS = {
@@ -7,31 +7,31 @@ const VIEWS = {
   side: { azimuth: -Math.PI / 2, elevation: 0, flat: true }, // x to the right, z up
   follow: { azimuth: -2.2, elevation: 0.42, flat: false },
 };
-const LENS = 1.6; // distance of the eye, in widths of what is seen
+const LENS = 1.6; // distance of the eye divided by the visible width
 
 class View {
   constructor() {
     this.target = [0, 0, 0];
-    this.extent = 4; // m, across what is seen
+    this.extent = 4; // m, visible width
     this.zoom = 1;
     this.show("space");
   }
 
-  // Look from one of VIEWS.
+  // Select one of VIEWS.
   show(name) {
     this.name = name;
     Object.assign(this, VIEWS[name]);
     this.zoom = 1;
   }
 
-  // Turn by angles (rad); from above and from the side it stays as it is.
+  // Rotate by angles (rad), except in the views from above and from the side.
   turn(azimuth, elevation) {
     if (this.flat) return;
     this.azimuth += azimuth;
     this.elevation = Math.min(1.5, Math.max(-0.1, this.elevation + elevation));
   }
 
-  // Begin a picture of so many pixels.
+  // Prepare a picture with a size in pixels.
   begin(width, height) {
     const [ca, sa, ce, se] = [this.azimuth, this.elevation].flatMap((angle) => [Math.cos(angle), Math.sin(angle)]);
     this.right = [-sa, ca, 0];
@@ -52,7 +52,7 @@ class View {
     return [this.middle[0] + scale * dot(this.right, v), this.middle[1] - scale * dot(this.up, v), depth];
   }
 
-  // Return how many pixels a metre has at a point.
+  // Return the pixels per metre at a point.
   size(point) {
     const seen = this.project(point);
     return !seen ? 0 : this.flat ? this.scale : (this.scale * this.eye) / seen[2];
@@ -63,7 +63,7 @@ function dot(a, b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-// Return a point of the body (m) in the world: ROS's roll, pitch, yaw.
+// Return a point of the body (m) in the world frame, with ROS's roll, pitch, yaw.
 function turned(point, [roll, pitch, yaw]) {
   const [cr, sr, cp, sp, cy, sy] = [roll, pitch, yaw].flatMap((angle) => [Math.cos(angle), Math.sin(angle)]);
   const [x, y, z] = point;
