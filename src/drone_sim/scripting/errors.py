@@ -1,4 +1,4 @@
-"""How a child script's files are read, and what goes wrong in it, in one line each."""
+"""Errors of child scripts, as one-line messages, and reading of their files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LONGEST_MESSAGE = 600  # characters
 
 
 def read_source(path: str | Path) -> bytes:
-    """Return what a script's file, or that of a helper, holds. Raises ValueError, without its name."""
+    """Return the contents of the file of a script or helper. Raises ValueError; its message does not name the file."""
     try:
         return read_bytes(path, MEBIBYTE)
     except OSError as error:
@@ -22,22 +22,22 @@ def read_source(path: str | Path) -> bytes:
 
 
 class ScriptError(Exception):
-    """A child script failed: in which phase, file and line, and for what reason; one line where it is said."""
+    """Error of a child script: phase, file, line and reason, shown in one line."""
 
     def __init__(self, phase: str, path: str, line: int, reason: str):
-        """It failed in a `phase`, at a `path` and `line` (0: not known), for a `reason`."""
+        """Create it; `line` is 0 if unknown, and `reason` is shortened to LONGEST_MESSAGE."""
         words = " ".join(reason[: 2 * LONGEST_MESSAGE].split())
         self.phase, self.path, self.line = phase, path, line
         self.reason = words if len(words) <= LONGEST_MESSAGE else words[:LONGEST_MESSAGE] + "…"
         super().__init__(phase, path, line, self.reason)
 
     def __str__(self) -> str:
-        """Return the line."""
+        """Return the one-line message."""
         place = f"{self.path}:{self.line}" if self.line else self.path
         return encodable(f"[{self.phase}] {place}: {self.reason}")
 
 
 def no_function(callback: Any, known: Iterable[str]) -> str:
-    """Return the message on a callback that a script does not have, with the near ones of the functions that it has."""
+    """Return the message for a callback that a script does not have; it lists similar names among the `known` ones."""
     near = difflib.get_close_matches(str(callback), list(known))
     return f"no function '{callback}' for this callback{'; near names are ' if near else ''}{', '.join(near)}"

@@ -1,4 +1,4 @@
-"""Child scripts by file: .py and .lua behind one interface."""
+"""Loading of child scripts from .py and .lua files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from drone_sim.scripting.time_limit import TimeLimit
 
 _ENDINGS = (".py", ".lua")
 DEFAULT = "pilot"
-NO_SCRIPT = "none"  # what a vehicle says that has none, for others to fly it: the one that is given, or a client
+NO_SCRIPT = "none"  # the script of a vehicle that only other scripts or clients fly
 
 
 Loader = Callable[[str, Mapping[str, Api], TimeLimit, Turns, "Breakpoints | None"], Script]  # as `load` below
@@ -27,14 +27,14 @@ Loader = Callable[[str, Mapping[str, Api], TimeLimit, Turns, "Breakpoints | None
 
 @functools.cache
 def no_script() -> Script:
-    """Return what a drone has before a script is loaded: an empty one."""
+    """Return the script of a drone before one is loaded: an empty one."""
     return PythonScript("", b"", {}, TimeLimit(0.0), Turns())
 
 
 def script_path(script: str) -> str:
-    """Return the path of a script: a file, a package:// address, or the name of a built-in one.
+    """Return the path of a script: a file, a package:// address, or the name of a built-in script.
 
-    '' is the pilot's. Raises ScriptError.
+    '' means the pilot. Raises ScriptError.
     """
     name = script or DEFAULT
     if "/" not in name and not Path(name).suffix:
@@ -50,7 +50,7 @@ def script_path(script: str) -> str:
         raise ScriptError("load", name, 0, str(error)) from None
 
 
-@functools.cache  # asked several times for every flight
+@functools.cache  # called several times for every flight
 def _built_in() -> dict[str, str]:
     """Return the paths of the built-in scripts, by name."""
     return {path.stem: str(path) for path in BUILT_IN.glob("*") if path.suffix in _ENDINGS and path.stem != "__init__"}
@@ -63,7 +63,7 @@ def load(
     turns: Turns | None = None,
     breakpoints: Breakpoints | None = None,
 ) -> Script:
-    """Load a child script, whose thread has those `turns`, and all scripts those `breakpoints`; raises ScriptError."""
+    """Load a child script. `turns` switch its thread; `breakpoints` are those of all scripts. Raises ScriptError."""
     path = script_path(script)
     try:
         source = read_source(path)
@@ -72,7 +72,7 @@ def load(
     if path.endswith(".py"):
         return PythonScript(path, source, modules, limit, turns or Turns(), breakpoints)
     try:
-        from drone_sim.scripting.lua.script import LuaScript  # whoever flies Python needs no lupa
+        from drone_sim.scripting.lua.script import LuaScript  # imported here because Python scripts do not need lupa
 
         return LuaScript(path, source, modules, limit, breakpoints)
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""The log of scripts: what they print, within limits."""
+"""Log of the lines that scripts print, limited in number and length."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import Any
 from drone_sim.message_text import encodable
 
 LOG = logging.getLogger("drone_sim.script")
-LOG.setLevel(logging.INFO)  # a script's print is wanted, whatever the level of the rest
+LOG.setLevel(logging.INFO)  # scripts' prints are shown whatever the level of the rest
 
 LONGEST = 1000  # characters of a line
 THREAD_GOES_ON = "{}: its thread continues where it is now, because a coroutine cannot be restored"
-MOST = 500  # lines of one call of the script: of a phase, a callback, or its top level
+MOST = 500  # lines in one call of the script: a phase, a callback, or its top level
 
 
 class Lines:
-    """How many lines were written in the call that is under way."""
+    """Number of lines written in the current call."""
 
     count = 0
 
 
 def say(text: Any, level: int = logging.INFO) -> None:
-    """Write a line to the log, or count it where there were too many in this call of the script."""
+    """Write a line to the log, unless there were too many in this call of the script."""
     Lines.count += 1
     if Lines.count <= MOST:
         line = text if type(text) is str else shown(text)
@@ -36,14 +36,14 @@ def log_failure(error: Exception) -> None:
 
 
 def end_call() -> None:
-    """Begin to count anew, after a call of the script; say how many lines were left out."""
+    """Reset the count after a call of the script, and log how many lines were left out."""
     left_out, Lines.count = Lines.count - MOST, 0
     if left_out > 0:
         LOG.info("… %d lines were left out: one call of the script may write at most %d", left_out, MOST)
 
 
 def shown(value: Any) -> str:
-    """Return what str() returns, or a word on why it does not."""
+    """Return str() of a value, shortened, or a text that names the type if str() fails."""
     if type(value) is bytes:
         return value[: 4 * LONGEST].decode("utf-8", "replace")
     try:

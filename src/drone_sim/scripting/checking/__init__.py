@@ -1,1 +1,1 @@
-"""What is wrong with a script's text, told without running any of it."""
+"""Static checks of scripts."""

@@ -1,4 +1,4 @@
-"""What a check of a script's text finds."""
+"""Findings of a script check."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ import difflib
 from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-LARGEST = 1 << 18  # bytes of a text that is checked
+LARGEST = 1 << 18  # bytes of a script
 MOST = 100  # findings
-_NEAR = 0.75  # of difflib's ratio
+_NEAR = 0.75  # least ratio of difflib
 
-Known = Mapping[str, Collection[str]]  # names of each module of the API
+Known = Mapping[str, Collection[str]]  # names in each module of the API
 
 
 class Finding(NamedTuple):
-    """What is wrong: line and columns (from 1; `end` is behind the last one, 0 the line's end), and one sentence."""
+    """A mistake in a script: line and first column (from 1), column after the last one (0: end of line), a sentence."""
 
     line: int
     column: int
     end: int
-    said: str
+    message: str
     severity: str = "error"  # or "warning"
 
 
-def not_defined(name: str, there: Collection[str]) -> str:
-    """Return what to say of a name that nobody gives a value."""
-    near = difflib.get_close_matches(name, sorted(there), cutoff=_NEAR)
+def not_defined(name: str, known: Collection[str]) -> str:
+    """Return the message for an undefined name."""
+    near = difflib.get_close_matches(name, sorted(known), cutoff=_NEAR)
     return f"'{name}' is not defined{'; near names are ' if near else ''}{', '.join(near)}"

@@ -1,4 +1,4 @@
-"""Syntax and unknown names of a Lua script."""
+"""Check of a Lua script: syntax and unknown names."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drone_sim.scripting.checking.findings import MOST, Finding, Known, not_defi
 
 _ERROR = re.compile(r":(\d+): (.*)", re.DOTALL)
 _NAME = re.compile(r"[A-Za-z_]\w*")
-# What is no code: long strings and comments, comments, strings. Each is matched once, whatever stands in it.
+# Long strings and comments, comments, strings. Each is matched as a whole, whatever it contains.
 _TEXT = re.compile(
     r"--\[(=*)\[.*?(?:\]\1\]|\Z)|--[^\n]*|\[(=*)\[.*?(?:\]\2\]|\Z)|\"(?:\\.|[^\"\\\n])*\"?|'(?:\\.|[^'\\\n])*'?",
     re.DOTALL,
@@ -23,58 +23,58 @@ _KEYWORDS = frozenset(_KEYWORD_LIST.split())
 _ATTRIBUTE = re.compile(r"(?<![\w.:])(sim[A-Z]*\w*)[ \t]*\.[ \t]*([A-Za-z_]\w*)")
 _REQUIRED = re.compile(r"(?<![\w.:])(sim[A-Z]*\w*)[ \t]*=[ \t]*require[ \t]*\(?[ \t]*['\"]\1(?:-[\w-]+)?['\"]")
 _REQUIRE = re.compile(r"\brequire[ \t]*\(?[ \t]*['\"]([\w./-]+)['\"]")
-_UNTOLD = re.compile(r"\b(?:dofile|loadfile|loadstring|load|setfenv|_G|_ENV)\b")  # which may give names values
+_HIDDEN = re.compile(r"\b(?:dofile|loadfile|loadstring|load|setfenv|_G|_ENV)\b")  # may define names out of sight
 _FLAT = re.compile(r"(?<![\w.:])(sim[A-Z_]\w*)")
 _CALL = re.compile(r"(?<![\w.:])([A-Za-z_]\w*)[ \t]*\(")
-_OWN_LIST = """
+_BUILT_IN_LIST = """
     assert bit32 collectgarbage coroutine debug dofile error getfenv getmetatable io ipairs load loadfile loadstring
     math module next os package pairs pcall print printf rawequal rawget rawlen rawset require select setfenv
     setmetatable string table tonumber tostring type unpack utf8 xpcall _G _VERSION Matrix Vector Vector3 Vector4
     Matrix3x3 Matrix4x4 self
 """
-_OWN = frozenset(_OWN_LIST.split())
+_BUILT_IN = frozenset(_BUILT_IN_LIST.split())
 
 
 def check_lua(text: str, known: Known, flat: Collection[str], syntax_error: str) -> list[Finding]:
-    """Return what is wrong with a Lua script; `flat` are the API's names of 3.x.
+    """Return the mistakes in a Lua script; `flat` are the API's V-REP 3.x names.
 
-    `syntax_error` is what Lua says when it compiles the text, '' for nothing.
+    `syntax_error` is the compiler's error message, '' for none.
     """
     if syntax_error:
-        return [_of_syntax(syntax_error)]
+        return [_syntax_finding(syntax_error)]
     code = _TEXT.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
-    given = _given_values(code)
+    defined = _defined_names(code)
     found = [
-        *_attributes(code, known, given - {match[1] for match in _REQUIRED.finditer(text)}),
-        *_flat_names(code, flat, {*given, *known, *PLUGINS}),
+        *_attributes(code, known, defined - {match[1] for match in _REQUIRED.finditer(text)}),
+        *_flat_names(code, flat, {*defined, *known, *PLUGINS}),
     ]
-    if not (_UNTOLD.search(code) or {match[1] for match in _REQUIRE.finditer(text)} - {*known, *_OWN}):
-        found += _calls(code, {*given, *known, *PLUGINS, *flat, *_OWN})
+    if not (_HIDDEN.search(code) or {match[1] for match in _REQUIRE.finditer(text)} - {*known, *_BUILT_IN}):
+        found += _calls(code, {*defined, *known, *PLUGINS, *flat, *_BUILT_IN})
     lines = _Lines(code)
-    findings = {Finding(*lines.place(start), lines.place(end)[1], said) for start, end, said in found}
+    findings = {Finding(*lines.place(start), lines.place(end)[1], message) for start, end, message in found}
     return sorted(findings)[:MOST]
 
 
 class _Lines:
-    """Lines and columns of places in a text."""
+    """Line and column of each index in a text."""
 
     def __init__(self, text: str):
-        self._starts = [0, *(one.end() for one in re.finditer("\n", text))]
+        self._starts = [0, *(match.end() for match in re.finditer("\n", text))]
 
-    def place(self, at: int) -> tuple[int, int]:
+    def place(self, index: int) -> tuple[int, int]:
         """Return line and column, both from 1."""
-        line = bisect_right(self._starts, at)
-        return line, at - self._starts[line - 1] + 1
+        line = bisect_right(self._starts, index)
+        return line, index - self._starts[line - 1] + 1
 
 
-def _of_syntax(error: str) -> Finding:
+def _syntax_finding(error: str) -> Finding:
     match = _ERROR.search(error)
-    line, said = (int(match[1]), match[2]) if match else (1, error)
-    return Finding(line, 1, 0, f"syntax error: {' '.join(said.split())}")
+    line, message = (int(match[1]), match[2]) if match else (1, error)
+    return Finding(line, 1, 0, f"syntax error: {' '.join(message.split())}")
 
 
-def _given_values(code: str) -> set[str]:
-    """Return every name that a script gives a value to somewhere, be it as a local, a parameter or a field."""
+def _defined_names(code: str) -> set[str]:
+    """Return every name that a script assigns anywhere, as a variable, a parameter or a field."""
     names: set[str] = set()
     for match in re.finditer(r"\b(?:local|for|function)\b([^=\n]*)", code):
         names.update(_NAME.findall(match[1]))
@@ -85,22 +85,22 @@ def _given_values(code: str) -> set[str]:
     return names - _KEYWORDS
 
 
-def _attributes(code: str, known: Known, given: set[str]) -> Iterator[tuple[int, int, str]]:
+def _attributes(code: str, known: Known, defined: set[str]) -> Iterator[tuple[int, int, str]]:
     for match in _ATTRIBUTE.finditer(code):
         module, name = match[1], match[2]
-        if module in known and module not in given and name not in known[module]:
+        if module in known and module not in defined and name not in known[module]:
             yield match.start(2), match.end(2), not_there(f"{module}.", name, known[module])
 
 
-def _flat_names(code: str, flat: Collection[str], there: set[str]) -> Iterator[tuple[int, int, str]]:
+def _flat_names(code: str, flat: Collection[str], known: set[str]) -> Iterator[tuple[int, int, str]]:
     for match in _FLAT.finditer(code):
-        if match[1] not in flat and match[1] not in there:
+        if match[1] not in flat and match[1] not in known:
             yield match.start(1), match.end(1), not_there("", match[1], flat)
 
 
-def _calls(code: str, there: set[str]) -> Iterator[tuple[int, int, str]]:
-    """Yield calls of functions that are not defined; names that begin with sim are reported elsewhere."""
+def _calls(code: str, known: set[str]) -> Iterator[tuple[int, int, str]]:
+    """Yield calls of undefined functions, except those with names that begin with sim (see `_flat_names`)."""
     for match in _CALL.finditer(code):
         name = match[1]
-        if name not in there and name not in _KEYWORDS and not name.startswith("sim"):
-            yield match.start(1), match.end(1), not_defined(name, there)
+        if name not in known and name not in _KEYWORDS and not name.startswith("sim"):
+            yield match.start(1), match.end(1), not_defined(name, known)

@@ -1,6 +1,6 @@
-"""A process that checks texts: a line of JSON for each, and a line of JSON back. It ends with its input.
+"""Process that checks scripts: reads a request and writes its findings as a line of JSON each, until its input ends.
 
-The compilers of Python and Lua are asked in a process of its own: whatever a text makes of them, a time limit ends it.
+It is a separate process because a script may make a compiler of Python or Lua hang; its client ends it after a time.
 """
 
 from __future__ import annotations
@@ -19,36 +19,36 @@ _MEMORY = 2 << 30  # bytes
 
 
 class Checker:
-    """Checks texts against the names of the API."""
+    """Checks scripts against the names in the API."""
 
     def __init__(self) -> None:
-        """Read the API."""
-        found = apis()
-        self._known = {name: {*contents(one)[1], *contents(one)[2]} for name, one in found.items()}
-        flat = {flat_name(name, function) for name, one in found.items() for function in contents(one)[1]}
-        self._flat = {*flat, "sim_call_type", *(f"sim_{constant}" for constant in contents(found["sim"])[2])}
+        """Collect the names in the API."""
+        modules = apis()
+        self._known = {name: {*contents(api)[1], *contents(api)[2]} for name, api in modules.items()}
+        flat = {flat_name(name, function) for name, api in modules.items() for function in contents(api)[1]}
+        self._flat = {*flat, "sim_call_type", *(f"sim_{constant}" for constant in contents(modules["sim"])[2])}
 
     def check(self, text: str, is_lua: bool) -> list[Finding]:
-        """Return what is wrong with a text."""
+        """Return the mistakes in a script."""
         if not is_lua:
             return check_python(text, self._known)
         try:
-            from drone_sim.scripting.lua import source, state  # whoever writes Python needs no lupa
+            from drone_sim.scripting.lua import source, state  # imported here because Python scripts do not need lupa
         except ImportError:
             return []
-        found = source.LuaSource(text.encode("utf-8", "replace"))
-        said = state.syntax_error(found.text, bool(found.flat_names) or "phases" in found.form)
-        mixed = [Finding(max(found.mixed), 1, 0, source.mixed_forms(*found.mixed))] if found.mixed else []
-        return [*mixed, *check_lua(text, self._known, self._flat, said)]
+        script = source.LuaSource(text.encode("utf-8", "replace"))
+        error = state.syntax_error(script.text, bool(script.flat_names) or "phases" in script.form)
+        mixed = [Finding(max(script.mixed), 1, 0, source.mixed_forms(*script.mixed))] if script.mixed else []
+        return [*mixed, *check_lua(text, self._known, self._flat, error)]
 
 
 def main() -> None:
-    """Answer until nobody asks any more."""
+    """Answer requests until the input ends."""
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     checker = Checker()
     for line in sys.stdin:
-        asked = json.loads(line)
-        print(json.dumps(checker.check(asked["text"], asked["lua"])), flush=True)
+        request = json.loads(line)
+        print(json.dumps(checker.check(request["text"], request["lua"])), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,1 +1,1 @@
-"""Child scripts in Lua, through lupa."""
+"""Child scripts in Lua, by means of lupa."""

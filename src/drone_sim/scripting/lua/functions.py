@@ -1,4 +1,4 @@
-"""The API's functions as a Lua script calls them."""
+"""Definition of the API's functions in a Lua state."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from drone_sim.scripting.lua.state import MEMORY, LuaState
 from drone_sim.scripting.lua.values import AS_STREAM, FAILED, PLAIN, TOO_MUCH
 from drone_sim.scripting.script_log import LOG
 
-_MOST_WAITS = 1000  # which Lua does not count as memory
+_MOST_WAITS = 1000  # limited because Lua does not count their memory
 _AS_STREAM, _TOO_MUCH, _STOPPED = (AS_STREAM,), (TOO_MUCH,), (FAILED, b"stopped")
 
 
 def define(state: LuaState, modules: Mapping[str, Api]) -> set[str]:
-    """Put modules of the API among the script's globals, with their flat names, too; return every name."""
+    """Define the API's modules, and the functions with flat names, as globals of the script; return all names."""
     known: set[str] = set()
     sandbox = state.sandbox
     script_globals = sandbox[b"globals"]
 
     def add(place: Any, name: str, shown: str, function: Function) -> None:
         known.add(name)
-        called = lua_function(shown, function, state)
-        sandbox[b"define"](place, name.encode(), shown.encode(), called, waits(function))
+        wrapped = lua_function(shown, function, state)
+        sandbox[b"define"](place, name.encode(), shown.encode(), wrapped, waits(function))
 
     for api in modules.values():
         module, functions, constants = contents(api)
@@ -46,7 +46,7 @@ def define(state: LuaState, modules: Mapping[str, Api]) -> set[str]:
 
 
 def _why_not(prefix: str, known: Set[str]) -> Callable[[bytes], bytes | None]:
-    """Return what says why a name is not there; nothing for a plugin that a script may ask for."""
+    """Return a function that returns the message for an unknown name; None for a plugin, which scripts may look up."""
 
     def why(name: bytes) -> bytes | None:
         text = name.decode("utf-8", "replace")
@@ -56,60 +56,60 @@ def _why_not(prefix: str, known: Set[str]) -> Callable[[bytes], bytes | None]:
 
 
 def lua_function(name: str, function: Function, state: LuaState) -> Function:
-    """Return a function that answers Lua's calls; one of a script that was left behind does nothing."""
-    executor, readers, answer = state.executor, state.values.readers(), state.values.answer_of(function)
+    """Return a function that Lua can call instead of `function`; it does nothing in a script that was abandoned."""
+    executor, readers, encode = state.executor, state.values.readers(), state.values.encoder_of(function)
     if waits(function):
-        answer = functools.partial(_asked_in_steps, name, state)
+        encode = functools.partial(_wait_function, name, state)
 
-    def call(how: int, *given: Any) -> tuple[Any, ...]:
+    def call(form: int, *values: Any) -> tuple[Any, ...]:
         if executor.closed:
             return _STOPPED
-        if state.used() > MEMORY and state.too_much():  # or there may be no room for the answer
+        if state.used() > MEMORY and state.too_much():  # otherwise memory may be missing for the result
             return _TOO_MUCH
-        arguments: Any = given
+        arguments: Any = values
         try:
-            if how:
-                arguments = readers[how](given)
+            if form:
+                arguments = readers[form](values)
                 if arguments is None:
                     return _AS_STREAM
-            return answer(function(*arguments))
+            return encode(function(*arguments))
         except Exception as error:
-            return _failed(name, function, arguments, error, call, state)
+            return _handle_error(name, function, arguments, error, call, state)
 
     executor.api_code = call.__code__
     return call
 
 
-def _failed(
+def _handle_error(
     name: str, function: Function, arguments: Any, error: Exception, call: Function, state: LuaState
 ) -> tuple[Any, ...]:
-    """Answer with what went wrong; or, as V-REP does, by a call without what the function does not take."""
+    """Return the error for Lua. After too many arguments, repeat the call without the surplus ones, as V-REP does."""
     most = most_values(function)
     if len(arguments) <= most:
         return FAILED, explain(name, function, arguments, error).encode("utf-8", "replace")
-    if name not in state.lavish:
-        state.lavish.add(name)
+    if name not in state.warned:
+        state.warned.add(name)
         LOG.info("%s: got %d values and uses %d: the others are ignored", name, len(arguments), most)
-    answered: tuple[Any, ...] = call(0, *arguments[:most])
-    return answered
+    result: tuple[Any, ...] = call(0, *arguments[:most])
+    return result
 
 
-def _asked_in_steps(name: str, state: LuaState, wait: Wait) -> tuple[Any, ...]:
-    """Answer with a function that Lua calls once a step: it returns whether to wait, and what the wait has brought.
+def _wait_function(name: str, state: LuaState, wait: Wait) -> tuple[Any, ...]:
+    """Return a function that Lua calls in each step; it returns whether to wait longer, and the result.
 
-    If one of the script's own functions is to be called first, it and its arguments follow after whether to wait, and
-    the next call tells whether that function has returned true.
+    If Lua must first call one of the script's own functions, the function and its arguments follow after `true`, and
+    the next call passes whether the function has returned true.
     """
     if state.waits >= _MOST_WAITS:
-        state.runtime.gccollect()  # those of coroutines that are no more
+        state.runtime.gccollect()  # frees the waits of coroutines that do not exist any more
     if state.waits >= _MOST_WAITS:
         raise ValueError(f"at most {_MOST_WAITS} coroutines of a script may wait at once")
     steps = _steps(wait, state)
 
-    def waited(answer: Any = None) -> tuple[Any, ...]:
+    def advance(answer: Any = None) -> tuple[Any, ...]:
         return steps.send(answer)
 
-    return PLAIN, lua_function(name, waited, state)
+    return PLAIN, lua_function(name, advance, state)
 
 
 def _steps(wait: Wait, state: LuaState) -> Generator[tuple[Any, ...], Any, None]:
@@ -118,10 +118,10 @@ def _steps(wait: Wait, state: LuaState) -> Generator[tuple[Any, ...], Any, None]
     try:
         while True:
             try:
-                asked = steps.send(answer)
+                call = steps.send(answer)
             except StopIteration:
                 break
-            answer = yield (True, asked.callback, *asked.arguments) if asked else (True,)
+            answer = yield (True, call.callback, *call.arguments) if call else (True,)
     finally:
         state.waits -= 1
     value = wait.value()

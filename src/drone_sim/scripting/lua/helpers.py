@@ -1,4 +1,4 @@
-"""Files beside a Lua child script: helpers that it requires by name or loads as files, and data that it reads."""
+"""Files in the folder of a Lua child script: helper modules, .lua files and data."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ _LONGEST, _MOST = 200, 1000  # characters of a name; helpers
 
 
 class LuaHelpers:
-    """Reads the files that a script requires: regular ones of limited size in its own folder, or below that."""
+    """Reads files for a script: regular files of limited size in its own folder or below it."""
 
     def __init__(self, script: str):
-        """Take the script's path."""
+        """`script` is its path."""
         self.chunk = self._chunk(Path(script).name)
         self._paths = {self.chunk: script}
         self._folder = Path(script).parent
 
     def chunk_of(self, path: str) -> str:
-        """Return the name of the chunk that a file is, or would be if it were required; '' for one elsewhere."""
+        """Return the chunk name of a file; '' for a file outside the script's folder."""
         own = os.path.realpath(self._paths[self.chunk])
         if path == own:
             return self.chunk
@@ -37,11 +37,11 @@ class LuaHelpers:
         return self._chunk(os.path.relpath(path, folder)) if path.startswith(f"{folder}{os.sep}") else ""
 
     def path(self, chunk: str) -> str:
-        """Return the file behind a chunk's name, the script's for any other name."""
+        """Return the file of a chunk, or the script's file for an unknown name."""
         return self._paths.get(chunk, self._paths[self.chunk])
 
-    def placed(self, text: str) -> tuple[str, int, str]:
-        """Return file, line (0: not known) and the rest of a message of Lua's."""
+    def parse_message(self, text: str) -> tuple[str, int, str]:
+        """Return file, line (0: unknown) and text of an error message from Lua."""
         for chunk, path in self._paths.items():
             match = re.match(rf"{re.escape(chunk)}:(\d+): (.*)$", text, re.DOTALL)
             if match:
@@ -49,15 +49,15 @@ class LuaHelpers:
         return self._paths[self.chunk], 0, text
 
     def read(self, name: bytes) -> tuple[bool, bytes, bytes]:
-        """Return true, text and chunk name of a module; or false and a message."""
+        """Return True, the text and the chunk name of a module; or False, a message and b''."""
         return self._read("no module", name, self._module)
 
     def read_file(self, name: bytes) -> tuple[bool, bytes, bytes]:
-        """Return true, text and chunk name of a .lua file; or false and a message."""
+        """Return True, the text and the chunk name of a .lua file; or False, a message and b''."""
         return self._read("cannot load", name, self._file)
 
     def read_data(self, name: bytes) -> tuple[bool, bytes, bytes]:
-        """Return true and the contents of a file; or false, a message, and 'refused' for one that is out of bounds."""
+        """Return True, the contents of a file and b''; or False, a message, and b'refused' if it may not be read."""
         shown = name.decode("utf-8", "replace")
         file, why = shown.removeprefix("./"), b"refused"
         try:
@@ -69,22 +69,22 @@ class LuaHelpers:
             return False, f"{shown[:80]}: {error}".encode("utf-8", "replace"), why
 
     def _inside(self, file: str) -> Path:
-        """Return the path of a file; raises ValueError for one that a link leads to elsewhere."""
+        """Return the path of a file. Raises ValueError if a link leads out of the folder."""
         path = self._folder / file
         if not path.resolve().is_relative_to(self._folder.resolve()):
             raise ValueError("is outside of the script's folder")
         return path
 
-    def _read(self, failed: str, name: bytes, found: Callable[[str], str]) -> tuple[bool, bytes, bytes]:
+    def _read(self, failure: str, name: bytes, find: Callable[[str], str]) -> tuple[bool, bytes, bytes]:
         try:
-            file = found(name.decode("utf-8"))
+            file = find(name.decode("utf-8"))
             path, chunk = self._inside(file), self._chunk(file)
             text = LuaSource(read_source(path)).text
             if len(self._paths) > _MOST:
                 raise ValueError(f"a script may have at most {_MOST} modules")
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
-            return False, f"{failed} '{name.decode('utf-8', 'replace')[:80]}': {why}".encode("utf-8", "replace"), b""
+            return False, f"{failure} '{name.decode('utf-8', 'replace')[:80]}': {why}".encode("utf-8", "replace"), b""
         self._paths[chunk] = str(path)
         return True, text, chunk.encode("utf-8", "replace")
 
@@ -93,7 +93,7 @@ class LuaHelpers:
         if len(file) > _LONGEST or not _FILE.fullmatch(file):
             raise ValueError("must be a .lua file in the script's folder or a folder in it, such as helpers/pid.lua")
         if not (self._folder / file).exists():
-            near = near_names(file, [one.name for one in self._folder.glob("*.lua")])
+            near = near_names(file, [path.name for path in self._folder.glob("*.lua")])
             raise ValueError(f"there is no such file in the script's folder; {near}")
         return file
 
@@ -115,7 +115,7 @@ class LuaHelpers:
         raise ValueError(f"there is no file {inner}.lua in the script's folder{f'; {near}' if beside else ''}")
 
     def _is_script(self, file: str) -> bool:
-        """Tell whether a file in the folder is the script, which is no helper of its own."""
+        """Return whether a file in the folder is the script itself, which is not its own helper."""
         return (self._folder / file) == Path(self._paths[self.chunk])
 
     @staticmethod

@@ -1,9 +1,9 @@
-"""Load a Lua child script and call its phases, in a state of its own that reaches nothing else.
+"""Child scripts in Lua, each in a Lua state of its own, from which nothing else can be accessed.
 
 V-REP 3.x scripts run in Lua 5.1, with flat names (simGetObjectPosition, simExtRosInterface_subscribe,
-sim_handle_self); the file's text is run once for each phase with `sim_call_type` set, where it asks for
-that, or as a whole in another form (source.py). CoppeliaSim 4.x scripts run in the newest Lua that lupa
-has, with `sim` and `simROS` and functions sysCall_init, ... Both forms of the API are there in either.
+sim_handle_self). If the text uses `sim_call_type`, it is run once for each phase, with `sim_call_type` set; source.py
+has the other forms. CoppeliaSim 4.x scripts run in the newest Lua that lupa contains, with `sim`, `simROS` and
+functions sysCall_init, ... Both forms of the API exist in all versions.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.lua import functions, state
 from drone_sim.scripting.lua.helpers import LuaHelpers
 from drone_sim.scripting.lua.source import LuaSource, mixed_forms
-from drone_sim.scripting.lua.thread import MOST_LEFT, Executor, LeftBehind, LuaThread, SameThread, left_behind
+from drone_sim.scripting.lua.thread import MOST_ABANDONED, Abandoned, Executor, LuaThread, SameThread, count_abandoned
 from drone_sim.scripting.lua.variables import read_rows
 from drone_sim.scripting.time_limit import Labels, TimeLimit
 
-_LOG = logging.getLogger(__name__)  # not the script's own words
+_LOG = logging.getLogger(__name__)  # for messages about scripts, not from scripts
 _NIL = re.compile(r"(?:field|global|method) '(\w+)'")
 _NUMBERS = {phase: number for number, phase in enumerate((*PHASES, "thread"), start=1)}
-_NEAR = 0.8  # of difflib's ratio
+_NEAR = 0.8  # least ratio of difflib
 _THREAD = 1 << _NUMBERS["thread"] - 1
-# In calls.lua.
+# Functions in calls.lua.
 _CALLS = (
     *("open", "phase", "called", "called_own", "executed", "executed_own", "called_back", "has", "functions"),
     *("save_state", "restore", "variables", "break_at"),
 )
 _EXECUTE = "executeScriptString"
-_MOST_PLACES = 4000  # values of breakpoints, two for each, that one call hands over
+_MOST_PLACES = 4000  # values, two for each breakpoint, that one call passes
 _ABOUT_MEMORY = f"not enough memory: the script uses more than {state.MEMORY // state.MIB} MiB"
 
 
 class LuaScript(Script):
-    """A file that defines sysCall_init, ... as it needs them, or looks at sim_call_type."""
+    """A Lua file that may define sysCall_init, ..., or uses sim_call_type."""
 
     language = "lua"
 
@@ -59,10 +59,9 @@ class LuaScript(Script):
         limit: TimeLimit,
         breakpoints: Breakpoints | None = None,
     ):
-        """Compile a `source`; run its top level unless it is to run in every phase. Raises ScriptError.
+        """Compile `source`, the contents of the file `path`; run its top level, unless each phase runs the whole file.
 
-        `path` is its file, `modules` are the API, `limit` is how long it may run; `breakpoints` are those of all
-        scripts.
+        `modules` are the API, `limit` is its time limit. `breakpoints` belong to all scripts. Raises ScriptError.
         """
         self._path = path
         self._limit, self._labels = limit, Labels(path, limit)
@@ -70,15 +69,15 @@ class LuaScript(Script):
         self.is_empty = not text.text.strip()
         self.flat_names: Collection[str] = text.flat_names
         self._modules = modules
-        self._end = ""  # why nothing can be called any more
+        self._end = ""  # why it cannot be called any more; '' while it can
         self._phases = 0
         self._helpers = LuaHelpers(path)
         self._breakpoints = breakpoints if breakpoints is not None else Breakpoints()
         self._check_form(text)
-        if text.loops_in_c and left_behind() >= MOST_LEFT:
+        if text.loops_in_c and count_abandoned() >= MOST_ABANDONED:
             raise self._error(
                 "load",
-                f"{MOST_LEFT} Lua scripts hang in this process, and no more can be loaded: restart the simulator",
+                f"{MOST_ABANDONED} Lua scripts hang in this process, and no more can be loaded: restart the simulator",
             )
         self._thread: Executor = LuaThread(limit) if text.loops_in_c else SameThread(limit)
         try:
@@ -95,7 +94,7 @@ class LuaScript(Script):
             raise
 
     def _build(self, dialect: str, threads: bool) -> dict[str, Any]:
-        """Return what can be called of a new Lua state, with the API in it; `threads`: the script may have some."""
+        """Create a Lua state with the API; return its functions for Python. `threads`: the script may have some."""
         self._state = state.LuaState(dialect, self._thread, self._limit, self._helpers, threads, self._breakpoints)
         self._finalizer = weakref.finalize(self, _free, self._state)
         self._known = self._state.known = functions.define(self._state, self._modules)
@@ -105,7 +104,7 @@ class LuaScript(Script):
     # ---- the script
 
     def _check_form(self, text: LuaSource) -> None:
-        """Raise ScriptError for two forms in one script, or a phase that does not exist: Lua would compare with nil."""
+        """Raise ScriptError for a script with two forms, or an unknown sim_childscriptcall_... (nil in Lua)."""
         if text.mixed:
             raise self._error("load", mixed_forms(*text.mixed), max(text.mixed))
         known = [name for name in CONSTANTS if name.startswith("childscriptcall_")]
@@ -115,10 +114,10 @@ class LuaScript(Script):
                 raise self._error("load", f"there is no sim_{name}; {near_names(name, known)}", line)
 
     def _check_names(self) -> None:
-        """Raise ScriptError for a function that was meant to be a phase, but would not be called as one."""
+        """Raise ScriptError for a misspelt phase function."""
         places = self._named_functions()
-        for name, meant in phase_names.misspelt(places):
-            raise ScriptError("load", *places[name], phase_names.never_called(name, meant))
+        for name, intended in phase_names.misspelt(places):
+            raise ScriptError("load", *places[name], phase_names.never_called(name, intended))
         phase_names.warn(self._path, places)
         self.idle = phase_names.idle(places)
 
@@ -138,7 +137,7 @@ class LuaScript(Script):
     def _run_phase(self, phase: str) -> None:
         number = _NUMBERS[phase]
         if self._phases & 1 << number - 1:
-            if self._end and phase == "cleanup":  # said when it happened
+            if self._end and phase == "cleanup":  # the error was raised before
                 return
             self._run(phase, self._lua.get("phase"), number)
 
@@ -155,37 +154,37 @@ class LuaScript(Script):
     def _run_function(self, name: str, arguments: list[Any]) -> Any:
         to_lua = self._state.values.to_lua
         self._run(name, lambda: self._lua["called"](name.encode(), *to_lua(arguments, unpacked=True)))
-        return self._state.values.handed_back()
+        return self._state.values.returned()
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
         arguments = self._state.values.to_lua(arguments, unpacked=True)
         self._check_own(name, self._lua["called_own"](name.encode(), *arguments))
-        return self._state.values.handed_back()
+        return self._state.values.returned()
 
     def _run_text(self, text: str) -> Any:
         self._run(_EXECUTE, self._lua.get("executed"), text.encode("utf-8", "replace"))
-        return self._state.values.handed_back()
+        return self._state.values.returned()
 
     def execute_own(self, text: str) -> Any:
         self._check_own(_EXECUTE, self._lua["executed_own"](text.encode("utf-8", "replace")))
-        return self._state.values.handed_back()
+        return self._state.values.returned()
 
     def _check_own(self, name: str, outcome: Any) -> None:
-        how, *found = outcome if isinstance(outcome, tuple) else (outcome,)
-        if how is not True:
-            raise self._failure(name, how, found)
+        status, *details = outcome if isinstance(outcome, tuple) else (outcome,)
+        if status is not True:
+            raise self._failure(name, status, details)
 
     def _run_callback(self, callback: Callback, message: Any) -> None:
         self._call_back(callback, message, False)
 
     def _answer_request(self, callback: Callback, request: Any) -> Any:
         self._call_back(callback, request, True)
-        return self._state.values.handed_back()
+        return self._state.values.returned()
 
-    def _call_back(self, callback: Callback, message: Any, answered: bool) -> None:
-        name, called = (callback, callback.encode()) if isinstance(callback, str) else ("callback", callback)
+    def _call_back(self, callback: Callback, message: Any, returns: bool) -> None:
+        name, key = (callback, callback.encode()) if isinstance(callback, str) else ("callback", callback)
         to_lua = self._state.values.to_lua
-        self._run(name, lambda: self._lua["called_back"](called, to_lua(message), answered))
+        self._run(name, lambda: self._lua["called_back"](key, to_lua(message), returns))
 
     def follow_breakpoints(self) -> None:
         places: list[bytes | int] = []
@@ -207,53 +206,53 @@ class LuaScript(Script):
             if self._has_thread() or self._has_coroutines:
                 script_log.say(script_log.THREAD_GOES_ON.format(self._path))
             self._run("restore", self._lua.get("restore"), snapshot)
-            for one in restoring:
-                one()
+            for restore_module in restoring:
+                restore_module()
 
         return restore
 
     def close(self) -> None:
-        """Free the Lua state; the script cannot be called after that."""
+        """Free the Lua state; the script cannot be called afterwards."""
         self._finalizer()
         self._end = self._end or "the script was closed"
         self._phases = 0
         self._lua.clear()
 
     def _run(self, phase: str, function: Any, *arguments: Any) -> Any:
-        """Call a function in Lua's thread; return what it returns."""
+        """Call a function in Lua's thread; return its result. Raises ScriptError."""
         if self._end:
             raise self._error(phase, self._end)
         self._limit.label = self._labels[phase]
         try:
             outcome = self._thread.run(function, *arguments)
-        except LeftBehind:
+        except Abandoned:
             self._end = str(self._limit)
             raise self._error(phase, self._end) from None
-        except Exception as error:  # lupa's own, or a message that cannot be handed over
-            said = str(error) or type(error).__name__
-            if said == "stopped":  # by a hook just before the script's beginning, or behind its end
-                said = _ABOUT_MEMORY if self._state.used() > state.MEMORY else str(self._limit)
-            raise self._error(phase, said) from None
+        except Exception as error:  # of lupa, or a value that cannot be passed
+            message = str(error) or type(error).__name__
+            if message == "stopped":  # by a hook before the beginning or after the end of the script
+                message = _ABOUT_MEMORY if self._state.used() > state.MEMORY else str(self._limit)
+            raise self._error(phase, message) from None
         finally:
             script_log.end_call()
             if not self._end and self._state.used() > state.MEMORY and self._state.too_much():
-                self._end = _ABOUT_MEMORY  # entered once more, lupa itself might find no room
-        self._phases, how, *found = outcome if isinstance(outcome, tuple) else (outcome, True, None)
-        if how is True:
+                self._end = _ABOUT_MEMORY  # in another call, lupa itself might run out of memory
+        self._phases, status, *details = outcome if isinstance(outcome, tuple) else (outcome, True, None)
+        if status is True:
             if not self._end:
-                return found[0]
-            how, found = state.OVER_MEMORY, []
-        raise self._failure(phase, how, found)
+                return details[0]
+            status, details = state.OVER_MEMORY, []
+        raise self._failure(phase, status, details)
 
-    def _failure(self, phase: str, how: Any, found: Sequence[Any]) -> ScriptError:
-        """Return the error that Lua tells of: `found` holds a message, or line and file where it was stopped."""
-        if how is False:
-            return self._error_with_line(phase, found[0])
-        if how == state.TIME:
-            return self._error(phase, str(self._limit), *found)
-        if how == state.OVER_MEMORY:
+    def _failure(self, phase: str, status: Any, details: Sequence[Any]) -> ScriptError:
+        """Return the error for a status from Lua; `details` are a message, or line and file where it was stopped."""
+        if status is False:
+            return self._error_with_line(phase, details[0])
+        if status == state.TIME:
+            return self._error(phase, str(self._limit), *details)
+        if status == state.OVER_MEMORY:
             self._end = _ABOUT_MEMORY
-            return self._error(phase, self._end, *found)
+            return self._error(phase, self._end, *details)
         return self._error(phase, no_function(phase, ()))
 
     def _error(self, phase: str, message: str, line: int = 0, chunk: bytes = b"") -> ScriptError:
@@ -263,18 +262,18 @@ class LuaScript(Script):
         text = message.decode("utf-8", "replace").partition("\nstack traceback:")[0]
         if text == "not enough memory":
             return self._error(phase, _ABOUT_MEMORY)
-        path, line, text = self._helpers.placed(text)
+        path, line, text = self._helpers.parse_message(text)
         return ScriptError(phase, path, line, text + self._hint(text))
 
     def _hint(self, text: str) -> str:
-        """Return what a name that is nil may have been meant to be."""
+        """Return a hint for an error about nil: similar names, or the reason why a plugin is missing."""
         match = _NIL.search(text) if "nil value" in text else None
         if match is None:
             return ""
         name = match.group(1)
         if name in PLUGINS:
             return f"; {not_there('', name, ())}"
-        near = difflib.get_close_matches(name, self._known, cutoff=_NEAR)  # it is the script's own, most often
+        near = difflib.get_close_matches(name, self._known, cutoff=_NEAR)  # often none: most names are the script's own
         return f"; near names are {', '.join(near)}" if near else ""
 
 

@@ -1,7 +1,7 @@
-"""A Lua state for one script: Lua itself, what the .lua files here put into it, and how much memory it uses.
+"""Lua state of one script, prepared by the .lua files in this folder, with a memory limit.
 
-The files run once in a fresh state (5.1 or newer), before the script is read. What one of them has for the others, and
-for Python, it leaves in a table that is called `sandbox` there.
+The files run once in a new state (5.1 or newer), before the script is compiled. They store what the other files and
+Python need in a table, their parameter `sandbox`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from drone_sim.scripting.lua.values import Values
 from drone_sim.scripting.phase_names import FUNCTIONS
 from drone_sim.scripting.time_limit import TimeLimit
 
-OLDEST = "lua51"  # V-REP 3.x's
+OLDEST = "lua51"  # the version in V-REP 3.x
 _NEWEST_FIRST = ("lua55", "lua54", "lua53", "lua52", OLDEST)
 _FILES = (
     "limits",
@@ -39,38 +39,38 @@ _FILES = (
     "matrix",
     "files",
     "variables",
-)  # each uses those before it
+)  # each uses the ones before it
 MIB = 1024 * 1024
 MEMORY = 256 * MIB  # bytes that a script may use
-_CAP = MEMORY + 256 * MIB  # where Lua gets no more: what lupa itself allocates in between must never fail
+_CAP = MEMORY + 256 * MIB  # at which allocations fail; larger, because lupa's own allocations must not fail
 _MUCH = 32 * MIB
 
-Reader = Callable[[bytes], tuple[bool, bytes, bytes]]  # of a name: whether there is one, text, name of the chunk
-TIME, OVER_MEMORY, MUCH_MEMORY = 1, 2, -1  # why Lua stops a script, or looks at it more often (limits.lua)
+Reader = Callable[[bytes], tuple[bool, bytes, bytes]]  # by name: whether it exists, text, chunk name
+TIME, OVER_MEMORY, MUCH_MEMORY = 1, 2, -1  # why Lua stops a script, or checks it more often (limits.lua)
 
 
 @functools.cache
 def _newest_first() -> list[str]:
-    """Return every Lua that lupa has; raises ImportError."""
-    found = [dialect for dialect in _NEWEST_FIRST if importlib.util.find_spec(f"lupa.{dialect}")]
-    if not found:
+    """Return the Lua versions that lupa contains. Raises ImportError if there is none."""
+    dialects = [dialect for dialect in _NEWEST_FIRST if importlib.util.find_spec(f"lupa.{dialect}")]
+    if not dialects:
         raise ImportError("lupa has no Lua")
-    return found
+    return dialects
 
 
 def newest() -> str:
-    """Return the newest Lua that lupa has; raises ImportError."""
+    """Return the newest Lua version that lupa contains. Raises ImportError if there is none."""
     return _newest_first()[0]
 
 
 def dialect_for(text: bytes, flat: bool) -> str:
-    """Return the Lua version for a script: V-REP 3.x's for `flat` names, otherwise the newest that can compile it.
+    """Return the Lua version for a script: 5.1 if it uses `flat` names, otherwise the newest that can compile it.
 
     An older one is needed, for example, if a script sets the variable of a `for` loop, which Lua 5.5 forbids. A script
     that no version can compile gets the first choice. Raises ImportError.
     """
-    likely = [OLDEST, *_newest_first()] if flat else _newest_first()
-    return next((one for one in likely if _parses(one, text)), likely[0])
+    candidates = [OLDEST, *_newest_first()] if flat else _newest_first()
+    return next((dialect for dialect in candidates if _parses(dialect, text)), candidates[0])
 
 
 def _parses(dialect: str, text: bytes) -> bool:
@@ -79,30 +79,30 @@ def _parses(dialect: str, text: bytes) -> bool:
         lupa.LuaRuntime(encoding=None, register_eval=False, register_builtins=False, max_memory=_CAP).compile(text)
     except lupa.LuaSyntaxError:
         return False
-    except lupa.LuaError:  # out of memory: whoever runs it will say so
+    except lupa.LuaError:  # out of memory, which is reported when the script is loaded
         return True
     return True
 
 
 def syntax_error(text: bytes, flat: bool) -> str:
-    """Return what Lua says of a text that it cannot compile, '' for any other: nothing of it is run.
+    """Return the error message of the compiler for a text, '' if it can be compiled; the text is not run.
 
-    `flat`: it has names of V-REP 3.x. Raises ImportError.
+    `flat`: it uses V-REP 3.x names. Raises ImportError.
     """
     lupa = importlib.import_module(f"lupa.{dialect_for(text, flat)}")
     try:
         lua = lupa.LuaRuntime(encoding=None, register_eval=False, register_builtins=False, max_memory=_CAP)
         lua.compile(text, name=b"=script")
     except lupa.LuaError as error:
-        said = error.args[0]
-        return said.decode("utf-8", "replace") if isinstance(said, bytes) else str(said)
+        message = error.args[0]
+        return message.decode("utf-8", "replace") if isinstance(message, bytes) else str(message)
     return ""
 
 
 class LuaState:
-    """Lua for one script. `close` frees it: Python cannot find a reference cycle that leads through Lua.
+    """Lua state of one script. It must be closed, because Python cannot free a reference cycle that includes Lua.
 
-    Python objects that Lua gets must not refer to the script's object, or neither is ever freed.
+    Python objects that are passed to Lua must not refer to the LuaScript, or both are never freed.
     """
 
     def __init__(
@@ -114,10 +114,10 @@ class LuaState:
         threads: bool,
         breakpoints: Breakpoints,
     ):
-        """Make a state, out of which nothing leads to Python. Raises ImportError.
+        """Create a state from which no Python object can be accessed. Raises ImportError.
 
-        `executor` runs what enters it, `limit` is how long the script may run, `helpers` reads the files that it
-        requires; `threads`: the script may have some; `breakpoints` are those of all scripts.
+        `executor` runs all calls into it, `limit` is the script's time limit, `helpers` reads the required files.
+        `threads`: whether it may have threads. `breakpoints` belong to all scripts.
         """
         self.executor = executor
         self.runtime: Any = importlib.import_module(f"lupa.{dialect}").LuaRuntime(
@@ -128,14 +128,16 @@ class LuaState:
             unpack_returned_tuples=True,
             max_memory=_CAP,
         )
-        self.used: Callable[[], int] = self.runtime.get_memory_used  # Lua's own count leaves out 5.5's long strings
-        self.waits = 0  # of functions, in coroutines
-        self.known: set[str] = set()  # names of the API
-        self.lavish: set[str] = set()  # functions that have been given more values than they take
+        self.used: Callable[[], int] = (
+            self.runtime.get_memory_used
+        )  # bytes; Lua's own count excludes 5.5's long strings
+        self.waits = 0  # unfinished waits of API functions in coroutines
+        self.known: set[str] = set()  # names in the API
+        self.warned: set[str] = set()  # functions that were called with too many values
         self.values = Values(self.runtime.table_from)
         bridge = {
             **self.values.bridge(),
-            "look": functools.partial(self._look, limit),
+            "look": functools.partial(self._check, limit),
             "log": self._log,
             "direct": isinstance(executor, SameThread),
             "longest_message": 4 * LONGEST_MESSAGE,
@@ -160,20 +162,20 @@ class LuaState:
             self.runtime.execute(text, table, self.sandbox, chunk, name=file)
 
     def close(self) -> None:
-        """Let go of Lua."""
+        """Free the Lua state."""
         self.runtime = self.sandbox = None
         self.values.close()
         self.used = int
 
     def too_much(self) -> bool:
-        """Tell whether the script uses more memory than it may, without what it does not need any more."""
+        """Return whether the script uses too much memory, if necessary after a garbage collection."""
         if self.used() <= MEMORY:
             return False
         self.runtime.gccollect()
         return self.used() > MEMORY
 
-    def _look(self, limit: TimeLimit) -> int:
-        """Answer Lua's hook: whether the script is to be stopped, or to be looked at more often, and for what."""
+    def _check(self, limit: TimeLimit) -> int:
+        """Return, for Lua's hook, why to stop the script (TIME, OVER_MEMORY) or check it more often; 0 to continue."""
         used = self.used()
         if used > MEMORY and self.too_much():
             return OVER_MEMORY

@@ -1,7 +1,7 @@
-"""Values on their way between Python and Lua: tables are 1-based in Lua, lists in Python.
+"""Conversion of values between Python and Lua.
 
-Strings of Lua arrive as str, or as bytes where they are no UTF-8 (images). A tuple of several results
-becomes several values; a message object becomes a table of its fields.
+Lua's tables, with indices from 1, become lists. Lua's strings become str, or bytes if they are not UTF-8 (images). In
+Lua, a tuple of results becomes several values, and a message object a table of its fields.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from drone_sim.scripting.api.script_values import DEEPEST, MOST_BYTES, MOST_VALU
 _NUMBERS = frozenset((float, int, bool))
 _ALL_NUMBERS = _NUMBERS.issuperset
 _ALL_FLOATS = frozenset((float,)).issuperset
-_LARGEST = 2**63  # whole numbers beyond are floats in Lua
+_LARGEST = 2**63  # integers beyond are converted to floats for Lua
 
-# How the values of an answer to Lua are read there (values.lua).
+# How Lua decodes the values of a result (values.lua).
 FAILED, PLAIN, LIST, TWO_LISTS, AS_STREAM, TOO_MUCH = range(6)
 
 
-# What functions of the API return, most often, and the answer that it is.
-_ANSWERS: dict[Any, Callable[[Any], tuple[Any, ...]]] = {
+# Encoders of the most frequent results, by the functions' annotations.
+_ENCODERS: dict[Any, Callable[[Any], tuple[Any, ...]]] = {
     "None": lambda _: (PLAIN,),
     "float": lambda value: (PLAIN, value),
     "list[float]": lambda values: (LIST, *values),
@@ -32,26 +32,26 @@ _ANSWERS: dict[Any, Callable[[Any], tuple[Any, ...]]] = {
 
 
 class _Mark:
-    """A mark in a stream of values: where a table begins or ends."""
+    """A mark in a stream of values, at the beginning or end of a table."""
 
 
 _OPEN_LIST, _OPEN_FIELDS, _CLOSE = _Mark(), _Mark(), _Mark()
 
 
 class Values:
-    """Converts for one Lua state, of which `close` lets go."""
+    """Converter for one Lua state."""
 
     def __init__(self, table_from: Callable[[Any], Any]):
-        """`table_from` makes a table of Lua's, as lupa's runtime does."""
+        """`table_from` creates a Lua table, as in lupa's LuaRuntime."""
         self._table_from = table_from
         self._stream: list[Any] = []
 
     def close(self) -> None:
-        """Let go of the Lua state."""
-        self._table_from = list  # anything that leads to no state
+        """Drop the reference to the Lua state."""
+        self._table_from = list  # any function without a reference to it
 
     def bridge(self) -> dict[str, Any]:
-        """Return what the Lua side needs for handing values over."""
+        """Return the functions and limits that values.lua needs."""
         return {
             "fresh": self._fresh,
             "put": self._put,
@@ -71,35 +71,35 @@ class Values:
     def _put(self, *values: Any) -> None:
         self._stream.extend(values)
 
-    def handed_back(self) -> Any:
-        """Return what a function has handed over: None, a value, or a tuple of several."""
-        found = self._from_stream(())
-        return tuple(found) if len(found) > 1 else found[0] if found else None
+    def returned(self) -> Any:
+        """Return the results of a Lua function, which Lua has put into the stream: None, a value, or a tuple."""
+        values = self._from_stream(())
+        return tuple(values) if len(values) > 1 else values[0] if values else None
 
-    def _from_stream(self, _given: tuple[Any, ...]) -> list[Any]:
-        found, self._stream = _from_stream(self._stream), []
-        while found and found[-1] is None:  # nil at the end is as good as left out
-            found.pop()
-        return found
+    def _from_stream(self, _values: tuple[Any, ...]) -> list[Any]:
+        values, self._stream = _from_stream(self._stream), []
+        while values and values[-1] is None:  # a nil at the end is the same as a missing value
+            values.pop()
+        return values
 
     def readers(self) -> Sequence[Callable[[tuple[Any, ...]], Sequence[Any] | None]]:
-        """Return, for each form of a call, the function that makes the arguments from what Lua has handed over.
+        """Return, for each form of a call, the function that decodes the arguments from Lua.
 
-        It returns None if a list contains anything but numbers: then the call is repeated with a stream.
+        It returns None if a list contains anything but numbers; then Lua repeats the call with a stream.
         """
         return tuple, _scalars, _one_list, _first_and_second, _second_and_third, self._from_stream
 
     # ---- to Lua
 
-    def answer_of(self, function: Callable[..., Any]) -> Callable[[Any], tuple[Any, ...]]:
-        """Return what turns a function's results into an answer to Lua, by what it is annotated to return.
+    def encoder_of(self, function: Callable[..., Any]) -> Callable[[Any], tuple[Any, ...]]:
+        """Return the function that encodes a function's results for Lua, by its annotation.
 
-        The answer raises ValueError for too much.
+        It raises ValueError for results that are too large.
         """
         returns = function.__annotations__.get("return", "")
         if returns == "VisionReading":
-            return lambda packets: self._results(tuple(one for one in packets if one != ()))
-        return _ANSWERS.get(returns, self._results)
+            return lambda packets: self._results(tuple(packet for packet in packets if packet != ()))
+        return _ENCODERS.get(returns, self._results)
 
     def _results(self, value: Any) -> tuple[Any, ...]:
         if type(value) is not tuple:
@@ -107,7 +107,7 @@ class Values:
         return (PLAIN, *self.to_lua(list(value), unpacked=True))
 
     def to_lua(self, value: Any, unpacked: bool = False) -> Any:
-        """Return a value as Lua takes it: scalars as they are, everything else as a table.
+        """Return a value for Lua: scalars unchanged, everything else as a table.
 
         `unpacked`: return a list with each item converted. Raises ValueError for a value that is too large.
         """
@@ -123,7 +123,7 @@ class Values:
             return value.encode("utf-8", "replace")
         if isinstance(value, Real):
             return float(value)
-        return value.to_sec() if hasattr(value, "to_sec") else self._table(value)  # ROS's times
+        return value.to_sec() if hasattr(value, "to_sec") else self._table(value)  # times of ROS
 
     def _table(self, value: Any) -> Any:
         if isinstance(value, (bytearray, memoryview)):
@@ -140,51 +140,51 @@ class Values:
         return self._to_lua(key)
 
 
-def _scalars(given: tuple[Any, ...]) -> list[Any]:
-    return [_text(value) if type(value) is bytes else value for value in given]
+def _scalars(values: tuple[Any, ...]) -> list[Any]:
+    return [_text(value) if type(value) is bytes else value for value in values]
 
 
-def _one_list(given: tuple[Any, ...]) -> list[Any] | None:
-    """Read a list, and two values that may be missing: first at which place it comes."""
-    place, one, other, *numbers = given
+def _one_list(values: tuple[Any, ...]) -> list[Any] | None:
+    """Decode a list and two scalars, which may be None; the first value is the list's index among the three."""
+    index, first, second, *numbers = values
     if not _ALL_NUMBERS(map(type, numbers)):
         return None
-    found = [one, other]
-    found.insert(place, numbers)
-    while found[-1] is None:
-        found.pop()
-    return found
+    arguments = [first, second]
+    arguments.insert(index, numbers)
+    while arguments[-1] is None:
+        arguments.pop()
+    return arguments
 
 
-def _first_and_second(given: tuple[Any, ...]) -> list[Any] | None:
-    return [[*given[3:]], [*given[:3]]] if _ALL_NUMBERS(map(type, given)) else None
+def _first_and_second(values: tuple[Any, ...]) -> list[Any] | None:
+    return [[*values[3:]], [*values[:3]]] if _ALL_NUMBERS(map(type, values)) else None
 
 
-def _second_and_third(given: tuple[Any, ...]) -> list[Any] | None:
-    first, x, y, z, *values = given
-    return [first, [x, y, z], values] if _ALL_NUMBERS(map(type, given[1:])) else None
+def _second_and_third(values: tuple[Any, ...]) -> list[Any] | None:
+    first, x, y, z, *numbers = values
+    return [first, [x, y, z], numbers] if _ALL_NUMBERS(map(type, values[1:])) else None
 
 
 def _from_stream(tokens: list[Any]) -> list[Any]:
     outer: list[list[Any]] = []
-    here: list[Any] = []
+    current: list[Any] = []
     marks: list[Any] = []
     for token in tokens:
         if type(token) in _NUMBERS:
-            here.append(token)
+            current.append(token)
         elif token is _CLOSE:
-            made: Any = here
+            table: Any = current
             if marks.pop() is _OPEN_FIELDS:
-                made = dict(zip(here[::2], here[1::2])) or []
-            here = outer.pop()
-            here.append(made)
+                table = dict(zip(current[::2], current[1::2])) or []
+            current = outer.pop()
+            current.append(table)
         elif type(token) is _Mark:
-            outer.append(here)
+            outer.append(current)
             marks.append(token)
-            here = []
+            current = []
         else:
-            here.append(_text(token))
-    return here
+            current.append(_text(token))
+    return current
 
 
 def _text(value: Any) -> Any:
@@ -204,7 +204,7 @@ def _as_float(value: int) -> float:
 
 
 def fields(value: Any) -> Mapping[Any, Any] | None:
-    """Return the named fields of a mapping or message object; None for a sequence."""
+    """Return the fields of a mapping or message object by name; None for a sequence."""
     if isinstance(value, Mapping):
         return value
     names = getattr(value, "_fields", None) or getattr(value, "__slots__", None)

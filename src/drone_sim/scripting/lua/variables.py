@@ -1,4 +1,4 @@
-"""What Lua tells of a script's variables, and of the lines that it reaches (variables.lua)."""
+"""Variables and breakpoints of Lua scripts, as reported by variables.lua."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ _LIMITS = {"most_rows": MOST_ROWS, "most_inside": MOST_INSIDE, "longest_value": 
 
 
 def read_rows(text: bytes) -> list[Scope]:
-    """Return the scopes that a text of rows has; what is sorted by chance in Lua is sorted by names here."""
+    """Return the scopes encoded in a text, with their rows sorted by name, because Lua's order is random."""
     scopes: list[Scope] = []
     inside: list[Row] = []
-    for one in reversed(text.decode("utf-8", "replace").split(_ROW)):
-        depth, name, kind, value = (*one.split(_FIELD), "", "", "", "")[:4]
+    for row in reversed(text.decode("utf-8", "replace").split(_ROW)):
+        depth, name, kind, value = (*row.split(_FIELD), "", "", "", "")[:4]
         if depth == "2":
             inside.append(Row(name[:LONGEST_NAME], kind, value))
         elif depth == "1":
             scopes = scopes or [Scope("", [])]
-            scopes[-1].rows.append(Row(name[:LONGEST_NAME], kind, value, tuple(sorted(inside, key=_order))))
+            scopes[-1].rows.append(Row(name[:LONGEST_NAME], kind, value, tuple(sorted(inside, key=_sort_key))))
             inside = []
         elif depth == "0":
             scopes = [*(scopes or [Scope("", [])])]
@@ -38,8 +38,8 @@ def read_rows(text: bytes) -> list[Scope]:
     return scopes[:-1][::-1]
 
 
-def _order(row: Row) -> tuple[bool, float, str]:
-    """Let the numbers of a list come first, in their order."""
+def _sort_key(row: Row) -> tuple[bool, float, str]:
+    """Return a sort key: first the indices of lists, by number, then names."""
     number = row.name[1:-1] if row.name[:1] == "[" else ""
     is_number = number.lstrip("-").isdigit()
     return not is_number, float(number) if is_number else 0.0, row.name
@@ -48,7 +48,7 @@ def _order(row: Row) -> tuple[bool, float, str]:
 def bridge(
     breakpoints: Breakpoints, path_of: Callable[[str], str], known: Callable[[], Any]
 ) -> dict[str, Callable[..., Any] | int]:
-    """Return what the Lua side needs: `path_of` returns the file of a chunk's name, `known` a table of names."""
+    """Return what variables.lua needs. `path_of` returns the file of a chunk, `known` a Lua table of API names."""
 
     def reached(chunk: bytes, line: int, rows: bytes) -> None:
         breakpoints.reach(path_of(chunk.decode("utf-8", "replace")), int(line), lambda: read_rows(rows))

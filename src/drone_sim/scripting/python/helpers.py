@@ -1,8 +1,8 @@
-"""Helper modules beside a Python child script, which it imports as any other.
+"""Import of helper modules in the folder of a Python child script.
 
-They belong to the script that imports them: read anew with it, seen by no other script, and without __pycache__.
-Python's own modules come before a file of the same name, and a file comes before an installed package. Last come
-the built-in scripts: `import tutorial` finds the tutorial's controller, wherever a script lies.
+They belong to the script that imports them: they are read again with it, no other script sees them, and no __pycache__
+is written. Python's standard library takes precedence over a file with the same name, and a file over an installed
+package. Built-in scripts come last: `import tutorial` finds the tutorial's controller from any folder.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from typing import Any, cast
 
 from drone_sim.scripting.errors import read_source
 
-_LOG = logging.getLogger(__name__)  # not the script's own words
+_LOG = logging.getLogger(__name__)  # for messages about scripts, not from scripts
 BUILT_IN = Path(__file__).resolve().parents[2] / "child_scripts"
 _FIRST = frozenset((*sys.stdlib_module_names, "drone_sim"))
 _numbers = itertools.count(1)
 
 
 class Helpers:
-    """Finds, reads and keeps the modules of one script; inside Python they stand below a package of its own."""
+    """Finder and loader of one script's helper modules; in sys.modules, they are in a package of their own."""
 
     def __init__(self, script: str, names: Mapping[str, Any], compiled: Callable[[bytes, str], CodeType]):
-        """`script`: its path; `names`: what its modules find as they find `len`; `compiled` compiles a file."""
+        """`script` is its path; `names` are added to the modules' builtins; `compiled` compiles a file."""
         self.files = {script}
         self.builtins: dict[str, Any] = {**vars(builtins), **names, "__import__": self._import}
         self._folder = Path(script).parent
         self.package = f"_script{next(_numbers)}"
         above = ModuleType(self.package)
         above.__path__ = [str(self._folder), str(BUILT_IN)]
-        sys.modules[self.package] = above  # dataclasses and the like look up the module of a class
+        sys.modules[self.package] = above  # dataclasses, for example, look up the module of a class
         self._compiled = compiled
-        self._is_beside: dict[str, bool] = {}
+        self._known: dict[str, bool] = {}  # results of _is_helper
 
     def close(self) -> None:
-        """Forget the modules; may be called twice."""
+        """Remove the modules from sys.modules; a second call does nothing."""
         if self in sys.meta_path:
             sys.meta_path.remove(self)
         if self.package not in sys.modules:  # closed before
@@ -51,18 +51,18 @@ class Helpers:
             sys.modules.pop(name, None)
 
     def modules(self) -> dict[str, ModuleType]:
-        """Return the modules that were imported, by their names in sys.modules."""
+        """Return the imported modules by their names in sys.modules."""
         own = [name for name in list(sys.modules) if name.startswith(f"{self.package}.")]
-        return {name: one for name in own if isinstance(one := sys.modules.get(name), ModuleType)}
+        return {name: module for name in own if isinstance(module := sys.modules.get(name), ModuleType)}
 
     def forget(self, name: str) -> None:
-        """Let a module be read anew by the next import."""
+        """Remove a module, so that the next import reads it again."""
         parent, _, last = name.rpartition(".")
         sys.modules.pop(name, None)
         vars(sys.modules.get(parent, self)).pop(last, None)
 
     def shown(self, error: ImportError) -> str:
-        """Return what an import that failed says, with near names."""
+        """Return the message of a failed import, with similar names."""
         text = str(error).replace(self.package + ".", "")
         missing = (error.name or "").replace(self.package + ".", "").partition(".")[0]
         beside = [path.stem for path in self._folder.glob("*.py") if str(path) not in self.files]
@@ -80,19 +80,19 @@ class Helpers:
         level: int = 0,
     ) -> Any:
         top = name.partition(".")[0]
-        if level or not self._found(top):
+        if level or not self._is_helper(top):
             return builtins.__import__(name, globals, locals, fromlist, level)
         if self not in sys.meta_path:
             sys.meta_path.insert(0, cast(Any, self))
         module = builtins.__import__(f"{self.package}.{name}", globals, locals, fromlist, 0)
         return module if fromlist else getattr(module, top)
 
-    def _found(self, top: str) -> bool:
-        if top not in self._is_beside:
-            self._is_beside[top] = self._look(top)
-        return self._is_beside[top]
+    def _is_helper(self, top: str) -> bool:
+        if top not in self._known:
+            self._known[top] = self._find_helper(top)
+        return self._known[top]
 
-    def _look(self, top: str) -> bool:
+    def _find_helper(self, top: str) -> bool:
         place = self._folder / top
         is_there = place.with_suffix(".py").is_file() or (place / "__init__.py").is_file()
         if top not in _FIRST:
@@ -104,23 +104,23 @@ class Helpers:
             )
         return False
 
-    # ---- what Python's import asks
+    # ---- the interface of importlib's finders and loaders
 
     def find_spec(self, name: str, path: Sequence[str] | None, _target: Any = None) -> ModuleSpec | None:
-        """Return how to load a module below the script's package."""
+        """Return the spec of a module in the script's package; None for any other."""
         if not name.startswith(self.package + ".") or path is None:
             return None
-        finders = (FileFinder(folder, (SourceFileLoader, [".py"])) for folder in path)  # new ones, which keep nothing
-        spec = next(filter(None, (one.find_spec(name) for one in finders)), None)
+        finders = (FileFinder(folder, (SourceFileLoader, [".py"])) for folder in path)  # new, so that nothing is cached
+        spec = next(filter(None, (finder.find_spec(name) for finder in finders)), None)
         if spec is not None and spec.loader is not None:
             spec.loader = cast(Any, self)
         return spec
 
     def create_module(self, _spec: ModuleSpec) -> None:
-        """Let Python make an empty module."""
+        """Return None, so that Python creates an empty module."""
 
     def exec_module(self, module: ModuleType) -> None:
-        """Read and run a module's file. Raises ImportError, and what the file raises."""
+        """Read and run a module's file. Raises ImportError, and any exception of the file."""
         path = str(module.__file__)
         self.files.add(path)
         namespace = vars(module)

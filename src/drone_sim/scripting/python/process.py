@@ -1,4 +1,4 @@
-"""Protection of the process from mistakes of a Python child script (not from attacks: it is trusted code)."""
+"""Protection of the process from mistakes of a Python child script (not from attacks: the script is trusted)."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from drone_sim.scripting import script_log, time_limit
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _STREAMS = ("stdin", "stdout", "stderr")
-_DEEPEST = 10_000  # levels of recursion that fit into a stack of 8 MiB; beyond, the process would crash
+_DEEPEST = 10_000  # levels of recursion that fit into a stack of 8 MiB; with more, the process would crash
 
-_UNTIL_SAID = 1  # s: another thread may have held what the log needs, and is not in the copy
+_LOG_TIMEOUT = 1  # s: a lock of the log may be held by a thread that does not exist in the copy
 
 _set_recursion_limit = sys.setrecursionlimit
 
 
 class Forks:
-    """How often `os.fork` has made this process; a subprocess's own fork does not count."""
+    """Number of calls of `os.fork` between the first process and this one, without those of subprocess."""
 
     count = 0
 
@@ -36,9 +36,9 @@ os.register_at_fork(after_in_child=_count_fork)
 
 
 def end_copy(path: str) -> NoReturn:
-    """End this process, a copy that a script has made by `os.fork`: it would also fly, and answer in our name."""
+    """End this process, a copy that a script has made by `os.fork`: otherwise it would also fly and answer clients."""
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    signal.alarm(_UNTIL_SAID)
+    signal.alarm(_LOG_TIMEOUT)
     try:
         script_log.say(f"{path}: the process that os.fork() made has returned from the script, and is ended")
     finally:
@@ -47,8 +47,8 @@ def end_copy(path: str) -> NoReturn:
 
 @contextlib.contextmanager
 def process_kept() -> Iterator[None]:
-    """Give signal handlers and standard streams back to the process afterwards."""
-    sys.setrecursionlimit = _guarded
+    """Restore signal handlers and standard streams at the end of the context."""
+    sys.setrecursionlimit = _set_limited_recursion
     for module, name, function in _GUARDED:
         setattr(module, name, function)
     streams = [getattr(sys, name) for name in _STREAMS]
@@ -64,17 +64,17 @@ def process_kept() -> Iterator[None]:
                     signal.signal(number, handler)
 
 
-def _guarded(limit: int) -> None:
-    """Set the recursion limit; raises ValueError beyond what the stack holds."""
+def _set_limited_recursion(limit: int) -> None:
+    """Set the recursion limit. Raises ValueError if the stack is too small for it."""
     if limit > _DEEPEST:
         raise ValueError(f"the recursion limit of a child script must be at most {_DEEPEST}, not {limit}")
     _set_recursion_limit(limit)
 
 
-# ---- what the time limit needs of the process, while a script runs
+# ---- functions that a running script may only call in part, because the time limit needs the alarm
 
 
-def _kept_from_scripts(name: str, takes: Callable[..., bool]) -> Any:
+def _without_alarm(name: str, takes: Callable[..., bool]) -> Any:
     function = getattr(signal, name)
 
     @functools.wraps(function)
@@ -88,14 +88,14 @@ def _kept_from_scripts(name: str, takes: Callable[..., bool]) -> Any:
 
 @functools.wraps(signal.pthread_sigmask)
 def _mask(how: int, mask: Iterable[int]) -> Any:
-    """Block what a script asks for, apart from the alarm."""
+    """Like pthread_sigmask, but never block the alarm while a script runs."""
     if time_limit.running() is not None and how != signal.SIG_UNBLOCK:
         mask = set(mask) - {signal.SIGALRM}
     return _pthread_sigmask(how, mask)
 
 
 def _tracing(function: Callable[[Any], None]) -> Any:
-    """Return a version whose trace function is removed when the script has returned: it traces only the script."""
+    """Return a version of settrace or setprofile whose trace function is removed when the script has returned."""
 
     @functools.wraps(function)
     def call(trace: Any) -> None:
@@ -109,9 +109,9 @@ def _tracing(function: Callable[[Any], None]) -> Any:
 
 _pthread_sigmask = signal.pthread_sigmask
 _GUARDED: tuple[tuple[Any, str, Any], ...] = (
-    (signal, "signal", _kept_from_scripts("signal", lambda number, *_: number == signal.SIGALRM)),
-    (signal, "setitimer", _kept_from_scripts("setitimer", lambda which, *_: which == signal.ITIMER_REAL)),
-    (signal, "alarm", _kept_from_scripts("alarm", lambda *_: True)),
+    (signal, "signal", _without_alarm("signal", lambda number, *_: number == signal.SIGALRM)),
+    (signal, "setitimer", _without_alarm("setitimer", lambda which, *_: which == signal.ITIMER_REAL)),
+    (signal, "alarm", _without_alarm("alarm", lambda *_: True)),
     (signal, "pthread_sigmask", _mask),
     (sys, "settrace", _tracing(sys.settrace)),
     (sys, "setprofile", _tracing(sys.setprofile)),

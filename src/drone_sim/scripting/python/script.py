@@ -1,4 +1,4 @@
-"""Load a Python child script and call its phases."""
+"""Child scripts in Python."""
 
 from __future__ import annotations
 
@@ -33,26 +33,27 @@ from drone_sim.scripting.time_limit import Labels, ScriptStopped, TimeLimit
 if TYPE_CHECKING:
     from drone_sim.scripting.python.thread import PythonThread
 
-_STOPPED = "__stopped__"  # ScriptStopped, among a script's globals
+_STOPPED = "__stopped__"  # name of ScriptStopped in a script's globals
+_LAZY = (inspect.isgeneratorfunction, inspect.iscoroutinefunction, inspect.isasyncgenfunction)
 _NAMES_THREAD = b"sysCall_thread"
 _RARE = frozenset(("init", "cleanup"))
 _NOT_COPIED = ("__builtins__", "__loader__", "__spec__")
 
 
 class Variables:
-    """An empty object to keep variables in: a script's `self`. Python reads it faster than a SimpleNamespace."""
+    """A script's `self`: an empty object to store variables in. Python reads it faster than a SimpleNamespace."""
 
     @reprlib.recursive_repr()
     def __repr__(self) -> str:
-        """Show what is in it."""
+        """Return it with its attributes."""
         return f"self({', '.join(f'{name}={value!r}' for name, value in vars(self).items())})"
 
 
 class PythonScript(Script):
-    """A file that defines sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup as it needs them.
+    """A Python file that may define sysCall_init, sysCall_actuation, sysCall_sensing and sysCall_cleanup.
 
-    It finds `sim`, `simROS`, `require` and `self` (an empty object to keep variables in), as
-    CoppeliaSim's Python scripts do; so do the modules beside it that it imports. What it prints goes to the log.
+    The script and its helper modules find `sim`, `simROS`, `require` and `self`, as in CoppeliaSim. Their prints go to
+    the log.
     """
 
     language = "python"
@@ -66,26 +67,26 @@ class PythonScript(Script):
         turns: Turns,
         breakpoints: Breakpoints | None = None,
     ):
-        """Run the top level of a `source`. Raises ScriptError.
+        """Run the top level of `source`, the contents of the file `path`. Raises ScriptError.
 
-        `path` is its file, `modules` are the API, `limit` is how long it may run, `turns` are its thread's;
-        `breakpoints` are those of all scripts.
+        `modules` are the API, `limit` is its time limit, `turns` switch its thread. `breakpoints` belong to all
+        scripts.
         """
         self._path = path
         self._limit, self._labels = limit, Labels(path, limit)
         self.is_empty = not source.strip()
         self._modules = modules
         self._thread = self._new_thread(turns) if _NAMES_THREAD in source else None
-        self._found = {name: _waiting(one, turns, self._called) for name, one in modules.items()}
+        self._api = {name: _waiting(api, turns, self._call_function) for name, api in modules.items()}
         if self._thread:
-            self._found = {name: self._thread.counted(one) for name, one in self._found.items()}
-        found = {"self": Variables(), "require": self._require, "print": _print, _STOPPED: ScriptStopped, **self._found}
-        self._helpers = Helpers(path, found, _compiled)
+            self._api = {name: self._thread.counted(api) for name, api in self._api.items()}
+        names = {"self": Variables(), "require": self._require, "print": _print, _STOPPED: ScriptStopped, **self._api}
+        self._helpers = Helpers(path, names, _compiled)
         self._globals: dict[str, Any] = {
             "__name__": self._helpers.package,
             "__file__": path,
             "__builtins__": self._helpers.builtins,
-            **found,
+            **names,
         }
         self._breakpoints = breakpoints if breakpoints is not None else Breakpoints()
         self.follow_breakpoints()
@@ -99,27 +100,29 @@ class PythonScript(Script):
 
     def _new_thread(self, turns: Turns) -> PythonThread:
         try:
-            from drone_sim.scripting.python.thread import PythonThread  # whoever has no thread needs no greenlet
+            from drone_sim.scripting.python.thread import (
+                PythonThread,
+            )  # imported here because only threads need greenlet
         except ImportError as error:
-            said = f"threads of Python scripts need greenlet (pip install greenlet): {error}"
-            raise ScriptError("load", self._path, 0, said) from None
+            message = f"threads of Python scripts need greenlet (pip install greenlet): {error}"
+            raise ScriptError("load", self._path, 0, message) from None
         return PythonThread(turns)
 
     def _check_names(self) -> None:
-        """Raise ScriptError for a function that was meant to be a phase, but would not be called as one."""
-        functions = {name: one for name, one in self._named() if callable(one) and not name.startswith("__")}
-        for name, meant in phase_names.misspelt(functions):
-            raise self._error_at(functions[name], phase_names.never_called(name, meant))
+        """Raise ScriptError for a misspelt phase function, or one that is a generator or coroutine."""
+        functions = {name: value for name, value in self._named() if callable(value) and not name.startswith("__")}
+        for name, intended in phase_names.misspelt(functions):
+            raise self._error_at(functions[name], phase_names.never_called(name, intended))
         for name in (*FUNCTIONS.values(), *THREADS):
-            one = functions.get(name)
-            if inspect.isgeneratorfunction(one) or inspect.iscoroutinefunction(one) or inspect.isasyncgenfunction(one):
-                raise self._error_at(one, f"{name} would not run, because it has a `yield` or is `async`")
+            function = functions.get(name)
+            if any(is_lazy(function) for is_lazy in _LAZY):
+                raise self._error_at(function, f"{name} would not run, because it has a `yield` or is `async`")
         phase_names.warn(self._path, functions)
         self.idle = phase_names.idle(functions)
 
     def _named(self) -> list[tuple[str, Any]]:
-        """Return its global variables; `globals()` takes any key."""
-        return [(name, one) for name, one in self._globals.items() if isinstance(name, str)]
+        """Return its global variables, without keys that are no strings, which `globals()` accepts."""
+        return [(name, value) for name, value in self._globals.items() if isinstance(name, str)]
 
     def _error_at(self, function: Any, message: str) -> ScriptError:
         code = getattr(function, "__code__", None)
@@ -177,19 +180,19 @@ class PythonScript(Script):
 
     _answer_request = _run_callback
 
-    def _called(self, call: Call) -> Any:
-        """Return what one of its functions returns, in the midst of its thread."""
+    def _call_function(self, call: Call) -> Any:
+        """Call one of its functions while its thread runs; return the result."""
         self._check_callback(call.callback)
         function = call.callback if callable(call.callback) else self._globals[call.callback]
         return function(*call.arguments)
 
     def _check_callback(self, callback: Callback) -> None:
         if not callable(callback) and not callable(self._globals.get(callback)):
-            known = [name for name, one in self._named() if inspect.isfunction(one)]
+            known = [name for name, value in self._named() if inspect.isfunction(value)]
             raise ScriptError(str(callback), self._path, 0, no_function(callback, known))
 
     def follow_breakpoints(self) -> None:
-        """Check every line while there are breakpoints: then another `_run` replaces the one that does not."""
+        """Trace every line while there are breakpoints, by an instance attribute `_run` that replaces the method."""
         tracer = LineTracer(self._breakpoints) if self._breakpoints else None
         if self._thread is not None:
             self._thread.tracer = tracer
@@ -213,33 +216,35 @@ class PythonScript(Script):
             if self._has_thread():
                 script_log.say(THREAD_GOES_ON.format(self._path))
             self._run("restore", restore_variables)
-            for one in restoring:
-                one()
+            for restore_module in restoring:
+                restore_module()
 
         return restore
 
     def _save_variables(self) -> Callable[[], None]:
         modules = self._helpers.modules()
-        builtins = self._helpers.builtins  # where its modules find `self`, and it, too, if it has lost its own
+        builtins = (
+            self._helpers.builtins
+        )  # contain the `self` of the helper modules, and of a script that has deleted its own
         namespaces = (self._globals, *map(vars, modules.values()))
         own, *kept = _copied({"self": builtins["self"]}, *namespaces)
-        as_they_are = [{name: one[name] for name in _NOT_COPIED if name in one} for one in namespaces]
+        uncopied = [{name: variables[name] for name in _NOT_COPIED if name in variables} for variables in namespaces]
 
         def restore() -> None:
             for name in set(self._helpers.modules()) - set(modules):
                 self._helpers.forget(name)
-            found, *copies = _copied(own, *kept)
-            builtins.update(found)
-            for variables, fresh, others in zip(namespaces, copies, as_they_are):
-                for name in set(variables) - set(fresh) - set(_NOT_COPIED):
+            restored, *copies = _copied(own, *kept)
+            builtins.update(restored)
+            for variables, values, others in zip(namespaces, copies, uncopied):
+                for name in set(variables) - set(values) - set(_NOT_COPIED):
                     del variables[name]
-                variables.update(fresh)
+                variables.update(values)
                 variables.update(others)
 
         return restore
 
     def close(self) -> None:
-        """Forget the script; it cannot be called after that."""
+        """End its thread and remove its modules; the script cannot be called afterwards."""
         if self._has_thread() and self._thread is not None:
             with contextlib.suppress(ScriptError):
                 self._run("cleanup", self._thread.end)
@@ -253,13 +258,13 @@ class PythonScript(Script):
         self._limit.label = self._labels[phase]
         try:
             result = self._limit.run(function, *arguments)
-        except BaseException as error:  # KeyboardInterrupt, too: whose it is cannot be told
+        except BaseException as error:  # also KeyboardInterrupt, because it may be the script's own
             failed = self._error(phase, error)
         if Forks.count != forks:
             end_copy(self._path)
-        if script_log.Lines.count:  # seldom: asked here, a call less in every phase
+        if script_log.Lines.count:  # rarely true; checked here to save a function call in every phase
             script_log.end_call()
-        if failed is not None:  # not chained: nobody wants the simulator's own frames, nor keeps the script's alive
+        if failed is not None:  # raised here and not chained, so that it does not keep the script's frames alive
             raise failed
         return result
 
@@ -268,13 +273,13 @@ class PythonScript(Script):
     def _require(self, name: str) -> Api:
         if name in PLUGINS:
             raise UnknownName(not_there("", name, ()))
-        if name not in self._found:
-            raise UnknownName(f"there is no module '{name}'; {near_names(str(name), self._found)}")
-        return self._found[name]
+        if name not in self._api:
+            raise UnknownName(f"there is no module '{name}'; {near_names(str(name), self._api)}")
+        return self._api[name]
 
     def _error(self, phase: str, error: BaseException) -> ScriptError:
         if self._limit.struck:
-            while isinstance(error.__context__, ScriptStopped):  # struck once more, in a handler
+            while isinstance(error.__context__, ScriptStopped):  # raised again, in a handler
                 error = error.__context__
             return ScriptError(phase, *self._place(error), str(self._limit))
         kind = "an exception"
@@ -286,7 +291,7 @@ class PythonScript(Script):
         return ScriptError(phase, path, line, message)
 
     def _format_error(self, error: BaseException) -> tuple[tuple[str, int], str]:
-        """Return place and message of an exception; a class of the script's own may raise here, or never return."""
+        """Return place and message of an exception. A method of the script's own exception class may raise or hang."""
         if isinstance(error, SyntaxError) and error.filename in self._helpers.files:
             return (str(error.filename), error.lineno or 0), f"SyntaxError: {error.msg}"
         place = self._place(error)
@@ -297,23 +302,23 @@ class PythonScript(Script):
         return place, mistake(error, self._modules.values()) or (f"{name}: {text}" if text else name)
 
     def _place(self, error: BaseException) -> tuple[str, int]:
-        """Return file and line, in the script or a module beside it, where an exception was raised."""
+        """Return file and line, in the script or a helper module, where an exception was raised."""
         frames = ((frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__))
         return ([(self._path, 0)] + [place for place in frames if place[0] in self._helpers.files])[-1]
 
 
-@functools.lru_cache(maxsize=32)  # the same few scripts fly again and again, in forks of this process, too
+@functools.lru_cache(maxsize=32)  # the same few scripts fly many times, also in forks of this process
 def _compiled(source: bytes, path: str) -> CodeType:
-    return compile(_let_stopped_pass(ast.parse(source, path)), path, "exec", dont_inherit=True)
+    return compile(_reraise_stopped(ast.parse(source, path)), path, "exec", dont_inherit=True)
 
 
 def _compiled_text(text: str, mode: str) -> CodeType:
     tree = ast.parse(text, "(text)", mode)
-    return compile(_let_stopped_pass(tree), "(text)", mode, dont_inherit=True)
+    return compile(_reraise_stopped(tree), "(text)", mode, dont_inherit=True)
 
 
 def _copied(*namespaces: Mapping[str, Any]) -> list[dict[str, Any]]:
-    memo: dict[int, Any] = {}  # one for all: what is shared stays shared
+    memo: dict[int, Any] = {}  # shared, so that objects in several namespaces stay shared
     return [
         {name: _copy(value, memo) for name, value in variables.items() if name not in _NOT_COPIED}
         for variables in namespaces
@@ -321,24 +326,26 @@ def _copied(*namespaces: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _copy(value: Any, memo: dict[int, Any]) -> Any:
-    if isinstance(value, Variables):  # attribute by attribute: one that cannot be copied spoils no other
-        if id(value) in memo:  # it is among its own attributes
+    if isinstance(
+        value, Variables
+    ):  # attribute by attribute, so that one that cannot be copied does not matter for the rest
+        if id(value) in memo:  # it is one of its own attributes
             return memo[id(value)]
-        made = memo[id(value)] = Variables()
-        made.__dict__.update({name: _copy(one, memo) for name, one in vars(value).items()})
-        return made
+        variables = memo[id(value)] = Variables()
+        variables.__dict__.update({name: _copy(attribute, memo) for name, attribute in vars(value).items()})
+        return variables
     if isinstance(value, Api):
         return value
     try:
         return copy.deepcopy(value, memo)
-    except Exception:  # whatever a class of the script's raises when it is copied
+    except Exception:  # any exception that a class of the script raises when it is copied
         return value
 
 
 def _waiting(api: Api, turns: Turns, called: Callable[[Call], Any]) -> Api:
-    """Return a module whose functions leave the script's thread as long as they have to wait.
+    """Return a module whose functions switch from the script's thread to the simulation as long as they have to wait.
 
-    `called` calls what they ask of the script meanwhile.
+    `called` calls functions of the script for them.
     """
     name, functions, constants = contents(api)
 
@@ -349,8 +356,8 @@ def _waiting(api: Api, turns: Turns, called: Callable[[Call], Any]) -> Api:
 
         return call
 
-    that_wait = {key: waiting(one, f"{name}.{key}") for key, one in functions.items() if waits(one)}
-    return Api(name, {**functions, **that_wait}, constants) if that_wait else api
+    wrapped = {key: waiting(function, f"{name}.{key}") for key, function in functions.items() if waits(function)}
+    return Api(name, {**functions, **wrapped}, constants) if wrapped else api
 
 
 def _print(*values: Any, sep: str = " ", file: Any = None, **options: Any) -> None:
@@ -360,8 +367,8 @@ def _print(*values: Any, sep: str = " ", file: Any = None, **options: Any) -> No
         say((sep if sep is not None else " ").join(map(shown, values)))
 
 
-def _let_stopped_pass(tree: ast.AST) -> Any:
-    """Let no handler of the script catch ScriptStopped: `while True: try: ... except: pass` has to end, too."""
+def _reraise_stopped(tree: ast.AST) -> Any:
+    """Let every `try` re-raise ScriptStopped, so that also `while True: try: ... except: pass` ends."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Try) and node.handlers:
             name = ast.Name(id=_STOPPED, ctx=ast.Load())

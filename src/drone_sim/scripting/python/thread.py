@@ -1,6 +1,6 @@
-"""The thread of a Python child script: a greenlet, a function that can be left and gone on with later.
+"""Thread of a Python child script: a greenlet, that is, a function that can be suspended and resumed.
 
-It runs in the simulation's own thread, under the script's time limit, as every other function of the script.
+It runs in the simulation's own thread, within the script's time limit, like every other function of the script.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.python.tracing import LineTracer
 from drone_sim.scripting.time_limit import ScriptStopped
 
-_abandoned: list[greenlet.greenlet] = []  # that would not end: kept, or Python would run them once more to free them
+_abandoned: list[greenlet.greenlet] = []  # that did not end; referenced, because Python resumes them to free them
 
 
 class PythonThread:
-    """A thread that takes turns with the simulation."""
+    """A thread that runs in turns with the simulation."""
 
     def __init__(self, turns: Turns):
-        """`turns` decide when it is left; it has not begun."""
+        """Create it; `turns` decide when it is suspended. `take_turn` starts it."""
         self._turns = turns
         self._greenlet: greenlet.greenlet | None = None
         self.has_ended = False
-        self.tracer: LineTracer | None = None  # while there are breakpoints
-        turns.leave = self._leave
+        self.tracer: LineTracer | None = None  # set while there are breakpoints
+        turns.leave = self._suspend
 
     def counted(self, api: Api) -> Api:
-        """Return a module of the API that counts what the thread calls."""
+        """Return a module of the API that counts the thread's calls."""
         name, functions, constants = contents(api)
-        return Api(name, {key: self._counted(one) for key, one in functions.items()}, constants)
+        return Api(name, {key: self._counted(function) for key, function in functions.items()}, constants)
 
     def _counted(self, function: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(function)
@@ -45,9 +45,9 @@ class PythonThread:
         return call
 
     def take_turn(self, function: Callable[[], Any]) -> None:
-        """Begin a function, or go on with it, until it is left or has ended. Raises what it raises."""
+        """Start or resume `function` until it is suspended or has ended. Raises its exceptions."""
         if self._greenlet is None:
-            self._greenlet = greenlet.greenlet(lambda: self._begin(function))
+            self._greenlet = greenlet.greenlet(lambda: self._start(function))
         self._turns.begin()
         self._greenlet.parent = greenlet.getcurrent()
         try:
@@ -55,21 +55,21 @@ class PythonThread:
         finally:
             self.has_ended = self._greenlet.dead
 
-    def _begin(self, function: Callable[[], Any]) -> Any:
+    def _start(self, function: Callable[[], Any]) -> Any:
         if self.tracer is not None:
             self.tracer.resume()
         return function()
 
-    def _leave(self) -> bool:
+    def _suspend(self) -> bool:
         if greenlet.getcurrent() is not self._greenlet or self._greenlet.parent is None:
             return False
         self._greenlet.parent.switch()
-        if self.tracer is not None:  # Python keeps for each greenlet whether it is traced
+        if self.tracer is not None:  # tracing is switched on or off for each greenlet
             self.tracer.resume()
         return True
 
     def end(self) -> None:
-        """End it where it is: its `finally` runs, and no handler of the script sees why."""
+        """Raise ScriptStopped in it: its `finally` blocks run, but no `except` of the script catches this."""
         self.has_ended = True
         if self._greenlet is None or self._greenlet.dead:
             return

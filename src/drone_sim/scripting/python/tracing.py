@@ -1,4 +1,4 @@
-"""Breakpoints of Python scripts: Python calls a trace function for each of their lines, while there are any."""
+"""Breakpoints of Python scripts, by a trace function that Python calls for each line."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 from drone_sim.scripting.breakpoints import Breakpoints
 from drone_sim.scripting.python.inspection import variables_at
 
-_set_trace, _get_trace = sys.settrace, sys.gettrace  # before process.py keeps them from scripts
+_set_trace, _get_trace = sys.settrace, sys.gettrace  # before process.py replaces them
 
 
 class LineTracer:
-    """Looks which lines of files with breakpoints are reached."""
+    """Detects reached breakpoints."""
 
     def __init__(self, breakpoints: Breakpoints):
-        """Take the breakpoints, which may change."""
+        """`breakpoints` may change later."""
         self._breakpoints = breakpoints
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a function, and look at the lines of all that it calls. Raises what it raises."""
+        """Call a function, and trace it with all functions that it calls. Raises its exceptions."""
         before = _get_trace()
         _set_trace(self._on_call)
         try:
@@ -30,8 +30,8 @@ class LineTracer:
             _set_trace(before)
 
     def resume(self) -> None:
-        """Look at the lines of a thread that goes on now, or begins: to be called in its greenlet."""
-        _set_trace(None)  # as of 3.13, only what runs when tracing begins is traced, and the thread did not
+        """Trace a thread that starts or resumes; to be called in its greenlet."""
+        _set_trace(None)  # since 3.13, only frames that run when tracing is switched on are traced
         _set_trace(self._on_call)
         frame: FrameType | None = sys._getframe()
         while frame is not None:
