@@ -8,7 +8,7 @@ import pytest
 
 from drone_sim.scripting.lua import thread as lua_thread
 from drone_sim.scripting.lua.functions import lua_function
-from drone_sim.scripting.lua.thread import LeftBehind, LuaThread
+from drone_sim.scripting.lua.thread import Abandoned, LuaThread
 from drone_sim.scripting.time_limit import TimeLimit
 
 
@@ -62,13 +62,13 @@ def test_who_hangs_is_left_behind_and_finds_the_api_closed(thread):
         spin(wake)
         outcomes.append(api(0))
 
-    before = lua_thread.left_behind()
-    with pytest.raises(LeftBehind):
+    before = lua_thread.count_abandoned()
+    with pytest.raises(Abandoned):
         thread.run(script)
-    assert lua_thread.left_behind() == before + 1
-    with pytest.raises(LeftBehind):
+    assert lua_thread.count_abandoned() == before + 1
+    with pytest.raises(Abandoned):
         thread.run(lambda: None)
     wake.set()
     thread._thread.join(20)
     assert outcomes == [(1, None), (0, b"stopped")] and called == [1]
-    assert lua_thread.left_behind() == before
+    assert lua_thread.count_abandoned() == before

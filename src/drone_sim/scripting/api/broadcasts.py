@@ -1,4 +1,4 @@
-"""Data on their way from script to script without wires, as V-REP 3.x has them."""
+"""Wireless data between scripts, as in V-REP 3.x."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from drone_sim.scripting.api.script_values import MOST_BYTES
 from drone_sim.scripting.api.types import Text
 
-_MOST = 10_000  # that wait
+_MOST = 10_000  # waiting broadcasts
 
 
 @dataclass(frozen=True)
 class Broadcast:
-    """Data on their way: from a script to one, or to sim.handle_all, _tree or _chain, until a time in s."""
+    """Data from a script to another, or to sim.handle_all, _tree or _chain, which can be received until a time in s."""
 
     sender: int
     target: int
@@ -23,37 +23,37 @@ class Broadcast:
     data: Text
     antenna: int
     radius: float  # m
-    angles: tuple[float, float]  # rad, up and down, and to both sides
+    angles: tuple[float, float]  # rad, vertical and horizontal
     until: float
     received_by: set[int] = field(default_factory=set)
 
 
 class Broadcasts:
-    """What has been sent and may still be received."""
+    """The broadcasts that can still be received."""
 
     def __init__(self) -> None:
-        """Start with nothing."""
+        """Create it without broadcasts."""
         self.sent: list[Broadcast] = []
 
     def clear(self) -> None:
-        """Forget all, as at the beginning of a run."""
+        """Remove all, as at the beginning of a run."""
         self.sent = []
 
     def send(self, broadcast: Broadcast) -> None:
-        """Send data; raises ValueError for more than may wait."""
-        if len(self.sent) >= _MOST or sum(len(one.data) for one in (broadcast, *self.sent)) > MOST_BYTES:
+        """Send data. Raises ValueError if too many are waiting."""
+        if len(self.sent) >= _MOST or sum(len(item.data) for item in (broadcast, *self.sent)) > MOST_BYTES:
             raise ValueError(
                 f"more than {_MOST} messages or {MOST_BYTES} bytes are waiting: let them persist for a shorter time"
             )
         self.sent.append(broadcast)
 
     def waiting(self, time: float) -> list[Broadcast]:
-        """Return what may be received at a simulated time, the oldest first; forget the rest."""
-        self.sent = [one for one in self.sent if time <= one.until]
+        """Return the broadcasts that can be received at a simulated time, oldest first; remove the others."""
+        self.sent = [broadcast for broadcast in self.sent if time <= broadcast.until]
         return self.sent
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings back what waits now."""
+        """Return a function that restores the present broadcasts."""
         kept = copy.deepcopy(self.sent)
 
         def restore() -> None:

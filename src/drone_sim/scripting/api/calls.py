@@ -1,14 +1,14 @@
-"""The functions of the script API: how one is declared, and how calls reach it.
+"""Declaration of the script API's functions, and error messages for calls of them.
 
-A function is declared where it is written, once for Lua, Python, the remote API and docs/api.md, by what its module is
-called and by which generations of V-REP have it under which names:
+A decorator declares a function once for Lua, Python, the remote API and docs/api.md, with the name of its module, and
+its names in each generation of V-REP:
 
     @sim("5", getInt32Parameter="34")
     def getInt32Param(self, parameter: int) -> int:
         ...
 
-Error messages name the expected arguments by their annotations; docs/api.md shows the docstring, in a section for each
-class.
+Error messages name the expected arguments by their annotations. docs/api.md has a section for each class and shows the
+docstrings.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _FLAT = {
     "simROS": "simExtRosInterface_",
     "simUI": "simExtCustomUI_",
     "simVision": "simExtVision_",
-}  # what names of 3.x begin with
+}  # prefixes of V-REP 3.x names
 _MISTAKES = (TypeError, ValueError, KeyError, IndexError, AttributeError, OverflowError)
 _SHOWN = 60  # characters of a value
 _MOST = 13  # values
@@ -41,10 +41,10 @@ _LONGEST = 1000  # characters of an error's message
 
 @dataclass(frozen=True)
 class Declaration:
-    """What a function is in the API.
+    """Module and names of a function in the API.
 
-    names: what scripts call it, its own name first, and for each the generations of V-REP that have it: 3 for 3.x, 4
-    for 4.0 to 4.2, 5 for 4.3 and later, such as "45"; '' if only drone_sim has it.
+    names: its names for scripts, its own name first, each with the generations of V-REP that have it: 3 for 3.x, 4 for
+    4.0 to 4.2, 5 for 4.3 and later, such as "45"; '' if only drone_sim has it.
     """
 
     module: str
@@ -52,14 +52,14 @@ class Declaration:
 
 
 class Module:
-    """Declares the functions of one module of the API, which hold a Declaration from then on."""
+    """Decorator factory that declares functions of one API module, by an attribute `declaration`."""
 
     def __init__(self, name: str):
-        """`name`: what scripts call it."""
+        """`name` is the module's name for scripts."""
         self._name = name
 
     def __call__(self, generations: str = "345", **others: str) -> Callable[[_Method], _Method]:
-        """Declare a function by the generations that have it under its own name, and under which others."""
+        """Return a decorator. `generations` have the function's own name; `others` are other names and generations."""
 
         def declare(function: _Method) -> _Method:
             names = {function.__name__: generations, **others}
@@ -69,7 +69,7 @@ class Module:
         return declare
 
     def add(self, to: type, function: Function, name: str, doc: str, generations: str = "345", **others: str) -> None:
-        """Declare a function that was made, not written, as a method of a class: its name, docstring, and names."""
+        """Declare a generated function and add it to the class `to`, with a name and docstring."""
         function.__name__, function.__qualname__, function.__doc__ = name, f"{to.__name__}.{name}", doc
         setattr(to, name, self(generations, **others)(function))
 
@@ -78,7 +78,7 @@ sim, simROS = Module("sim"), Module("simROS")
 
 
 def declaration_of(function: Function) -> Declaration | None:
-    """Return how a function was declared, None where it was not."""
+    """Return the declaration of a function, None if it has none."""
     return getattr(function, "declaration", None)
 
 
@@ -92,7 +92,7 @@ def methods_of(kind: type) -> Iterator[tuple[Function, str, list[str]]]:
 
 
 def functions_of(*parts: object) -> dict[str, Function]:
-    """Return the functions that were declared in the classes of some objects, under each of their names."""
+    """Return the declared methods of some objects, under each of their names."""
     found: dict[str, Function] = {}
     for part in parts:
         for attribute, names in _declared_in(type(part)):  # type: ignore[arg-type] # a class has a hash
@@ -102,22 +102,22 @@ def functions_of(*parts: object) -> dict[str, Function]:
 
 @functools.cache
 def _declared_in(kind: type) -> list[tuple[str, Mapping[str, str]]]:
-    """Return the methods of a class that were declared, each with the names that it has in the API."""
+    """Return the declared methods of a class, each with its names in the API."""
     declared = ((attribute, declaration_of(getattr(kind, attribute))) for attribute in dir(kind))
     return [(attribute, declaration.names) for attribute, declaration in declared if declaration is not None]
 
 
 def flat_name(module: str, name: str) -> str:
-    """Return what a function of a module is called in 3.x: simGetObjectPosition, simExtRosInterface_publish."""
+    """Return the V-REP 3.x name of a function: simGetObjectPosition, simExtRosInterface_publish."""
     return _FLAT.get(module, f"{module}_") + (f"{name[:1].upper()}{name[1:]}" if module == "sim" else name)
 
 
 class UnknownName(AttributeError):
-    """A script asked for a function or constant that the API does not have."""
+    """Access to a function or constant that the API does not have."""
 
 
 class Api:
-    """The functions and constants of one module, such as `sim`, as the attributes that a Python script uses."""
+    """A module such as `sim`, with its functions and constants as attributes for Python scripts."""
 
     def __init__(
         self,
@@ -126,58 +126,60 @@ class Api:
         constants: Mapping[str, Any],
         save_state: Callable[[], Callable[[], None]] | None = None,
     ):
-        """`name`: what scripts call it; `functions` and `constants`: what it has.
+        """`name` is its name for scripts.
 
-        `save_state` returns a function that restores the values which a script has set, and which are stored only here.
+        `save_state` returns a function that restores the values that a script has set, if they are stored only here.
         """
         self.__dict__.update(constants)
         self.__dict__.update(functions)
-        # Kept out of sight: whatever else is an attribute is the script's to use.
+        # In a single attribute, because scripts may use all other names.
         self.__dict__["_api"] = (name, dict(functions), dict(constants), save_state)
 
     def __getattr__(self, name: str) -> Any:
-        """Raise UnknownName, with the near names; called for what is not there."""
+        """Raise UnknownName with similar names; Python calls this for missing attributes."""
         own, functions, constants, _ = self.__dict__["_api"]
         raise UnknownName(not_there(f"{own}.", name, [*functions, *constants]))
 
 
 def contents(api: Api) -> tuple[str, dict[str, Function], dict[str, Any]]:
-    """Return name, functions and constants of an API."""
+    """Return name, functions and constants of an API module."""
     name, functions, constants, _ = api.__dict__["_api"]
     return name, functions, constants
 
 
 def save_state(apis: Iterable[Api]) -> list[Callable[[], None]]:
-    """Return functions that bring back what a script has set in its APIs."""
-    saving = (api.__dict__["_api"][3] for api in apis)
-    return [one() for one in saving if one is not None]
+    """Return functions that restore the values that a script has set in its API modules."""
+    functions = (api.__dict__["_api"][3] for api in apis)
+    return [function() for function in functions if function is not None]
 
 
 def mistake(error: BaseException, apis: Iterable[Api]) -> str | None:
-    """Return one line on an error that a call of an API raised in a Python script; None for any other error.
+    """Return a one-line message for an error raised by an API call in a Python script; None for any other error.
 
-    Looked up afterwards, in the traceback: a guard around every function would cost every call.
+    The call is found in the traceback, because a wrapper around every function would slow every call down.
     """
     if not isinstance(error, _MISTAKES):
         return None
-    if (line := getattr(error, "explained", None)) is not None:  # where the function was called, in another process
+    if (line := getattr(error, "explained", None)) is not None:  # the message from the simulation's process
         return str(line)
-    functions = [(f"{contents(api)[0]}.{known}", one) for api in apis for known, one in contents(api)[1].items()]
-    by_code = {one.__code__: (name, one) for name, one in reversed(functions)}
+    functions = [
+        (f"{contents(api)[0]}.{name}", function) for api in apis for name, function in contents(api)[1].items()
+    ]
+    by_code = {function.__code__: (name, function) for name, function in reversed(functions)}
     for frame, _ in traceback.walk_tb(error.__traceback__):
         if frame.f_code in by_code:
             name, function = by_code[frame.f_code]
             parameters = inspect.signature(function).parameters.values()
-            given = [frame.f_locals[one.name] for one in parameters if one.kind is not one.VAR_POSITIONAL]
-            return explain(name, function, given, error)
+            arguments = [frame.f_locals[each.name] for each in parameters if each.kind is not each.VAR_POSITIONAL]
+            return explain(name, function, arguments, error)
     for name, function in functions:
-        if str(error).startswith(f"{function.__qualname__}() "):  # never got inside
+        if str(error).startswith(f"{function.__qualname__}() "):  # raised by the call itself
             return f"{name}: wrong number of values, expected ({_expected(inspect.signature(function))})"
     return None
 
 
 def explain(name: str, function: Function, arguments: Sequence[Any], error: Exception) -> str:
-    """Return one line: what is wrong, what came, what is expected."""
+    """Return a one-line message: what is wrong, the arguments, the expected ones."""
     if isinstance(error, ValueError):
         return f"{name}: {str(error)[:_LONGEST]}"
     signature = inspect.signature(function)
@@ -186,18 +188,18 @@ def explain(name: str, function: Function, arguments: Sequence[Any], error: Exce
         reason = str(error) if isinstance(error, WrongValue) else "wrong kind of value"
     except TypeError:
         reason = "wrong number of values"
-    came = ", ".join(show(value) for value in arguments[:_MOST])
-    return f"{name}: {reason}: got ({came}), expected ({_expected(signature)})"
+    shown = ", ".join(show(value) for value in arguments[:_MOST])
+    return f"{name}: {reason}: got ({shown}), expected ({_expected(signature)})"
 
 
 def most_values(function: Function) -> int:
-    """Return how many values a function takes at most."""
-    kinds = [one.kind for one in inspect.signature(function).parameters.values()]
+    """Return the largest number of arguments of a function."""
+    kinds = [parameter.kind for parameter in inspect.signature(function).parameters.values()]
     return sys.maxsize if inspect.Parameter.VAR_POSITIONAL in kinds else len(kinds)
 
 
 def _expected(signature: inspect.Signature) -> str:
-    """Return 'handle: Handle, relativeTo: Handle = -1'."""
+    """Return the parameters as text: 'handle: Handle, relativeTo: Handle = -1'."""
     shown = []
     for parameter in signature.parameters.values():
         text = f"{parameter.name}: {parameter.annotation}"
@@ -208,7 +210,7 @@ def _expected(signature: inspect.Signature) -> str:
 
 
 def show(value: Any, depth: int = 0) -> str:
-    """Return a value as a message shows it: short, on one line, whatever it is."""
+    """Return any value as short text on one line, for messages."""
     try:
         text = _shown(value, depth)
     except Exception:

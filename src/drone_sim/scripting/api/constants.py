@@ -1,15 +1,15 @@
-"""CoppeliaSim's constants, with its values (simConst.h of 3.6, 4.2 and 4.9), as far as scripts of drones use them.
+"""CoppeliaSim's constants that scripts of drones use, with its values (simConst.h of 3.6, 4.2 and 4.9).
 
-`sim.particle_cyclic` in 4.x, `sim_particle_cyclic` in 3.x. Where the three disagree, as on syscb_..., the values are
-those of 4.x. And the flags that scripts add to handles.
+A constant is `sim.particle_cyclic` in 4.x and `sim_particle_cyclic` in 3.x. If the three versions differ, as for
+syscb_..., the values are those of 4.x. Also, functions for the flags that scripts add to handles.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-# What each name begins with, and how the names go on; the number of one without a number is, as in a C enum, that of
-# the one before and 1, of the first 0.
+# Lines of a prefix and suffixes of names. A name without a number has, as in a C enum, the number after the previous
+# one, or 0 if it is the first.
 _TABLE = """\
 # what stands for a handle, and what is added to one
 handle all=-2 all_except_explicit=-3 self=-4 main_script=-5 tree=-6 single=-8 default=-9 all_except_self=-10
@@ -171,7 +171,7 @@ childscriptcall initialization=2 actuation=6 sensing cleanup=1 threaded=27
 
 
 def _numbered(table: str) -> Iterator[tuple[str, int]]:
-    """Yield names and numbers."""
+    """Yield the names of constants and their numbers."""
     beginning, last = "", -1
     for line in table.splitlines():
         if line.startswith("#"):
@@ -186,10 +186,10 @@ def _numbered(table: str) -> Iterator[tuple[str, int]]:
 
 CONSTANTS = dict(_numbered(_TABLE))
 PHASES = ("init", "actuation", "sensing", "cleanup")
-# Of sim_call_type, by phase.
+# Values of sim_call_type by phase.
 CALL_TYPES = {phase: CONSTANTS[f"syscb_{phase}"] for phase in PHASES} | {"thread": CONSTANTS["syscb_threadmain"]}
 
-AXIS = GREYSCALE = CODED = CONSTANTS["handleflag_axis"]  # the same bit, which each function understands in its own way
+AXIS = GREYSCALE = CODED = CONSTANTS["handleflag_axis"]  # the same bit, with a different meaning in each function
 BASE, WXYZ = CONSTANTS["handleflag_reljointbaseframe"], CONSTANTS["handleflag_wxyzquat"]
 METRES = ABSOLUTE = CONSTANTS["handleflag_depthbuffermeters"]  # ABSOLUTE: handleflag_abscoords
 RESET_FORCE, RESET_TORQUE = CONSTANTS["handleflag_resetforce"], CONSTANTS["handleflag_resettorque"]
@@ -202,5 +202,5 @@ def bare(handle: int) -> int:
 
 
 def has(handle: int, flag: int) -> bool:
-    """Tell whether a flag was added to a handle."""
+    """Return whether a flag was added to a handle."""
     return FIRST_FLAG <= handle < _BEYOND_FLAGS and bool(int(handle) & flag)

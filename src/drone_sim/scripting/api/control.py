@@ -1,4 +1,4 @@
-"""Whether the simulation goes on, and whose turn it is: a script's thread, or the simulation."""
+"""Control of the simulation by scripts: stop and pause, waits, and turns of threads."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.types import WrongValue
 
 STOP, PAUSE = "stop", "pause"
-CALLS_PER_MS = 100  # of the API, that stand for a millisecond of V-REP's
+CALLS_PER_MS = 100  # calls of the API that count as a millisecond in V-REP
 DEFAULT_MS = 2.0
 SHORTEST_MS, LONGEST_MS = 2.0, 200.0
-_SOON = 1e-9  # s: sums of steps are not exact
+_TOLERANCE = 1e-9  # s, because sums of steps are not exact
 
 NO_THREAD = "only in a thread: in sysCall_thread, sysCall_threadmain, or a coroutine"
 
 
 class Control:
-    """Requests of scripts to stop or pause, shared by all; the Player reads `asked` after each step."""
+    """Requests of scripts to stop or pause the simulation; the Player reads `asked` after each step."""
 
     def __init__(self) -> None:
-        """Begin with nothing asked for."""
+        """Create it without requests."""
         self.clear()
 
     def clear(self) -> None:
-        """Have nothing asked for, as at the beginning of a run."""
-        self.asked = ""  # STOP, PAUSE or nothing
+        """Remove all requests, as at the beginning of a run."""
+        self.asked = ""  # STOP, PAUSE or ''
         self.is_stopping = False  # while threads have their last turns
         self.is_ending = False  # while cleanup is called
 
     @property
     def is_exit_requested(self) -> bool:
-        """Whether the simulation ends, and threads should."""
+        """Whether the simulation is ending, so that threads should end."""
         return self.is_stopping or self.is_ending
 
     def state(self, time: float) -> int:
@@ -44,23 +44,24 @@ class Control:
         return CONSTANTS["simulation_advancing_running" if time > 0 else "simulation_advancing_firstafterstop"]
 
     def take(self) -> str:
-        """Return what was asked for, and forget it."""
+        """Return the request, and remove it."""
         asked, self.asked = self.asked, ""
         return asked
 
 
 class Call(NamedTuple):
-    """A call of one of the script's own functions: by name, itself, or in Lua its number."""
+    """A call of one of the script's own functions, which is given by name, as itself, or (Lua) by its number."""
 
     callback: Any
     arguments: list[Any]
 
 
-Steps = Generator[Call | None, Any, None]  # yields None once a step, and what is to be called, whose answer is sent in
+# Yields None once in each step, and calls to make, whose results are sent to it.
+Steps = Generator[Call | None, Any, None]
 
 
 class Wait:
-    """What a function of the API waits for, the same for threads of either language and for clients outside."""
+    """The wait of an API function, for threads in either language and for remote clients."""
 
     def __init__(
         self,
@@ -69,10 +70,10 @@ class Wait:
         given_up: Callable[[], bool] = lambda: False,
         by_steps: bool = True,
     ):
-        """`over` tells whether the wait has ended; `value` then gives the return value of the API function.
+        """`over` returns whether the wait has ended; then `value` returns the result of the API function.
 
-        `given_up` tells, after each step of waiting, whether a thread goes on although the wait has not ended;
-        `by_steps`: whether the wait can end only through steps of the simulation.
+        `given_up` returns, after each step, whether a thread continues although the wait has not ended.
+        `by_steps`: whether the wait can only end by steps of the simulation.
         """
         self.over = over
         self.value = value
@@ -80,7 +81,7 @@ class Wait:
         self._given_up = given_up
 
     def __iter__(self) -> Steps:
-        """Yield once a step as long as a thread has to wait."""
+        """Yield once in each step as long as a thread has to wait."""
         while not self.over():
             yield None
             if self._given_up():
@@ -88,10 +89,10 @@ class Wait:
 
 
 class Action(Wait):
-    """Work of an API function that takes several steps; a thread waits until it has ended."""
+    """The work of an API function in several steps, for which a thread waits."""
 
     def __init__(self, steps: Steps, value: Callable[[], Any]):
-        """`steps` does the work; `value` then gives the return value of the API function."""
+        """`steps` does the work; then `value` returns the result of the API function."""
         super().__init__(lambda: False, value)
         self._steps = steps
 
@@ -101,51 +102,52 @@ class Action(Wait):
 
 
 def has_passed(clock: Callable[[], float], seconds: float) -> Callable[[], bool]:
-    """Return a function that tells whether so many seconds of a clock have passed since this call."""
-    end = clock() + seconds - _SOON
+    """Return a function that returns whether some seconds of a clock have passed since this call."""
+    end = clock() + seconds - _TOLERANCE
     return lambda: clock() >= end
 
 
 def waits(function: Callable[..., Any]) -> bool:
-    """Tell whether a function of the API returns what is to be waited for."""
+    """Return whether an API function returns a Wait."""
     return function.__annotations__.get("return") == Wait.__name__
 
 
 class NoThread(ValueError):
-    """A script calls a function that has to wait, but not in a thread; one line that names the function."""
+    """Call of a function that has to wait outside of a thread; the message names the function."""
 
 
 class Turns:
-    """Decides when the thread of a Python script is switched."""
+    """Switching between the thread of a Python script and the simulation."""
 
     def __init__(self) -> None:
-        """Begin with V-REP's default timing, and no thread."""
-        self.leave: Callable[[], bool] = lambda: False  # leaves the thread, if it runs; returns in the next step
+        """Create it with V-REP's default timing, and without a thread."""
+        # Suspends the thread until the next step; returns False if it does not run.
+        self.leave: Callable[[], bool] = lambda: False
         self._forbidden = 0
         self._called = 0
         self._most = int(DEFAULT_MS * CALLS_PER_MS)
 
     def begin(self) -> None:
-        """Begin a turn."""
+        """Start a turn."""
         self._called = 0
 
     def wait_for(self, wait: Wait, function: str, call: Callable[[Call], Any]) -> Any:
-        """Leave the thread as long as a function has to wait; return the function's value. Raises NoThread.
+        """Suspend the thread as long as a function has to wait; return the function's result. Raises NoThread.
 
-        `call` carries out each Call of the script's own functions that the wait needs.
+        `call` executes calls of the script's own functions for the wait.
         """
         steps, answer = iter(wait), None
         while True:
             try:
-                asked = steps.send(answer)
+                request = steps.send(answer)
             except StopIteration:
                 return wait.value()
-            answer = call(asked) if asked else None
-            if not asked and not self.leave():
+            answer = call(request) if request else None
+            if not request and not self.leave():
                 raise NoThread(f"{function}: {NO_THREAD}")
 
     def count(self) -> None:
-        """Count a call of the API in a thread; leave it where it has had its turn."""
+        """Count an API call in the thread; suspend the thread at the end of its turn."""
         self._called += 1
         if self._called > self._most and not self._forbidden:
             self.leave()
@@ -153,11 +155,14 @@ class Turns:
 
     @property
     def is_automatic(self) -> bool:
-        """Whether the thread is switched by itself."""
+        """Whether the thread is switched automatically."""
         return not self._forbidden
 
     def set_automatic(self, allowed: bool | int) -> int:
-        """Raise, lower or set the level that forbids automatic switching (0: allowed); return the level from before."""
+        """Raise (False), lower (True) or set the level that forbids automatic switching (0: allowed).
+
+        Return the old one.
+        """
         before = self._forbidden
         if not isinstance(allowed, (bool, int, float)) or not 0 <= allowed < 1e9:
             raise WrongValue("expected true, false, or a level of 0 or more")
@@ -165,5 +170,5 @@ class Turns:
         return before
 
     def set_timing(self, milliseconds: float) -> None:
-        """Let the thread have so many "milliseconds" for a turn."""
+        """Set the length of a turn in "milliseconds" (see CALLS_PER_MS)."""
         self._most = int(min(max(SHORTEST_MS, milliseconds), LONGEST_MS) * CALLS_PER_MS)

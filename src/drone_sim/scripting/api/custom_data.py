@@ -1,4 +1,4 @@
-"""`sim`: custom data, strings and tables under a name that scripts leave on objects, and properties (4.7)."""
+"""`sim`: custom data, that is, strings and tables that scripts store in objects by name, and properties (4.7)."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ _MOST = 10_000  # values of all objects
 _LONGEST_NAME = 200  # characters
 _SCENE, _APP = CONSTANTS["handle_scene"], CONSTANTS["handle_app"]
 _CUSTOM = "customData."
-_PATHS = ("PATH", "PATHCTRLPTS")  # tags of CoppeliaSim's own
+_PATHS = ("PATH", "PATHCTRLPTS")  # tags that CoppeliaSim itself uses
 _PROPERTIES = (_CUSTOM, "signal.")
 _PROPERTY_KINDS = "Bool Int Float String Buffer Table Vector2 Vector3 Quaternion Pose Color FloatArray IntArray Long"
 _GETTERS, _SETTERS = ({f"{verb}{kind}Property": "5" for kind in _PROPERTY_KINDS.split()} for verb in ("get", "set"))
 
 
 class CustomData:
-    """Values by object and name, for the scripts of all vehicles."""
+    """Values by object and name, shared by all scripts."""
 
     def __init__(self) -> None:
-        """Start with none."""
+        """Create it without values."""
         self.values: dict[tuple[int, str], Any] = {}
 
     def clear(self) -> None:
-        """Forget all of them, as at the beginning of a run."""
+        """Remove all values, as at the beginning of a run."""
         self.values.clear()
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings the present values back."""
+        """Return a function that restores the present values."""
         kept = copy.deepcopy(self.values)
 
         def restore() -> None:
@@ -46,7 +46,7 @@ class CustomData:
         return restore
 
     def set(self, handle: int, name: str, value: Any) -> None:
-        """Keep a value, or forget it where it is None or ''. Raises WrongValue, ValueError."""
+        """Store a value, or remove it if `value` is None or ''. Raises WrongValue, ValueError."""
         if not isinstance(name, str):
             raise WrongValue("the name of a value must be a string")
         if len(name) > _LONGEST_NAME:
@@ -57,21 +57,21 @@ class CustomData:
             return
         if (handle, name) not in self.values and len(self.values) >= _MOST:
             raise ValueError(f"at most {_MOST} values are allowed: remove some")
-        size = sum(len(one) for one in self.values.values() if isinstance(one, (str, bytes)))
+        size = sum(len(stored) for stored in self.values.values() if isinstance(stored, (str, bytes)))
         if isinstance(value, (str, bytes)) and size + len(value) > MOST_BYTES:
             raise ValueError(f"all custom data together may have at most {MOST_BYTES} bytes")
         self.values[handle, name] = copy.deepcopy(value)
 
     def names(self, handle: int) -> list[str]:
         """Return the names of an object's values."""
-        return [name for one, name in self.values if one == handle]
+        return [name for owner, name in self.values if owner == handle]
 
 
 class CustomDataFunctions:
     """Custom data: named strings and tables of objects, and properties (4.7)."""
 
     def __init__(self, objects: ObjectTree, data: CustomData):
-        """`data` is what scripts have left on the `objects`."""
+        """`data` are the values stored in the `objects`."""
         self._objects = objects
         self._data = data
 
@@ -89,12 +89,12 @@ class CustomDataFunctions:
 
         A path of the scene has its points under PATH, and under PATHCTRLPTS: 7 doubles each.
         """
-        found = self._data.values.get((self._target(handle), _CUSTOM + tag))
-        return self._path_data(handle) if found is None and tag in _PATHS else found
+        value = self._data.values.get((self._target(handle), _CUSTOM + tag))
+        return self._path_data(handle) if value is None and tag in _PATHS else value
 
     def _path_data(self, handle: int) -> bytes | None:
-        found = self._objects[handle] if handle >= 0 else None
-        return struct.pack(f"<{len(found.table)}d", *found.table) if isinstance(found, Path) else None
+        path = self._objects[handle] if handle >= 0 else None
+        return struct.pack(f"<{len(path.table)}d", *path.table) if isinstance(path, Path) else None
 
     @sim("345", readCustomDataTags="5")
     def readCustomDataBlockTags(self, handle: Handle) -> list[str]:
@@ -130,13 +130,13 @@ class CustomDataFunctions:
     @sim("5", **_SETTERS)
     def setProperty(self, handle: Handle, name: Name, value: Any, _options: Any = None) -> None:
         """Set a property customData.… or signal.… of an object, or of sim.handle_scene."""
-        self._data.set(self._target(handle), _known(name), value)
+        self._data.set(self._target(handle), _checked_name(name), value)
 
     @sim("5", **_GETTERS)
     def getProperty(self, handle: Handle, name: Name, options: Mapping[str, Any] | None = None) -> Any:
         """Return a property customData.… or signal.…; nothing for none with the option noError."""
         target = self._target(handle)
-        if (target, _known(name)) in self._data.values:
+        if (target, _checked_name(name)) in self._data.values:
             return copy.deepcopy(self._data.values[target, name])
         if options and options.get("noError"):
             return None
@@ -144,8 +144,8 @@ class CustomDataFunctions:
 
     @sim("5")
     def removeProperty(self, handle: Handle, name: Name, _options: Any = None) -> None:
-        """Forget a property customData.… or signal.…."""
-        self._data.set(self._target(handle), _known(name), None)
+        """Remove a property customData.… or signal.…."""
+        self._data.set(self._target(handle), _checked_name(name), None)
 
     def _target(self, handle: int) -> int:
         if handle not in (_SCENE, _APP):
@@ -153,8 +153,8 @@ class CustomDataFunctions:
         return int(handle)
 
 
-def _known(name: str) -> str:
-    """Return the name of a property; raises ValueError for one that CoppeliaSim itself has."""
+def _checked_name(name: str) -> str:
+    """Return the name of a property. Raises ValueError for a property of CoppeliaSim itself."""
     if not isinstance(name, str):
         raise WrongValue("the name of a property must be a string")
     if not name.startswith(_PROPERTIES):

@@ -1,4 +1,4 @@
-"""`sim`: distances and collisions between objects, measured when they are asked for."""
+"""`sim`: distances and collisions between objects, measured when a script calls the functions."""
 
 from __future__ import annotations
 
@@ -14,28 +14,29 @@ from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.types import Handle, Number, numbers
 
 _ALL = CONSTANTS["handle_all"]
-_FAR = 1e5  # m, where no threshold is given
+_FAR = 1e5  # m, without a threshold
 
 
 class Nearest(NamedTuple):
-    """The shortest way from one object to another: m, 0 where they overlap; its ends, world frame; both names."""
+    """The shortest line between two objects: length (m, 0 if they overlap), ends (world frame), and both names."""
 
     distance: float
     start: Vector
     end: Vector
     own: str
-    name: str  # '' where scripts know none
+    name: str  # '' if it has none for scripts
 
 
-# Returns the shortest way within so many m from some objects to others, or to any (None). Raises ValueError.
-MeasureWay = Callable[[Sequence[SceneObject], Sequence[SceneObject] | None, float], Nearest | None]
+# Returns the shortest line, up to a length in m, from some objects to others, or to any object (None). Raises
+# ValueError.
+MeasureDistance = Callable[[Sequence[SceneObject], Sequence[SceneObject] | None, float], Nearest | None]
 
 
 class DistanceFunctions:
     """Distances and collisions between objects."""
 
-    def __init__(self, objects: ObjectTree, collections: Collections, nearest: MeasureWay):
-        """`nearest` measures between the `objects`, of which there may be `collections`."""
+    def __init__(self, objects: ObjectTree, collections: Collections, nearest: MeasureDistance):
+        """`nearest` measures distances between `objects`; `collections` consist of them."""
         self._objects = objects
         self._collections = collections
         self._nearest = nearest
@@ -44,17 +45,18 @@ class DistanceFunctions:
     def checkDistance(
         self, entity1: Handle, entity2: Handle = _ALL, threshold: Number = 0.0
     ) -> tuple[int, list[float], list[int]]:
-        """Return whether two entities are nearer than a threshold (m; 0: none), the shortest line, and the objects.
+        """Return whether two entities are closer than a threshold (m; 0: none), the shortest line, and the objects.
 
-        Each is an object or a collection, the second may be sim.handle_all. The way has 7 numbers: both ends (m,
-        world), and its length, 0 where they overlap. A vehicle is one solid; dummies, sensors and targets are points,
-        of a collection the shapes and dummies alone count. Between two meshes that are not convex no way is found.
+        Each entity is an object or a collection; the second may be sim.handle_all. The line has 7 numbers: both ends
+        (m, world), and its length, which is 0 if they overlap. A vehicle is a single solid; dummies, sensors and
+        targets are points. In a collection, only shapes and dummies count. Between two meshes that are not convex, no
+        line is found.
         """
         (limit,) = numbers((threshold,), 1)
-        way = self._way(entity1, entity2, limit if 0 < limit < _FAR else _FAR, ("shape", "dummy"))
-        if way is None:
+        line = self._shortest_line(entity1, entity2, limit if 0 < limit < _FAR else _FAR, ("shape", "dummy"))
+        if line is None:
             return 0, [0.0] * 7, [WORLD, WORLD]
-        return 1, [*way.start, *way.end, way.distance], self._pair(way)
+        return 1, [*line.start, *line.end, line.distance], self._handles(line)
 
     @sim("")
     def checkCollision(self, entity1: Handle, entity2: Handle = _ALL) -> tuple[int, list[int]]:
@@ -62,21 +64,22 @@ class DistanceFunctions:
 
         The second entity may be sim.handle_all.
 
-        What touches, respondable or not, overlaps; so does, unlike in V-REP, what is wholly inside. Points do not.
+        Objects that touch overlap, respondable or not. Unlike in V-REP, an object inside another overlaps. Points do
+        not.
         """
-        way = self._way(entity1, entity2, 0.0, ("shape",))
-        if way is None or way.distance > 0:
+        line = self._shortest_line(entity1, entity2, 0.0, ("shape",))
+        if line is None or line.distance > 0:
             return 0, [WORLD, WORLD]
-        return 1, self._pair(way)
+        return 1, self._handles(line)
 
-    def _way(self, entity1: int, entity2: int, reach: float, kinds: Collection[str]) -> Nearest | None:
+    def _shortest_line(self, entity1: int, entity2: int, limit: float, kinds: Collection[str]) -> Nearest | None:
         others = None if entity2 == _ALL else self._entity(entity2, kinds)
-        return self._nearest(self._entity(entity1, kinds), others, reach)
+        return self._nearest(self._entity(entity1, kinds), others, limit)
 
     def _entity(self, handle: int, kinds: Collection[str]) -> list[SceneObject]:
-        """Return an object, or those of a collection that are of some kinds."""
-        found = [self._objects[one] for one in members(handle, self._objects, self._collections)]
-        return [one for one in found if one.kind in kinds] if handle in self._collections else found
+        """Return an object, or the objects of some kinds in a collection."""
+        found = [self._objects[member] for member in members(handle, self._objects, self._collections)]
+        return [item for item in found if item.kind in kinds] if handle in self._collections else found
 
-    def _pair(self, way: Nearest) -> list[int]:
-        return [self._objects.handle(name) if name in self._objects else WORLD for name in (way.own, way.name)]
+    def _handles(self, line: Nearest) -> list[int]:
+        return [self._objects.handle(name) if name in self._objects else WORLD for name in (line.own, line.name)]

@@ -1,7 +1,7 @@
-"""`sim`: what the dynamics know of an object, and parameters of objects: getObjectInt32Param and the others.
+"""`sim`: dynamics of objects, and parameters of objects (getObjectInt32Param and others).
 
-A motor that is switched on without control runs at the target velocity, with control it goes to the target position, as
-V-REP 3.x has it.
+As in V-REP 3.x, a motor that is on runs at the target velocity without control, and to the target position with
+control.
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ Getters = Mapping[str, Callable[[], float]]
 Setters = Mapping[str, Callable[[float], None]]
 _NONE = Inertia((0.0,) * 9, frames.IDENTITY)
 _EVERYTHING = (CONSTANTS["handle_all"], CONSTANTS["handle_scene"])
-_COLOR_CODED = 2  # a render mode: colours are handles
-_WHOLE = ("objintparam_", "shapeintparam_", "jointintparam_", "visionintparam_", "proxintparam_")
+_COLOR_CODED = 2  # render mode in which colours are handles
+_INTEGER = ("objintparam_", "shapeintparam_", "jointintparam_", "visionintparam_", "proxintparam_")
 _FLOAT = ("objfloatparam_", "shapefloatparam_", "jointfloatparam_", "visionfloatparam_")
 
 
 @runtime_checkable
 class Freezable(Protocol):
-    """A shape of the scene that can be made static for a while."""
+    """A shape of the scene, which can be made static or dynamic."""
 
     @property
     def is_static(self) -> bool:
-        """Whether the shape is static: the dynamics does not move it."""
+        """Whether the shape is static, that is, not moved by the dynamics."""
 
     def set_static(self, static: bool) -> None:
-        """Make the shape static, or dynamic again. Raises ValueError."""
+        """Make the shape static or dynamic. Raises ValueError."""
 
 
 def readable(found: SceneObject) -> Getters:
-    """Return what can be read of an object."""
+    """Return getters of an object's parameters by the parameters' names."""
     if isinstance(found, Joint):
         control = found.control
         return {
@@ -72,7 +72,7 @@ def readable(found: SceneObject) -> Getters:
 
 
 def settable(found: SceneObject) -> Setters:
-    """Return what can be set of an object."""
+    """Return setters of an object's parameters by the parameters' names."""
     if isinstance(found, Joint) and found.control.mode != KINEMATIC:
         mode = found.control.mode
         with_control = POSITION if mode == POSITION else VELOCITY
@@ -88,10 +88,10 @@ def settable(found: SceneObject) -> Setters:
 
 @runtime_checkable
 class Massive(Protocol):
-    """A shape of the scene."""
+    """An object that may have a mass."""
 
     def inertia(self) -> Inertia | None:
-        """Return its inertia, None if it has no mass."""
+        """Return its inertia, None without a mass."""
 
 
 class Dynamics(Functions):
@@ -99,12 +99,12 @@ class Dynamics(Functions):
 
     @sim("345")
     def resetDynamicObject(self, handle: Handle) -> None:
-        """Stop the body that carries an object (sim.handle_all: every body): it starts again from rest at its place."""
+        """Stop the body that carries an object (sim.handle_all: every body); it then starts from rest at its place."""
         handles = list(self._objects) if handle in _EVERYTHING else [handle]
-        bodies = {id(one): one for one in map(_carrier, (self._objects[one] for one in handles)) if one is not None}
-        for one in bodies.values():
-            if not getattr(one, "is_held", False):  # those go with what they hang on
-                one.put(one.matrix())
+        carriers = map(_carrier, map(self._objects.__getitem__, handles))
+        for body in {id(body): body for body in carriers if body is not None}.values():
+            if not getattr(body, "is_held", False):  # a body that is held moves with its parent
+                body.put(body.matrix())
 
     @sim("45")
     def isDynamicallyEnabled(self, handle: Handle) -> bool:
@@ -115,7 +115,7 @@ class Dynamics(Functions):
     def getShapeMass(self, handle: Handle) -> float:
         """Return the mass of a shape in kg; 0 if the dynamics does not move it."""
         found = self._objects[handle]
-        return float(getattr(found, "mass", 0.0)) or self._surroundings.masses().get(found.name, 0.0)
+        return float(getattr(found, "mass", 0.0)) or self._services.masses().get(found.name, 0.0)
 
     @sim("345")
     def getShapeMassAndInertia(
@@ -123,7 +123,8 @@ class Dynamics(Functions):
     ) -> tuple[float, list[float], list[float]]:
         """Return a shape's mass (kg), inertia about its center of mass (kg m², 9 numbers), and this center (m) (3.x).
 
-        All in the frame of `transform`, the world's without one. What the dynamics do not move has 0 and nine zeros.
+        They are in the frame of `transform`, or the world frame without one. If the dynamics does not move the shape,
+        mass and inertia are zero.
         """
         inertia = self._inertia(handle) or _NONE
         place = frames.multiply(self._objects[handle].matrix(), inertia.frame)
@@ -136,7 +137,7 @@ class Dynamics(Functions):
     def getShapeInertia(self, handle: Handle) -> tuple[Numbers, TwelveNumbers]:
         """Return a shape's inertia about its center of mass (kg m², 9 numbers), and the frame of these (4.x).
 
-        The frame is a transform in the shape's own. A propeller's shape is without its blades, as its mass is.
+        The frame is a transform in the shape's frame. Inertia and mass of a propeller's shape are without its blades.
         """
         inertia = self._inertia(handle)
         if inertia is None:
@@ -146,9 +147,9 @@ class Dynamics(Functions):
         return list(inertia.tensor), list(inertia.frame)
 
     def _inertia(self, handle: int) -> Inertia | None:
-        """Return the inertia of a shape, None if it has no mass."""
+        """Return the inertia of a shape, None without a mass."""
         found = self._objects[handle]
-        return found.inertia() if isinstance(found, Massive) else self._surroundings.inertias().get(found.name)
+        return found.inertia() if isinstance(found, Massive) else self._services.inertias().get(found.name)
 
     # ---- parameters of objects
 
@@ -156,7 +157,7 @@ class Dynamics(Functions):
     def getObjectInt32Param(self, handle: Handle, parameter: int) -> int:
         """Return a parameter of an object, 0 for an unknown parameter.
 
-        Those of any object are sim.shapeintparam_static (0 or 1), _respondable and sim.objintparam_visibility_layer.
+        All objects have sim.shapeintparam_static (0 or 1), _respondable and sim.objintparam_visibility_layer.
         """
         return self.getObjectInt32Parameter(handle, parameter)[1]
 
@@ -170,7 +171,7 @@ class Dynamics(Functions):
             "objintparam_visibility_layer": lambda: 1,
             **readable(found),
         }
-        value = self._read("getObjectInt32Param", _WHOLE, parameter, known)
+        value = self._read("getObjectInt32Param", _INTEGER, parameter, known)
         return (0, 0) if value is None else (1, int(value))
 
     @sim("5", setObjectInt32Parameter="345", setObjectIntParam="", setObjectIntParameter="3")
@@ -179,13 +180,14 @@ class Dynamics(Functions):
 
         Other parameters are accepted and ignored. Return 1.
         """
-        return self._set("setObjectInt32Param", handle, _WHOLE, parameter, value)
+        return self._set("setObjectInt32Param", handle, _INTEGER, parameter, value)
 
     @sim("5")
     def getObjectFloatParam(self, handle: Handle, parameter: int) -> float:
         """Return sim.shapefloatparam_mass (kg), sim.objfloatparam_abs_x_velocity, _y, _z (m/s) or _rot (rad/s).
 
-        Of the scene's shapes also sim.objfloatparam_objbbox_min_x and others (m, in the shape); 0 for what is unknown.
+        The scene's shapes also have sim.objfloatparam_objbbox_min_x and others (m, in the shape). An unknown parameter
+        is 0.
         """
         return self.getObjectFloatParameter(handle, parameter)[1]
 
@@ -208,7 +210,7 @@ class Dynamics(Functions):
 
     @sim("5", setObjectFloatParameter="345")
     def setObjectFloatParam(self, handle: Handle, parameter: int, value: Number) -> int:
-        """Accept any number among an object's parameters and ignore it; return 1."""
+        """Accept any float parameter of an object and ignore it; return 1."""
         return self._set("setObjectFloatParam", handle, _FLOAT, parameter, value)
 
     def _read(self, function: str, kinds: tuple[str, ...], parameter: int, known: Getters) -> float | None:
@@ -216,33 +218,33 @@ class Dynamics(Functions):
         for name in names:
             if name in known:
                 return known[name]()
-        self._ignored.say(function, f"{names[0]} is not supported: 0 is returned")
+        self._ignored.log(function, f"{names[0]} is not supported: 0 is returned")
         return None
 
     def _corners(self, handle: int) -> Getters:
-        """Return what says where the box around a shape of the scene begins and ends along its own axes."""
-        operations = self._surroundings.operations
+        """Return getters of the corners of the box around a shape of the scene, along the shape's axes."""
+        operations = self._services.operations
         if operations is None:
             return {}
 
-        def corner(axis: int, half: float) -> float:
+        def corner(axis: int, factor: float) -> float:
             size, centre = operations.box(handle)
-            return centre[axis] + half * size[axis]
+            return centre[axis] + factor * size[axis]
 
         ends = {"min": -0.5, "max": 0.5}
         return {
-            f"objfloatparam_objbbox_{end}_{name}": functools.partial(corner, axis, half)
-            for end, half in ends.items()
+            f"objfloatparam_objbbox_{end}_{name}": functools.partial(corner, axis, factor)
+            for end, factor in ends.items()
             for axis, name in enumerate("xyz")
         }
 
     def _factor(self, handle: int) -> float:
-        return self._surroundings.operations.factors(handle)[0] if self._surroundings.operations is not None else 1.0
+        return self._services.operations.factors(handle)[0] if self._services.operations is not None else 1.0
 
     def _set(self, function: str, handle: int, kinds: tuple[str, ...], parameter: int, value: float) -> int:
         found, names = self._objects[handle], _names(kinds, parameter)
         known = dict(settable(found))
-        operations = self._surroundings.operations
+        operations = self._services.operations
         if operations is not None and isinstance(found, Freezable):  # a shape of the scene
             known["shapeintparam_respondable"] = lambda on: operations.change(handle, respondable=bool(on))
         if isinstance(found, Detector):
@@ -254,28 +256,28 @@ class Dynamics(Functions):
             if name in known:
                 known[name](*numbers((value,), 1))
                 return 1
-        self._ignored.say(function, f"{names[0]} is accepted and ignored")
+        self._ignored.log(function, f"{names[0]} is accepted and ignored")
         return 1
 
     def _look_for(self, sensor: Detector | Eye, entity: int) -> None:
         if entity != EVERYTHING:
-            members(entity, self._objects, self._context.collections)  # or there is none
+            members(entity, self._objects, self._context.collections)  # raises ValueError if it does not exist
         sensor.entity = entity
 
 
 def _render(sensor: Eye, mode: float) -> None:
-    sensor.color_coded = mode == _COLOR_CODED  # all other modes are ways to draw the same picture
+    sensor.color_coded = mode == _COLOR_CODED  # all other modes render the same picture
 
 
 def _carrier(found: SceneObject | None) -> SceneObject | None:
-    """Return the object with a body that carries an object, itself perhaps."""
+    """Return the object itself or its nearest ancestor that has a body."""
     while found is not None and found.body is None:
         found = found.parent
     return found
 
 
 def _names(kinds: tuple[str, ...], parameter: int) -> list[str]:
-    """Return the constants' names of a parameter; raises WrongValue, ValueError for none."""
+    """Return the names of the constants with a parameter's number. Raises WrongValue, ValueError."""
     if not isinstance(parameter, (int, float)):
         raise WrongValue("expected the number of a parameter, such as sim.shapeintparam_static")
     found = [name for name, value in CONSTANTS.items() if value == parameter and name.startswith(kinds)]

@@ -1,4 +1,4 @@
-"""`sim`: the streams of graphs, numbers that a script gives to be plotted. The cockpit draws them."""
+"""`sim`: graphs, that is, streams of numbers that the cockpit plots."""
 
 from __future__ import annotations
 
@@ -14,53 +14,53 @@ _LONGEST_NAME = 200  # characters
 
 
 class Graphs:
-    """Streams by handle: the graph that each is of, its name, and its latest value, None where it has none yet."""
+    """Streams of graphs by handle: each with its graph, its name, and its latest value (None before the first)."""
 
     def __init__(self) -> None:
-        """Start with none."""
+        """Create it without streams."""
         self.clear()
 
     def clear(self) -> None:
-        """Forget all."""
+        """Remove all streams."""
         self._streams: dict[int, tuple[int, str, float | None]] = {}
 
     def add(self, handle: int, graph: int, name: str) -> int:
-        """Add a stream to a graph, unless that has one of this name; return its handle. Raises ValueError."""
+        """Add a stream to a graph, unless the graph has one with this name; return its handle. Raises ValueError."""
         if not isinstance(name, str):
             raise WrongValue("the name of a stream must be a string")
         if len(name) > _LONGEST_NAME:
             raise ValueError(f"the name of a stream must have at most {_LONGEST_NAME} characters, not {len(name)}")
-        known = next((key for key, one in self._streams.items() if one[:2] == (graph, name)), None)
-        if known is not None:
-            return known
+        existing = next((key for key, stream in self._streams.items() if stream[:2] == (graph, name)), None)
+        if existing is not None:
+            return existing
         if len(self._streams) >= _MOST:
             raise ValueError(f"at most {_MOST} streams of graphs are allowed: destroy some")
         self._streams[handle] = graph, name, None
         return handle
 
     def set(self, graph: int, stream: int, value: float | None) -> None:
-        """Give a stream its next value. Raises ValueError for one that the graph has not."""
+        """Set the next value of a stream. Raises ValueError if the graph has no such stream."""
         if self._streams.get(stream, (None,))[0] != graph:
             raise ValueError(f"the graph {graph} has no stream with the handle {stream}")
         self._streams[stream] = (*self._streams[stream][:2], value)
 
     def remove(self, graph: int, stream: int) -> None:
-        """Remove a stream. Raises ValueError for one that the graph has not."""
+        """Remove a stream. Raises ValueError if the graph has no such stream."""
         self.set(graph, stream, None)
         del self._streams[stream]
 
     def reset(self, graph: int) -> None:
-        """Forget the values of a graph's streams."""
+        """Delete the values of a graph's streams."""
         self._streams = {
             key: (own, name, None if own == graph else value) for key, (own, name, value) in self._streams.items()
         }
 
     def values(self) -> dict[str, float]:
-        """Return the latest value of each stream that has one, by name."""
+        """Return the latest values of streams by the streams' names."""
         return {name: value for _, name, value in self._streams.values() if value is not None}
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings the present streams back."""
+        """Return a function that restores the present streams."""
         kept = copy.copy(self._streams)
 
         def restore() -> None:
@@ -70,13 +70,13 @@ class Graphs:
 
 
 class GraphFunctions:
-    """Graphs: numbers that the cockpit plots. Any object may take the place of a graph object.
+    """Graphs: numbers that the cockpit plots. Any object may be used as a graph.
 
     Colours, units and ranges are accepted and ignored.
     """
 
     def __init__(self, graphs: Graphs, new_handle: Callable[[], int]):
-        """Take the graphs of the simulation; `new_handle` gives a handle that nothing else has."""
+        """`graphs` are those of the simulation; `new_handle` returns an unused handle."""
         self._graphs, self._new_handle = graphs, new_handle
 
     @sim("45", addGraphDataStream="")
@@ -86,12 +86,12 @@ class GraphFunctions:
 
     @sim("45")
     def setGraphStreamValue(self, graph: Handle, stream: Handle, value: Number) -> None:
-        """Give a stream its next value."""
+        """Set the next value of a stream."""
         self._graphs.set(graph, stream, numbers((value,), 1)[0])
 
     @sim("345")
     def setGraphUserData(self, graph: Handle, name: Name, value: Number) -> None:
-        """Give the stream of a name its next value (3.x)."""
+        """Set the next value of the stream with a name (3.x)."""
         stream = self._graphs.add(self._new_handle(), graph, name)
         self._graphs.set(graph, stream, numbers((value,), 1)[0])
 
@@ -102,5 +102,5 @@ class GraphFunctions:
 
     @sim("345")
     def resetGraph(self, graph: Handle) -> None:
-        """Forget the values of a graph's streams."""
+        """Delete the values of a graph's streams."""
         self._graphs.reset(graph)

@@ -1,4 +1,4 @@
-"""What the script API needs from the object that a script is attached to, and from the drone that has it."""
+"""What the script API needs: the object that a script is attached to, its vehicle, and the scene."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from drone_sim.mechanics.velocity_meter import VelocityMeter
 from drone_sim.scripting.api.broadcasts import Broadcasts
 from drone_sim.scripting.api.control import Control, Turns
 from drone_sim.scripting.api.custom_data import CustomData
-from drone_sim.scripting.api.distances import MeasureWay
+from drone_sim.scripting.api.distances import MeasureDistance
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.graphs import Graphs
 from drone_sim.scripting.api.ignored import Ignored
@@ -34,15 +34,15 @@ Caller = Callable[[Callable[[], Any]], Any]
 
 
 class Readable(Protocol):
-    """A sensor, as the API sees it."""
+    """A sensor of a vehicle."""
 
     def read(self) -> dict[str, Any] | None:
-        """Return its last reading, by field; None before there is one."""
+        """Return the fields of its last reading; None before the first one."""
 
 
 @dataclass(kw_only=True)
 class ScriptContext:
-    """What the scripts of a simulation share: clock, gravity (m/s² along z), objects, and what they leave there."""
+    """What the scripts of a simulation share: clock, gravity (m/s² along z), objects, and the data of scripts."""
 
     clock: Clock
     gravity: float
@@ -58,144 +58,148 @@ class ScriptContext:
     tubes: Tubes = field(default_factory=Tubes)
     collections: Collections = field(default_factory=Collections)
     broadcasts: Broadcasts = field(default_factory=Broadcasts)
-    breakpoints: Breakpoints = field(default_factory=Breakpoints)  # which last longer than a run
+    breakpoints: Breakpoints = field(default_factory=Breakpoints)  # not cleared between runs
     remote_ports: RemotePorts = field(default_factory=RemotePorts)
 
     def clear(self) -> None:
         """Clear all parts, as before a run; they stay the same Python objects, so references to them remain valid."""
         parts = self.objects, self.velocities, self.scripts, self.signals, self.control, self.data, self.tubes
-        for one in (*parts, self.graphs, self.collections, self.broadcasts, self.remote_ports):
-            one.clear()
+        for part in (*parts, self.graphs, self.collections, self.broadcasts, self.remote_ports):
+            part.clear()
 
 
 class Host(Protocol):
-    """The drone, or what else a script is attached to, as the API sees it."""
+    """The object that a script is attached to, or a remote client."""
 
     @property
     def context(self) -> ScriptContext:
-        """What all scripts share."""
+        """The data that all scripts share."""
 
     @property
     def sensors(self) -> Mapping[str, Readable]:
-        """Its sensors, cameras aside, by the name of their object."""
+        """Its sensors except cameras, by the names of their objects."""
 
     @property
     def own_script(self) -> str:
         """Name of the object that this script is attached to, with its suffix: 'Drone', 'Drone#0'."""
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
-        """Let a force (N, world) act in the next step at a point (m) in the frame of a shape, and a torque (N m).
+        """Apply a force (N, world) at a point (m, frame of the shape) and a torque (N m, world) in the next step.
 
-        Raises ValueError for a shape that is not a part of the drone.
+        Raises ValueError for a shape that is not part of a vehicle.
         """
 
     def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
-        """Forget the forces on a shape, or the torques, or both, that were added since the last step.
+        """Remove the forces on a shape, the torques, or both, that were added since the last step.
 
-        Raises ValueError for a shape that is not a part of the drone.
+        Raises ValueError for a shape that is not part of a vehicle.
         """
 
     def turn_joint(self, joint: str, angle: float | None) -> float:
-        """Turn a joint to an angle (rad), unless None; return the angle. Raises ValueError for what is none."""
+        """Turn a propeller's joint to an angle (rad), unless None; return it. Raises ValueError for other joints."""
 
 
 class Operations(Protocol):
-    """What can be done to the objects of the scene, by their handles, in the words of a scene file.
+    """Operations on the objects of the scene, with handles, and with the keys and values of scene files.
 
-    An operation that is not possible raises ValueError, in one line, and changes nothing.
+    A Protocol because its implementation, `scene.operations`, is in a package above this one. An operation that is not
+    possible raises ValueError and changes nothing.
     """
 
-    def add(self, said: Sequence[Mapping[str, Any]]) -> list[int]:
-        """Add entries as in a scene file; return their handles."""
+    def add(self, items: Sequence[Mapping[str, Any]]) -> list[int]:
+        """Add entries as in a scene file; return the handles of the new objects."""
 
     def add_mesh(self, name: str, vertices: Sequence[float], indices: Sequence[int]) -> int:
-        """Add a shape of triangles: their corners' coordinates (m), and the corners of each; return its handle."""
+        """Add a shape of triangles: coordinates of vertices (m), three indices for each triangle; return its handle."""
 
     def remove(self, handles: Sequence[int]) -> None:
-        """Remove objects; what hangs on them stays where it is."""
+        """Remove objects; their children stay."""
 
     def copy(self, handles: Sequence[int]) -> list[int]:
-        """Add copies of objects, one of which may hang on another; return their handles."""
+        """Add copies of objects, which may be children of each other; return their handles."""
 
     def model(self, handle: int) -> list[int]:
-        """Return an object and all that hangs on it."""
+        """Return an object and its descendants."""
 
     def free_name(self, wanted: str) -> str:
-        """Return a name that nothing has: the wanted one, or that with a number."""
+        """Return an unused name: the wanted one, or that with a number."""
 
     def rename(self, handle: int, name: str) -> None:
-        """Give an object another name, which nothing else has."""
+        """Change the name of an object to an unused one."""
 
     def set_alias(self, handle: int, alias: str) -> None:
-        """Give an object another alias, which others may have, too."""
+        """Change the alias of an object; other objects may have the same alias."""
 
     def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None:
         """Hang an object on another, -1 for none."""
 
     def change(self, handle: int, **values: Any) -> None:
-        """Let a key of its entry have another value."""
+        """Set values of keys in the object's entry."""
 
     def paint(self, handle: int, rgba: Sequence[float | None]) -> None:
-        """Set the color of a shape; a component that is None stays as it is."""
+        """Set the color of a shape; a component that is None does not change."""
 
     def color(self, handle: int) -> tuple[float, ...]:
-        """Return the color of a shape, of its first part."""
+        """Return the color of a shape's first part."""
 
     def scale(self, handles: Sequence[int], factors: Sequence[float], positions: bool = False) -> None:
         """Scale objects by factors along x, y and z; `positions`: also their distances from their parents."""
 
     def factors(self, handle: int) -> tuple[float, float, float]:
-        """Return how many times as large an object is as it was."""
+        """Return by which factors an object was scaled along x, y and z."""
 
     def box(self, handle: int) -> tuple[Vector, Vector]:
         """Return size and centre (m) of the box around a shape, along its own axes."""
 
     def forms(self, handle: int) -> list[tuple[str, tuple[float, ...]]]:
-        """Return the forms of a shape, each with its size, as in a scene file; [] if it is no shape of the scene."""
+        """Return kind and size of each part of a shape, as in a scene file; [] for another object."""
 
     def group(self, handles: Sequence[int]) -> int:
-        """Make one rigid shape of several; return its handle."""
+        """Combine shapes into a rigid one; return its handle."""
 
     def ungroup(self, handle: int) -> list[int]:
-        """Make a shape of each part of one; return their handles."""
+        """Make each part of a shape a shape; return their handles."""
 
     def load_model(self, name: str) -> int:
-        """Add the objects of a file; return the first one's handle."""
+        """Add the objects of a file; return the handle of the first one."""
 
     def save_model(self, handle: int, name: str) -> None:
-        """Write an object and all that hangs on it into a file."""
+        """Write an object and its descendants to a file."""
 
 
 @dataclass(frozen=True)
 class SceneServices:
-    """What the API needs besides the drone: how a script is run, and what it sees, by object name."""
+    """Services of the simulation for the API of one script; mappings have object names as keys."""
 
-    pictures: Mapping[str, Callable[..., np.ndarray]] = field(default_factory=dict)  # of a kind, or without one its own
-    outside: Caller = lambda function: function()  # calls a function where OpenGL is, on nobody's time limit
-    inside: Caller = lambda function: function()  # the same, on this script's time limit
-    operations: Operations | None = None  # on the objects of the scene, where there is one
+    pictures: Mapping[str, Callable[..., np.ndarray]] = field(default_factory=dict)  # by kind; default: its own
+    outside: Caller = lambda function: function()  # calls a function in the thread of OpenGL, without a time limit
+    inside: Caller = lambda function: function()  # the same, within this script's time limit
+    operations: Operations | None = None  # None without a scene
     turns: Turns = field(default_factory=Turns)  # of the script's thread
-    planes: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # m: the near and far plane of each
-    masses: Callable[[], Mapping[str, float]] = dict  # kg, of the shapes that the dynamics move, by object name
-    inertias: Callable[[], Mapping[str, Inertia]] = dict  # how these lie in each, in its frame
-    nearest: MeasureWay = lambda *_: None  # without a world
+    planes: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # near and far plane of each camera, m
+    masses: Callable[[], Mapping[str, float]] = dict  # kg, of a vehicle's shapes
+    inertias: Callable[[], Mapping[str, Inertia]] = dict  # of a vehicle's shapes, in their frames
+    nearest: MeasureDistance = lambda *_: None
 
 
 class Functions:
-    """Functions of `sim` about what a script is attached to; docs/api.md has a section for each such class."""
+    """Base class for functions of `sim`; docs/api.md has a section for each class."""
 
     def __init__(self, host: Host, services: SceneServices, ignored: Ignored):
         """`host` is the drone or object that the script belongs to; `services` give access to the rest of the scene.
 
-        `ignored` says that something is ignored.
+        `ignored` logs what is ignored.
         """
-        self._host, self._surroundings, self._ignored = host, services, ignored
+        self._host, self._services, self._ignored = host, services, ignored
         self._context, self._objects = host.context, host.context.objects
 
     def _found(self, handle: int, kind: type[_Kind], called: str) -> _Kind:
-        """Return the object with a handle, which is of a kind. Raises WrongValue that lists those that are."""
-        found = self._objects[handle]
-        if isinstance(found, kind):
-            return found
-        known = [self._objects[one].name for one in self._objects if isinstance(self._objects[one], kind)]
-        raise WrongValue(f"'{found.name}' is not {called}; there are: {', '.join(known[:_MOST_NAMES]) or 'none'}")
+        """Return the object with a handle, if it has a type.
+
+        Raises WrongValue, which lists the objects of this type.
+        """
+        item = self._objects[handle]
+        if isinstance(item, kind):
+            return item
+        known = [other.name for other in map(self._objects.__getitem__, self._objects) if isinstance(other, kind)]
+        raise WrongValue(f"'{item.name}' is not {called}; there are: {', '.join(known[:_MOST_NAMES]) or 'none'}")

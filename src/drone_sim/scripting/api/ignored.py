@@ -1,7 +1,7 @@
-"""`sim` and its plugins: functions that are accepted and ignored; the log says so once for each function of a script.
+"""`sim` and its plugins: functions that are accepted and ignored, with one log line for each function of a script.
 
-So a script that shows something to a person also flies here, where nobody looks. docs/api.md lists every one of
-these functions, with what it returns.
+So a script also flies here if it shows something in windows that do not exist here. docs/api.md lists these functions
+and their results.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 from drone_sim.scripting.api.calls import Function, Module, flat_name
 from drone_sim.scripting.script_log import LOG
 
-_HELD = ("setLinkDummy",)  # without which bodies that belong together fall apart: a warning
-HANDLE = object()  # a new handle of something that is not there
+_IMPORTANT = ("setLinkDummy",)  # logged as a warning, because without it, connected bodies separate
+HANDLE = object()  # means that the function returns a new handle
 
-# By module and the reason, as the log says it: behind the generations that have them (-: none) functions that do
-# nothing, each with what it returns, if anything.
+# Functions by module and by the reason for the log. Each line starts with the generations that have the functions (-:
+# none); a function may have a result.
 _TABLE = {
     "sim": {
         "particles are not simulated one by one": """
@@ -93,22 +93,22 @@ _TABLE = {
 
 
 class Group(NamedTuple):
-    """Functions that do nothing for one reason, by name: the generations that have each, and what it returns."""
+    """Functions that are ignored for the same reason: by name, their generations and results."""
 
     why: str
     functions: dict[str, tuple[str, Any]]
 
 
-def _group(why: str, rows: str) -> Group:
+def _group(reason: str, rows: str) -> Group:
     generations, functions = "", dict[str, tuple[str, Any]]()
     for word in rows.split():
         if word == "-" or word.isdigit():
             generations = word.strip("-")
         else:
-            name, _, returned = word.partition("=")
-            value = HANDLE if returned == "handle" else ast.literal_eval(returned or "None")
+            name, _, result = word.partition("=")
+            value = HANDLE if result == "handle" else ast.literal_eval(result or "None")
             functions[name] = generations, value
-    return Group(why, functions)
+    return Group(reason, functions)
 
 
 MODULES = {module: [_group(*one) for one in groups.items()] for module, groups in _TABLE.items()}
@@ -116,42 +116,42 @@ PLUGINS = tuple(name for name in MODULES if name != "sim")
 
 
 class Ignored:
-    """The functions of one script that do nothing, and what says so."""
+    """The ignored functions of one script, and its log of ignored calls."""
 
     def __init__(
         self, script: str, new_handle: Callable[[], int], flat_names: Callable[[], Collection[str]] = frozenset
     ):
-        """`script`: the name of the object that it is on; `new_handle` gives a handle that nothing else has.
+        """`script` is the name of the object that it is on; `new_handle` returns an unused handle.
 
-        `flat_names` returns the functions that the script calls by their names of 3.x, such as simSetObjectColor.
+        `flat_names` returns the functions that the script calls by V-REP 3.x names, such as simSetObjectColor.
         """
         self._script = script
         self._new_handle = new_handle
         self._flat_names = flat_names
-        self._said: set[tuple[str, str]] = set()
+        self._logged: set[tuple[str, str]] = set()
 
-    def say(self, name: str, what: str, module: str = "sim", level: int = logging.INFO) -> None:
-        """Write to the log, once, that something is ignored, with the function's name as the script writes it."""
-        if (name, what) not in self._said:
-            self._said.add((name, what))
+    def log(self, name: str, what: str, module: str = "sim", level: int = logging.INFO) -> None:
+        """Log once that something is ignored, with the function's name in the form that the script uses."""
+        if (name, what) not in self._logged:
+            self._logged.add((name, what))
             flat = flat_name(module, name)
             written = flat if flat in self._flat_names() else f"{module}.{name}"
             LOG.log(level, "%s: %s (in the script of %s)", written, what, self._script)
 
     def functions(self, module: str) -> dict[str, Function]:
-        """Return every one of them in a module, by name."""
+        """Return the ignored functions of a module by name."""
         return {
-            name: self._function(module, name, f"{group.why}; accepted and ignored", *one)
+            name: self._function(module, name, f"{group.why}; accepted and ignored", *properties)
             for group in MODULES[module]
-            for name, one in group.functions.items()
+            for name, properties in group.functions.items()
         }
 
-    def _function(self, module: str, name: str, said: str, generations: str, returned: Any) -> Function:
-        level = logging.WARNING if name in _HELD else logging.INFO
+    def _function(self, module: str, name: str, message: str, generations: str, result: Any) -> Function:
+        level = logging.WARNING if name in _IMPORTANT else logging.INFO
 
         def call(*_arguments: Any) -> Any:
-            self.say(name, said, module, level)
-            return self._new_handle() if returned is HANDLE else copy.deepcopy(returned)
+            self.log(name, message, module, level)
+            return self._new_handle() if result is HANDLE else copy.deepcopy(result)
 
         call.__name__ = name
         return Module(module)(generations)(call)

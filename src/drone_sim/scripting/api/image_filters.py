@@ -1,6 +1,6 @@
-"""`simVision`: pictures that a script filters: each sensor has a work image, and two buffers beside it.
+"""`simVision`: filters for pictures. Each vision sensor has a work image and two buffers.
 
-An image is (height, width, 3), red, green, blue from 0 to 1, the bottom row first, as V-REP has it.
+An image is (height, width, 3), red, green and blue from 0 to 1, bottom row first, as in V-REP.
 """
 
 from __future__ import annotations
@@ -22,101 +22,101 @@ from drone_sim.scripting.api.vision import Eye, VisionSensors
 simVision = Module("simVision")
 _WORK, _BUFFER1, _BUFFER2 = "work image", "buffer 1", "buffer 2"
 _SELF = CONSTANTS["handle_self"]
-_MOST = 100  # sensors with images, of one script
+_MOST = 100  # sensors with images in one script
 _MOST_POINTS = 100_000
-_EDGES = 27.0 * np.eye(9)[4].reshape(3, 3) - 3.0  # a pixel against the mean of those around it
+_EDGES = 27.0 * np.eye(9)[4].reshape(3, 3) - 3.0  # kernel: a pixel minus the mean of its neighbourhood
 
 
 class ImageFilters(Functions):
     """Filters of pictures."""
 
-    def __init__(self, *seen: Any):
-        """Take what all functions take; there are no images yet."""
-        super().__init__(*seen)
-        self._sensors = VisionSensors(*seen)
+    def __init__(self, *arguments: Any):
+        """Create it without images; `arguments` are those of Functions."""
+        super().__init__(*arguments)
+        self._sensors = VisionSensors(*arguments)
         self._images: dict[tuple[int, str], np.ndarray] = {}
 
-    # ---- where images come from, and go
+    # ---- from and to sensors
 
     @simVision("45")
     def sensorImgToWorkImg(self, handle: Handle) -> None:
-        """Let the work image be what a sensor sees."""
-        self._keep(handle, self._picture_of(handle))
+        """Copy a sensor's picture to the work image."""
+        self._store(handle, self._picture_of(handle))
 
     @simVision("45")
     def sensorDepthMapToWorkImg(self, handle: Handle) -> None:
-        """Let the work image be a sensor's depths, grey: 0 at the near plane, 1 at the far one."""
+        """Copy a sensor's depths to the work image, as grey values: 0 at the near plane, 1 at the far plane."""
         depths = self._sensors._depths(self._handle(handle), (0, 0), (0, 0))
-        self._keep(handle, np.repeat(depths[:, :, None], 3, axis=2))
+        self._store(handle, np.repeat(depths[:, :, None], 3, axis=2))
 
     @simVision("45", workImgToSensorDepthMap="45")
     def workImgToSensorImg(self, handle: Handle, _removeBuffer: bool = True) -> None:
-        """Do nothing: a picture is what the sensor sees."""
+        """Do nothing: a script cannot change a sensor's picture."""
         self._image(handle)
-        self._ignored.say(
+        self._ignored.log(
             "workImgToSensorImg", "a script cannot change the sensor's picture; accepted and ignored", "simVision"
         )
 
     @simVision("45")
     def uniformImgToWorkImg(self, handle: Handle, color: ThreeNumbers) -> None:
-        """Let the work image be of one color."""
-        self._keep(handle, np.broadcast_to(np.array(numbers(color, 3)), self._picture_of(handle).shape).copy())
+        """Fill the work image with a color."""
+        self._store(handle, np.broadcast_to(np.array(numbers(color, 3)), self._picture_of(handle).shape).copy())
 
-    # ---- what is done to every pixel
+    # ---- operations on all pixels
 
     @simVision("45")
     def intensityScaleOnWorkImg(self, handle: Handle, start: Number, end: Number, greyScale: bool) -> None:
-        """Make the image grey, and scale its brightness: 0 becomes `start`, and 1 `end`."""
+        """Make the work image grey, and scale its brightness: 0 becomes `start`, and 1 becomes `end`."""
         if not greyScale:
             raise ValueError("color scales are not supported: greyScale must be true")
         low, high = numbers((start, end), 2)
         grey = low + (high - low) * self._image(handle).mean(2)
-        self._keep(handle, np.repeat(grey[:, :, None], 3, axis=2))
+        self._store(handle, np.repeat(grey[:, :, None], 3, axis=2))
 
     @simVision("45")
     def normalizeWorkImg(self, handle: Handle) -> None:
-        """Stretch the work image from 0 to 1."""
+        """Scale the work image to the range from 0 to 1."""
         image = self._image(handle)
         low, high = image.min(), image.max()
-        self._keep(handle, (image - low) / (high - low) if high > low else np.zeros_like(image))
+        self._store(handle, (image - low) / (high - low) if high > low else np.zeros_like(image))
 
     @simVision("45")
     def selectiveColorOnWorkImg(
         self, handle: Handle, color: ThreeNumbers, colorTolerance: ThreeNumbers, rgb: bool, keep: bool, toBuffer1: bool
     ) -> None:
-        """Black out the pixels within a tolerance of a color, in RGB or HSL, or with `keep` all others.
+        """Make the pixels within a tolerance of a color black, in RGB or HSL; with `keep`, all others.
 
-        `toBuffer1`: put the pixels that get black into buffer 1.
+        `toBuffer1`: copy the pixels that become black to buffer 1.
         """
-        image, middle, apart = self._image(handle), numbers(color, 3), np.array(numbers(colorTolerance, 3))
-        off = np.abs((image if rgb else _hsl(image)) - middle)
+        image, tolerance = self._image(handle), np.array(numbers(colorTolerance, 3))
+        difference = np.abs((image if rgb else _hsl(image)) - numbers(color, 3))
         if not rgb:
-            off[:, :, 0] = np.minimum(off[:, :, 0], 1 - off[:, :, 0])  # hues go round
-        gone = (off > apart + 1e-6).any(2) == bool(keep)
+            difference[:, :, 0] = np.minimum(difference[:, :, 0], 1 - difference[:, :, 0])  # hues are cyclic
+        removed = (difference > tolerance + 1e-6).any(2) == bool(keep)
         if toBuffer1:
-            self._keep(handle, np.where(gone[:, :, None], image, 0.0), _BUFFER1)
-        self._keep(handle, np.where(gone[:, :, None], 0.0, image))
+            self._store(handle, np.where(removed[:, :, None], image, 0.0), _BUFFER1)
+        self._store(handle, np.where(removed[:, :, None], 0.0, image))
 
     @simVision("45")
     def edgeDetectionOnWorkImg(self, handle: Handle, threshold: Number) -> None:
-        """Let edges be white and everything else black."""
+        """Make edges white and all other pixels black."""
         found = cv2.filter2D(self._image(handle), -1, _EDGES, borderType=cv2.BORDER_REPLICATE)
         edges = found.mean(2) > numbers((threshold,), 1)[0]
-        self._keep(handle, np.repeat(edges[:, :, None], 3, axis=2).astype(float))
+        self._store(handle, np.repeat(edges[:, :, None], 3, axis=2).astype(float))
 
-    # ---- what is found
+    # ---- detection
 
     @simVision("45")
     def binaryWorkImg(
         self, handle: Handle, threshold: Number, oneProportion: Number, oneTol: Number, *expected: Any
     ) -> tuple[bool, bytes]:
-        """Let pixels be white, where they are as bright as a threshold, or black; return whether it triggers, a packet.
+        """Make pixels at least as bright as a threshold white, others black; return whether it triggers, and a packet.
 
-        The packet has the share of white, its centre (x, y from 0 to 1), its orientation (rad) and its roundness. The
-        others are xCenter, xCenterTol, yCenter, yCenterTol, orient, orientTol, roundness, enableTrigger.
+        The packet has the proportion of white, its centre (x, y from 0 to 1), its orientation (rad) and its roundness.
+        The other arguments are xCenter, xCenterTol, yCenter, yCenterTol, orient, orientTol, roundness, enableTrigger.
         """
         white = self._image(handle).mean(2) >= numbers((threshold,), 1)[0]
-        self._keep(handle, np.repeat(white[:, :, None], 3, axis=2).astype(float))
+        self._store(handle, np.repeat(white[:, :, None], 3, axis=2).astype(float))
         found = _shape_of(white)
         return _triggers(found, numbers((oneProportion, oneTol), 2), expected), _packed(found)
 
@@ -124,10 +124,10 @@ class ImageFilters(Functions):
     def blobDetectionOnWorkImg(
         self, handle: Handle, threshold: Number, minBlobSize: Number, modifyWorkImage: bool = False, *_overlay: Any
     ) -> tuple[bool, bytes]:
-        """Find blobs as bright as a threshold; return false and a packet: how many, 6, and 6 numbers of each.
+        """Find blobs with at least a brightness; return false and a packet: their number, 6, and 6 numbers for each.
 
-        These are its share of the picture, its orientation (rad), its centre and its size (from 0 to 1). Smaller ones
-        than `minBlobSize` are blacked out.
+        These are its proportion of the picture, its orientation (rad), its centre and its size (from 0 to 1). Blobs
+        smaller than `minBlobSize` become black.
         """
         image = self._image(handle)
         least, smallest = numbers((threshold, minBlobSize), 2)
@@ -135,21 +135,22 @@ class ImageFilters(Functions):
         areas = stats[:, cv2.CC_STAT_AREA] / labels.size
         large = [label for label in range(1, count) if areas[label] >= smallest]
         lost = (labels > 0) & ~np.isin(labels, large) | (labels == 0) & bool(modifyWorkImage)
-        self._keep(handle, np.where(lost[:, :, None], 0.0, image))
+        self._store(handle, np.where(lost[:, :, None], 0.0, image))
         blobs = [one for label in large for one in (areas[label], *_box(labels == label))]
         return False, _packed([len(large), 6, *blobs])
 
     @simVision("45")
     def changedPixelsOnWorkImg(self, handle: Handle, threshold: Number) -> tuple[bool, bytes]:
-        """Compare the work image with that of the last call; return whether pixels have changed by more, and a packet.
+        """Compare the work image with that of the last call; return whether pixels have changed, and a packet.
 
-        The packet has the share of pixels that have become brighter or darker. These are white in the work image.
+        The packet has the proportion of pixels that have changed by at least a threshold. These become white in the
+        work image.
         """
         image, (least,) = self._image(handle), numbers((threshold,), 1)
         before = self._images.get((self._handle(handle), _BUFFER1), image)
         changed = np.abs(image.mean(2) - before.mean(2)) >= least
-        self._keep(handle, image, _BUFFER1)
-        self._keep(handle, np.repeat(changed[:, :, None], 3, axis=2).astype(float))
+        self._store(handle, image, _BUFFER1)
+        self._store(handle, np.repeat(changed[:, :, None], 3, axis=2).astype(float))
         return bool(changed.any()), _packed([changed.mean()])
 
     @simVision("45")
@@ -160,10 +161,10 @@ class ImageFilters(Functions):
         evenlySpacedInAngularSpace: bool,
         returnColorData: bool = False,
     ) -> tuple[bool, bytes, bytes]:
-        """Return false, and the points that the depths in a perspective sensor's work image stand for, in a packet.
+        """Return false, and a packet with the points for the depths in a perspective sensor's work image.
 
-        It has how many there are along x and y, and of each x, y, z (m, in the sensor's frame, or with
-        sim.handleflag_abscoords the world's) and the distance (m). Then their colours, from buffer 1.
+        The packet has the numbers of points along x and y, and for each x, y, z (m, in the sensor's frame, or with
+        sim.handleflag_abscoords in the world frame) and the distance (m). Then follow their colors, from buffer 1.
         """
         eye, image = self._eye(handle), self._image(handle)
         columns, rows = (int(one) for one in numbers(xyPointCount, 2))
@@ -186,10 +187,10 @@ class ImageFilters(Functions):
             return False, packet, b""
         return False, packet, (colors[row, column] * 255).astype(np.uint8).tobytes()
 
-    # ---- what all share
+    # ---- images
 
     def save_state(self) -> Restore:
-        """Return a function that brings back the images."""
+        """Return a function that restores the present images."""
         return saved(self, "_images")
 
     def _handle(self, handle: int) -> int:
@@ -206,13 +207,13 @@ class ImageFilters(Functions):
         return self._sensors._colors(self._handle(handle), (0, 0), (0, 0))[::-1] / 255.0
 
     def _image(self, handle: int, which: str = _WORK) -> np.ndarray:
-        """Return an image of a sensor; raises ValueError where there is none yet."""
+        """Return an image of a sensor. Raises ValueError if it does not exist yet."""
         number = self._handle(handle)
         if (number, which) not in self._images:
             raise ValueError(f"'{self._objects[number].name}' has no {which} yet: call sensorImgToWorkImg first")
         return self._images[number, which]
 
-    def _keep(self, handle: int, image: np.ndarray, which: str = _WORK) -> None:
+    def _store(self, handle: int, image: np.ndarray, which: str = _WORK) -> None:
         key = self._handle(handle), which
         if key not in self._images and len(self._images) >= 3 * _MOST:
             raise ValueError(f"a script can filter the pictures of at most {_MOST} sensors")
@@ -220,7 +221,7 @@ class ImageFilters(Functions):
 
 
 def _add(name: str, doc: str, result: Callable[[ImageFilters, int], None]) -> None:
-    """Add a function that takes a sensor alone."""
+    """Add a function whose only argument is a sensor."""
 
     def call(self: ImageFilters, handle: Handle) -> None:
         result(self, handle)
@@ -229,20 +230,20 @@ def _add(name: str, doc: str, result: Callable[[ImageFilters, int], None]) -> No
 
 
 def _copies(source: str, target: str) -> Callable[[ImageFilters, int], None]:
-    return lambda self, handle: self._keep(handle, self._image(handle, source), target)
+    return lambda self, handle: self._store(handle, self._image(handle, source), target)
 
 
 def _swaps(one: str, other: str) -> Callable[[ImageFilters, int], None]:
     def swap(self: ImageFilters, handle: int) -> None:
         first, second = self._image(handle, one), self._image(handle, other)
-        self._keep(handle, second, one)
-        self._keep(handle, first, other)
+        self._store(handle, second, one)
+        self._store(handle, first, other)
 
     return swap
 
 
 def _joins(target: str, other: str, join: Callable[[Any, Any], Any]) -> Callable[[ImageFilters, int], None]:
-    return lambda self, handle: self._keep(
+    return lambda self, handle: self._store(
         handle, np.clip(join(self._image(handle, target), self._image(handle, other)), 0.0, 1.0), target
     )
 
@@ -255,11 +256,11 @@ _add("swapBuffers", "Exchange the buffers.", _swaps(_BUFFER1, _BUFFER2))
 _add("swapWorkImgWithBuffer1", "Exchange the work image and buffer 1.", _swaps(_WORK, _BUFFER1))
 _add("addBuffer1ToWorkImg", "Add buffer 1 to the work image.", _joins(_WORK, _BUFFER1, np.add))
 _add("addWorkImgToBuffer1", "Add the work image to buffer 1.", _joins(_BUFFER1, _WORK, np.add))
-_add("subtractBuffer1FromWorkImg", "Take buffer 1 from the work image.", _joins(_WORK, _BUFFER1, np.subtract))
-_add("subtractWorkImgFromBuffer1", "Take the work image from buffer 1.", _joins(_BUFFER1, _WORK, np.subtract))
+_add("subtractBuffer1FromWorkImg", "Subtract buffer 1 from the work image.", _joins(_WORK, _BUFFER1, np.subtract))
+_add("subtractWorkImgFromBuffer1", "Subtract the work image from buffer 1.", _joins(_BUFFER1, _WORK, np.subtract))
 _add("multiplyWorkImgWithBuffer1", "Multiply the work image by buffer 1.", _joins(_WORK, _BUFFER1, np.multiply))
-_add("horizontalFlipWorkImg", "Turn the work image over, left to right.", lambda s, h: s._keep(h, s._image(h)[:, ::-1]))
-_add("verticalFlipWorkImg", "Turn the work image over, top to bottom.", lambda s, h: s._keep(h, s._image(h)[::-1]))
+_add("horizontalFlipWorkImg", "Flip the work image left to right.", lambda s, h: s._store(h, s._image(h)[:, ::-1]))
+_add("verticalFlipWorkImg", "Flip the work image top to bottom.", lambda s, h: s._store(h, s._image(h)[::-1]))
 
 
 def _packed(values: Sequence[Any]) -> bytes:
@@ -273,15 +274,15 @@ def _hsl(image: np.ndarray) -> np.ndarray:
 
 
 def _shape_of(white: np.ndarray) -> list[float]:
-    """Return the share of white, its centre, its orientation and its roundness."""
+    """Return the proportion of white, its centre, its orientation and its roundness."""
     rows, columns = np.nonzero(white)
     if not len(rows):
         return [0.0, 0.5 / white.shape[1], 0.5 / white.shape[0], 0.0, 1.0]
     x, y = columns - columns.mean(), rows - rows.mean()
     a, b, c = float((x * x).sum()), 2 * float((x * y).sum()), float((y * y).sum())
-    apart = math.hypot(b, a - c)
-    roundness = (a + c - apart) / (a + c + apart) if apart else 1.0
-    angle = 0.5 * math.atan2(b, a - c) if apart else 0.0
+    difference = math.hypot(b, a - c)  # of the two principal moments
+    roundness = (a + c - difference) / (a + c + difference) if difference else 1.0
+    angle = 0.5 * math.atan2(b, a - c) if difference else 0.0
     return [len(rows) / white.size, columns.mean() / white.shape[1], rows.mean() / white.shape[0], angle, roundness]
 
 
@@ -300,11 +301,11 @@ def _triggers(found: Sequence[float], share: Sequence[float], expected: Sequence
 
 
 def _box(blob: np.ndarray) -> tuple[float, float, float, float, float]:
-    """Return orientation (rad), centre and size, from 0 to 1, of the smallest box around a blob's pixels."""
+    """Return orientation (rad), centre and size (0 to 1) of the smallest rectangle around a blob's pixels."""
     rows, columns = np.nonzero(blob)
     corners = np.column_stack([columns, rows]).astype(np.float32)
     (x, y), (wide, high), degrees = cv2.minAreaRect(corners)
-    quarters = round(degrees / 90)  # of a turn: the sides are called so that it lies as nearly upright as can be
+    quarters = round(degrees / 90)  # quarter turns, which are removed so that the rectangle is nearly upright
     if quarters % 2:
         wide, high = high, wide
     height, width = blob.shape
@@ -318,7 +319,7 @@ def _angles(eye: Eye) -> tuple[float, float]:
 
 
 def _directions(eye: Eye, columns: int, rows: int, evenly: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return where columns and rows of points lie in the picture, from -1 to 1: x to the left, y up."""
+    """Return the places of columns and rows of points in the picture, from -1 to 1: x to the left, y up."""
     found = []
     for angle, count in zip(_angles(eye), (columns, rows)):
         at = np.linspace(-angle / 2, angle / 2, count) if count > 1 else np.zeros(1)

@@ -1,7 +1,7 @@
-"""`sim`: joints. Revolute ones in rad, rad/s and N m, prismatic ones in m, m/s and N.
+"""`sim`: joints. Revolute joints are in rad, rad/s and N m, prismatic joints in m, m/s and N.
 
-A propeller's joint answers to getJointPosition and setJointPosition: how its blades look. Targets are accepted of it
-and ignored, for the law turns the blades.
+A propeller's joint has a position, which is the angle of the visible blades. Its targets are accepted and ignored,
+because the thrust model turns the blades.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from drone_sim.scripting.api.types import Handle, Number, Numbers, TwelveNumbers
 
 _TYPES = {REVOLUTE: 10, PRISMATIC: 11, SPHERICAL: 12}  # sim.joint_revolute_subtype and so on
 _KINEMATIC_MODE, _DYNAMIC_MODE = 0, 5  # sim.jointmode_kinematic, _dynamic (3.x: _passive, _force)
-_WITHOUT_END = (-math.pi, math.tau)  # what V-REP says of a cyclic joint: from where, how far
-_UNIT = 1e-3  # by how much a rotation may miss
+_CYCLIC = (-math.pi, math.tau)  # lowest position and range of a cyclic joint, as in V-REP
+_TOLERANCE = 1e-3  # of the elements of a rotation matrix
 
 
 class JointFunctions(Functions):
-    """Joints: revolute ones in rad, rad/s and N m, prismatic ones in m, m/s and N."""
+    """Joints: revolute joints in rad, rad/s and N m, prismatic joints in m, m/s and N."""
 
-    # ---- where they are
+    # ---- positions and velocities
 
     @sim("345")
     def getJointPosition(self, handle: Handle) -> float:
@@ -40,13 +40,13 @@ class JointFunctions(Functions):
         (value,) = numbers((position,), 1)
         found = self._objects[handle]
         if isinstance(found, Joint):
-            self._moving(handle).place(value)
+            self._linear_joint(handle).place(value)
         else:
             self._host.turn_joint(found.name, value)
 
     @sim("45")
     def getJointVelocity(self, handle: Handle) -> float:
-        """Return how fast the dynamics moves a joint."""
+        """Return the velocity of a joint that the dynamics moves."""
         return self._joint(handle).velocity_along
 
     @sim("345", getSphericalJointMatrix="")
@@ -56,23 +56,23 @@ class JointFunctions(Functions):
 
     @sim("5")
     def getObjectChildPose(self, handle: Handle) -> list[float]:
-        """Return the pose that a joint gives to its children, in its own frame; for other objects the identity."""
+        """Return the pose of a joint's children in the joint's own frame; for other objects, the identity."""
         found = self._objects[handle]
         return to_pose(found.motion_matrix() if isinstance(found, Joint) else IDENTITY)
 
     @sim("345")
     def setSphericalJointMatrix(self, handle: Handle, matrix: TwelveNumbers) -> None:
-        """Turn a spherical joint; only the rotation of the transform counts."""
+        """Set the rotation of a spherical joint; the position in the matrix is ignored."""
         joint, m = self._joint(handle), numbers(matrix, 12)
         if joint.motion != SPHERICAL:
             raise WrongValue(f"'{joint.name}' is a {joint.motion} joint: must be a spherical joint")
         turn = (*m[:3], 0.0, *m[4:7], 0.0, *m[8:11], 0.0)
         product = frames.multiply(turn, frames.invert(turn))
-        if max(abs(a - b) for a, b in zip(product, IDENTITY)) > _UNIT:
+        if max(abs(a - b) for a, b in zip(product, IDENTITY)) > _TOLERANCE:
             raise WrongValue("expected the matrix of a rotation")
         joint.turn = frames.from_quaternion((0.0, 0.0, 0.0), frames.to_quaternion(turn))
 
-    # ---- what they are
+    # ---- types, limits and modes
 
     @sim("345")
     def getJointType(self, handle: Handle) -> int:
@@ -81,36 +81,36 @@ class JointFunctions(Functions):
 
     @sim("345")
     def getJointInterval(self, handle: Handle) -> tuple[bool, list[float]]:
-        """Return whether a joint has no limits, and its lowest position and its range."""
+        """Return whether a joint has no limits, its lowest position and its range."""
         limits = self._joint(handle).limits
-        return (True, list(_WITHOUT_END)) if limits is None else (False, [limits[0], limits[1] - limits[0]])
+        return (True, list(_CYCLIC)) if limits is None else (False, [limits[0], limits[1] - limits[0]])
 
     @sim("345")
     def setJointInterval(self, handle: Handle, cyclic: bool, interval: Numbers = ()) -> None:
         """Set a joint's lowest position and its range; a cyclic joint has no limits."""
-        joint = self._moving(handle)
+        joint = self._linear_joint(handle)
         if cyclic and joint.motion == PRISMATIC:
             raise WrongValue(f"'{joint.name}' is prismatic: only revolute joints are cyclic")
-        low, extent = numbers(interval, 2) if not cyclic else _WITHOUT_END
+        low, extent = numbers(interval, 2) if not cyclic else _CYCLIC
         if extent <= 0:
             raise WrongValue(f"the range of a joint must be greater than 0, not {extent:g}")
         joint.limit(None if cyclic else (low, low + extent))
 
     @sim("345")
     def getJointMode(self, handle: Handle) -> tuple[int, int]:
-        """Return 0 for a joint that scripts move, 5 for one that the dynamics moves, and no options."""
+        """Return 0 for a joint that only scripts move, 5 for a joint that the dynamics moves; and 0 as options."""
         return (_KINEMATIC_MODE if self._joint(handle).control.mode == KINEMATIC else _DYNAMIC_MODE), 0
 
     @sim("345")
     def setJointMode(self, handle: Handle, mode: int, _options: Any = 0) -> None:
-        """Let only scripts move a joint (0), or let the dynamics move it (5), in its last mode."""
+        """Let only scripts move a joint (0), or let the dynamics move it (5), in its last dynamic mode."""
         joint = self._joint(handle)
         if mode not in (_KINEMATIC_MODE, _DYNAMIC_MODE):
             raise WrongValue("expected sim.jointmode_kinematic (0) or sim.jointmode_dynamic (5)")
         if (joint.control.mode == KINEMATIC) != (mode == _KINEMATIC_MODE):
             joint.change(mode=KINEMATIC if mode == _KINEMATIC_MODE else joint.dynamic_mode)
 
-    # ---- what moves them
+    # ---- targets and forces
 
     @sim("345")
     def getJointTargetPosition(self, handle: Handle) -> float:
@@ -119,10 +119,10 @@ class JointFunctions(Functions):
 
     @sim("345")
     def setJointTargetPosition(self, handle: Handle, position: Number, _motion: Any = None) -> None:
-        """Set a joint's target position; a joint that only scripts move is there at once."""
+        """Set a joint's target position; a joint that only scripts move goes there at once."""
         (value,) = numbers((position,), 1)
-        if not self._is_propellers(handle, "setJointTargetPosition"):
-            self._moving(handle).change(position=value)
+        if not self._is_ignored(handle, "setJointTargetPosition"):
+            self._linear_joint(handle).change(position=value)
 
     @sim("345")
     def getJointTargetVelocity(self, handle: Handle) -> float:
@@ -133,8 +133,8 @@ class JointFunctions(Functions):
     def setJointTargetVelocity(self, handle: Handle, velocity: Number, _motion: Any = None) -> None:
         """Set a joint's target velocity, for the velocity mode."""
         (value,) = numbers((velocity,), 1)
-        if not self._is_propellers(handle, "setJointTargetVelocity"):
-            self._moving(handle).change(velocity=value)
+        if not self._is_ignored(handle, "setJointTargetVelocity"):
+            self._linear_joint(handle).change(velocity=value)
 
     @sim("345", jointGetForce="3")
     def getJointForce(self, handle: Handle) -> float:
@@ -144,17 +144,17 @@ class JointFunctions(Functions):
 
     @sim("5")
     def getJointTargetForce(self, handle: Handle) -> float:
-        """Return the target force of a joint in force mode, otherwise the largest force of its motor."""
+        """Return the target force of a joint in force mode, otherwise its largest force."""
         control = self._joint(handle).control
         return control.force if control.mode == FORCE else control.max_force
 
     @sim("5")
     def setJointTargetForce(self, handle: Handle, force: Number, signedValue: bool = True) -> None:
-        """Set a joint's force in force mode, signed or in the last direction; otherwise its motor's largest force."""
+        """Set a joint's force in force mode, signed or in the last direction; otherwise its largest force."""
         (value,) = numbers((force,), 1)
-        if self._is_propellers(handle, "setJointTargetForce"):
+        if self._is_ignored(handle, "setJointTargetForce"):
             return
-        joint = self._moving(handle)
+        joint = self._linear_joint(handle)
         if joint.control.mode != FORCE:
             joint.change(max_force=abs(value))
         elif signedValue:
@@ -172,19 +172,19 @@ class JointFunctions(Functions):
         """Set the largest force of a joint's motor (3.x)."""
         self.setJointTargetForce(handle, force, False)
 
-    def _is_propellers(self, handle: int, function: str) -> bool:
-        """Tell whether an object is the joint of a propeller; if so, log that the call is ignored."""
+    def _is_ignored(self, handle: int, function: str) -> bool:
+        """Return whether an object is the joint of a propeller; if so, log that the call is ignored."""
         found = self._objects[handle]
         if found.kind != "joint" or isinstance(found, Joint):
             return False
-        self._ignored.say(function, "the thrust model turns a propeller's blades; accepted and ignored")
+        self._ignored.log(function, "the thrust model turns a propeller's blades; accepted and ignored")
         return True
 
     def _joint(self, handle: int) -> Joint:
         return self._found(handle, Joint, "a joint of the scene")
 
-    def _moving(self, handle: int) -> Joint:
-        """Return a joint that has a position."""
+    def _linear_joint(self, handle: int) -> Joint:
+        """Return a revolute or prismatic joint."""
         joint = self._joint(handle)
         if joint.motion == SPHERICAL:
             raise WrongValue(f"'{joint.name}' is spherical: setSphericalJointMatrix turns it")

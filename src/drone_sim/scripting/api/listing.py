@@ -1,4 +1,4 @@
-"""All functions of the script API, for docs/api.md and for editors, without a simulated drone."""
+"""The script API without a simulation, for docs/api.md, editors and checks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _PAGES = {"simROS": "rosInterf", "simUI": "simUI", "simVision": "simVision"}  # 
 
 
 def apis() -> dict[str, Api]:
-    """Return every module of the script API, without a simulated drone."""
+    """Return the modules of the script API, without a simulation; their functions must not be called."""
     scripts = Scripts()
     scripts.add("Drone", {})
     clock, objects = Clock(0.05), ObjectTree()
@@ -51,7 +51,7 @@ def apis() -> dict[str, Api]:
 def classes_of_sim() -> tuple[type, ...]:
     """Return the classes whose methods are the functions of `sim`."""
     functions = contents(apis()["sim"])[1].values()
-    return tuple(dict.fromkeys(type(one.__self__) for one in functions if inspect.ismethod(one)))
+    return tuple(dict.fromkeys(type(function.__self__) for function in functions if inspect.ismethod(function)))
 
 
 def declared(api: Api) -> Iterator[tuple[Declaration, Any]]:
@@ -65,7 +65,7 @@ def declared(api: Api) -> Iterator[tuple[Declaration, Any]]:
 
 
 def is_ignored(function: Any) -> bool:
-    """Tell whether a function of the API does nothing."""
+    """Return whether a function of the API is accepted and ignored."""
     return bool(function.__module__ == ignored.__name__)
 
 
@@ -75,20 +75,20 @@ def first_paragraph(doc: str) -> str:
 
 
 def for_editors() -> dict[str, Any]:
-    """Return all that a script may name, as JSON takes it.
+    """Return all names of the API, for JSON.
 
-    `functions`: rows of module, name, name in 3.x, generations, arguments, sentence, address of the manual's page;
-    `constants`: names and values of `sim`.
+    `functions`: rows of module, name, V-REP 3.x name, generations, arguments, description, address in the manual;
+    `constants`: names and values in `sim`.
     """
-    found = apis()
+    modules = apis()
     rows = [
         [module, name, flat_name(module, name), generations, arguments_of(function), _sentence(function), page]
-        for module, api in found.items()
+        for module, api in modules.items()
         for declaration, function in declared(api)
         for name, generations in declaration.names.items()
         for page in [_page(module, name, generations)]
     ]
-    return {"functions": sorted(rows), "constants": dict(sorted(contents(found["sim"])[2].items()))}
+    return {"functions": sorted(rows), "constants": dict(sorted(contents(modules["sim"])[2].items()))}
 
 
 def _sentence(function: Any) -> str:
@@ -98,19 +98,25 @@ def _sentence(function: Any) -> str:
 
 
 def arguments_of(function: Any) -> str:
-    """Return 'objectHandle, relativeTo=-1': what a function takes, without the kinds of the values."""
+    """Return a function's parameters without types: 'objectHandle, relativeTo=-1'."""
     if is_ignored(function):
         return "..."
     shown = []
-    for one in inspect.signature(function).parameters.values():
-        star = "*" if one.kind is one.VAR_POSITIONAL else "**" if one.kind is one.VAR_KEYWORD else ""
-        default = "" if one.default is one.empty else f"={one.default!r}"
-        shown.append(f"{star}{one.name.lstrip('_')}{default}")
+    for parameter in inspect.signature(function).parameters.values():
+        star = (
+            "*"
+            if parameter.kind is parameter.VAR_POSITIONAL
+            else "**"
+            if parameter.kind is parameter.VAR_KEYWORD
+            else ""
+        )
+        default = "" if parameter.default is parameter.empty else f"={parameter.default!r}"
+        shown.append(f"{star}{parameter.name.lstrip('_')}{default}")
     return ", ".join(shown)
 
 
 def _page(module: str, name: str, generations: str) -> str:
-    """Return the address of a function's page in CoppeliaSim's manual; '' for what is drone_sim's own."""
+    """Return the address of a function's page in CoppeliaSim's manual; '' for drone_sim's own functions."""
     if not generations:
         return ""
     if module in _PAGES:

@@ -1,6 +1,7 @@
-"""`sim`: matrices, 12 numbers each, poses, 7 numbers each, and rotations.
+"""`sim`: matrices of 12 numbers, poses of 7 numbers, and rotations.
 
-Interpolation goes round one axis at one speed: K. Shoemake, Animating Rotation with Quaternion Curves, 1985.
+Interpolation rotates about a fixed axis at constant speed: K. Shoemake, Animating Rotation with Quaternion Curves,
+1985.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ class Matrices:
         values = numbers(vector, len(vector))
         if not values or len(values) % 3 or len(values) > 3 * _MOST_POINTS:
             raise WrongValue("expected 3 numbers, or 3 for each of several points")
-        return [one for index in range(0, len(values), 3) for one in frames.transform(m, values[index : index + 3])]
+        points = (values[index : index + 3] for index in range(0, len(values), 3))
+        return [coordinate for point in points for coordinate in frames.transform(m, point)]
 
     @sim("345")
     def multiplyMatrices(self, first: TwelveNumbers, second: TwelveNumbers) -> list[float]:
@@ -92,12 +94,12 @@ class Matrices:
 
     @sim("345")
     def interpolateMatrices(self, first: TwelveNumbers, second: TwelveNumbers, part: Number) -> list[float]:
-        """Return the transform at a share (0 to 1) between two, with the shortest rotation."""
+        """Return the transform at a fraction (0 to 1) between two, with the shortest rotation."""
         return list(between(numbers(first, 12), numbers(second, 12), numbers((part,), 1)[0]))
 
     @sim("345")
     def getRotationAxis(self, start: TwelveNumbers, goal: TwelveNumbers) -> tuple[list[float], float]:
-        """Return axis (world) and angle (rad) of the turn from one transform's axes to another's."""
+        """Return axis (world) and angle (rad) of the rotation between two transforms."""
         turn = frames.multiply(numbers(goal, 12), frames.invert(numbers(start, 12)))
         axis, angle = axis_and_angle(frames.to_quaternion(turn))
         return list(axis), angle
@@ -106,7 +108,7 @@ class Matrices:
     def rotateAroundAxis(
         self, matrix: Numbers, axis: ThreeNumbers, position: ThreeNumbers, angle: Number
     ) -> list[float]:
-        """Return a transform, or a pose, turned by an angle (rad) about an axis through a position, in the world."""
+        """Return a transform, or a pose, rotated by an angle (rad) about an axis (world) through a position."""
         if len(matrix) == 7:
             return to_pose(self.rotateAroundAxis(from_pose(matrix), axis, position, angle))
         there = numbers(position, 3)
@@ -143,7 +145,7 @@ def built(position: Sequence[float], turn: Sequence[float]) -> Matrix:
 
 
 def unit(quaternion: Sequence[float]) -> Quaternion:
-    """Return a quaternion of length 1; raises WrongValue for zero."""
+    """Return a quaternion scaled to length 1. Raises WrongValue for zero."""
     length = math.sqrt(sum(value * value for value in quaternion))
     if length == 0:
         raise WrongValue("expected a quaternion that is not zero")
@@ -152,7 +154,7 @@ def unit(quaternion: Sequence[float]) -> Quaternion:
 
 
 def axis_and_angle(quaternion: Quaternion) -> tuple[Vector, float]:
-    """Return the axis of a unit quaternion, and the angle in rad; z for none."""
+    """Return axis and angle (rad) of a unit quaternion; the z axis without a rotation."""
     x, y, z, w = quaternion
     length = math.sqrt(x * x + y * y + z * z)
     if length == 0:
@@ -161,7 +163,7 @@ def axis_and_angle(quaternion: Quaternion) -> tuple[Vector, float]:
 
 
 def about(axis: Sequence[float], angle: float) -> Quaternion:
-    """Return the quaternion of a turn about an axis; raises WrongValue for an axis that is zero."""
+    """Return the quaternion of a rotation about an axis by an angle (rad). Raises WrongValue for a zero axis."""
     length = math.sqrt(sum(value * value for value in axis))
     if length == 0:
         raise WrongValue("expected an axis that is not zero")
@@ -170,7 +172,7 @@ def about(axis: Sequence[float], angle: float) -> Quaternion:
 
 
 def between(first: Matrix, second: Matrix, part: float) -> Matrix:
-    """Return the transform at a share (0 to 1) of the way between two."""
+    """Return the transform at a fraction (0 to 1) between two."""
     turn = frames.multiply(frames.invert(first), second)
     axis, angle = axis_and_angle(frames.to_quaternion(turn))
     orientation = frames.multiply_quaternions(frames.to_quaternion(first), about(axis, part * angle))
@@ -193,12 +195,12 @@ class Poses:
 
     @sim("5", getPoseInverse="5")
     def invertPose(self, pose: SevenNumbers) -> list[float]:
-        """Return the pose that undoes another."""
+        """Return the inverse of a pose."""
         return to_pose(frames.invert(from_pose(pose)))
 
     @sim("5")
     def interpolatePoses(self, first: SevenNumbers, second: SevenNumbers, part: Number) -> list[float]:
-        """Return the pose at a share (0 to 1) between two, with the shortest rotation."""
+        """Return the pose at a fraction (0 to 1) between two, with the shortest rotation."""
         return to_pose(between(from_pose(first), from_pose(second), numbers((part,), 1)[0]))
 
     @sim("5")

@@ -1,7 +1,7 @@
-"""What a script subscribes to, publishes and offers, with or without ROS behind.
+"""Subscriptions, publications and services of a script, with or without ROS.
 
-Whoever has a message leaves it here from any thread; the simulation hands it to the script's callback
-at the start of its next step. What a script publishes goes to the Backend where there is one, else nowhere.
+Any thread may post a message here; at the beginning of its next step, the simulation passes it to the script's
+callback. The script's publications are sent by the Backend, if there is one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _LOG = logging.getLogger(__name__)
 
 _MOST = 200  # subscriptions and publishers
 _LONGEST_QUEUE = 1000  # messages
-_MOST_WAITING = 100  # requests of one service
+_MOST_WAITING = 100  # waiting requests of one service
 _OWN_TOPICS = {
     "cmd_vel": "geometry_msgs/Twist",
     **dict.fromkeys(("takeoff", "land", "reset", "home"), "std_msgs/Empty"),
@@ -29,46 +29,46 @@ _OWN_TOPICS = {
     "parameter_updates": "dynamic_reconfigure/Config",
 }
 _TYPE = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
-_NAME = re.compile(r"(/[A-Za-z0-9_]+)+")  # rosgraph.names.is_legal_name, of resolved names, without other alphabets
+_NAME = re.compile(r"(/[A-Za-z0-9_]+)+")  # like rosgraph.names.is_legal_name for complete names, but ASCII only
 
 
 class _Publisher(NamedTuple):
-    begin: Callable[[], MessageSender | None]  # nothing where there is no backend
+    begin: Callable[[], MessageSender | None]  # returns None without a backend
     sender: MessageSender | None
 
 
 class MessageBus:
-    """What one script subscribes to, publishes and offers.
+    """Subscriptions, publications and services of one script.
 
-    `backend` may be set at any time; it serves what is subscribed and advertised after that. It is not
-    used for the topics in `own_topics`: the drone itself posts them, and receives what is published on them.
+    `backend` may be set at any time, and is used for later subscriptions and publications. It is not used for the
+    topics in `own_topics`, which the drone itself posts and receives.
     """
 
     def __init__(self, namespace: str, own_topics: Mapping[str, str] | None = None):
-        """`namespace`: 'drone', '' is none; `own_topics`: those that the drone itself has, with their types."""
+        """`namespace`: such as 'drone', '' for none; `own_topics`: types of the drone's own topics by name."""
         self.backend: Backend | None = None
         self._prefix = f"/{namespace}" if namespace else ""
         own = _OWN_TOPICS if own_topics is None else own_topics
         self._own_topics = {self.resolve(topic): kind for topic, kind in own.items()}
         self._subscriptions = Subscriptions()
-        # Asked for in every step: without another call in between.
+        # Called in every step, so without another function call.
         self.new_callbacks, self.deliver = self._subscriptions.new_callbacks, self._subscriptions.deliver
         self.take = self._subscriptions.take
         self._publishers: dict[int, _Publisher] = {}
-        self.said: dict[str, Any] = {}  # what was last published on own topics, by their full names
+        self.said: dict[str, Any] = {}  # the last message on each of the drone's own topics, by complete name
         self._last_handle = 0
 
-    # ---- what a script does
+    # ---- for scripts
 
     def subscribe(self, topic: str, kind: str, callback: Callback, queue: int = 1) -> int:
-        """Collect messages of a topic for a callback, the last `queue` of a step; return a handle. Raises ValueError.
+        """Subscribe to a topic; in each step, the last `queue` messages are kept. Return a handle. Raises ValueError.
 
         A second call with the same topic, type and callback returns the same handle.
         """
         resolved = self.resolved("topic", topic)
-        there = self._subscriptions.same(resolved, kind, callback)
-        if there is not None:
-            return there
+        existing = self._subscriptions.same(resolved, kind, callback)
+        if existing is not None:
+            return existing
 
         def begin(take: Callable[[Any], None]) -> Callable[[], None]:
             if resolved in self._own_topics:
@@ -84,7 +84,7 @@ class MessageBus:
         return handle
 
     def offer(self, name: str, kind: str, callback: Callback) -> int:
-        """Offer a service, which a callback answers; return a handle. Raises ValueError."""
+        """Offer a service whose requests a callback answers; return a handle. Raises ValueError."""
         service = self.resolved("service", name)
         if self._subscriptions.has(SERVICE.format(service)):
             raise ValueError(f"this script already offers the service {service}")
@@ -98,7 +98,7 @@ class MessageBus:
             end = self.backend.serve(service, kind, server.ask)
 
             def close() -> None:
-                server.close()  # refuses what still waits
+                server.close()  # refuses waiting requests
                 end()
 
             return close
@@ -127,33 +127,33 @@ class MessageBus:
         )
 
     def publish(self, handle: int, message: Any) -> None:
-        """Publish a message; raises ValueError where nothing has that handle."""
+        """Publish a message. Raises ValueError for an unknown handle."""
         sender = self._sender(handle)
         if sender is not None:
             sender.publish(message)
 
     def subscribers(self, handle: int) -> int:
-        """Return how many listen; raises ValueError where nothing has that handle."""
+        """Return the number of subscribers. Raises ValueError for an unknown handle."""
         sender = self._sender(handle)
         return 0 if sender is None else sender.subscribers()
 
     def end_publisher(self, handle: int) -> None:
-        """Stop advertising; raises ValueError where nothing has that handle."""
+        """Stop advertising. Raises ValueError for an unknown handle."""
         sender = self._sender(handle)
         del self._publishers[handle]
         if sender is not None:
             sender.shutdown()
 
     def check_subscription(self, handle: int, is_service: bool = False) -> None:
-        """Raise ValueError where no subscription, or no service that is offered, has that handle."""
+        """Raise ValueError if no subscription (or no offered service) has this handle."""
         self._subscriptions.check(handle, is_service)
 
     def end_subscription(self, handle: int, is_service: bool = False) -> None:
-        """End a subscription, or offer a service no longer; raises ValueError where none has that handle."""
+        """End a subscription or an offered service. Raises ValueError for an unknown handle."""
         self._subscriptions.check(handle, is_service)
         self._subscriptions.end(handle)
 
-    # ---- what the simulation calls
+    # ---- for the simulation
 
     @property
     def is_subscribed(self) -> bool:
@@ -161,21 +161,21 @@ class MessageBus:
         return len(self._subscriptions) > 0
 
     def post(self, topic: str, message: Any) -> None:
-        """Leave a message for the next step; any thread may call it."""
+        """Store a message for the next step; any thread may call this."""
         self._subscriptions.post(self.resolve(topic), message)
 
     def hears(self, topic: str) -> bool:
-        """Whether the script is subscribed to a topic."""
+        """Return whether the script is subscribed to a topic."""
         return self._subscriptions.has(self.resolve(topic))
 
     def close(self) -> None:
-        """End every subscription and stop advertising: the script that made them is gone."""
+        """End all subscriptions, services and publications."""
         self._subscriptions.close()
         for handle in list(self._publishers):
             self.end_publisher(handle)
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings back what is subscribed and advertised now, and the messages that wait."""
+        """Return a function that restores the present subscriptions, publications and waiting messages."""
         restore_subscriptions, kept = self._subscriptions.save_state(), dict(self._publishers)
         last, said = self._last_handle, dict(self.said)
 
@@ -203,7 +203,7 @@ class MessageBus:
         return self._publishers[handle].sender
 
     def _check_type(self, topic: str, kind: str) -> None:
-        """Raise ValueError for a type that the topic does not have, or that is none."""
+        """Raise ValueError if the type is malformed, or differs from the type of the drone's own topic."""
         own = self._own_topics.get(topic)
         if own is not None and kind != own:
             raise ValueError(f"messages on {topic} have the type {own}, not '{kind}'")
@@ -217,14 +217,14 @@ class MessageBus:
         return self._last_handle
 
     def resolved(self, what: str, name: str) -> str:
-        """Return the full name of a topic, service or parameter (`what`). Raises ValueError for an impossible name."""
+        """Return the complete name of a topic, service or parameter (`what`). Raises ValueError for an invalid name."""
         full = self.resolve(name)
         if not _NAME.fullmatch(full):
             raise ValueError(f"{name[:80]!r} is no name of a {what}: letters, digits, _ and / are allowed")
         return full
 
     def resolve(self, topic: str) -> str:
-        """Return the full name of a topic or parameter: a relative one stands in the drone's namespace."""
+        """Return the complete name of a topic or parameter; relative names are in the drone's namespace."""
         return topic if topic.startswith("/") else f"{self._prefix}/{topic}"
 
 

@@ -1,9 +1,9 @@
-"""The script API, under CoppeliaSim's names: what a child script reaches as `sim`.
+"""Modules of the script API, with CoppeliaSim's names: `sim`, `simROS`, `simVision` and plugins.
 
-Positions are [x, y, z] in metres, orientations V-REP's Euler angles [alpha, beta, gamma] in radians
-(R = Rx Ry Rz), matrices 12 numbers, velocities world-frame. `relativeTo` is a handle, -1 the world.
-A wrong name, number or kind of values raises ValueError or TypeError; where the script does not catch it, the
-log names the function, what it got, and what it takes.
+Positions are [x, y, z] in m, orientations V-REP's Euler angles [alpha, beta, gamma] in rad (R = Rx Ry Rz), matrices
+have 12 numbers, velocities are in the world frame. `relativeTo` is a handle, -1 means the world. A wrong name, number
+or type of values raises ValueError or TypeError. If the script does not catch it, the log names the function, its
+arguments and the expected arguments.
 """
 
 from __future__ import annotations
@@ -46,45 +46,45 @@ from drone_sim.scripting.api.wireless import Wireless
 
 
 def make_sim(host: Host, services: SceneServices) -> Api:
-    """Return `sim` for a script, on what it is attached to."""
+    """Return `sim` for the script on `host`."""
     context = host.context
     names, ignored, trajectories = NameFunctions(host), _ignored(host), TrajectoryFunctions()
-    seen = host, services, ignored
-    motions = MotionFunctions(*seen)
+    arguments = host, services, ignored
+    motions = MotionFunctions(*arguments)
     parts = (
-        Sensors(*seen),
-        Objects(*seen),
-        JointFunctions(*seen),
-        ProximitySensors(*seen),
+        Sensors(*arguments),
+        Objects(*arguments),
+        JointFunctions(*arguments),
+        ProximitySensors(*arguments),
         DistanceFunctions(context.objects, context.collections, services.nearest),
         CollectionFunctions(names, context.objects, context.collections),
-        Paths(*seen),
-        ObjectKinds(*seen),
+        Paths(*arguments),
+        ObjectKinds(*arguments),
         SceneObjects(services),
         Shapes(services),
-        Dynamics(*seen),
-        ShapeMasses(*seen),
+        Dynamics(*arguments),
+        ShapeMasses(*arguments),
         Matrices(),
         Poses(),
         Bits(),
-        ScriptFunctions(names, *seen),
-        ScriptCalls(names, *seen),
-        SimulationFunctions(*seen),
+        ScriptFunctions(names, *arguments),
+        ScriptCalls(names, *arguments),
+        SimulationFunctions(*arguments),
         Dialogs(context.windows, context.drawings.new_handle, ignored),
         Views(context.windows, context.drawings.new_handle, context.objects),
-        VisionSensors(*seen),
+        VisionSensors(*arguments),
         names,
         SignalFunctions(context.signals),
         GraphFunctions(context.graphs, context.drawings.new_handle),
         TubeFunctions(context.tubes),
-        Wireless(*seen),
+        Wireless(*arguments),
         CustomDataFunctions(context.objects, context.data),
         Packing(),
         Tables(),
-        Threads(*seen),
+        Threads(*arguments),
         trajectories,
         motions,
-        OlderMotions(motions, *seen),
+        OlderMotions(motions, *arguments),
         DrawingFunctions(context.drawings, context.objects, ignored),
         OlderRemotePortFunctions(RemotePortFunctions(context.remote_ports, ignored)),
     )
@@ -94,23 +94,23 @@ def make_sim(host: Host, services: SceneServices) -> Api:
 
 
 def _both(names: NameFunctions, trajectories: TrajectoryFunctions) -> Restore:
-    """Return a function that brings back what a script has set in both."""
+    """Return a function that restores the values that a script has set in both."""
     return in_turn(names.save_state(), trajectories.save_state())
 
 
 def make_sim_ros(bus: MessageBus, clock: Clock) -> Api:
-    """Return `simROS` for the script that flies a drone, by the simulation's clock."""
+    """Return `simROS` for a script; `clock` is the simulation's."""
     return Api("simROS", functions_of(TopicFunctions(bus), ServiceFunctions(bus), RosFunctions(bus, clock)), {})
 
 
 def make_sim_vision(host: Host, services: SceneServices) -> Api:
-    """Return `simVision` for a script, on what it is attached to."""
+    """Return `simVision` for the script on `host`."""
     filters = ImageFilters(host, services, _ignored(host))
     return Api("simVision", functions_of(filters), {}, filters.save_state)
 
 
 def make_plugins(host: Host) -> dict[str, Api]:
-    """Return `simRemoteApi`, and the plugins of CoppeliaSim's that are accepted and do nothing, by name."""
+    """Return `simRemoteApi`, and the plugins of CoppeliaSim that are accepted and ignored, by name."""
     ignored = _ignored(host)
     ports = functions_of(RemotePortFunctions(host.context.remote_ports, ignored))
     return {

@@ -1,8 +1,7 @@
-"""`sim`: motions within limits of velocity, acceleration and jerk, in threads (4.x).
+"""`sim`: motions with limited velocity, acceleration and jerk, in threads (4.x).
 
-In every step the script's own function is called with what the motion has come to; without one, the joints or the
-object are put there. A motion ends in the step that reaches its end, exactly there, or as soon as the function returns
-true.
+In every step, the script's callback is called with the state of the motion; without a callback, the joints or the
+object are moved. A motion ends in the step in which it reaches its exact end, or as soon as the callback returns true.
 """
 
 from __future__ import annotations
@@ -23,9 +22,9 @@ from drone_sim.scripting.api.trajectories import LEAST_ACCELERATION, LEAST_VELOC
 from drone_sim.scripting.api.types import WrongValue, numbers
 from drone_sim.scripting.api.unknown import PLUGINS
 
-ABORTED = 2  # what a step returns after the script's function has returned true
-_MOST = 1000  # of one script
-_AT_ONCE = {"maxVel": 9999.0, "maxAccel": 99999.0, "maxJerk": 9999999.0}  # and a step of 10 s, as CoppeliaSim has them
+ABORTED = 2  # result of a step if the script's callback has returned true
+_MOST = 1000  # motions of one script
+_AT_ONCE = {"maxVel": 9999.0, "maxAccel": 99999.0, "maxJerk": 9999999.0}  # with a step of 10 s, as in CoppeliaSim
 _CONFIG = (
     "flags",
     "pos",
@@ -57,42 +56,45 @@ Parameters = dict[str, Any]
 
 
 class Motion:
-    """A motion along a trajectory: `seen` makes parameters of its state, `put` puts the joints or the object there."""
+    """A motion along a trajectory."""
 
     def __init__(
         self,
         trajectory: Trajectory,
         time_step: float,
-        seen: Callable[[State], Parameters],
-        put: Callable[[Parameters], None] = lambda _data: None,
+        describe: Callable[[State], Parameters],
+        move: Callable[[Parameters], None] = lambda _data: None,
         data: Parameters | None = None,
     ):
-        """`data` are the script's own parameters, among them its `callback`, if any; `seen` adds to them."""
-        self._trajectory, self._time_step, self._seen, self._put = trajectory, time_step, seen, put
+        """`describe` returns parameters for a state; `move` moves the joints or the object according to them.
+
+        `data` are the script's own parameters, with its `callback`, if any; those of `describe` are added.
+        """
+        self._trajectory, self._time_step, self._describe, self._move = trajectory, time_step, describe, move
         self.data: Parameters = {**(data or {}), "timeLeft": 0.0}
         self._callback = self.data.pop("callback", None)
         self._legacy: tuple[str, ...] = self.data.pop("legacy", ())
 
     def step(self) -> Generator[Call | None, Any, int]:
-        """Move once; return 0, 1 at the end, or ABORTED."""
-        self.data.update(self._seen(self._trajectory.advance(self._time_step)))
+        """Advance by a step; return 0, 1 at the end, or ABORTED."""
+        self.data.update(self._describe(self._trajectory.advance(self._time_step)))
         self.data["timeLeft"] = max(0.0, self._trajectory.elapsed - self._trajectory.duration)
         if self._callback is None:
-            self._put(self.data)
-        elif (yield Call(self._callback, self._told())):
+            self._move(self.data)
+        elif (yield Call(self._callback, self._callback_arguments())):
             return ABORTED
         return int(self._trajectory.is_over)
 
-    def _told(self) -> list[Any]:
+    def _callback_arguments(self) -> list[Any]:
         return [self.data.get(name) for name in (*self._legacy, "auxData")] if self._legacy else [dict(self.data)]
 
 
 class MotionFunctions(Functions):
-    """Motions within limits of velocity, acceleration and jerk, in threads (4.x)."""
+    """Motions with limited velocity, acceleration and jerk, in threads (4.x)."""
 
-    def __init__(self, *seen: Any):
-        """Take what all functions take."""
-        super().__init__(*seen)
+    def __init__(self, *arguments: Any):
+        """Create it without motions; `arguments` are those of Functions."""
+        super().__init__(*arguments)
         self._motions: dict[int, Motion] = {}
         self._handles = itertools.count(1)
 
@@ -100,24 +102,25 @@ class MotionFunctions(Functions):
 
     @sim("5")
     def moveToConfig(self, params: Any, *arguments: Any) -> Wait:
-        """Move joints to positions, and return when they are there: what was given, with `pos`, `vel`, `accel`.
+        """Move joints to positions; at the end, return the parameters with `pos`, `vel` and `accel`.
 
         `params`: `joints` or `pos`, `targetPos`, and `maxVel`, `maxAccel`, `maxJerk` (without these three: at once);
         `vel`, `accel`, `targetVel`, `minVel`, `minAccel`, `flags`, `cyclicJoints`, `callback`, `auxData`, `timeStep`.
-        Before 4.6 they come one after the other: flags, pos, vel, accel, maxVel, maxAccel, maxJerk, targetPos,
-        targetVel, callback, auxData, cyclicJoints, timeStep; then the four are returned, and the callback gets them.
+        Before 4.6, the arguments are flags, pos, vel, accel, maxVel, maxAccel, maxJerk, targetPos, targetVel, callback,
+        auxData, cyclicJoints, timeStep. Then pos, vel, accel and the time left are returned, and passed to the
+        callback.
         """
-        given = _given(_CONFIG, params, arguments, ("pos", "vel", "accel"))
-        return self.run(self._config(given), _returned(given, "pos", "vel", "accel", "timeLeft"))
+        parameters = _parse_parameters(_CONFIG, params, arguments, ("pos", "vel", "accel"))
+        return self.run(self._config(parameters), _result_of(parameters, "pos", "vel", "accel", "timeLeft"))
 
     @sim("5")
     def moveToConfig_init(self, params: Mapping[str, Any]) -> dict[str, Any]:
-        """Begin a motion as moveToConfig's, which moveToConfig_step moves on; return what was given and `ruckigObj`."""
-        return self._begin(self._config(_given(_CONFIG, params, ())))
+        """Start a motion like moveToConfig's, for moveToConfig_step; return the parameters and `ruckigObj`."""
+        return self._begin(self._config(_parse_parameters(_CONFIG, params, ())))
 
     @sim("5", moveToPose_step="5")
     def moveToConfig_step(self, data: Mapping[str, Any]) -> Wait:
-        """Move once; return 0, 1 at the end or 2 where the script's function returned true, and how things are."""
+        """Advance a motion by a step; return 0, 1 at the end or 2 if the callback returned true, and its parameters."""
         motion, result = self._motion(data), [0]
 
         def step() -> Steps:
@@ -127,22 +130,25 @@ class MotionFunctions(Functions):
 
     @sim("5", moveToPose_cleanup="5")
     def moveToConfig_cleanup(self, data: Mapping[str, Any]) -> None:
-        """Forget a motion that was begun with _init."""
+        """Remove a motion that was started with _init."""
         self._motion(data)
         del self._motions[data["ruckigObj"]]
 
-    def _config(self, given: Parameters) -> Motion:
-        joints = [self._movable(handle) for handle in given.get("joints") or ()]
-        if "pos" not in given:
-            given["pos"] = [joint.value for joint in joints]
-        start = _numbers(given, "pos", len(joints) or None)
-        target = [_near(*one) for one in zip(_numbers(given, "targetPos", len(start)), start, _cyclic(given, start))]
+    def _config(self, parameters: Parameters) -> Motion:
+        joints = [self._movable(handle) for handle in parameters.get("joints") or ()]
+        if "pos" not in parameters:
+            parameters["pos"] = [joint.value for joint in joints]
+        start = _numbers(parameters, "pos", len(joints) or None)
+        target = [
+            _nearest_target(*one)
+            for one in zip(_numbers(parameters, "targetPos", len(start)), start, _cyclic(parameters, start))
+        ]
         return Motion(
-            self._trajectory(given, start, target),
-            self._time_step(given),
+            self._trajectory(parameters, start, target),
+            self._time_step(parameters),
             lambda state: dict(zip(("pos", "vel", "accel"), state)),
             lambda data: move_joints(joints, data["pos"]),
-            given,
+            parameters,
         )
 
     def _movable(self, handle: int) -> Joint:
@@ -155,38 +161,38 @@ class MotionFunctions(Functions):
 
     @sim("5")
     def moveToPose(self, params: Any, *arguments: Any) -> Wait:
-        """Move an object to a pose, and return when it is there: what was given, with `pose`, `matrix`, `vel`, `accel`.
+        """Move an object to a pose; at the end, return the parameters with `pose`, `matrix`, `vel` and `accel`.
 
         `params`: `object` (and `relObject`) or `pose`, `targetPose`, and `maxVel`, `maxAccel`, `maxJerk`. These limits
-        are for x, y, z and the angle; with `metric`, four weights of these, they are for the weighted distance. The
-        rest is as for moveToConfig. Before 4.6: flags, pose, maxVel, maxAccel, maxJerk, targetPose, callback, auxData,
-        metric, timeStep.
+        apply to x, y, z and the angle; with `metric`, four weights, they apply to the weighted distance. The other
+        parameters are those of moveToConfig. Before 4.6: flags, pose, maxVel, maxAccel, maxJerk, targetPose, callback,
+        auxData, metric, timeStep.
         """
-        given = _given(_POSE, params, arguments, ("pose", "vel", "accel"))
-        place = "pose" if len(given.get("pose") or ()) != 12 else "matrix"
-        if "legacy" in given:
-            given["legacy"] = (place, "vel", "accel")
-        return self.run(self._pose(given), _returned(given, place, "timeLeft"))
+        parameters = _parse_parameters(_POSE, params, arguments, ("pose", "vel", "accel"))
+        place = "pose" if len(parameters.get("pose") or ()) != 12 else "matrix"
+        if "legacy" in parameters:
+            parameters["legacy"] = (place, "vel", "accel")
+        return self.run(self._pose(parameters), _result_of(parameters, place, "timeLeft"))
 
     @sim("5")
     def moveToPose_init(self, params: Mapping[str, Any]) -> dict[str, Any]:
-        """Begin a motion as moveToPose's, which moveToPose_step moves on; return what was given, and `ruckigObj`."""
-        return self._begin(self._pose(_given(_POSE, params, ())))
+        """Start a motion like moveToPose's, for moveToPose_step; return the parameters and `ruckigObj`."""
+        return self._begin(self._pose(_parse_parameters(_POSE, params, ())))
 
-    def _pose(self, given: Parameters) -> Motion:
-        if given.get("ik") is not None:
+    def _pose(self, parameters: Parameters) -> Motion:
+        if parameters.get("ik") is not None:
             raise ValueError(f"ik: {PLUGINS['simIK']}; `callback` is called in every step")
-        moved, relative = given.get("object"), given.get("relObject", -1)
-        if "pose" not in given:
+        moved, relative = parameters.get("object"), parameters.get("relObject", -1)
+        if "pose" not in parameters:
             if moved is None:
-                raise ValueError("`object` or `pose` must be given")
-            given["pose"] = to_pose(self._objects.matrix(moved, relative))
-        start, goal = (_place(given, name) for name in ("pose", "targetPose"))
+                raise ValueError("`object` or `pose` must be parameters")
+            parameters["pose"] = to_pose(self._objects.matrix(moved, relative))
+        start, goal = (_matrix_of(parameters, name) for name in ("pose", "targetPose"))
         way = [b - a for a, b in zip(frames.position(start), frames.position(goal))]
         turn = axis_and_angle(frames.to_quaternion(frames.multiply(frames.invert(start), goal)))[1]
         goals = [*way, turn]
-        if "metric" in given:  # one number for all four
-            goals = [math.hypot(*(one * much for one, much in zip(goals, numbers(given["metric"], 4))))]
+        if "metric" in parameters:  # one number for all four
+            goals = [math.hypot(*(one * much for one, much in zip(goals, numbers(parameters["metric"], 4))))]
 
         def seen(state: State) -> Parameters:
             m = list(goal)
@@ -197,25 +203,27 @@ class MotionFunctions(Functions):
             return {"pose": to_pose(m), "matrix": m, "vel": state.velocity, "accel": state.acceleration}
 
         return Motion(
-            self._trajectory(given, [0.0] * len(goals), goals),
-            self._time_step(given),
+            self._trajectory(parameters, [0.0] * len(goals), goals),
+            self._time_step(parameters),
             seen,
             lambda data: None if moved is None else self._objects.set_matrix(moved, relative, data["matrix"]),
-            given,
+            parameters,
         )
 
     # ---- both
 
-    def move(self, given: Parameters, value: Callable[[Parameters], Any]) -> Wait:
-        """Move like moveToConfig if there are `joints`, otherwise like moveToPose; surplus numbers are ignored.
+    def move(self, parameters: Parameters, value: Callable[[Parameters], Any]) -> Wait:
+        """Move like moveToConfig if `parameters` have `joints`, otherwise like moveToPose; surplus numbers are ignored.
 
-        `value` makes the function's return value from the motion's data.
+        `value` returns the API function's result for the motion's data.
         """
-        given = {name: one for name, one in given.items() if one is not None}
-        return self.run((self._config if "joints" in given else self._pose)({**given, "legacy": ("vel",)}), value)
+        parameters = {name: one for name, one in parameters.items() if one is not None}
+        return self.run(
+            (self._config if "joints" in parameters else self._pose)({**parameters, "legacy": ("vel",)}), value
+        )
 
     def run(self, motion: Motion, value: Callable[[Parameters], Any]) -> Wait:
-        """Return the wait for the end of a motion; `value` makes the function's return value from the motion's data."""
+        """Return the wait for the end of a motion; `value` returns the API function's result for the motion's data."""
 
         def steps() -> Steps:
             over = 0
@@ -238,33 +246,35 @@ class MotionFunctions(Functions):
             raise WrongValue("expected the value that moveToConfig_init or moveToPose_init returned")
         return self._motions[handle]
 
-    def _trajectory(self, given: Parameters, start: Sequence[float], goal: Sequence[float]) -> Trajectory:
-        count, flags = len(start), int(given.get("flags", -1))
+    def _trajectory(self, parameters: Parameters, start: Sequence[float], goal: Sequence[float]) -> Trajectory:
+        count, flags = len(start), int(parameters.get("flags", -1))
         bits = max(flags, 0)
-        if not any(given.get(name) for name in _AT_ONCE):
-            given.update({name: [most] * count for name, most in _AT_ONCE.items()}, timeStep=10.0)
+        if not any(parameters.get(name) for name in _AT_ONCE):
+            parameters.update({name: [most] * count for name, most in _AT_ONCE.items()}, timeStep=10.0)
         still = [0.0] * count
-        state = State(list(start), _numbers(given, "vel", count, still), _numbers(given, "accel", count, still))
-        velocity, acceleration, jerk = (_numbers(given, name, count) for name in _AT_ONCE)
+        state = State(
+            list(start), _numbers(parameters, "vel", count, still), _numbers(parameters, "accel", count, still)
+        )
+        velocity, acceleration, jerk = (_numbers(parameters, name, count) for name in _AT_ONCE)
         limits = Limits(
             velocity,
             acceleration,
             jerk,
-            _least(given, "minVel", "maxVel", count, bits & LEAST_VELOCITY),
-            _least(given, "minAccel", "maxAccel", count, bits & LEAST_ACCELERATION),
+            _least(parameters, "minVel", "maxVel", count, bits & LEAST_VELOCITY),
+            _least(parameters, "minAccel", "maxAccel", count, bits & LEAST_ACCELERATION),
         )
-        target = _numbers(given, "targetVel", count, still)
+        target = _numbers(parameters, "targetVel", count, still)
         return Trajectory(state, goal, target, limits, synchronization(flags, PHASE))
 
-    def _time_step(self, given: Parameters) -> float:
-        (seconds,) = numbers((given.get("timeStep") or self._context.clock.time_step,), 1)
+    def _time_step(self, parameters: Parameters) -> float:
+        (seconds,) = numbers((parameters.get("timeStep") or self._context.clock.time_step,), 1)
         if seconds <= 0:
             raise WrongValue(f"timeStep = {seconds:g}: must be greater than 0")
         return seconds
 
 
 def move_joints(joints: Sequence[Joint], positions: Sequence[float]) -> None:
-    """Let joints that the dynamics moves go to positions, and put the others there."""
+    """Set target positions of joints that the dynamics moves, and positions of the others."""
     for joint, position in zip(joints, positions):
         if joint.drive is not None and joint.control.mode != KINEMATIC:
             joint.change(position=position)
@@ -272,30 +282,32 @@ def move_joints(joints: Sequence[Joint], positions: Sequence[float]) -> None:
             joint.place(position)
 
 
-def _given(names: Sequence[str], params: Any, arguments: Sequence[Any], told: tuple[str, ...] = ()) -> Parameters:
-    """Return parameters by name, without those that are None; `told`: the names that a callback before 4.6 gets."""
+def _parse_parameters(
+    names: Sequence[str], params: Any, arguments: Sequence[Any], legacy: tuple[str, ...] = ()
+) -> Parameters:
+    """Return parameters by name, without None. `legacy`: names of the callback's arguments before 4.6."""
     if isinstance(params, Mapping):
         found = dict(params)
-    elif told and isinstance(params, (int, float)) and len(arguments) < len(names):
-        found = {**dict(zip(names, (params, *arguments))), "legacy": told}
+    elif legacy and isinstance(params, (int, float)) and len(arguments) < len(names):
+        found = {**dict(zip(names, (params, *arguments))), "legacy": legacy}
     else:
         raise WrongValue("expected a table of parameters")
-    return {name: one for name, one in found.items() if one is not None}
+    return {name: value for name, value in found.items() if value is not None}
 
 
-def _returned(given: Parameters, *names: str) -> Callable[[Parameters], Any]:
-    """Return a function from a motion's data to the return value: all data, or before 4.6 those with these names."""
-    if "legacy" not in given:
+def _result_of(parameters: Parameters, *names: str) -> Callable[[Parameters], Any]:
+    """Return a function that selects the result from a motion's data: all data, or before 4.6 these names."""
+    if "legacy" not in parameters:
         return lambda data: data
     return lambda data: tuple(data[name] for name in names)
 
 
-def _numbers(given: Parameters, name: str, count: int | None, otherwise: list[float] | None = None) -> list[float]:
-    """Return `count` numbers, or as many as there are. Before 4.6 there may be more, which are ignored."""
-    values = given.get(name, otherwise)
+def _numbers(parameters: Parameters, name: str, count: int | None, otherwise: list[float] | None = None) -> list[float]:
+    """Return `count` numbers (None: all). Before 4.6, there may be more, which are ignored."""
+    values = parameters.get(name, otherwise)
     if not isinstance(values, Sequence) or isinstance(values, (str, bytes)) or not values:
-        raise WrongValue(f"`{name}`: a list of {f'{count} ' if count else ''}numbers must be given")
-    if count and "legacy" in given:
+        raise WrongValue(f"`{name}`: a list of {f'{count} ' if count else ''}numbers must be parameters")
+    if count and "legacy" in parameters:
         values = values[:count]
     try:
         return list(numbers(values, count or len(values)))
@@ -303,27 +315,27 @@ def _numbers(given: Parameters, name: str, count: int | None, otherwise: list[fl
         raise WrongValue(f"`{name}`: {error}") from None
 
 
-def _least(given: Parameters, name: str, most: str, count: int, is_behind: int) -> list[float] | None:
-    """Return the lower limits that belong to the upper limits `most`; before 4.6 they may follow in the same list."""
-    if "legacy" in given and is_behind:
-        return list(numbers(given[most][count : 2 * count], count))
-    return _numbers(given, name, count) if name in given else None
+def _least(parameters: Parameters, name: str, most: str, count: int, is_behind: int) -> list[float] | None:
+    """Return the lower limits for the upper limits `most`; before 4.6, they may follow in the same list."""
+    if "legacy" in parameters and is_behind:
+        return list(numbers(parameters[most][count : 2 * count], count))
+    return _numbers(parameters, name, count) if name in parameters else None
 
 
-def _cyclic(given: Parameters, start: Sequence[float]) -> Sequence[bool]:
-    found = given.get("cyclicJoints") or [False] * len(start)
+def _cyclic(parameters: Parameters, start: Sequence[float]) -> Sequence[bool]:
+    found = parameters.get("cyclicJoints") or [False] * len(start)
     if not isinstance(found, Sequence) or len(found) < len(start):
-        raise WrongValue(f"`cyclicJoints`: {len(start)} values must be given")
+        raise WrongValue(f"`cyclicJoints`: {len(start)} values must be parameters")
     return found
 
 
-def _near(target: float, start: float, is_cyclic: bool) -> float:
-    """Return a joint's target, the shorter way round where it has no end."""
+def _nearest_target(target: float, start: float, is_cyclic: bool) -> float:
+    """Return a joint's target; for a cyclic joint, the equivalent one in the shorter direction."""
     return start + math.remainder(target - start, math.tau) if is_cyclic else target
 
 
-def _place(given: Parameters, name: str) -> frames.Matrix:
-    values = _numbers(given, name, None)
+def _matrix_of(parameters: Parameters, name: str) -> frames.Matrix:
+    values = _numbers(parameters, name, None)
     if len(values) not in (7, 12):
         raise WrongValue(f"`{name}`: expected a pose of 7 numbers or a matrix of 12, not {len(values)} numbers")
     return from_pose(values) if len(values) == 7 else numbers(values, 12)

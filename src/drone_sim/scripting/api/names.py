@@ -1,13 +1,13 @@
-"""`sim`: objects by their names: V-REP 3.x names, and CoppeliaSim 4.x paths (object_paths.py).
+"""`sim`: objects by V-REP 3.x names and CoppeliaSim 4.x paths (object_paths.py).
 
-    Quadricopter_base  Quadricopter_base#  Quadricopter_base#0     3.x; the suffix tells copies of a model apart
+    Quadricopter_base  Quadricopter_base#  Quadricopter_base#0     3.x; the suffix distinguishes copies of a model
 
-A name without a suffix means the object of the script's own model, as in V-REP: in the script of Drone#0,
-Quadricopter_base is Quadricopter_base#0. Where there is none, it is an object of the scene, such as Floor, but not one
-of the model that Drone#0 is a copy of. `name#` is always the one without a suffix.
+A name without a suffix means the object in the script's own copy of the model, as in V-REP: in the script of Drone#0,
+Quadricopter_base is Quadricopter_base#0. If there is no such object, it means an object of the scene, such as Floor,
+but not one in the model that Drone#0 is a copy of. `name#` is always the object without a suffix.
 
-Since CoppeliaSim 4.9 a script is an object of its own below the model, so `..` is the model; before that, a script was
-a part of the object, so `.` is the model. In the drone's script both mean the drone.
+Since CoppeliaSim 4.9, a script is an object of its own, a child of the model, so `..` is the model; before, a script
+was part of its object, so `.` is the model. In the drone's script, both mean the drone.
 """
 
 from __future__ import annotations
@@ -35,22 +35,22 @@ class NameFunctions:
     A name without a suffix means the copy of the model that the script belongs to."""
 
     def __init__(self, host: Host):
-        """`host` is the drone that the script flies, or what else it is on."""
+        """`host` is the object that the script is attached to."""
         self._objects = host.context.objects
-        self._host = host  # its object may get another name
-        self.suffix = split(host.own_script)[1]  # that names without one have
+        self._host = host  # its object may be renamed
+        self.suffix = split(host.own_script)[1]  # added to names without a suffix
 
     @sim("5")
     def getObject(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
-        """Return the handle of an object by path or name; with the option noError, or name@silentError, -1 for none.
+        """Return the handle of an object by path or name; -1 for none with the option noError, or name@silentError.
 
-        The option `index` takes the i-th of several of a path, from 0; `proxy` is the object from which relative paths
-        begin, in the place of the script's own. sim.handle_self is what the script is on.
+        If a path means several objects, the option `index` selects one, from 0; `proxy` is the object where relative
+        paths begin, instead of the script's own. sim.handle_self is the object that the script is on.
         """
         if path == _SELF:
             return self._objects.handle(self._host.own_script)
         options = options or {}
-        name, _, flag = path.partition("@") if isinstance(path, str) else (path, "", "")  # @alt: of 4.x, found anyhow
+        name, _, flag = path.partition("@") if isinstance(path, str) else (path, "", "")  # @alt (4.x) is not needed
         try:
             return self._find(name, int(options.get("index", 0)), options.get("proxy", WORLD))
         except ValueError:
@@ -89,8 +89,8 @@ class NameFunctions:
     def getObjectAlias(self, handle: Handle, options: int = -1) -> str:
         """Return the 4.x alias of an object.
 
-        `options`: -1 the alias, 0 with its index ('propeller[1]'), 1, 2 and 5 the path from the root, 3 and 4 with
-        its handle ('propeller__42__'; 3: where the alias is not unique).
+        `options`: -1 the alias, 0 with its index ('propeller[1]'), 1, 2 and 5 the path from the root, 3 and 4 with its
+        handle ('propeller__42__'; 3: if the alias is not unique).
         """
         alias = self._objects[handle].alias
         if options in (1, 2, 5):
@@ -114,11 +114,11 @@ class NameFunctions:
 
     @sim("345")
     def setNameSuffix(self, suffix: int) -> None:
-        """Let names without a suffix mean those with this one, -1 for none."""
+        """Set the suffix that is added to names without one, -1 for none."""
         self.suffix = max(NO_SUFFIX, int(numbers((suffix,), 1)[0]))
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings back the suffix that setNameSuffix has set."""
+        """Return a function that restores the suffix that setNameSuffix has set."""
         kept = self.suffix
 
         def restore() -> None:
@@ -128,9 +128,9 @@ class NameFunctions:
 
 
 def find(objects: ObjectTree, name: str, own: str, suffix: int) -> int:
-    """Return the handle that a name means in a script of the object `own`, whose names have that suffix.
+    """Return the handle that a name means in the script of the object `own`, with this suffix for names.
 
-    Raises ValueError with the near names.
+    Raises ValueError, which lists similar names.
     """
     if not isinstance(name, str):
         raise TypeError("a name must be a string")
@@ -138,41 +138,42 @@ def find(objects: ObjectTree, name: str, own: str, suffix: int) -> int:
 
 
 def _full_name(objects: ObjectTree, name: str, own: str, suffix: int) -> str:
-    """Return what a name in a script stands for, whether there is such an object or not."""
+    """Return the complete name that a name in a script means, whether the object exists or not."""
     match = _SUFFIXED.fullmatch(name)
     if match is None:
         full = suffixed(name, suffix)
         if full in objects:
             return full
-        is_its_own = suffix == split(own)[1]  # and not one that setNameSuffix has set
-        by_its_names = (suffixed(name, split(one)[1]) for one in _names(objects, own) if is_its_own)
-        found = next((one for one in by_its_names if one in objects and one != name), None)
+        is_default = suffix == split(own)[1]  # not changed by setNameSuffix
+        candidates = (suffixed(name, split(own_name)[1]) for own_name in _names(objects, own) if is_default)
+        found = next((candidate for candidate in candidates if candidate in objects and candidate != name), None)
         if found or not _is_of_the_scene(objects, name, own):
             return found or full
         return name if name in objects else _only_copy(objects, name, own)
-    # A script that is copied out of a scene with several models names its own with a suffix.
-    is_meant = name in objects or (match.group(2) and objects.is_copied(match.group(1)))
-    return name if is_meant else match.group(1)
+    # A script from a scene with several models uses suffixes for its own objects.
+    is_complete = name in objects or (match.group(2) and objects.is_copied(match.group(1)))
+    return name if is_complete else match.group(1)
 
 
 def _names(objects: ObjectTree, own: str) -> tuple[str, ...]:
-    """Return the names of a script's object: in an imported scene its copy may have another suffix than the vehicle."""
+    """Return the names of a script's object; in an imported scene, its copy may have another suffix."""
     return objects[objects.handle(own)].names if own in objects else ()
 
 
 def _is_of_the_scene(objects: ObjectTree, name: str, own: str) -> bool:
-    """Tell whether a name does not belong to the original model, which `own` is or is a copy of."""
+    """Return whether the object with a name is not in the original model of `own`."""
     original = plain(own)
     if name not in objects or original not in objects or not objects.is_copied(original):
         return True
-    twin = objects[objects.handle(original)]
-    return not objects[objects.handle(name)].is_part_of(twin.model() or twin)
+    root = objects[objects.handle(original)]
+    return not objects[objects.handle(name)].is_part_of(root.model() or root)
 
 
 def _only_copy(objects: ObjectTree, name: str, own: str) -> str:
-    """Return the first copy that an import has made of a name, with a suffix that no copy of `own` has; else the name.
+    """Return the first copy that an import has made of a name, if no copy of `own` has its suffix; otherwise the name.
 
-    An import gives a suffix to all names of a tree if one of them is a name of ours (importing/scene_folder.py).
+    An import adds a suffix to all names of a tree if one of them exists already (importing/scene_folder.py).
     """
-    copies = sorted(split(one)[1] for one in objects.names if plain(one) == name) if objects.is_copied(name) else []
-    return next((suffixed(name, end) for end in copies if suffixed(own, end) not in objects), name)
+    is_copied = objects.is_copied(name)
+    suffixes = sorted(split(other)[1] for other in objects.names if plain(other) == name) if is_copied else []
+    return next((suffixed(name, suffix) for suffix in suffixes if suffixed(own, suffix) not in objects), name)

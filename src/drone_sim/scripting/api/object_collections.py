@@ -1,4 +1,4 @@
-"""`sim`: collections of objects, which distances, collisions and proximity sensors take in the place of one object."""
+"""`sim`: collections of objects, which can be used instead of a single object for distances, collisions and sensors."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from drone_sim.scripting.api.types import Handle, Name, WrongValue
 
 _ALL = CONSTANTS["handle_all"]
 _ITEMS = {CONSTANTS[f"handle_{word}"]: word for word in ITEMS}
-_REMOVES, _WITHOUT_OBJECT = 1, 2  # options of an item
+_REMOVES, _WITHOUT_OBJECT = 1, 2  # option bits of an item
 
 
 class CollectionFunctions:
-    """Collections of objects, which distances, collisions and proximity sensors take in the place of one object."""
+    """Collections of objects, which can be used instead of a single object for distances, collisions and sensors."""
 
     def __init__(self, names: NameFunctions, objects: ObjectTree, collections: Collections):
-        """`names` understands names; `collections` are those of the run, of some `objects`."""
+        """`names` has the suffix for names; `collections` consist of `objects`."""
         self._names = names
         self._objects = objects
         self._collections = collections
 
     @sim("345", createCollectionEx="45")
     def createCollection(self, name: Name | int = "", _options: int = 0) -> int:
-        """Make an empty collection: (options), or (name, options) as up to 4.1; return its handle.
+        """Create an empty collection: (options), or up to 4.1 (name, options); return its handle.
 
-        The option 1, which overrides properties of the objects, changes nothing: here all objects always count.
+        Option 1, which overrides properties of the objects, has no effect: here, all objects always count.
         """
         return self._collections.add(name if isinstance(name, str) else "")
 
     @sim("45")
     def addItemToCollection(self, collection: Handle, what: int, object: Handle = -1, options: int = 0) -> None:
-        """Add an object (sim.handle_single), with all below it (_tree), with its parents (_chain), or all (_all).
+        """Add an object (sim.handle_single), with its descendants (_tree), with its ancestors (_chain), or all (_all).
 
-        `options`: 1 removes them from what was added before, 2 leaves out the object itself. A tree is that of the
-        moment at which the collection is asked for.
+        `options`: 1 removes them instead, 2 excludes the object itself. Trees and chains are evaluated when the
+        collection is used.
         """
         word = _ITEMS.get(what)
         if word is None:
@@ -50,7 +50,7 @@ class CollectionFunctions:
 
     @sim("34")
     def addObjectToCollection(self, collection: Handle, object: Handle, what: int, options: int = 0) -> int:
-        """Do what addItemToCollection does; return 1 (3.x)."""
+        """Like addItemToCollection; return 1 (3.x)."""
         self.addItemToCollection(collection, what, object, options)
         return 1
 
@@ -81,14 +81,14 @@ class CollectionFunctions:
     @sim("345")
     def emptyCollection(self, collection: Handle) -> None:
         """Remove all objects from a collection; with sim.handle_all, from all collections."""
-        for one in self._these(collection):
-            self._collections.empty(one)
+        for handle in self._selected(collection):
+            self._collections.empty(handle)
 
     @sim("5", removeCollection="345")
     def destroyCollection(self, collection: Handle) -> None:
         """Remove a collection, or all with sim.handle_all; the objects stay."""
-        for one in self._these(collection):
-            self._collections.remove(one)
+        for handle in self._selected(collection):
+            self._collections.remove(handle)
 
-    def _these(self, collection: int) -> list[int]:
+    def _selected(self, collection: int) -> list[int]:
         return [*self._collections] if collection == _ALL else [collection]

@@ -1,12 +1,12 @@
-"""Paths of CoppeliaSim 4.x: which object of the tree a path means.
+"""Paths of CoppeliaSim 4.x, which identify objects in the tree.
 
     /Quadcopter/base  /base                    from the root of the scene
     .  ./base  ..  ../propeller[0]             from the object that the script is on, or from its parent
-    :  :/base  ::                              from the model that it is part of, or from the model above that
-    /Quadcopter/propeller[1]  /Quad*/prop*     the second of siblings; any letters (*), one letter (?)
+    :  :/base  ::                              from the model that contains it, or from the parent model
+    /Quadcopter/propeller[1]  /Quad*/prop*     the second sibling with this name; any letters (*), one letter (?)
 
-An element names any descendant, the nearest first. The next element is looked for below each of these, until an object
-is found.
+An element means any descendant with this name, nearest first. The next element is searched below each of these, until
+an object is found.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ _Fits = Callable[[SceneObject, str], bool]
 
 
 def is_path(name: str) -> bool:
-    """Tell whether a name is a path."""
+    """Return whether a name is a path."""
     return "/" in name or name in (".", "..", ":", "::")
 
 
 def find(
     objects: ObjectTree, path: str, own: SceneObject | None, above: SceneObject | None, index: int = 0
 ) -> SceneObject | None:
-    """Return the object that a path means, the index-th of several; None where there is none.
+    """Return the object that a path means, the index-th of several; None if there is none.
 
-    `own` is the object where relative paths begin (None: there is none), `above` the object that `..` means.
+    `own` is the object where relative paths begin (None: none), `above` the object that `..` means.
     """
     found = every(objects, path, own, above, index + 1) if index >= 0 else []
     return found[index] if len(found) > index else None
@@ -49,38 +49,38 @@ def every(
     above: SceneObject | None = None,
     most: int | None = None,
 ) -> list[SceneObject]:
-    """Return the objects that a path means, the first ones, or all of them; the rest is as for `find`."""
+    """Return the objects that a path means, at most `most`; other arguments are those of `find`."""
     first, *rest = path.split("/")
     model = None if own is None else own.model()
     model_above = None if model is None or model.parent is None else model.parent.model()
     begins = {".": own, "..": above, ":": model, "::": model_above}
-    elements = [one for one in (rest if first in begins else [first, *rest]) if one not in ("", ".")]
+    elements = [element for element in (rest if first in begins else [first, *rest]) if element not in ("", ".")]
     if len(elements) > _MOST:
         return []
-    for fits in (_has_alias, SceneObject.is_called):  # names of 3.x, too, where nothing has the alias
+    for fits in (_has_alias, SceneObject.is_called):  # 3.x names only if no object has the alias
         found = [*itertools.islice(_Search(objects, fits).below(begins.get(first), elements), most)]
         if found:
             return found
     return []
 
 
-def _has_alias(one: SceneObject, name: str) -> bool:
-    return fnmatchcase(one.alias, name)
+def _has_alias(item: SceneObject, name: str) -> bool:
+    return fnmatchcase(item.alias, name)
 
 
 class _Search:
-    """Looks for what the elements of one path name."""
+    """Search for the objects of one path."""
 
     def __init__(self, objects: ObjectTree, fits: _Fits):
-        """`fits` tells whether an object is called so."""
+        """`fits` returns whether an object has a name."""
         self._children: dict[SceneObject | None, list[SceneObject]] = defaultdict(list)
-        for one in map(objects.__getitem__, objects):
-            self._children[one.parent].append(one)
+        for item in map(objects.__getitem__, objects):
+            self._children[item.parent].append(item)
         self._fits = fits
         self._seen: set[tuple[SceneObject | None, int]] = set()
 
     def below(self, here: SceneObject | None, elements: Sequence[str]) -> Iterator[SceneObject]:
-        """Yield the objects that elements name, beginning at an object (None: the root of the scene), each once."""
+        """Yield each object that the elements mean, starting from an object (None: the root of the scene), once."""
         if (here, len(elements)) in self._seen:
             return
         self._seen.add((here, len(elements)))
@@ -91,17 +91,17 @@ class _Search:
             named = iter(()) if here is None else iter((here.parent,))
         else:
             named = self._named(here, elements[0])
-        for one in named:
-            yield from self.below(one, elements[1:])
+        for item in named:
+            yield from self.below(item, elements[1:])
 
     def _named(self, above: SceneObject | None, element: str) -> Iterator[SceneObject]:
         match = _ELEMENT.fullmatch(element)
         if match is None:
             return
         level = self._children[above]
-        found = [one for one in level if self._fits(one, match.group(1))]
+        found = [item for item in level if self._fits(item, match.group(1))]
         index = match.group(2)
         yield from found if index is None else found[int(index) :][:1]
-        for one in level:
-            if index is None or one not in found:
-                yield from self._named(one, element)
+        for item in level:
+            if index is None or item not in found:
+                yield from self._named(item, element)

@@ -1,4 +1,4 @@
-"""`sim`: the objects of the scene: what they are, where they are, how they move, the forces on them."""
+"""`sim`: kinds, poses and velocities of objects, and forces on them."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ from drone_sim.scripting.api.types import (
 )
 
 _ALL, _SCENE = CONSTANTS["handle_all"], CONSTANTS["handle_scene"]
-_WITHOUT_ROOT, _CHILDREN_ALONE = 1, 2  # options of getObjectsInTree
+_WITHOUT_ROOT, _ONLY_CHILDREN = 1, 2  # options of getObjectsInTree
 
 
 class Objects(Functions):
-    """Objects: where they are, how they move, the forces on them.
+    """Objects: poses, velocities, and forces on them.
 
-    Relative to a joint is relative to what hangs on it; sim.handleflag_reljointbaseframe, added to the handle of the
-    object, makes it relative to the joint's own frame, which does not turn.
+    A pose relative to a joint is relative to the frame of the joint's children. With sim.handleflag_reljointbaseframe
+    added to the object's handle, it is relative to the joint's own frame, which does not turn.
     """
 
     @sim("345")
@@ -51,14 +51,14 @@ class Objects(Functions):
 
     @sim("345")
     def setObjectParent(self, handle: Handle, parent: Handle = WORLD, keepInPlace: bool = True) -> None:
-        """Give an object another parent, or none (-1). A joint that the dynamics moves holds its child."""
-        operations = self._surroundings.operations
+        """Set the parent of an object, -1 for none. A joint that the dynamics moves holds its child."""
+        operations = self._services.operations
         if operations is None:
             self._objects.set_parent(handle, parent, bool(keepInPlace))
         else:
-            self._surroundings.outside(lambda: operations.set_parent(handle, parent, bool(keepInPlace)))
+            self._services.outside(lambda: operations.set_parent(handle, parent, bool(keepInPlace)))
 
-    # ---- where they are
+    # ---- poses
 
     @sim("345")
     def getObjectPosition(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
@@ -125,7 +125,7 @@ class Objects(Functions):
         self._put(handle, frame, place)
 
     def _matrix(self, handle: int, frame: int) -> frames.Matrix:
-        if handle < FIRST_FLAG:  # most often, and often in a step
+        if handle < FIRST_FLAG:  # the usual case, several times in a step
             return self._objects.matrix(handle, frame)
         return self._objects.matrix(bare(handle), frame, has(handle, BASE))
 
@@ -135,14 +135,15 @@ class Objects(Functions):
         else:
             self._objects.set_matrix(bare(handle), frame, matrix, has(handle, BASE))
 
-    # ---- how they move
+    # ---- velocities
 
     @sim("345")
     def getObjectVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
-        """Return an object's velocity (m/s, world) and angular velocity (rad/s): the means over the last step.
+        """Return an object's velocity (m/s, world) and angular velocity (rad/s), both as means over the last step.
 
-        The latter has the Euler angles of the step's turn, in the frame that the object had before it, over the step.
-        With sim.handleflag_axis added to the handle it is that turn as a rotation vector, in the world frame.
+        The angular velocity is the Euler angles of the rotation in the step, in the object's frame before the step,
+        divided by the time step. With sim.handleflag_axis added to the handle, it is a rotation vector in the world
+        frame.
         """
         meter = self._context.velocities
         if handle < AXIS:
@@ -163,12 +164,12 @@ class Objects(Functions):
     ) -> None:
         """Apply a force (N) at a body's center of mass, and a torque (N m), in the next step.
 
-        Both are in the world frame, and keep their direction through the sub-steps of the step, whatever the body does.
-        sim.handleflag_resetforce and _resettorque, or both, _resetforcetorque, added to the handle, forget what was
-        added before.
+        Both are in the world frame, and keep their directions in all sub-steps of the step. With
+        sim.handleflag_resetforce, _resettorque or _resetforcetorque added to the handle, earlier forces or torques of
+        this step are removed.
         """
-        found = self._pushed(handle, RESET_FORCE, RESET_TORQUE)
-        push = getattr(found, "push", None)  # a shape of the scene
+        found = self._target_of_force(handle, RESET_FORCE, RESET_TORQUE)
+        push = getattr(found, "push", None)  # shapes of the scene have it
         if push is None:
             self._host.add_force(found.name, _vector(force), _vector(torque), (0.0, 0.0, 0.0))
         else:
@@ -176,21 +177,21 @@ class Objects(Functions):
 
     @sim("345")
     def addForce(self, handle: Handle, position: ThreeNumbers, force: ThreeNumbers) -> None:
-        """Apply a force (N) at a position (m) in the next step; both in the frame of the body.
+        """Apply a force (N) at a position (m) in the next step, both in the frame of the body.
 
-        For a shape of the scene the position is from its centre of mass. sim.handleflag_resetforcetorque, added to the
-        handle, forgets what was added before.
+        For a shape of the scene, the position is relative to its center of mass. With sim.handleflag_resetforcetorque
+        added to the handle, earlier forces and torques of this step are removed.
         """
-        found = self._pushed(handle, RESET_FORCE | RESET_TORQUE, RESET_FORCE | RESET_TORQUE)
-        push = getattr(found, "push", None)  # a shape of the scene
-        place, lever, pull = found.matrix(), _vector(position), _vector(force)
+        found = self._target_of_force(handle, RESET_FORCE | RESET_TORQUE, RESET_FORCE | RESET_TORQUE)
+        push = getattr(found, "push", None)  # shapes of the scene have it
+        matrix, lever, local_force = found.matrix(), _vector(position), _vector(force)
         if push is None:
-            self._host.add_force(found.name, frames.rotate(place, pull), (0.0, 0.0, 0.0), lever)
+            self._host.add_force(found.name, frames.rotate(matrix, local_force), (0.0, 0.0, 0.0), lever)
         else:
-            push(frames.rotate(place, pull), frames.rotate(place, frames.cross(lever, pull)))
+            push(frames.rotate(matrix, local_force), frames.rotate(matrix, frames.cross(lever, local_force)))
 
-    def _pushed(self, handle: int, forces: int, torques: int) -> SceneObject:
-        """Return the object to be pushed; if its handle has one of these flags, forget what was added before."""
+    def _target_of_force(self, handle: int, forces: int, torques: int) -> SceneObject:
+        """Return the object of a force; if its handle has one of these flags, remove earlier forces or torques."""
         if handle < RESET_FORCE:
             return self._objects[handle]
         found = self._objects[bare(handle)]
@@ -200,7 +201,7 @@ class Objects(Functions):
 
 
 def _frame_and_values(first: Any, second: Any, count: int) -> tuple[int, tuple[float, ...]]:
-    """Return handle and values of two arguments in either order; without a handle, the world's and the values."""
+    """Return handle and values from two arguments in either order; the handle may be missing (the world)."""
     if isinstance(first, (int, float)):
         return int(first), numbers(second, count)
     if isinstance(second, (int, float)):
@@ -229,24 +230,24 @@ class ObjectKinds(Functions):
 
     @sim("345")
     def getObjectType(self, handle: Handle) -> int:
-        """Return what an object is: sim.object_shape_type (4.x: sim.sceneobject_shape), _joint_type and so on."""
+        """Return the type of an object: sim.object_shape_type (4.x: sim.sceneobject_shape), _joint_type and so on."""
         return self._kind(self._objects[handle])
 
     @sim("345")
     def getObjects(self, index: int, kind: int = _ALL) -> int:
-        """Return the handle of an object of a kind by its index, from 0; -1 if there are no more."""
+        """Return the handle of an object of a type by its index, from 0; -1 if there are no more."""
         found = self._of_kind(iter(self._objects), kind)
         return found[int(index)] if 0 <= index < len(found) else -1
 
     @sim("345")
     def getObjectsInTree(self, root: Handle, kind: int = _ALL, options: int = 0) -> list[int]:
-        """Return an object and all objects of a kind below it (sim.handle_scene: all objects).
+        """Return an object and its descendants of a type (sim.handle_scene: all objects).
 
-        `options`: 1 leaves out the root, 2 takes its children alone.
+        `options`: 1 excludes the root, 2 includes only its children.
         """
         of_scene = root in (_SCENE, -1)
-        above = None if of_scene else self._objects[root]
-        below = list(self._below(above, deep=not int(options) & _CHILDREN_ALONE))
+        parent = None if of_scene else self._objects[root]
+        below = list(self._below(parent, deep=not int(options) & _ONLY_CHILDREN))
         if not of_scene and not int(options) & _WITHOUT_ROOT:
             below.insert(0, int(root))
         return self._of_kind(iter(below), kind)
@@ -269,7 +270,7 @@ class ObjectKinds(Functions):
 
     @sim("5", getObjectUniqueIdentifier="345")
     def getObjectUid(self, handle: Handle) -> int:
-        """Return an object's handle: it is unique in the whole run."""
+        """Return an object's handle, which is unique in the whole run."""
         self._objects[handle]
         return int(handle)
 

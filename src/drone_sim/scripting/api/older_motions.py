@@ -1,4 +1,4 @@
-"""`sim`: how 3.x moves joints and objects in threads, on the motions of 4.x."""
+"""`sim`: V-REP 3.x functions that move joints and objects in threads, based on the motions of 4.x."""
 
 from __future__ import annotations
 
@@ -18,39 +18,41 @@ from drone_sim.scripting.api.matrices import axis_and_angle, between, built
 from drone_sim.scripting.api.motions import Motion, MotionFunctions, move_joints
 from drone_sim.scripting.api.types import Handle, Number, Numbers, WrongValue, numbers
 
-_POSITION, _ORIENTATION = 1, 2  # what of an object is moved, added up
+_POSITION, _ORIENTATION = 1, 2  # bits: what of an object is moved
 _LIMITS = ("flags", "vel", "accel", "maxVel", "maxAccel", "maxJerk")
 _JOINTS = (*_LIMITS, "targetPos", "targetVel", "direction")
 _PLACES = (*_LIMITS, "position", "quaternion")
-_M_PER_RAD = 0.1 / math.radians(90)  # what V-REP counts a turn for, where nothing else is said
-_NEAR_M, _NEAR_RAD = 5e-5, math.radians(0.01)  # below which V-REP takes a way for none
-_WAYS: tuple[Callable[[float, float], float], ...] = (  # by sim.distcalcmethod_..., of m and of rad in m
-    lambda way, turn: way,
-    lambda way, turn: turn,
+_M_PER_RAD = 0.1 / math.radians(90)  # V-REP's default for the length that corresponds to an angle
+_NEAR_M, _NEAR_RAD = 5e-5, math.radians(0.01)  # distances below which V-REP ignores a motion
+# Distances by sim.distcalcmethod_..., from a length in m and an angle converted to m.
+_DISTANCES: tuple[Callable[[float, float], float], ...] = (
+    lambda length, angle: length,
+    lambda length, angle: angle,
     max,
-    lambda way, turn: way + turn,
+    lambda length, angle: length + angle,
     math.hypot,
-    lambda way, turn: way if way > _NEAR_M else turn,
-    lambda way, turn: turn if turn > _NEAR_RAD * _M_PER_RAD else way,
+    lambda length, angle: length if length > _NEAR_M else angle,
+    lambda length, angle: angle if angle > _NEAR_RAD * _M_PER_RAD else length,
 )
 
 
 class OlderMotions(Functions):
     """Motions in threads (3.x)."""
 
-    def __init__(self, motions: MotionFunctions, *seen: Any):
-        """`motions` are those of 4.x."""
-        super().__init__(*seen)
+    def __init__(self, motions: MotionFunctions, *arguments: Any):
+        """`motions` are those of 4.x; the other arguments are those of Functions."""
+        super().__init__(*arguments)
         self._motions = motions
 
-    # ---- with Reflexxes' limits: velocity, acceleration and jerk
+    # ---- with limits of velocity, acceleration and jerk, as in Reflexxes
 
     @sim("45", RMLMoveToJointPositions="3")
     def rmlMoveToJointPositions(self, jointHandles: Sequence[Handle], *arguments: Any) -> Wait:
-        """Move joints to positions; return 1 when they are there, positions, velocities, accelerations, and time left.
+        """Move joints to positions; at the end, return 1, positions, velocities, accelerations and the time left.
 
-        The others are flags, currentVel, currentAccel, maxVel, maxAccel, maxJerk, targetPos, targetVel, direction: -1
-        or 1 for a joint without end that turns only that way, -2 or 2 one turn more.
+        The other arguments are flags, currentVel, currentAccel, maxVel, maxAccel, maxJerk, targetPos, targetVel,
+        direction. A direction is for a joint without limits: -1 or 1 is the direction of rotation, -2 or 2 adds one
+        turn.
         """
         given = dict(zip(_JOINTS, arguments))
         joints = [self._found(handle, Joint, "a joint of the scene") for handle in jointHandles]
@@ -65,10 +67,11 @@ class OlderMotions(Functions):
 
     @sim("45", RMLMoveToPosition="3")
     def rmlMoveToPosition(self, handle: Handle, relativeTo: Handle, *arguments: Any) -> Wait:
-        """Move an object to a position and a quaternion, one of which may be left out; return 1 when it is there.
+        """Move an object to a position and quaternion, one of which may be missing; at the end, return 1 and the state.
 
-        And position, quaternion, velocities, accelerations, and time left. The others are flags, currentVel,
-        currentAccel, maxVel, maxAccel, maxJerk (of x, y, z and the angle), targetPosition, targetQuaternion.
+        The state is position, quaternion, velocities, accelerations and the time left. The other arguments are flags,
+        currentVel, currentAccel, maxVel, maxAccel, maxJerk (of x, y, z and the angle), targetPosition,
+        targetQuaternion.
         """
         given = {name: one for name, one in zip(_PLACES, arguments) if one is not None}
         now = self._objects.matrix(handle, relativeTo)
@@ -82,7 +85,7 @@ class OlderMotions(Functions):
 
         return self._motions.move(params, value)
 
-    # ---- with a velocity and an acceleration
+    # ---- with limits of velocity and acceleration
 
     @sim("345")
     def moveToPosition(
@@ -95,10 +98,10 @@ class OlderMotions(Functions):
         accel: Number | None = None,
         distance: Numbers = (5, _M_PER_RAD),
     ) -> Wait:
-        """Move an object to a position and Euler angles, one of which may be left out; return the time left in s.
+        """Move an object to a position and Euler angles, either of which may be missing; return the time left in s.
 
-        `velocity`: the most, m/s; `accel`: m/s², chosen to fit if it is left out. `distance`: sim.distcalcmethod_...
-        and how many m a rad counts for.
+        `velocity`: the largest, in m/s; `accel`: in m/s², unlimited if it is missing. `distance`:
+        sim.distcalcmethod_..., and the length (m) that corresponds to 1 rad.
         """
         start = self._objects.matrix(handle, relativeTo)
         if position is None and orientation is None:
@@ -107,9 +110,9 @@ class OlderMotions(Functions):
         part = (_POSITION if position else 0) + (_ORIENTATION if orientation else 0)
         way, turn = _apart(start, goal)
         method, much = numbers(distance, 2)
-        if not 0 <= method < len(_WAYS):
+        if not 0 <= method < len(_DISTANCES):
             raise WrongValue("the distance needs one of sim.distcalcmethod_... and a number")
-        whole = _WAYS[int(method)](way, turn * much)
+        whole = _DISTANCES[int(method)](way, turn * much)
         return self._along(
             whole, velocity, accel, self._mover(handle, relativeTo, part, lambda share: between(start, goal, share))
         )
@@ -124,9 +127,10 @@ class OlderMotions(Functions):
         velocity: Number = 1.0,
         accel: Number | None = None,
     ) -> Wait:
-        """Move an object to where another is by then, or to a share of a path; return the time left in s.
+        """Move an object to the current pose of another object, or to a fraction of a path; return the time left in s.
 
-        `positionAndOrOrientation`: 1, 2, or 3 both. Velocity and acceleration are shares of the way, in 1/s and 1/s².
+        `positionAndOrOrientation`: 1 position, 2 orientation, 3 both. Velocity and acceleration are fractions of the
+        motion, in 1/s and 1/s².
         """
         start, path = self._objects.matrix(handle), self._objects[target]
 
@@ -148,9 +152,10 @@ class OlderMotions(Functions):
         velocity: Number = 0.0,
         accel: Number | None = None,
     ) -> Wait:
-        """Move an object along a path (m/s, m/s²) from a share of it to its end; return the time left in s.
+        """Move an object along a path (m/s, m/s²) from a fraction of it to its end; return the time left in s.
 
-        With a velocity below 0 it moves to its beginning. `positionAndOrOrientation`: 1, 2, or 3 both.
+        With a negative velocity, it moves to the beginning. `positionAndOrOrientation`: 1 position, 2 orientation, 3
+        both.
         """
         line, (share, speed) = self._found(path, Path, "a path"), numbers((relativeDistance, velocity), 2)
         begin = min(max(share, 0.0), 1.0) * line.length
@@ -173,8 +178,8 @@ class OlderMotions(Functions):
     ) -> Wait:
         """Move joints to positions; return the time left in s.
 
-        With one velocity (rad/s or m/s) and acceleration, all arrive together; with lists, each moves by itself. With
-        one velocity for all, that of revolute joints is divided by `angleToLinearCoeff`.
+        With a single velocity (rad/s or m/s) and acceleration, all joints arrive at the same time, and the velocity of
+        revolute joints is divided by `angleToLinearCoeff`. With lists, each joint moves independently.
         """
         joints = [self._found(handle, Joint, "a joint of the scene") for handle in jointHandles]
         alone = isinstance(velocity, Sequence)
@@ -191,7 +196,7 @@ class OlderMotions(Functions):
         return self._run(trajectory, lambda state: move_joints(joints, state.position))
 
     def _along(self, way: float, velocity: Any, accel: Any, move: Callable[[float], None]) -> Wait:
-        """Move something over a way, in m; `move` is told the share of it."""
+        """Return the wait for a motion over a distance in m; `move` is called with the fraction of it."""
         (most,), (fastest,) = numbers((velocity,), 1), (math.inf,) if not accel else numbers((accel,), 1)
         if way < _NEAR_M / 10:
             way, most, fastest = 1.0, 1e6, math.inf
@@ -208,7 +213,7 @@ class OlderMotions(Functions):
     def _mover(
         self, handle: int, relative: int, parts: int, place: Callable[[float], Matrix]
     ) -> Callable[[float], None]:
-        """Return a function of the share of the way that puts an object at `place(share)`, or only its `parts`."""
+        """Return a function that moves an object, or only its `parts`, to `place(share)`, by the fraction `share`."""
         if parts not in (_POSITION, _ORIENTATION, _POSITION + _ORIENTATION):
             raise WrongValue("expected 1 (move the position), 2 (the orientation) or 3 (both)")
         self._objects[handle]
@@ -223,25 +228,25 @@ class OlderMotions(Functions):
 
 
 def _apart(start: Matrix, goal: Matrix) -> tuple[float, float]:
-    """Return how far two places are apart, in m and in rad."""
+    """Return the distance between two poses in m and in rad."""
     turn = frames.multiply(frames.invert(start), goal)
     return math.dist(frames.position(start), frames.position(goal)), axis_and_angle(frames.to_quaternion(turn))[1]
 
 
 def _turned(start: float, target: float, turns: int) -> float:
-    """Return a target of a joint without limits, in the direction of the sign of `turns`; 2 or -2: one turn more."""
+    """Return the target of a joint without limits, in the direction of `turns`; 2 or -2 adds one turn."""
     ahead = (target - start) % math.tau if turns > 0 else -((start - target) % math.tau)
     return start + ahead + math.tau * (turns - 1 if turns > 0 else turns + 1)
 
 
 def _each(values: Any, scale: Sequence[float]) -> list[float]:
-    """Return one number for each joint, of a list or of one for all."""
+    """Return one number for each joint, from a list or a single number."""
     found = numbers(values, len(scale)) if isinstance(values, Sequence) else [values] * len(scale)
-    return [abs(one) * factor for one, factor in zip(found, scale)]
+    return [abs(value) * factor for value, factor in zip(found, scale)]
 
 
 def _allowed(joint: Joint, position: float) -> float:
-    """Return the position nearest to a target that a joint may have: the shorter way round where it has no end."""
+    """Return the allowed position of a joint nearest to a target; without limits, in the shorter direction."""
     if joint.limits is None:
         return joint.value + math.remainder(position - joint.value, math.tau) if joint.motion == REVOLUTE else position
     return min(max(position, joint.limits[0]), joint.limits[1])

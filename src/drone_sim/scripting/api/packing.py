@@ -1,4 +1,4 @@
-"""`sim`: values in a string, as signals and custom data carry them, little endian, and whole numbers bit by bit."""
+"""`sim`: packing of values into strings for signals and custom data, and bit operations."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.script_values import refuse_if_too_large
 from drone_sim.scripting.api.types import Numbers, Text, WrongValue
 
-# What one value is called in 4.x and in 3.x, and its format (struct).
+# Types of numbers: the name in 4.x, the name in 3.x, and the format for struct.
 _KINDS = {
     "FloatTable": ("Floats", "f"),
     "DoubleTable": ("Doubles", "d"),
@@ -30,13 +30,13 @@ class Packing:
 
     @sim("345")
     def packTable(self, table: Any, _scheme: int = 0) -> bytes:
-        """Return a table as a string that unpackTable reads: numbers, strings, booleans, tables of those."""
+        """Return a table of numbers, strings, booleans and tables as a string for unpackTable."""
         refuse_if_too_large(table)
         return json.dumps(_plain(table)).encode()
 
     @sim("345")
     def unpackTable(self, data: Text) -> Any:
-        """Return the table in a string of packTable's."""
+        """Return the table in a string from packTable."""
         try:
             return _table(json.loads(as_bytes(data)))
         except (ValueError, TypeError, LookupError, RecursionError):
@@ -44,15 +44,15 @@ class Packing:
 
     @sim("345")
     def transformBuffer(self, data: Text, from_kind: int, factor: float, offset: float, to_kind: int) -> bytes:
-        """Return values of one sim.buffer_... as values of another, each times `factor` plus `offset`."""
+        """Convert values from one sim.buffer_... type to another, each multiplied by `factor`, plus `offset`."""
         if from_kind not in _FORMATS or to_kind not in _FORMATS:
             raise ValueError("known are sim.buffer_uint8, _int8, _uint16, _int16, _uint32, _int32, _float and _double")
-        values = [factor * one + offset for one in _unpacked(_FORMATS[from_kind], as_bytes(data))]
+        values = [factor * value + offset for value in _unpacked(_FORMATS[from_kind], as_bytes(data))]
         return _packed(_FORMATS[to_kind], values)
 
 
 def _add_kind(code: str, new: str, old: str) -> None:
-    """Add the functions on one kind of number."""
+    """Add the functions for one type of number."""
 
     def pack(_self: Packing, values: Numbers, start: int = 0, count: int = 0) -> bytes:
         return _packed(code, _part(values, start, count))
@@ -79,9 +79,9 @@ def _part(values: Sequence[Any], start: int, count: int) -> list[Any]:
 
 
 def _packed(kind: str, values: Sequence[Any]) -> bytes:
-    """Return values as bytes; raises WrongValue for what is no number, ValueError for one that does not fit."""
+    """Return values as bytes. Raises WrongValue if a value is not a number, ValueError if it is too large."""
     try:
-        numbers = [float(one) if kind in "fd" else int(one) for one in values]
+        numbers = [float(value) if kind in "fd" else int(value) for value in values]
     except (TypeError, ValueError, OverflowError):
         raise WrongValue("expected a table of numbers") from None
     try:
@@ -96,7 +96,7 @@ def _unpacked(kind: str, data: bytes) -> list[Any]:
 
 
 def as_bytes(data: Text | bytes) -> bytes:
-    """Return a string as it was packed; raises WrongValue for anything else."""
+    """Return a script's string as bytes. Raises WrongValue for other values."""
     if isinstance(data, str):
         return data.encode("utf-8", "surrogateescape")
     if not isinstance(data, (bytes, bytearray)):
@@ -105,11 +105,11 @@ def as_bytes(data: Text | bytes) -> bytes:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON has it; raises WrongValue for what cannot be packed."""
+    """Return a value encoded for JSON. Raises WrongValue if it cannot be packed."""
     if isinstance(value, Mapping):
-        return {"table": [[_plain(key), _plain(one)] for key, one in value.items()]}
+        return {"table": [[_plain(key), _plain(item)] for key, item in value.items()]}
     if isinstance(value, (list, tuple)):
-        return [_plain(one) for one in value]
+        return [_plain(item) for item in value]
     if isinstance(value, (bytes, bytearray)):
         return {"bytes": value.decode("latin-1")}
     if value is None or isinstance(value, (bool, int, float, str)):
@@ -119,39 +119,39 @@ def _plain(value: Any) -> Any:
 
 def _table(value: Any) -> Any:
     if isinstance(value, list):
-        return [_table(one) for one in value]
+        return [_table(item) for item in value]
     if isinstance(value, dict):
         if "bytes" in value:
             return value["bytes"].encode("latin-1")
-        return {_table(key): _table(one) for key, one in value["table"]}
+        return {_table(key): _table(item) for key, item in value["table"]}
     return value
 
 
 class Tables:
-    """Tables of a script's own."""
+    """Tables of a script."""
 
     @sim("45")
     def copyTable(self, table: Any) -> Any:
-        """Return a copy of a table and of all tables in it; of anything else the value itself."""
+        """Return a deep copy of a table; other values are returned unchanged."""
         return copy.deepcopy(table)
 
 
 class Bits:
-    """Whole numbers, bit by bit, as V-REP's Lua 5.1 has no operators for them."""
+    """Bit operations on whole numbers, for which Lua 5.1 has no operators."""
 
     @sim("345", boolOr16="345")
     def boolOr32(self, first: int, second: int) -> int:
-        """Return the bits that either number has."""
+        """Return the bitwise or of two numbers."""
         return _whole(first) | _whole(second)
 
     @sim("345", boolAnd16="345")
     def boolAnd32(self, first: int, second: int) -> int:
-        """Return the bits that both numbers have."""
+        """Return the bitwise and of two numbers."""
         return _whole(first) & _whole(second)
 
     @sim("345", boolXor16="345")
     def boolXor32(self, first: int, second: int) -> int:
-        """Return the bits that only one of the numbers has."""
+        """Return the bitwise exclusive or of two numbers."""
         return _whole(first) ^ _whole(second)
 
 

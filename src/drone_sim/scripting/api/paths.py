@@ -1,4 +1,4 @@
-"""`sim`: paths, as objects (3.x) and as tables of numbers (4.x). Metres and radians."""
+"""`sim`: paths as objects (3.x) and as tables of numbers (4.x), in m and rad."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from drone_sim.scripting.api.host import Functions, Operations
 from drone_sim.scripting.api.types import Handle, Number, Numbers, ThreeNumbers, WrongValue, numbers
 
 _MOST = 1_000_000  # numbers of a table
-_MOST_POINTS = 10_000  # of a path that is made
+_MOST_POINTS = 10_000  # points of a new path
 _CLOSED, _LOOKS_ALONG = 2, 16  # options of createPath
 _DEFAULT = -1
 _PROPERTY = {
@@ -30,7 +30,7 @@ _WITHOUT_DATA, _WITH_DATA = 11, 16  # numbers of a control point
 
 
 class Paths(Functions):
-    """Paths, as objects (3.x) and as tables of numbers (4.x). Metres and radians."""
+    """Paths, as objects (3.x) and as tables of numbers (4.x), in m and rad."""
 
     # ---- objects
 
@@ -41,26 +41,26 @@ class Paths(Functions):
 
     @sim("345")
     def getPositionOnPath(self, handle: Handle, relativeDistance: Number) -> list[float]:
-        """Return the place in the world at a share of a path, from 0 to 1."""
+        """Return the position (world) at a fraction of a path, from 0 to 1."""
         return list(frames.position(self._on_path(handle, relativeDistance)))
 
     @sim("345")
     def getOrientationOnPath(self, handle: Handle, relativeDistance: Number) -> list[float]:
-        """Return the Euler angles, in the world, of the frame at a share of a path: x ahead, z up.
+        """Return the Euler angles (world) of the frame at a fraction of a path: x ahead, z up.
 
-        Of a curved path it is its own: z ahead, y outwards, or as its control points have it.
+        A curved path has its own frames: z ahead, y outwards, or the orientations of its control points.
         """
         return list(frames.to_euler(self._on_path(handle, relativeDistance)))
 
     @sim("34")
     def getDataOnPath(self, handle: Handle, relativeDistance: Number) -> tuple[int, list[float]]:
-        """Return the flags and four numbers of the control points of a curved path; 0 for other paths."""
+        """Return the flags and four numbers of a curved path at a fraction; 0 for other paths."""
         path = self._path(handle)
         return path.carried(numbers((relativeDistance,), 1)[0] * path.length)
 
     @sim("34")
     def getClosestPositionOnPath(self, handle: Handle, position: Sequence[float]) -> float:
-        """Return the share of a path, from 0 to 1, of the point nearest to a place in the world."""
+        """Return the fraction, from 0 to 1, of the point of a path nearest to a position (world)."""
         path = self._path(handle)
         place = frames.transform(frames.invert(path.matrix()), numbers(position, 3))
         return path.nearest(place) / path.length if path.length else 0.0
@@ -69,12 +69,13 @@ class Paths(Functions):
     def createPath(
         self, ctrlPts: Numbers | int = -1, options: Any = 0, subdiv: Any = 100, smoothness: Any = 1.0, *_: Any
     ) -> int:
-        """Make a path through a list of poses of 7 numbers each; return its handle.
+        """Create a path through a list of poses of 7 numbers each; return its handle.
 
-        `options`: 2 closed, 16 it looks along itself, not as the poses do. It has `subdiv` points, and its corners are
-        rounded off over `smoothness` (0 to 1) of each piece. In 3.x: (sim.pathproperty_..., intParams, floatParams),
-        -1 for V-REP's own, makes a curved path without points. intParams[1] says how its length is counted
-        (sim.distcalcmethod_...), floatParams[1] and [2] how much a turn (m/rad) and a pause count; indices from 0.
+        `options`: 2 closed; 16 with orientations along the path instead of the poses' own. The path has `subdiv`
+        points, and its corners are rounded over `smoothness` (0 to 1) of each piece. In 3.x: (sim.pathproperty_...,
+        intParams, floatParams), -1 for V-REP's defaults, creates a curved path without points. intParams[1] is the
+        measure of its length (sim.distcalcmethod_...); floatParams[1] and [2] are the lengths of a turn (m/rad) and of
+        a pause; indices from 0.
         """
         operations = self._operations()
         if not isinstance(ctrlPts, Sequence):
@@ -84,80 +85,80 @@ class Paths(Functions):
             raise WrongValue(f"subdiv = {count}: must be 2 to {_MOST_POINTS} points")
         closed = bool(int(options) & _CLOSED)
         poses = smoothed(_points(ctrlPts, 7), closed, min(max(smooth, 0.0), 1.0), count)
-        said: dict[str, Any] = {"points": [pose[:3] for pose in poses], "closed": closed}
+        entry: dict[str, Any] = {"points": [pose[:3] for pose in poses], "closed": closed}
         if not int(options) & _LOOKS_ALONG:
-            said["turns"] = [pose[3:] for pose in poses]
-        return self._add(operations, kind="path", **said)
+            entry["turns"] = [pose[3:] for pose in poses]
+        return self._add(operations, kind="path", **entry)
 
     def _empty_path(self, attributes: int, whole: Sequence[float] | None, real: Sequence[float] | None) -> int:
         bits = int(attributes) if attributes != _DEFAULT else _USUAL
-        said: dict[str, Any] = {"closed": bool(bits & _PROPERTY["closed"]), "flat": bool(bits & _PROPERTY["flat"])}
-        said["orientation"] = _orientation(bits)
+        entry: dict[str, Any] = {"closed": bool(bits & _PROPERTY["closed"]), "flat": bool(bits & _PROPERTY["flat"])}
+        entry["orientation"] = _orientation(bits)
         if whole is not None:
             method = int(numbers(whole, 3)[1])
             if method not in range(len(COUNTS)):
                 raise WrongValue("intParams must contain one of sim.distcalcmethod_...")
-            said["counts"] = [*COUNTS][method]
+            entry["counts"] = [*COUNTS][method]
         if real is not None:
-            _, said["metres_per_radian"], said["metres_per_pause"] = numbers(real, 3)
-        return self._add(self._operations(), kind="curved_path", control_points=[], **said)
+            _, entry["metres_per_radian"], entry["metres_per_pause"] = numbers(real, 3)
+        return self._add(self._operations(), kind="curved_path", control_points=[], **entry)
 
     def _operations(self) -> Operations:
-        if self._surroundings.operations is None:
+        if self._services.operations is None:
             raise ValueError("there is no scene")
-        return self._surroundings.operations
+        return self._services.operations
 
-    def _add(self, operations: Operations, **said: Any) -> int:
-        entry = {"name": operations.free_name("Path"), "alias": "Path", **said}
-        made: int = self._surroundings.outside(lambda: operations.add([entry])[0])
-        return made
+    def _add(self, operations: Operations, **keys: Any) -> int:
+        entry = {"name": operations.free_name("Path"), "alias": "Path", **keys}
+        handle: int = self._services.outside(lambda: operations.add([entry])[0])
+        return handle
 
     @sim("34")
     def insertPathCtrlPoints(self, handle: Handle, options: int, startIndex: int, ptCnt: int, ptData: Numbers) -> int:
-        """Add control points to a curved path before one, counted from 0. Return 1.
+        """Insert control points into a curved path before an index, from 0. Return 1.
 
-        `options`: 1 it is closed from now on, otherwise it is open; 2 (3.3) 16 numbers a point, otherwise 11: position
-        (m) and Euler angles, in the path's frame, a speed (ignored), pause, points of the curve, its two factors; and
-        flags and four numbers that are carried.
+        `options`: 1 closes the path, otherwise it is open; 2 (3.3): 16 numbers for each point, otherwise 11. These are
+        position (m) and Euler angles in the path's frame, a speed (ignored), a pause, the number of points of the
+        curve, and two factors; then the flags and four numbers of getDataOnPath.
         """
         path, count = self._curved(handle), int(ptCnt)
         size = _WITH_DATA if int(options) & 2 else _WITHOUT_DATA
-        given = _points(ptData, size) if count else []
-        if len(given) != count:
+        points = _points(ptData, size) if count else []
+        if len(points) != count:
             raise WrongValue(f"expected {size} numbers for each of {count} points, not {len(ptData)}")
-        there = [one.said for one in path.control_points]
-        at = min(max(int(startIndex), 0), len(there))
-        there[at:at] = [_control_point(one, path.is_flat) for one in given]
-        self._change(handle, control_points=there, closed=bool(int(options) & 1) and len(there) > 2)
+        entries = [point.said for point in path.control_points]
+        index = min(max(int(startIndex), 0), len(entries))
+        entries[index:index] = [_control_point(point, path.is_flat) for point in points]
+        self._change(handle, control_points=entries, closed=bool(int(options) & 1) and len(entries) > 2)
         return 1
 
     @sim("34")
     def cutPathCtrlPoints(self, handle: Handle, startIndex: int, ptCnt: int) -> int:
-        """Remove a number of control points from a curved path, from an index (from 0) on; -1: all. Return 1."""
-        there = [one.said for one in self._curved(handle).control_points]
+        """Remove a number of control points from a curved path, starting at an index (from 0); -1: all. Return 1."""
+        entries = [point.said for point in self._curved(handle).control_points]
         first, count = int(startIndex), int(ptCnt)
         if first < 0 or count < 0:
-            there = []
+            entries = []
         else:
-            del there[first : first + count]
-        self._change(handle, control_points=there)
+            del entries[first : first + count]
+        self._change(handle, control_points=entries)
         return 1
 
     def _change(self, handle: int, **values: Any) -> None:
         operations, along = self._operations(), self._path(handle).position_along
-        self._surroundings.outside(lambda: operations.change(int(handle), along=along, **values))
+        self._services.outside(lambda: operations.change(int(handle), along=along, **values))
 
     def _curved(self, handle: int) -> ControlledPath:
         return self._found(handle, ControlledPath, "a curved path")
 
     @sim("345")
     def getPathPosition(self, handle: Handle) -> float:
-        """Return the value of setPathPosition, m."""
+        """Return the distance (m) stored by setPathPosition."""
         return self._path(handle).position_along
 
     @sim("345")
     def setPathPosition(self, handle: Handle, position: Number) -> None:
-        """Store the distance (m) along a path of an object that follows it."""
+        """Store the distance (m) of an object along a path."""
         (self._path(handle).position_along,) = numbers((position,), 1)
 
     def _on_path(self, handle: int, share: float) -> Matrix:
@@ -171,7 +172,7 @@ class Paths(Functions):
 
     @sim("45")
     def getPathLengths(self, path: Numbers, dof: int, _callback: Any = None) -> tuple[list[float], float]:
-        """Return each point's distance along a path table, and its length; a point has `dof` numbers, 3 in m."""
+        """Return the distance of each point along a path table, and its length; a point has `dof` numbers, 3 in m."""
         points = _points(path, dof)
         pieces = (math.dist(one[:3], other[:3]) for one, other in itertools.pairwise(points))
         lengths = list(itertools.accumulate(pieces, initial=0.0))
@@ -181,7 +182,7 @@ class Paths(Functions):
     def getPathInterpolatedConfig(
         self, path: Numbers, lengths: Numbers, t: Number, _method: Any = None, _types: Any = None
     ) -> list[float]:
-        """Return the point of a path table at a distance, as in getPathLengths, interpolated between two points."""
+        """Return the interpolated point of a path table at a distance; `lengths` are from getPathLengths."""
         ends = numbers(lengths, len(lengths))
         if len(ends) < 2 or len(path) % len(ends):
             raise WrongValue(
@@ -196,7 +197,7 @@ class Paths(Functions):
 
     @sim("45")
     def getClosestPosOnPath(self, path: Numbers, lengths: Numbers, absPt: ThreeNumbers) -> float:
-        """Return the distance along a path table, as in getPathLengths, to the point nearest to a place."""
+        """Return the distance of the point nearest to a position along a path table; `lengths` as of getPathLengths."""
         ends = numbers(lengths, len(lengths))
         if len(ends) < 2 or len(path) % len(ends) or len(path) < 3 * len(ends):
             raise WrongValue(f"expected 3 numbers or more for each of {len(ends)} points, not {len(path)} in all")
@@ -208,7 +209,7 @@ class Paths(Functions):
     def resamplePath(
         self, path: Numbers, lengths: Numbers, finalConfigCnt: int, method: Any = None, types: Any = None
     ) -> list[float]:
-        """Return a path table with a number of points, at equal distances along another path table."""
+        """Return a path table with a number of points at equal distances along another path table."""
         count = int(finalConfigCnt)
         if not 2 <= count <= _MOST_POINTS:
             raise WrongValue(f"expected 2 to {_MOST_POINTS} points, not {count}")
@@ -231,7 +232,7 @@ def _orientation(bits: int) -> str:
 
 
 def _control_point(given: Sequence[float], is_flat: bool) -> dict[str, Any]:
-    """Return a control point in the words of a scene file, of V-REP's 11 or 16 numbers."""
+    """Return a control point as in a scene file, from V-REP's 11 or 16 numbers."""
     x, y, z = given[:3]
     turn = frames.to_quaternion(frames.from_euler((0.0, 0.0, 0.0), given[3:6]))
     count = min(max(round(given[8]), 1), 100)
@@ -247,7 +248,7 @@ def _control_point(given: Sequence[float], is_flat: bool) -> dict[str, Any]:
 
 
 def smoothed(points: Sequence[Sequence[float]], closed: bool, smoothness: float, count: int) -> list[list[float]]:
-    """Return `count` points along a line through `points`; its corners are parabolas over a share of each piece."""
+    """Return `count` points along a line through `points`; its corners are parabolas over a fraction of each piece."""
     corners = [*points, points[0]] if closed and points[0] != points[-1] else [*points]
     if len(corners) < 2:
         raise WrongValue("expected two control points or more")
@@ -256,7 +257,7 @@ def smoothed(points: Sequence[Sequence[float]], closed: bool, smoothness: float,
 
 
 def _rounded(corners: Sequence[Sequence[float]], closed: bool, smoothness: float, along: float) -> list[float]:
-    """Return the point at `along` (in pieces); it is rounded off if a corner is nearer than half of `smoothness`."""
+    """Return the point at `along` (in pieces); it is rounded if a corner is closer than half of `smoothness`."""
     pieces = len(corners) - 1
     corner = round(along)
     index, share = min(int(along), pieces - 1), along - corner
@@ -276,7 +277,7 @@ def _between(one: Sequence[float], other: Sequence[float], share: float) -> list
 def _with_unit_quaternion(
     between: list[float], one: Sequence[float], other: Sequence[float], share: float
 ) -> list[float]:
-    """Return a point between two; of 7 numbers the last four are a quaternion, the shorter way round."""
+    """Return the interpolated point; of 7 numbers, the last four are a quaternion on the shorter arc."""
     if len(between) != 7:
         return between
     sign = 1.0 if sum(a * b for a, b in zip(one[3:], other[3:])) >= 0 else -1.0

@@ -1,6 +1,7 @@
-"""The scripts of a simulation, by handle and by the object that each is attached to.
+"""Scripts of a simulation, by handle and by the object that each is attached to.
 
-A propeller with the built-in law has one, too, instead of V-REP's script: it has parameters, but no functions to call.
+A propeller with the built-in thrust model also has an entry, in place of V-REP's script: it has parameters, but no
+functions.
 """
 
 from __future__ import annotations
@@ -12,32 +13,32 @@ from typing import Any
 from drone_sim.message_text import near_names
 from drone_sim.scripting.api.script import Script
 
-ScriptParameters = dict[str, Any]  # what getScriptSimulationParameter reads
+ScriptParameters = dict[str, Any]  # read by getScriptSimulationParameter
 
-FIRST = 500_000  # the first handle: no object has one that large
-DEEPEST = 8  # scripts that wait for each other
+FIRST = 500_000  # the first handle, which is larger than those of objects
+DEEPEST = 8  # nested calls between scripts
 
 
 class Attachment:
-    """A script on an object; `script` is set while it is loaded."""
+    """The script of an object; `script` is set while it is loaded."""
 
     def __init__(self, handle: int, name: str, parameters: ScriptParameters, is_law: bool):
-        """Take its handle, the name of its object, and its parameters, which stay the same mapping.
+        """`name` is the object's name; `parameters` is not copied.
 
-        `is_law`: it stands for a built-in law, which reads these parameters and no others.
+        `is_law`: it represents a built-in thrust model, which reads only these parameters.
         """
         self.handle = handle
         self.name = name
         self.parameters = parameters
         self.read: frozenset[str] = frozenset(parameters)
-        self.asked: set[str] = set()  # names that scripts have asked for since it was attached
+        self.asked: set[str] = set()  # names of parameters that scripts have read
         self.is_law = is_law
-        self.is_embedded = False  # whether `..` in its paths is the parent of its object, as up to CoppeliaSim 4.8
-        self.began = 0.0  # s, simulated, when it was loaded
+        self.is_embedded = False  # whether `..` in its paths means the parent of its object, as up to CoppeliaSim 4.8
+        self.began = 0.0  # simulated time (s) when it was loaded
         self.script: Script | None = None
 
     def loaded(self, script: Script, time: float) -> None:
-        """Take the script, which begins at a simulated time (s)."""
+        """Set the loaded script, and the simulated time (s)."""
         self.script, self.began = script, time
 
 
@@ -49,86 +50,90 @@ def _all_permitted(_caller: Attachment, _callee: Attachment, _function: str) -> 
 
 
 class Scripts:
-    """Attachments by handle (a number that nothing else of the run has had) and by object.
+    """Attachments by handle, which is unique in a run, and by object.
 
-    `are_own`: whether the caller is one of them; a client outside is not, and its paths begin at no object.
+    `are_own`: whether the caller is one of these scripts; a remote client is not, and has no object for relative paths.
     """
 
     are_own = True
 
     def __init__(self) -> None:
-        """Start with none."""
-        # Raises ValueError if a script (the first) may not call a function of another; '' stands for running a text.
+        """Create it without scripts."""
+        # Raises ValueError if a script (the first argument) may not call a function of another; '' means executing a
+        # text.
         self.permit: PermitCall = _all_permitted
         self.clear()
 
     def clear(self) -> None:
-        """Forget all; handles are given out anew."""
+        """Remove all; handles start again."""
         self._by_handle: dict[int, Attachment] = {}
         self._by_name: dict[str, Attachment] = {}
         self._numbers = itertools.count(FIRST)
-        self.asked = 0  # parameters that somebody has asked for
-        self._waiting: list[Attachment] = []  # callers, and what they called
+        self.asked = 0  # number of parameters that scripts have read
+        self._waiting: list[Attachment] = []  # callers in the present nested calls
 
     def add(self, name: str, parameters: ScriptParameters, *, is_law: bool = False) -> Attachment:
-        """Attach a script to an object, in the place of a law; return what stands for it."""
-        before = self._by_name.get(name)
-        handle = next(self._numbers) if before is None else before.handle
-        made = Attachment(handle, name, parameters, is_law)
-        self._by_handle[handle] = self._by_name[name] = made
-        return made
+        """Attach a script to an object; it replaces a built-in thrust model there. Return its attachment."""
+        existing = self._by_name.get(name)
+        handle = next(self._numbers) if existing is None else existing.handle
+        attachment = Attachment(handle, name, parameters, is_law)
+        self._by_handle[handle] = self._by_name[name] = attachment
+        return attachment
 
     def remove(self, name: str) -> None:
-        """Forget the script of an object, if there is one."""
-        gone = self._by_name.pop(name, None)
-        if gone is not None:
-            del self._by_handle[gone.handle]
+        """Remove the script of an object, if there is one."""
+        removed = self._by_name.pop(name, None)
+        if removed is not None:
+            del self._by_handle[removed.handle]
 
     def rename(self, name: str, new: str) -> None:
-        """Know the script of an object by the object's new name."""
+        """Change the name of a script's object."""
         renamed = self._by_name[new] = self._by_name.pop(name)
         renamed.name = new
 
     def __iter__(self) -> Iterator[Attachment]:
-        """Yield all, in the order of their handles."""
+        """Return an iterator in the order of handles."""
         return iter(self._by_handle.values())
 
     def __contains__(self, name: str) -> bool:
-        """Tell whether a script is attached to an object."""
+        """Return whether a script is attached to an object."""
         return name in self._by_name
 
     def get(self, handle: int) -> Attachment | None:
-        """Return what has a handle, None for nothing."""
+        """Return the script with a handle, None for an unknown handle."""
         return self._by_handle.get(handle)
 
     def __getitem__(self, handle: int) -> Attachment:
-        """Return what has a handle; raises ValueError."""
+        """Return the script with a handle. Raises ValueError for an unknown handle."""
         if handle not in self._by_handle:
             raise ValueError(f"there is no script with the handle {handle}")
         return self._by_handle[handle]
 
     def attached_to(self, name: str) -> Attachment:
-        """Return the script of an object; raises ValueError that lists the near names."""
+        """Return the script of an object. Raises ValueError, which lists similar names."""
         if name not in self._by_name:
             raise ValueError(f"no script is attached to '{name}'; {near_names(name, self._by_name)}")
         return self._by_name[name]
 
     def law_parameters(self) -> Mapping[str, Any]:
-        """Return the parameters that built-in laws read, by name."""
-        return {name: None for one in self if one.is_law for name in one.read}
+        """Return the parameters that built-in thrust models read, by name."""
+        return {name: None for attachment in self if attachment.is_law for name in attachment.read}
 
     def ask(self, attachment: Attachment, name: str) -> None:
-        """Note that a script reads a parameter: parameters that no script reads need not be offered for tuning."""
+        """Record that a script reads a parameter; only such parameters are offered for tuning."""
         if name not in attachment.asked:
             attachment.asked.add(name)
             self.asked += 1
 
     def is_own(self, caller: Attachment, callee: Attachment) -> bool:
-        """Tell whether a script calls itself."""
+        """Return whether a script calls itself."""
         return caller is callee
 
     def call(self, caller: Attachment, callee: Attachment, call: Callable[[Script], Any]) -> Any:
-        """Let a script call another, or itself. Raises ValueError for one that waits for this call, or is too deep."""
+        """Let a script call another, or itself.
+
+        Raises ValueError if it is not loaded, waits itself, or is nested too deeply.
+        """
         if callee.script is None:
             why = (
                 "is the built-in thrust model, which has no functions"

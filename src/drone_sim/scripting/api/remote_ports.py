@@ -1,4 +1,4 @@
-"""`simRemoteApi`: on which ports scripts ask for V-REP's legacy remote API (`simxStart`)."""
+"""`simRemoteApi`: ports for V-REP's legacy remote API (`simxStart`), which scripts open."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ _WAITING, _CONNECTED = 0, 1
 
 
 class RemotePorts:
-    """The ports that scripts of a run ask for; the server reads `wanted`, and sets which ports are `connected`."""
+    """Ports that scripts of a run request; the server reads `wanted`, and sets `connected`."""
 
     def __init__(self, are_served: bool = False):
-        """`are_served`: whether there is a server for them."""
+        """`are_served`: whether there is a server."""
         self.are_served = are_served
         self.clear()
 
     def clear(self) -> None:
-        """Ask for none, as at the beginning of a run."""
-        self.wanted: dict[int, bool] = {}  # by port, whether its clients trigger the steps from the start
+        """Remove all requests, as at the beginning of a run."""
+        self.wanted: dict[int, bool] = {}  # by port: whether its clients trigger the steps from the start
         self.connected: Collection[int] = ()  # ports
 
 
@@ -34,18 +34,18 @@ class RemotePortFunctions:
     """Ports for clients of V-REP's legacy remote API, as long as the simulation runs."""
 
     def __init__(self, ports: RemotePorts, ignored: Ignored):
-        """`ports` are those of the simulation, `ignored` says that something is ignored."""
+        """`ports` are those of the simulation; `ignored` logs what is ignored."""
         self._ports, self._ignored = ports, ignored
 
     @simRemoteApi("45")
     def start(self, port: int, _size: Any = None, _debug: Any = False, synchronous: Any = False, *_others: Any) -> int:
-        """Let clients connect to a port, 1024 to 65535; return 1, or -1 where `remote_api` is off.
+        """Let clients connect to a port, 1024 to 65535; return 1, or -1 if `remote_api` is off.
 
-        `synchronous`: a client that connects triggers the steps, as after simxSynchronous.
+        `synchronous`: clients trigger the steps from the start, as after simxSynchronous.
         """
         number = _port(port)
         if not self._ports.are_served:
-            self._ignored.say("start", "the legacy remote API is off: start it with remote_api:=true", "simRemoteApi")
+            self._ignored.log("start", "the legacy remote API is off: start it with remote_api:=true", "simRemoteApi")
             return _NOT
         if number not in self._ports.wanted and len(self._ports.wanted) >= _MOST:
             raise ValueError(f"at most {_MOST} ports can be open")
@@ -54,17 +54,17 @@ class RemotePortFunctions:
 
     @simRemoteApi("45")
     def stop(self, port: int) -> int:
-        """Close a port, and let its clients go; return 1, or -1 where it was not open."""
+        """Close a port and disconnect its clients; return 1, or -1 if it was not open."""
         return _DONE if self._ports.wanted.pop(_port(port), None) is not None else _NOT
 
     @simRemoteApi("45")
     def reset(self, port: int) -> int:
-        """Return 1 for a port that is open, else -1: what a client leaves is removed when it goes."""
+        """Return 1 for an open port, otherwise -1; there is nothing to reset."""
         return _DONE if _port(port) in self._ports.wanted else _NOT
 
     @simRemoteApi("45")
     def status(self, port: int) -> int:
-        """Return 1 where a client is connected to a port, 0 where it is open, else -1."""
+        """Return 1 if a client is connected to a port, 0 if the port is open, otherwise -1."""
         number = _port(port)
         if number not in self._ports.wanted:
             return _NOT
@@ -72,37 +72,37 @@ class RemotePortFunctions:
 
 
 class OlderRemotePortFunctions:
-    """Ports for clients of V-REP's legacy remote API, as 3.x calls these functions."""
+    """Ports for clients of V-REP's legacy remote API (3.x names)."""
 
     def __init__(self, functions: RemotePortFunctions):
-        """Take what they do."""
+        """`functions` are those that these names stand for."""
         self._functions = functions
 
     @sim("3")
     def extRemoteApiStart(
         self, port: int, _size: Any = None, _debug: Any = False, synchronous: Any = False, *_others: Any
     ) -> int:
-        """Do what simRemoteApi.start does."""
+        """Like simRemoteApi.start."""
         return self._functions.start(port, _size, _debug, synchronous)
 
     @sim("3")
     def extRemoteApiStop(self, port: int) -> int:
-        """Do what simRemoteApi.stop does."""
+        """Like simRemoteApi.stop."""
         return self._functions.stop(port)
 
     @sim("3")
     def extRemoteApiReset(self, port: int) -> int:
-        """Do what simRemoteApi.reset does."""
+        """Like simRemoteApi.reset."""
         return self._functions.reset(port)
 
     @sim("3")
     def extRemoteApiStatus(self, port: int) -> int:
-        """Do what simRemoteApi.status does."""
+        """Like simRemoteApi.status."""
         return self._functions.status(port)
 
 
 def _port(number: Any) -> int:
-    """Return the number of a port. Raises WrongValue, ValueError."""
+    """Return a checked port number. Raises WrongValue, ValueError."""
     if not isinstance(number, (int, float)) or isinstance(number, bool):
         raise WrongValue("expected the number of a port")
     if not _LOWEST <= number <= _HIGHEST:

@@ -1,6 +1,6 @@
-"""`simROS`: topics, services, time, frames and parameters, with or without ROS behind.
+"""`simROS`: topics, services, time, frames and parameters, with or without ROS.
 
-Without ROS transforms go nowhere, parameters are the script's alone, and there are no services.
+Without ROS, transforms are not sent, parameters exist only for the script, and there are no services.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ _MOST = 100  # service clients
 
 
 class TopicFunctions:
-    """Topics as a child script sees them, `simROS`, with or without ROS."""
+    """Topics, with or without ROS."""
 
     def __init__(self, bus: MessageBus):
-        """`bus`: what the script subscribes to and publishes."""
+        """`bus` has the script's subscriptions and publications."""
         self._bus = bus
 
     @simROS()
     def subscribe(self, topic: Name, kind: Name, callback: Callback, queue: int = 1, *_ignored: Any) -> int:
         """Call the script's function `callback` with each message on `topic`; return a handle.
 
-        Of the messages that arrive during one step the last `queue` are kept; V-REP's 0 stands for 1. The same
-        topic, type and callback once more give the handle that they have; V-REP calls back once more for each.
+        Of the messages that arrive during a step, the last `queue` are kept; V-REP's 0 means 1. If the topic, type and
+        callback are subscribed already, their handle is returned; V-REP would call the callback once more.
         """
         return self._bus.subscribe(topic, kind, callback, int(queue))
 
     @simROS()
     def shutdownSubscriber(self, handle: Handle) -> None:
-        """End a subscription; raises ValueError where there is none of that handle."""
+        """End a subscription."""
         self._bus.end_subscription(handle)
 
     @simROS()
     def advertise(self, topic: Name, kind: Name, queue: int = 1, latch: bool = False, *_ignored: Any) -> int:
-        """Advertise a topic; return a handle to publish on."""
+        """Advertise a topic; return a handle for publish."""
         return self._bus.advertise(topic, kind, int(queue), bool(latch))
 
     @simROS()
@@ -56,32 +56,32 @@ class TopicFunctions:
 
     @simROS()
     def shutdownPublisher(self, handle: Handle) -> None:
-        """Stop advertising; raises ValueError where nothing has that handle."""
+        """Stop advertising a topic."""
         self._bus.end_publisher(handle)
 
     @simROS("")
     def getNumSubscribers(self, handle: Handle) -> int:
-        """Return how many listen to what is published; V-REP has no such function."""
+        """Return the number of subscribers of a published topic; V-REP has no such function."""
         return self._bus.subscribers(handle)
 
     @simROS()
     def publisherTreatUInt8ArrayAsString(self, handle: Handle) -> None:
-        """Do nothing: uint8[] goes as a string or a table in any case."""
+        """Do nothing: uint8[] may always be a string or a table."""
         self._bus.subscribers(handle)
 
     @simROS()
     def subscriberTreatUInt8ArrayAsString(self, handle: Handle) -> None:
-        """Do nothing: uint8[] arrives as a string in any case; string.byte(data, 1) is its first byte."""
+        """Do nothing: uint8[] is always a string; string.byte(data, 1) is its first byte."""
         self._bus.check_subscription(handle)
 
     @simROS()
     def imageTransportAdvertise(self, topic: Name, queue: int = 1) -> int:
-        """Advertise an image topic; return a handle to publish on."""
+        """Advertise an image topic; return a handle for imageTransportPublish."""
         return self._bus.advertise_image(topic, int(queue))
 
     @simROS()
     def imageTransportPublish(self, handle: Handle, data: Any, width: int, height: int, frame_id: Name) -> None:
-        """Publish a vision sensor's image as getVisionSensorCharImage returns it, the bottom row first."""
+        """Publish an image from getVisionSensorCharImage, bottom row first."""
         self._bus.publish(handle, Image(_top_row_first(data, width, height), frame_id))
 
     @simROS()
@@ -94,41 +94,41 @@ class ServiceFunctions:
     """Services that a script offers to others, with or without ROS."""
 
     def __init__(self, bus: MessageBus):
-        """`bus` keeps the services that the script offers."""
+        """`bus` has the services that the script offers."""
         self._bus = bus
 
     @simROS()
     def advertiseService(self, name: Name, kind: Name, callback: Callback) -> int:
-        """Offer a service: `callback` gets each request, and returns a table of the response's fields.
+        """Offer a service: `callback` is called with each request, and returns a table of the response's fields.
 
-        It is called in the script's turn, at the beginning of the next step; who asks waits, 5 s at most.
+        It is called at the beginning of the next step. A client waits for at most 5 s.
         """
         return self._bus.offer(name, kind, callback)
 
     @simROS()
     def shutdownServiceServer(self, handle: Handle) -> None:
-        """Offer a service no longer; raises ValueError where none has that handle."""
+        """Stop offering a service."""
         self._bus.end_subscription(handle, is_service=True)
 
     @simROS()
     def serviceServerTreatUInt8ArrayAsString(self, handle: Handle) -> None:
-        """Do nothing: uint8[] is taken and given as a string in any case."""
+        """Do nothing: uint8[] is always a string."""
         self._bus.check_subscription(handle, is_service=True)
 
 
 class RosFunctions:
-    """Time, frames, parameters and services of others, with or without ROS."""
+    """Time, frames, parameters and services of other nodes, with or without ROS."""
 
     def __init__(self, bus: MessageBus, clock: Clock):
-        """`bus` reaches ROS and resolves names; `clock` is the simulation's."""
+        """`bus` has the backend and completes names; `clock` is the simulation's."""
         self._bus = bus
         self._clock = clock
-        self._own: dict[str, Any] = {}  # parameters, where there is no ROS
+        self._own: dict[str, Any] = {}  # parameters, without ROS
         self._clients: dict[int, tuple[str, str]] = {}
 
     @simROS()
     def getTime(self, _flag: int = 0) -> float:
-        """Return ROS's time in s: what messages are stamped with."""
+        """Return the time of ROS in s, for stamps of messages."""
         backend = self._bus.backend
         return backend.time() if backend is not None else self._clock.time
 
@@ -136,14 +136,14 @@ class RosFunctions:
 
     @simROS()
     def sendTransform(self, transform: Mapping[str, Any]) -> None:
-        """Broadcast a frame: a table with the fields of geometry_msgs/TransformStamped."""
+        """Broadcast a transform, a table with the fields of geometry_msgs/TransformStamped."""
         self.sendTransforms([transform])
 
     @simROS()
     def sendTransforms(self, transforms: Sequence[Mapping[str, Any]]) -> None:
-        """Broadcast several frames."""
+        """Broadcast several transforms."""
         refuse_if_too_large(transforms)
-        if isinstance(transforms, Mapping) or any(not isinstance(one, Mapping) for one in transforms):
+        if isinstance(transforms, Mapping) or any(not isinstance(item, Mapping) for item in transforms):
             raise WrongValue("expected tables with the fields of geometry_msgs/TransformStamped")
         if self._bus.backend is not None:
             self._bus.backend.send_transforms(list(transforms))
@@ -157,7 +157,7 @@ class RosFunctions:
 
     @simROS()
     def deleteParam(self, name: Name) -> None:
-        """Forget a parameter."""
+        """Delete a parameter."""
         full, backend = self._name(name), self._bus.backend
         if backend is not None:
             backend.delete_parameter(full)
@@ -166,7 +166,7 @@ class RosFunctions:
 
     @simROS()
     def searchParam(self, name: Name) -> tuple[bool, str]:
-        """Return whether a parameter is set in the drone's namespace or above it, and its full name ('' for none)."""
+        """Return whether a parameter is set in the drone's namespace or above, and its complete name ('' for none)."""
         space = "" if name.startswith("/") else self._name("x").rpartition("/")[0]
         name = name.lstrip("/")
         while True:
@@ -190,16 +190,16 @@ class RosFunctions:
             self._own[full] = value
 
     def _name(self, name: str) -> str:
-        """Return the full name; raises WrongValue for what is none."""
+        """Return the complete name of a parameter. Raises WrongValue, ValueError."""
         if not isinstance(name, str) or not name.strip("/"):
             raise WrongValue("expected the name of a parameter")
         return self._bus.resolved("parameter", name)
 
-    # ---- services of others
+    # ---- services of other nodes
 
     @simROS()
     def serviceClient(self, name: Name, kind: Name) -> int:
-        """Return a handle to call a service with."""
+        """Return a handle for calls of a service."""
         if len(self._clients) >= _MOST:
             raise ValueError(f"a script may have at most {_MOST} service clients")
         handle = len(self._clients) + 1
@@ -208,20 +208,23 @@ class RosFunctions:
 
     @simROS()
     def call(self, handle: Handle, request: Any = None) -> Any:
-        """Call a service with a table of the request's fields; return the response. It may take a second of time."""
+        """Call a service with a table of the request's fields; return the response.
+
+        This may take a second of real time.
+        """
         name, kind = self._client(handle)
         refuse_if_too_large(request)
         return self._ros().call_service(name, kind, request or {})
 
     @simROS()
     def shutdownServiceClient(self, handle: Handle) -> None:
-        """Forget a service client."""
+        """Remove a service client."""
         self._client(handle)
         del self._clients[handle]
 
     @simROS()
     def serviceClientTreatUInt8ArrayAsString(self, handle: Handle) -> None:
-        """Do nothing: uint8[] is taken and given as a string in any case."""
+        """Do nothing: uint8[] is always a string."""
         self._client(handle)
 
     def _client(self, handle: int) -> tuple[str, str]:
@@ -236,7 +239,7 @@ class RosFunctions:
 
 
 def _add_kind(word: str, kind: type[Any]) -> None:
-    """Add the functions on parameters of one type."""
+    """Add the functions for parameters of one type."""
 
     def get(self: RosFunctions, name: Name, default: Any = None) -> tuple[bool, Any]:
         is_set, value = self._read(name)
@@ -252,8 +255,8 @@ def _add_kind(word: str, kind: type[Any]) -> None:
             raise WrongValue(f"expected a value of the type {kind.__name__}") from None
         self._write(name, value)
 
-    said = "Return whether a parameter of that type is set, and its value or the default."
-    simROS.add(RosFunctions, get, f"getParam{word}", said)
+    doc = "Return whether a parameter of this type is set, and its value or the default."
+    simROS.add(RosFunctions, get, f"getParam{word}", doc)
     simROS.add(RosFunctions, put, f"setParam{word}", "Set a parameter.")
 
 
@@ -262,7 +265,7 @@ for _word, _kind in {"String": str, "Int": int, "Double": float, "Bool": bool}.i
 
 
 def _top_row_first(data: Any, width: int, height: int) -> np.ndarray:
-    """Return a flipped view of an image, (height, width, 3). Raises WrongValue or ValueError for another size."""
+    """Return a flipped view of an image, (height, width, 3). Raises WrongValue, ValueError."""
     if isinstance(data, int):
         raise WrongValue("expected an image")
     refuse_if_too_large(data)

@@ -1,6 +1,6 @@
-"""`sim`: objects of the scene that a script makes, copies, names, and takes away; models of them in files.
+"""`sim`: creating, copying, naming and removing objects of the scene; models in files.
 
-What is done in flight is undone by stop. A shape of a vehicle, and the floor, are none of the scene's objects.
+Stopping the simulation undoes these changes. The shapes of vehicles, and the floor, are not objects of the scene.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from drone_sim.scripting.api.host import Operations, SceneServices
 from drone_sim.scripting.api.types import Handle, Name, Number, Numbers, SevenNumbers, ThreeNumbers, WrongValue, numbers
 
 _Value = TypeVar("_Value")
-_DENSITY = 1000.0  # kg/m³, of a shape without a mass of its own
+_DENSITY = 1000.0  # kg/m³, for shapes without a given mass
 _RESPONDABLE, _STATIC = 8, 16  # options of createPureShape
 _PERSPECTIVE = 2  # an option of createVisionSensor
 _WHOLE_MODELS = 1  # an option of copyPasteObjects
-_THIN = 1e-3  # m, of planes and discs
-_PURE = ("cuboid", "sphere", "cylinder", "cone")  # by their numbers
+_THICKNESS = 1e-3  # m, of planes and discs
+_PURE = ("cuboid", "sphere", "cylinder", "cone")  # by number
 _PRIMITIVE = {
     CONSTANTS[f"primitiveshape_{word}"]: word
     for word in ("plane", "disc", "cuboid", "spheroid", "cylinder", "cone", "heightfield", "capsule")
@@ -32,21 +32,21 @@ _VOLUMES = {
 
 
 class SceneObjects:
-    """Objects of the scene: making, copying, naming and removing them; models in files."""
+    """Objects of the scene: creating, copying, naming and removing them; models in files."""
 
     def __init__(self, services: SceneServices):
-        """Take what may be done to the scene, and how something is done whole."""
+        """`services` has the operations on the scene."""
         self._operations, self._outside = services.operations, services.outside
 
     def _do(self, action: Callable[[Operations], _Value]) -> _Value:
         operations = self._operations
         if operations is None:
             raise ValueError("there is no scene")
-        made: _Value = self._outside(lambda: action(operations))  # whole, whatever the script's time
-        return made
+        result: _Value = self._outside(lambda: action(operations))  # the script's time limit cannot interrupt it
+        return result
 
-    def _add(self, name: str, **said: Any) -> int:
-        return self._do(lambda scene: scene.add([{"name": scene.free_name(name), "alias": name, **said}])[0])
+    def _add(self, name: str, **keys: Any) -> int:
+        return self._do(lambda scene: scene.add([{"name": scene.free_name(name), "alias": name, **keys}])[0])
 
     # ---- shapes
 
@@ -54,9 +54,9 @@ class SceneObjects:
     def createPureShape(
         self, primitiveType: int, options: int, sizes: ThreeNumbers, mass: Number, _precision: Any = None
     ) -> int:
-        """Make a cuboid (0), sphere (1) or cylinder (2) of so many metres along x, y, z, and kg; return its handle.
+        """Create a cuboid (0), sphere (1) or cylinder (2) with sizes (m) and a mass (kg); return its handle.
 
-        `options`: 8 it is respondable, 16 static; the others change nothing. It stands at the origin of the world.
+        `options`: 8 respondable, 16 static; others have no effect. It is at the origin of the world.
         """
         kind = _PURE[int(primitiveType)] if primitiveType in range(len(_PURE)) else ""
         bits, (kilograms,) = int(options), numbers((mass,), 1)
@@ -66,36 +66,36 @@ class SceneObjects:
 
     @sim("5")
     def createPrimitiveShape(self, primitiveType: int, sizes: ThreeNumbers, _options: int = 0) -> int:
-        """Make a sim.primitiveshape_cuboid, _spheroid, _cylinder, _capsule, _plane or _disc; return its handle.
+        """Create a sim.primitiveshape_cuboid, _spheroid, _cylinder, _capsule, _plane or _disc; return its handle.
 
-        It stands at the origin of the world, static and not respondable, and weighs 1000 kg/m³.
+        It is at the origin of the world, static and not respondable, with a density of 1000 kg/m³.
         """
         kind = _PRIMITIVE.get(int(primitiveType), "")
         x, y, z = numbers(sizes, 3)
         flat = kind in ("plane", "disc")
         known = "sim.primitiveshape_cuboid, _spheroid, _cylinder, _capsule, _plane, _disc"
-        shape = _shape(kind, (x, y, _THIN) if flat else (x, y, z), known, primitiveType)
-        mass = _DENSITY * x * y * (_THIN if flat else z)
+        shape = _shape(kind, (x, y, _THICKNESS) if flat else (x, y, z), known, primitiveType)
+        mass = _DENSITY * x * y * (_THICKNESS if flat else z)
         return self._add(kind.capitalize(), **shape, mass=mass, static=True, respondable=False)
 
     @sim("345", createShape="5")
     def createMeshShape(
         self, _options: int, _shadingAngle: Number, vertices: Numbers, indices: Numbers, *_: Any
     ) -> int:
-        """Make a static shape from vertices (m) and triangles, three indices from 0 each; return its handle."""
-        corners = [int(one) for one in indices]
+        """Create a static shape from vertices (m) and triangles, three indices from 0 each; return its handle."""
+        corners = [int(index) for index in indices]
         if not vertices or len(vertices) % 3 or not corners or len(corners) % 3:
             raise WrongValue("expected three numbers for each vertex and three indices for each triangle")
         points = numbers(vertices, len(vertices))
         return self._do(lambda scene: scene.add_mesh(scene.free_name("Shape"), points, corners))
 
-    # ---- whatever else there is
+    # ---- other objects
 
     @sim("345")
     def createDummy(self, size: Number, _color: Any = None) -> int:
-        """Make a dummy at the origin of the world; return its handle.
+        """Create a dummy at the origin of the world; return its handle.
 
-        Its name is Dummy, or Dummy0, Dummy1 and so on; setObjectPosition and setObjectParent put it somewhere.
+        Its name is Dummy, or Dummy0, Dummy1 and so on. Move it with setObjectPosition and setObjectParent.
         """
         (length,) = numbers((size,), 1)
         return self._add("Dummy", kind="dummy", **({"size": length} if length else {}))
@@ -104,9 +104,9 @@ class SceneObjects:
     def createJoint(
         self, jointType: int, jointMode: int = 0, _options: int = 0, _sizes: Any = None, *_colors: Any
     ) -> int:
-        """Make a sim.joint_revolute_subtype, _prismatic_ or _spherical_ at the origin; return its handle.
+        """Create a sim.joint_revolute_subtype, _prismatic_ or _spherical_ joint at the origin; return its handle.
 
-        In sim.jointmode_force (4.x: _dynamic) it turns freely, in any other mode scripts move it.
+        In sim.jointmode_force (4.x: _dynamic), it turns freely; in any other mode, scripts move it.
         """
         if jointType not in _JOINTS:
             raise ValueError(
@@ -117,16 +117,17 @@ class SceneObjects:
 
     @sim("345")
     def createForceSensor(self, _options: int, _intParams: Numbers, _floatParams: Numbers, *_color: Any) -> int:
-        """Make a force sensor at the origin; return its handle. It does not break."""
+        """Create a force sensor at the origin; return its handle. It does not break."""
         return self._add("Force_sensor", kind="force_sensor")
 
     @sim("345")
     def createProximitySensor(
         self, sensorType: int, _subType: int, _options: int, _intParams: Numbers, floatParams: Numbers, *_color: Any
     ) -> int:
-        """Make a sim.proximitysensor_ray_subtype, _cone_, _disc_, _cylinder_ or _pyramid_; return its handle.
+        """Create a sim.proximitysensor_ray_subtype, _cone_, _disc_, _cylinder_ or _pyramid_; return its handle.
 
-        Of `floatParams`, from 0: 0 offset and 1 range (m), 4 width of a pyramid's end (m), 7 radius (m), 9 angle (rad).
+        `floatParams` by index from 0: 0 offset and 1 range (m), 4 width of a pyramid's end (m), 7 radius (m), 9 angle
+        (rad).
         """
         if sensorType not in _VOLUMES:
             raise ValueError(
@@ -135,47 +136,47 @@ class SceneObjects:
         kind, values = _VOLUMES[sensorType], numbers(floatParams, len(floatParams))
         if len(values) < 10:
             raise WrongValue("floatParams must have 15 numbers")
-        said: dict[str, Any] = {"type": kind, "offset": values[0], "range": values[1]}
+        keys: dict[str, Any] = {"type": kind, "offset": values[0], "range": values[1]}
         if kind in ("cone", "disc"):
-            said["angle"] = values[9]
+            keys["angle"] = values[9]
         if kind == "cylinder":
-            said["radius"] = values[7]
+            keys["radius"] = values[7]
         if kind == "pyramid":
-            said["angle"] = 2 * atan2(values[4] / 2, values[0] + values[1])
-        return self._add("Proximity_sensor", kind="proximity_sensor", **said)
+            keys["angle"] = 2 * atan2(values[4] / 2, values[0] + values[1])
+        return self._add("Proximity_sensor", kind="proximity_sensor", **keys)
 
     @sim("345")
     def createVisionSensor(self, options: int, intParams: Numbers, floatParams: Numbers, *_color: Any) -> int:
-        """Make a vision sensor; return its handle. `options`: 2 perspective, else orthographic.
+        """Create a vision sensor; return its handle. `options`: 2 perspective, otherwise orthographic.
 
-        `intParams`: width and height (px); `floatParams`: near and far plane (m), angle (rad), or size (m).
+        `intParams`: width and height (px); `floatParams`: near and far plane (m), and angle (rad) or size (m).
         """
         whole, values = numbers(intParams, len(intParams)), numbers(floatParams, len(floatParams))
         if len(whole) < 2 or len(values) < 3:
             raise WrongValue("expected width and height, and near, far and angle")
-        said = {"width": int(whole[0]), "height": int(whole[1]), "near": values[0], "far": values[1]}
+        keys = {"width": int(whole[0]), "height": int(whole[1]), "near": values[0], "far": values[1]}
         key = "fov" if int(options) & _PERSPECTIVE else "size"
-        return self._add("Vision_sensor", kind="vision_sensor", **said, **{key: values[2]})
+        return self._add("Vision_sensor", kind="vision_sensor", **keys, **{key: values[2]})
 
     # ---- copies, names, removal
 
     @sim("345")
     def copyPasteObjects(self, handles: Sequence[Handle], options: int = 0) -> list[int]:
-        """Copy objects at the same places; return the copies' handles. Copies of children have the copied parent.
+        """Copy objects at the same places; return the copies' handles. A copied child has the copied parent.
 
-        `options`: 1 each with all that hangs on it. The copies of Ball are named Ball#0, Ball#1 and so on; a child
-        script on it is copied, too, and begins before the scripts are called the next time.
+        `options`: 1 with all descendants. The copies of Ball are named Ball#0, Ball#1 and so on. Child scripts are also
+        copied, and start before the scripts are called the next time.
         """
         wanted = _handles(handles)
         if int(options) & _WHOLE_MODELS:
-            return self._do(lambda scene: scene.copy([one for top in wanted for one in scene.model(top)]))
+            return self._do(lambda scene: scene.copy([handle for top in wanted for handle in scene.model(top)]))
         return self._do(lambda scene: scene.copy(wanted))
 
     @sim("345")
     def setObjectName(self, handle: Handle, name: Name) -> int:
         """Set the name of an object; it must be unique (3.x). Return 1.
 
-        With sim.handleflag_altname it is the alias (4.2).
+        With sim.handleflag_altname, set the alias (4.2).
         """
         self._do(
             lambda scene: scene.set_alias(bare(handle), name) if handle != bare(handle) else scene.rename(handle, name)
@@ -203,9 +204,9 @@ class SceneObjects:
         """Remove an object with all objects below it. Return the number of removed objects."""
 
         def remove(scene: Operations) -> int:
-            going = scene.model(handle)
-            scene.remove(going)
-            return len(going)
+            removed = scene.model(handle)
+            scene.remove(removed)
+            return len(removed)
 
         return self._do(remove)
 
@@ -213,9 +214,9 @@ class SceneObjects:
 
     @sim("345")
     def loadModel(self, filename: Name) -> int:
-        """Add the objects of a model (.ttm; .yaml) or scene file (.yaml), and the scripts on them; return a handle.
+        """Add the objects and scripts of a model (.ttm; .yaml) or scene file (.yaml); return the first object's handle.
 
-        It is that of the first one. The file lies beside the scene file; what else it says is left aside.
+        The file is in the folder of the scene file; its other settings are ignored.
         """
         return self._do(lambda scene: scene.load_model(filename))
 
@@ -227,17 +228,17 @@ class SceneObjects:
 
 
 class Shapes:
-    """Shapes of the scene: their looks, masses, sizes and meshes."""
+    """Shapes of the scene: their colors, masses, sizes and groups."""
 
     def __init__(self, services: SceneServices):
-        """Take what may be done to the scene, and how something is done whole."""
+        """`services` has the operations on the scene."""
         self._do = SceneObjects(services)._do
 
     @sim("345")
     def setShapeColor(self, handle: Handle, _colorName: Any, colorComponent: int, rgbData: Numbers) -> int:
-        """Set the color of a shape and all of its parts: red, green, blue from 0 to 1. Return 1.
+        """Set the color of a shape and its parts: red, green, blue from 0 to 1. Return 1.
 
-        sim.colorcomponent_transparency takes one number, how opaque it is; other components change nothing.
+        sim.colorcomponent_transparency takes one number, the opacity; other components have no effect.
         """
         if colorComponent == CONSTANTS["colorcomponent_transparency"]:
             (opacity,) = numbers(rgbData if isinstance(rgbData, Sequence) else (rgbData,), 1)
@@ -250,7 +251,7 @@ class Shapes:
     def getShapeColor(
         self, handle: Handle, _colorName: Any = None, _colorComponent: int = 0
     ) -> tuple[int, list[float]]:
-        """Return 1, and the color of a shape (of its first part): red, green, blue from 0 to 1."""
+        """Return 1, and the color of a shape's first part: red, green, blue from 0 to 1."""
         return 1, list(self._do(lambda scene: scene.color(handle))[:3])
 
     @sim("345")
@@ -271,7 +272,7 @@ class Shapes:
 
         def scale(scene: Operations) -> None:
             now, _ = scene.box(handle)
-            scene.scale([handle], [one / before for one, before in zip(wanted, now)])
+            scene.scale([handle], [new / old for new, old in zip(wanted, now)])
 
         self._do(scale)
         return 1
@@ -290,33 +291,33 @@ class Shapes:
 
     @sim("345")
     def getObjectSizeFactor(self, handle: Handle) -> float:
-        """Return how much an object was scaled, along x."""
+        """Return the factor by which an object was scaled along x."""
         return self._do(lambda scene: scene.factors(handle)[0])
 
     @sim("345")
     def getObjectSizeValues(self, handle: Handle) -> list[float]:
-        """Return how much an object was scaled along x, y and z."""
+        """Return the factors by which an object was scaled along x, y and z."""
         return list(self._do(lambda scene: scene.factors(handle)))
 
     @sim("345")
     def groupShapes(self, handles: Sequence[Handle], _merge: bool = False) -> int:
-        """Make one rigid shape from several, with the name and the frame of the first one; return its handle."""
+        """Combine shapes into a rigid one, with the name and the frame of the first one; return its handle."""
         return self._do(lambda scene: scene.group(_handles(handles)))
 
     @sim("345")
     def ungroupShape(self, handle: Handle) -> list[int]:
-        """Make a shape from each part of a shape; return their handles. Each gets its share of the mass, by volume."""
+        """Make each part of a shape a shape, with a mass according to its volume; return their handles."""
         return self._do(lambda scene: scene.ungroup(handle))
 
 
 def _handles(handles: Sequence[Handle]) -> list[int]:
     if isinstance(handles, (int, float, str)):
         raise WrongValue("expected a table of handles")
-    return [int(one) for one in handles]
+    return [int(handle) for handle in handles]
 
 
-def _shape(kind: str, sizes: tuple[float, ...], known: str, given: Any) -> dict[str, Any]:
-    """Return what a scene file says of a shape that fills so many metres along x, y, z. Raises ValueError."""
+def _shape(kind: str, sizes: tuple[float, ...], known: str, number: Any) -> dict[str, Any]:
+    """Return the keys of a scene file for a shape with sizes along x, y, z (m). Raises ValueError."""
     x, y, z = sizes
     if kind in ("cuboid", "plane"):
         return {"shape": "box", "size": [x, y, z]}
@@ -333,4 +334,4 @@ def _shape(kind: str, sizes: tuple[float, ...], known: str, given: Any) -> dict[
             if kind == "capsule"
             else {"shape": "cylinder", "size": [x / 2, z]}
         )
-    raise ValueError(f"primitiveType = {given!r}: must be one of {known}")
+    raise ValueError(f"primitiveType = {number!r}: must be one of {known}")

@@ -1,4 +1,4 @@
-"""How much a script may hand over at once, and how it is counted."""
+"""Limits for the size of values that scripts pass."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 DEEPEST = 16  # levels of nested tables, lists and mappings
-MOST_VALUES = 3 * 2048 * 2048  # in one call or message: the largest picture of a vision sensor, as numbers
-MOST_BYTES = 64 * 1024 * 1024  # of all its strings
+MOST_VALUES = 3 * 2048 * 2048  # in one call or message, as in the largest picture of a vision sensor
+MOST_BYTES = 64 * 1024 * 1024  # of all strings in it
 
 _PLAIN = frozenset((float, int, bool, type(None)))
 _STRINGS = (str, bytes, bytearray, memoryview)
@@ -17,9 +17,9 @@ Fields = Callable[[Any], Mapping[Any, Any] | None]
 def refuse_if_too_large(
     value: Any, fields: Fields = lambda value: value if isinstance(value, Mapping) else None
 ) -> None:
-    """Raise ValueError for a value of the script's that is nested too deeply, in itself, or that is too large.
+    """Raise ValueError for a value from a script that is too large, nested too deeply, or contains itself.
 
-    `fields` returns the named fields of what has some. Lists, tuples and mappings are looked into, and what has fields.
+    Lists, tuples and mappings are searched, and objects for which `fields` returns a mapping.
     """
     if type(value) in _PLAIN:
         return
@@ -40,12 +40,12 @@ def refuse_if_too_large(
         count += len(inner)
         if count > MOST_VALUES:
             raise ValueError(f"more than {MOST_VALUES} values are too many")
-        waiting.extend((one, depth + 1) for one in _not_plain(inner))
+        waiting.extend((item, depth + 1) for item in _not_plain(inner))
 
 
 def _not_plain(values: list[Any]) -> list[Any]:
-    """Return those that are to be looked into; whether there are any is asked at once, for images have millions."""
-    return [] if _PLAIN.issuperset(map(type, values)) else [one for one in values if type(one) not in _PLAIN]
+    """Return the values that are not plain; fast if there are none, as in images with millions of values."""
+    return [] if _PLAIN.issuperset(map(type, values)) else [value for value in values if type(value) not in _PLAIN]
 
 
 def _inner(value: Any, fields: Fields) -> list[Any] | None:

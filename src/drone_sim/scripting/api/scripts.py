@@ -1,7 +1,7 @@
-"""`sim`: scripts: their simulation parameters, the log, and calls from one script to another.
+"""`sim`: simulation parameters of scripts, the log, and calls between scripts.
 
-What is handed over in a call is copied: numbers, strings, and tables or lists of them. A script that waits for another
-one's answer cannot be called meanwhile.
+Arguments and results of calls are copied: numbers, strings, and tables or lists of them. A script that waits for
+another script's result cannot be called meanwhile.
 """
 
 from __future__ import annotations
@@ -29,35 +29,35 @@ from drone_sim.scripting.api.types import Handle, Name, WrongValue
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import say
 
-_LOG = logging.getLogger(__name__)  # not the script's own words
+_LOG = logging.getLogger(__name__)  # for messages about scripts, not from scripts
 
 _MOST = 1000  # parameters of one script
-_NEAR = 0.8  # of difflib's ratio
-_LONGEST = 80  # characters of a name that is looked at
+_NEAR = 0.8  # least ratio of difflib
+_LONGEST = 80  # characters of a name that is compared
 _LEVELS = {
     **{CONSTANTS[name]: logging.WARNING for name in ("verbosity_warnings", "verbosity_scriptwarnings")},
     **{CONSTANTS[name]: logging.ERROR for name in ("verbosity_errors", "verbosity_scripterrors")},
 }
 _SELF, _TREE, _CHAIN, _ALL, _MAIN = (
-    CONSTANTS[f"handle_{one}"] for one in ("self", "tree", "chain", "all", "main_script")
+    CONSTANTS[f"handle_{name}"] for name in ("self", "tree", "chain", "all", "main_script")
 )
-_TYPES = tuple(CONSTANTS[f"scripttype_{one}"] for one in ("childscript", "customizationscript"))
-_TYPES_OF_NONE = tuple(CONSTANTS[f"scripttype_{one}"] for one in ("mainscript", "addonscript", "sandboxscript"))
+_TYPES = tuple(CONSTANTS[f"scripttype_{name}"] for name in ("childscript", "customizationscript"))
+_MISSING_TYPES = tuple(CONSTANTS[f"scripttype_{name}"] for name in ("mainscript", "addonscript", "sandboxscript"))
 _CHILD, _CUSTOMIZATION, _NONE = CONSTANTS["scripttype_childscript"], CONSTANTS["scripttype_customizationscript"], -1
 
 
 class _OnScripts(Functions):
-    """What functions on scripts share."""
+    """Base class of functions on scripts."""
 
     def __init__(self, names: NameFunctions, host: Host, services: SceneServices, ignored: Ignored):
-        """`names` understands names; the others are what all functions take."""
+        """`names` finds objects; the other arguments are those of Functions."""
         super().__init__(host, services, ignored)
         self._find = names.getObject
         self._scripts = host.context.scripts
 
     @functools.cached_property
     def _own(self) -> Attachment:
-        """This script; a client outside has none where nobody flies. Raises ValueError."""
+        """The script that calls. Raises ValueError for a remote client without a vehicle."""
         return self._scripts.attached_to(self._host.own_script)
 
     def _script(self, handle: int) -> Attachment:
@@ -68,20 +68,20 @@ class _OnScripts(Functions):
         if not isinstance(handle, (int, float)):
             raise WrongValue("expected the handle of a script")
         number = int(handle)
-        one = self._objects.get(number)
-        return self._script_of(number) if one is not None and one.kind == "script" else self._scripts[number]
+        item = self._objects.get(number)
+        return self._script_of(number) if item is not None and item.kind == "script" else self._scripts[number]
 
     def _script_of(self, handle: int) -> Attachment:
-        """Return the script of an object. Raises ValueError where it has none."""
+        """Return the script of an object. Raises ValueError if it has none."""
         if handle == _SELF:
             return self._own
         return self._on_object(handle) or self._scripts.attached_to(self._objects[handle].name)
 
     def _on_object(self, handle: int) -> Attachment | None:
-        """Return the script that is on an object, or that a script object is; None for none."""
-        one = self._objects[handle]
-        there = (each for each in (one, one.parent if one.kind == "script" else None) if each is not None)
-        return next((self._scripts.attached_to(each.name) for each in there if each.name in self._scripts), None)
+        """Return the script of an object, or of a script object's parent; None if there is none."""
+        item = self._objects[handle]
+        owners = (owner for owner in (item, item.parent if item.kind == "script" else None) if owner is not None)
+        return next((self._scripts.attached_to(owner.name) for owner in owners if owner.name in self._scripts), None)
 
 
 class ScriptFunctions(_OnScripts):
@@ -91,7 +91,7 @@ class ScriptFunctions(_OnScripts):
 
     @sim("345")
     def getScriptHandle(self, name: Name | None = None) -> int:
-        """Return the handle of the script that is attached to an object; without a name, of this script."""
+        """Return the handle of an object's script; without a name, of this script."""
         if name is None or name == _SELF:
             return self._own.handle
         try:
@@ -107,9 +107,9 @@ class ScriptFunctions(_OnScripts):
 
     @sim("345")
     def getScriptSimulationParameter(self, script: Handle, name: Name, _as_string: bool = False) -> Any:
-        """Return a simulation parameter of a script; for sim.handle_tree, _chain or _all, of the first with it."""
+        """Return a simulation parameter of a script; for sim.handle_tree, _chain or _all, of the first that has it."""
         several = self._several(script)
-        found = next((one for one in several if name in one.parameters), None)
+        found = next((script for script in several if name in script.parameters), None)
         found = found or (several or [self._script(script)])[0]
         if name not in found.parameters:
             raise ValueError(f"there is no script parameter '{name}'; {near_names(name, found.parameters)}")
@@ -121,62 +121,62 @@ class ScriptFunctions(_OnScripts):
     def setScriptSimulationParameter(self, script: Handle, name: Name, value: Any) -> None:
         """Set a simulation parameter of a script: `particleVelocity` (m/s) drives a propeller.
 
-        With sim.handle_tree it is set in this script and those below, with sim.handle_chain in this one and those
-        above, with sim.handle_all in every one. A name that a propeller's law does not have is refused where it comes
-        near to one that it has; of any other the log says once that nothing reads it.
+        With sim.handle_tree, it is set in this script and those of descendants; with sim.handle_chain, in this script
+        and those of ancestors; with sim.handle_all, in every script. An unknown parameter of a propeller raises an
+        error if its name is similar to a known one; otherwise the log says that nothing reads it.
         """
         found = self._scripts.get(script)
         if found and found is not self._own and name in found.parameters and type(value) is float and isfinite(value):
-            found.parameters[name] = value  # of a propeller: often, so at once
+            found.parameters[name] = value  # fast, because it is called for each propeller in every step
             return
         several = self._several(script)
         scripts = several or [self._script(script)]
         if several or name not in scripts[0].parameters:
             self._check_name(scripts, name)
-        for one in scripts:
-            _set(one.parameters, name, value)
-            if one is self._own:  # a default
-                self._scripts.ask(one, name)
+        for attachment in scripts:
+            _set(attachment.parameters, name, value)
+            if attachment is self._own:  # a default value
+                self._scripts.ask(attachment, name)
 
     @sim("45")
     def getUserParameter(self, handle: Handle, name: Name, _options: Any = None) -> Any:
-        """Return a simulation parameter of the script that is attached to an object (4.x)."""
+        """Return a simulation parameter of an object's script (4.x)."""
         return self.getScriptSimulationParameter(self._script_of(handle).handle, name)
 
     @sim("45")
     def setUserParameter(self, handle: Handle, name: Name, value: Any) -> None:
-        """Set a simulation parameter of the script that is attached to an object (4.x)."""
+        """Set a simulation parameter of an object's script (4.x)."""
         self.setScriptSimulationParameter(self._script_of(handle).handle, name, value)
 
     def _several(self, handle: int) -> list[Attachment]:
-        """Return the scripts that a special handle stands for, this one first, as there are; none for any other."""
+        """Return the scripts that a special handle means, this script first; none for other handles."""
         own = self._object(self._own)
         belongs: dict[int, Callable[[SceneObject], bool]] = {
-            _TREE: lambda one: one.is_part_of(own),
+            _TREE: lambda item: item.is_part_of(own),
             _CHAIN: own.is_part_of,
             _ALL: lambda _: True,
         }
-        meant = belongs.get(handle)
-        found = [one for one in self._scripts if meant is not None and meant(self._object(one))]
-        return sorted(found, key=lambda one: one is not self._own)
+        is_included = belongs.get(handle)
+        found = [script for script in self._scripts if is_included is not None and is_included(self._object(script))]
+        return sorted(found, key=lambda script: script is not self._own)
 
     def _object(self, script: Attachment) -> SceneObject:
         return self._objects[self._objects.handle(script.name)]
 
     def _check_name(self, scripts: Collection[Attachment], name: Any) -> None:
-        """Raise ValueError for a misspelt parameter of a propeller; log a parameter that nothing reads."""
+        """Raise ValueError for a misspelt parameter of a propeller; log any other parameter that nothing reads."""
         of_propellers = self._scripts.law_parameters()
         if list(scripts) == [self._own]:
             if name in of_propellers:
-                said = "'%s' is a parameter of the propellers; in the script of %s nothing reads it"
-                _LOG.warning(said, name, self._own.name)
+                message = "'%s' is a parameter of the propellers; in the script of %s nothing reads it"
+                _LOG.warning(message, name, self._own.name)
             return
-        if name in of_propellers or name in self._own.read or not any(one.is_law for one in scripts):
+        if name in of_propellers or name in self._own.read or not any(script.is_law for script in scripts):
             return
         plain = {known.lower(): known for known in sorted(of_propellers)}
         near = difflib.get_close_matches(str(name)[:_LONGEST].replace("_", "").lower(), plain, cutoff=_NEAR)
         if near:
-            known = ", ".join(plain[one] for one in near)
+            known = ", ".join(plain[match] for match in near)
             raise ValueError(f"a propeller has no script parameter '{name}'; near names are {known}")
         _LOG.warning("nothing reads '%.80s' of a propeller; particleVelocity drives it", name)
 
@@ -194,7 +194,7 @@ class ScriptFunctions(_OnScripts):
 
 
 def _set(parameters: ScriptParameters, name: Any, value: Any) -> None:
-    """Keep a value; raises WrongValue, ValueError."""
+    """Store a parameter. Raises WrongValue, ValueError."""
     value = _stored(value, parameters.get(name))
     refuse_if_too_large([name, value])
     if name not in parameters and len(parameters) >= _MOST:
@@ -203,14 +203,14 @@ def _set(parameters: ScriptParameters, name: Any, value: Any) -> None:
 
 
 def _stored(value: Any, before: Any) -> Any:
-    """Return a value as V-REP keeps it, where '5.33' is a number and 'true' is true.
+    """Return a value as V-REP stores it: '5.33' becomes a number, and 'true' becomes True.
 
-    Raises WrongValue where something else comes in the place of a number.
+    Raises WrongValue if another type would replace a number.
     """
     if isinstance(value, str):
         value = _from_text(value)
     elif isinstance(value, list):
-        value = list(value)  # the script's own may change
+        value = list(value)  # a copy, because the script may change its list
     elif isinstance(value, np.number):
         value = value.item()
     if type(value) is float or type(value) is int:
@@ -231,17 +231,17 @@ def _from_text(text: str) -> Any:
 
 
 class ScriptCalls(_OnScripts):
-    """Calls from one script to another."""
+    """Calls between scripts."""
 
     @sim("5")
     def getScript(self, scriptType: int, object: Handle | Name = _SELF, _name: Name = "") -> int:
-        """Return the handle of the script that is attached to an object, by its handle or path; -1 for none (4.x)."""
+        """Return the handle of an object's script, by the object's handle or path; -1 for none (4.x)."""
         found = self._attached(object) if scriptType == _CHILD else None
         return _NONE if found is None else found.handle
 
     @sim("345")
     def getScriptAssociatedWithObject(self, object: Handle) -> int:
-        """Return the handle of the script that is attached to an object, -1 for none (3.x)."""
+        """Return the handle of an object's script, -1 for none (3.x)."""
         return self.getScript(_CHILD, object)
 
     @sim("345")
@@ -262,9 +262,9 @@ class ScriptCalls(_OnScripts):
 
     @sim("345")
     def callScriptFunction(self, function: Name, script: Handle, *arguments: Any) -> Any:
-        """Call 'function@object', or 'function' of the script with a handle; return what it returns.
+        """Call 'function@object', or 'function' of the script with a handle; return its results.
 
-        Behind 'function@object' stands the type of the script, such as sim.scripttype_childscript.
+        After 'function@object', the second argument is the type of the script, such as sim.scripttype_childscript.
         """
         if not isinstance(function, str):
             raise WrongValue("expected the name of a function")
@@ -273,15 +273,17 @@ class ScriptCalls(_OnScripts):
         values = list(arguments)
         refuse_if_too_large(values)
         self._scripts.permit(self._own, callee, name)
-        return self._call(callee, lambda one: one.call_function(name, values), lambda one: one.call_own(name, values))
+        return self._call(
+            callee, lambda script: script.call_function(name, values), lambda script: script.call_own(name, values)
+        )
 
     @sim("345")
     def executeScriptString(self, stringToExecute: Any, scriptHandle: Any = _SELF) -> tuple[Any, ...]:
-        """Run a text in another script, in its language and with its globals; return 0 and the text's value.
+        """Run a text as code of another script, with its globals; return 0 and the text's value.
 
-        That is its value where it is an expression, and an empty table where nothing is returned. In 3.x and 4.2 it is
-        'text@object' and a sim.scripttype_...; since 4.9 the script's handle comes first. A text is run in a Python
-        script for Python scripts alone.
+        This is the value of an expression, or an empty table if nothing is returned. In 3.x and 4.2, the arguments are
+        'text@object' and a sim.scripttype_...; since 4.9, the script's handle comes first. Only Python scripts may run
+        a text in a Python script.
         """
         text, script = (stringToExecute, scriptHandle)
         if not isinstance(text, str):
@@ -291,20 +293,20 @@ class ScriptCalls(_OnScripts):
         refuse_if_too_large([text])
         callee, text = self._executing(text, script)
         self._scripts.permit(self._own, callee, "")
-        found = self._call(callee, lambda one: one.execute(text), lambda one: one.execute_own(text))
-        if found is None:
+        value = self._call(callee, lambda script: script.execute(text), lambda script: script.execute_own(text))
+        if value is None:
             return 0, []
-        return (0, *found) if isinstance(found, tuple) else (0, found)
+        return (0, *value) if isinstance(value, tuple) else (0, value)
 
     def _executing(self, text: str, script: Any) -> tuple[Attachment, str]:
-        """Return the script in which a text is to be run, and the text alone."""
+        """Return the script that runs the text, and the text without `@object` or `@language`."""
         code, at, of = text.rpartition("@")
         language = of if at and of in ("lua", "python") else ""
         if language:
             callee, text = self._script(script), code
         elif at and script in _TYPES:
             callee, text = self._of_type(self._find(of), script), code
-        elif script in _TYPES_OF_NONE:
+        elif script in _MISSING_TYPES:
             raise ValueError("every script belongs to an object: name one, as 'text@object', or by its handle")
         else:
             callee, text = self._script(script), text if of else code or text
@@ -319,21 +321,21 @@ class ScriptCalls(_OnScripts):
 
     @property
     def _is_python(self) -> bool:
-        """Whether who asks is a Python script, which may do in Python what it likes in any case."""
+        """Whether the caller is a Python script, which can run any Python code anyway."""
         own = self._own.script if self._scripts.are_own else None
         return own is not None and own.language == "python"
 
     def _call(self, callee: Attachment, call: Callable[[Script], Any], call_own: Callable[[Script], Any]) -> Any:
-        """Call another script, or on its own time this one. Raises ValueError."""
+        """Call another script, or this script within its own time limit. Raises ValueError."""
         try:
             if self._scripts.is_own(self._own, callee):
                 return self._scripts.call(self._own, callee, call_own)
-            return self._surroundings.inside(lambda: self._scripts.call(self._own, callee, call))
+            return self._services.inside(lambda: self._scripts.call(self._own, callee, call))
         except ScriptError as error:
             raise ValueError(str(error)) from None
 
     def _of_type(self, handle: int, kind: int) -> Attachment:
-        """Return the script of a type on an object. Raises ValueError."""
+        """Return an object's script of a type. Raises ValueError."""
         if kind == _CUSTOMIZATION:
             name = self._objects[handle].name
             raise ValueError(f"no customization script is attached to '{name}': V-REP's are not imported")
@@ -341,7 +343,7 @@ class ScriptCalls(_OnScripts):
 
     @sim("5")
     def getScriptFunctions(self, script: Handle) -> Any:
-        """Return an object that calls a script's functions: `it:name(...)` in Lua, `it.name(...)` in Python."""
+        """Return an object for calls of a script's functions: `it:name(...)` in Lua, `it.name(...)` in Python."""
         return FunctionsOfScript(self.callScriptFunction, self._script(script).handle)
 
     def _attached(self, object: Handle | Name) -> Attachment | None:
@@ -351,20 +353,20 @@ class ScriptCalls(_OnScripts):
 
 
 class FunctionsOfScript:
-    """The functions of a script, as attributes."""
+    """The functions of a script as attributes."""
 
     def __init__(self, call: Callable[..., Any], script: int):
-        """`call` is callScriptFunction, `script` a handle."""
+        """`call` is callScriptFunction, `script` is a handle."""
         self._call, self._script = call, script
 
     def __getattr__(self, name: str) -> Any:
-        """Return what calls a function of the script."""
+        """Return a function that calls the script's function with this name."""
         if name.startswith("__"):
             raise AttributeError(name)
         return lambda *arguments: self._call(name, self._script, *arguments)
 
 
 def handle_of(functions: FunctionsOfScript) -> int:
-    """Return the handle of the script; it is no attribute, because the script's functions may have any name."""
+    """Return the handle of the script; not a method, because the script's functions may have any name."""
     handle: int = vars(functions)["_script"]
     return handle

@@ -1,8 +1,8 @@
-"""`sim`: what sensors read: proximity sensors and force sensors of the scene, and a vehicle's instruments.
+"""`sim`: proximity sensors and force sensors of the scene, and a vehicle's instruments.
 
-A proximity sensor of the scene measures at the moment when it is read; a range sensor has measured at its own rate.
-CoppeliaSim's accelerometers, gyroscopes and GPS are models whose scripts compute and send the readings; so there is one
-more function here, readSensor, for all instruments. Cameras are in vision.py.
+A proximity sensor of the scene measures when it is read; a range sensor of a vehicle measures at its own rate.
+CoppeliaSim's accelerometers, gyroscopes and GPS are models whose scripts compute and send the readings; instead, there
+is a function readSensor for all instruments. Cameras are in vision.py.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Sensors(Functions):
 
     @sim("345")
     def readForceSensor(self, handle: Handle) -> tuple[int, list[float], list[float]]:
-        """Return 1, and the force (N) and torque (N m) of the object below a force sensor on it, in its frame."""
+        """Return 1, and the force (N) and torque (N m) of the child on a force sensor, in the sensor's frame."""
         found = self._objects[handle]
         if not isinstance(found, _ForceSensor):
             raise WrongValue(f"'{found.name}' is not a force sensor of the scene")
@@ -45,9 +45,9 @@ class Sensors(Functions):
 
     @sim("")
     def readSensor(self, handle: Handle) -> dict[str, Any] | None:
-        """Return the last reading of any sensor as the fields of its message; nothing before the first reading.
+        """Return the last reading of an instrument as the fields of its message; nothing before the first reading.
 
-        The stamp in its `header` is the simulated time in s at which it was measured.
+        The stamp in its `header` is the simulated time in s of the measurement.
         """
         return self._sensor(handle).read()
 
@@ -60,7 +60,7 @@ class Sensors(Functions):
 
 
 class FoundObject(Protocol):
-    """What a sensor has found, in its own frame."""
+    """An object detected by a sensor, in the sensor's frame."""
 
     distance: float  # m
     point: Vector
@@ -72,74 +72,74 @@ class FoundObject(Protocol):
 class Detector(Protocol):
     """A proximity sensor of the scene."""
 
-    entity: int  # handle of the object or collection that it looks for, or EVERYTHING
+    entity: int  # handle of the object or collection that it detects, or EVERYTHING
 
     def detect(self, wanted: Callable[[str], bool] = ...) -> Any:
-        """Return what is nearest (FoundObject) of the objects whose names are wanted, or None."""
+        """Return the nearest (FoundObject) of the objects whose names are wanted, or None."""
 
 
 class ProximitySensors(Functions):
-    """Proximity sensors: those of the scene, and a vehicle's range sensors."""
+    """Proximity sensors of the scene, and range sensors of vehicles."""
 
     @sim("345")
     def readProximitySensor(self, handle: Handle) -> _Detection:
         """Return detection state, distance (m), point, object and normal.
 
-        The state is 1, 0 where nothing is within range, -1 before a range sensor's first reading. Point (m) and unit
-        normal are in the sensor's frame, which looks along z; the object is -1 where it has gone.
+        The state is 1, 0 if nothing is within range, or -1 before the first reading of a range sensor. Point (m) and
+        unit normal are in the sensor's frame, which looks along z; the object is -1 if it does not exist any more.
         """
         found = self._objects[handle]
-        return self._seen(self._detected(found)) if isinstance(found, Detector) else self._last(found.name)
+        return self._detection(self._detected(found)) if isinstance(found, Detector) else self._last(found.name)
 
     @sim("345")
     def handleProximitySensor(self, handle: Handle) -> _Detection:
-        """Do what readProximitySensor does; for sim.handle_all, and _all_except_explicit, return the nearest of all."""
+        """Like readProximitySensor; for sim.handle_all and _all_except_explicit, return the nearest detection."""
         if handle not in EVERY_SENSOR:
             return self.readProximitySensor(handle)
-        every = [self._objects[one] for one in self._objects]
-        seen = [self._detected(one) for one in every if isinstance(one, Detector)]
-        return self._seen(min((one for one in seen if one is not None), key=lambda one: one.distance, default=None))
+        sensors = [item for item in map(self._objects.__getitem__, self._objects) if isinstance(item, Detector)]
+        detections = [found for found in map(self._detected, sensors) if found is not None]
+        return self._detection(min(detections, key=lambda found: found.distance, default=None))
 
     @sim("345")
     def checkProximitySensor(self, handle: Handle, entity: Handle) -> _Detection:
-        """Do what readProximitySensor does, but only for one object or collection, or for sim.handle_all."""
+        """Like readProximitySensor, but only for an object or collection, or for sim.handle_all."""
         sensor = self._objects[handle]
         if not isinstance(sensor, Detector):
             raise WrongValue(f"'{sensor.name}' is not a proximity sensor of the scene: {self._known()}")
-        return self._seen(self._detected(sensor, entity))
+        return self._detection(self._detected(sensor, entity))
 
     @sim("345")
     def checkProximitySensorEx(
         self, handle: Handle, entity: Handle, _mode: int = 0, threshold: Number = 0.0, _maxAngle: Number = 0.0
     ) -> _Detection:
-        """Do what checkProximitySensor does, but only up to a distance (m); 0 is no limit."""
+        """Like checkProximitySensor, but only up to a distance (m; 0: no limit)."""
         found = self.checkProximitySensor(handle, entity)
-        return found if not threshold or found[1] <= threshold else self._seen(None)
+        return found if not threshold or found[1] <= threshold else self._detection(None)
 
     @sim("345")
     def resetProximitySensor(self, handle: Handle) -> None:
-        """Do nothing: a sensor measures when it is read, and keeps no reading."""
+        """Do nothing: a sensor measures when it is read, and stores no reading."""
         if handle not in EVERY_SENSOR:
             self._objects[handle]
 
     def _detected(self, sensor: Detector, entity: int | None = None) -> FoundObject | None:
-        """Return what a sensor detects of an entity; if none is given, of the one that the sensor is set to detect."""
-        of = sensor.entity if entity is None else entity
-        if of == EVERYTHING:
+        """Return the detected object of an entity; None means the entity that the sensor is set to detect."""
+        entity = sensor.entity if entity is None else entity
+        if entity == EVERYTHING:
             found: FoundObject | None = sensor.detect()
             return found
-        detectable = members(of, self._objects, self._context.collections)
-        names = {name for one in detectable for name in self._objects[one].names}
+        detectable = members(entity, self._objects, self._context.collections)
+        names = {name for handle in detectable for name in self._objects[handle].names}
         found = sensor.detect(names.__contains__)
         return found
 
-    def _seen(self, found: FoundObject | None) -> _Detection:
+    def _detection(self, found: FoundObject | None) -> _Detection:
         if found is None:
             return _none(_NOTHING)
         return _DETECTED, found.distance, list(found.point), self._handle(found.name), list(found.normal)
 
     def _last(self, name: str) -> _Detection:
-        """Return what a vehicle's range sensor has read."""
+        """Return the last detection of a vehicle's range sensor."""
         sensor = self._host.sensors.get(name)
         detected = getattr(sensor, "detected", None)
         if sensor is None or detected is None:
@@ -154,11 +154,13 @@ class ProximitySensors(Functions):
         return self._objects.handle(name) if name in self._objects else WORLD
 
     def _known(self) -> str:
-        ranges = [name for name, one in self._host.sensors.items() if hasattr(one, "detected")]
-        every = [self._objects[one] for one in self._objects]
-        return f"there are: {', '.join([*ranges, *(one.name for one in every if isinstance(one, Detector))]) or 'none'}"
+        ranges = [name for name, sensor in self._host.sensors.items() if hasattr(sensor, "detected")]
+        items = map(self._objects.__getitem__, self._objects)
+        return (
+            f"there are: {', '.join([*ranges, *(item.name for item in items if isinstance(item, Detector))]) or 'none'}"
+        )
 
 
 def _none(state: int) -> _Detection:
-    """Return what is read where nothing is detected; the lists are the script's own."""
+    """Return a detection without an object; its lists are new, because the script may change them."""
     return state, 0.0, [0.0, 0.0, 0.0], WORLD, [0.0, 0.0, 0.0]

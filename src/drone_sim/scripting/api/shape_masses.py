@@ -1,4 +1,4 @@
-"""`sim`: how the mass of a shape of the scene lies in it, and of what form it is."""
+"""`sim`: mass, inertia and geometry of the scene's shapes."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.types import Handle, Number, Numbers, ThreeNumbers, TwelveNumbers, WrongValue, numbers
 from drone_sim.shapes.mass import principal
 
-_LEAST_MASS = _LEAST_MOMENT = 1e-7  # kg; m², of a moment over the mass: as V-REP has them
+_LEAST_MASS = _LEAST_MOMENT = 1e-7  # kg; m² (moment divided by mass); as in V-REP
 _NONE = CONSTANTS["primitiveshape_none"]
-_COMPOUND, _PURE, _CONVEX = 1, 2, 4  # of what getShapeGeomInfo returns
+_COMPOUND, _PURE, _CONVEX = 1, 2, 4  # bits from getShapeGeomInfo
 _PRIMITIVES = {
     word: CONSTANTS[f"primitiveshape_{vreps}"]
     for word, vreps in (("box", "cuboid"), ("sphere", "spheroid"), ("cylinder", "cylinder"), ("capsule", "capsule"))
@@ -25,7 +25,7 @@ _PRIMITIVES = {
 
 
 class ShapeMasses(Functions):
-    """Mass and inertia of shapes of the scene, and their forms."""
+    """Mass, inertia and geometry of the scene's shapes."""
 
     @sim("345")
     def setShapeMassAndInertia(
@@ -36,9 +36,10 @@ class ShapeMasses(Functions):
         centerOfMass: ThreeNumbers,
         transform: TwelveNumbers | None = None,
     ) -> int:
-        """Set the mass (kg) of a shape, its inertia (kg m², 9 numbers) about the center of mass, and this center (m).
+        """Set mass (kg), inertia about the center of mass (kg m², 9 numbers), and center of mass (m) of a shape.
 
-        Both in the frame of `transform`, the world's without one (3.x). What is static stays static. Return 1.
+        Both are in the frame of `transform`, or the world frame without one (3.x). A static shape stays static. Return
+        1.
         """
         (kilograms,) = numbers((mass,), 1)
         place = IDENTITY if transform is None else numbers(transform, 12)
@@ -50,7 +51,7 @@ class ShapeMasses(Functions):
     def setShapeInertia(self, handle: Handle, inertiaMatrix: Numbers, transform: TwelveNumbers) -> int:
         """Set the inertia (kg m², 9 numbers) of a shape, in a frame whose origin is the center of mass.
 
-        That frame is in the shape's own (4.x). Return 1.
+        `transform` is that frame in the shape's frame (4.x). Return 1.
         """
         mass = float(getattr(self._objects[handle], "mass", 0.0))
         if not mass:
@@ -59,31 +60,31 @@ class ShapeMasses(Functions):
         return 1
 
     def _set(self, handle: int, mass: float, tensor: Numbers, frame: Matrix) -> None:
-        operations = self._surroundings.operations
+        operations = self._services.operations
         if operations is None:
             raise ValueError("there is no scene")
-        xx, xy, xz, _, yy, yz, _, _, zz = numbers(tensor, 9)  # as V-REP reads it: what is below the diagonal is above
+        xx, xy, xz, _, yy, yz, _, _, zz = numbers(tensor, 9)  # only the upper triangle counts, as in V-REP
         inertia = Inertia((xx, xy, xz, xy, yy, yz, xz, yz, zz), IDENTITY)
         found = principal(turned(inertia, frame), np.array(frames.position(frame)))
-        said = {
-            "moments": [max(one, _LEAST_MOMENT * mass) for one in found.moments],
+        entry = {
+            "moments": [max(moment, _LEAST_MOMENT * mass) for moment in found.moments],
             "position": list(frames.position(found.frame)),
             "rpy": list(frames.to_rpy(found.frame)),
         }
         change = operations.change
-        self._surroundings.outside(lambda: change(int(handle), mass=mass, inertia=said))
+        self._services.outside(lambda: change(int(handle), mass=mass, inertia=entry))
 
     @sim("345")
     def getShapeGeomInfo(self, handle: Handle) -> tuple[int, int, list[float]]:
-        """Return the form of a shape: bits, the form, its full sizes along x, y and z (m), and 0.
+        """Return the geometry of a shape: bits, the kind, its full sizes along x, y and z (m), and 0.
 
-        Bits are 1 a compound, 2 of simple forms, 4 convex. The form is sim.primitiveshape_cuboid, _spheroid, _cylinder
-        or _capsule; _none, without extents, for compounds, meshes and the shapes of vehicles.
+        Bits: 1 compound, 2 made of primitives, 4 convex. The kind is sim.primitiveshape_cuboid, _spheroid, _cylinder or
+        _capsule; for compounds, meshes and the shapes of vehicles, it is _none, and the sizes are 0.
         """
         found = self._objects[handle]
         if found.kind != "shape":
             raise WrongValue(f"'{found.name}' is not a shape")
-        operations = self._surroundings.operations
+        operations = self._services.operations
         forms = operations.forms(int(handle)) if operations is not None else []
         bits = _PURE if forms and all(word in _PRIMITIVES for word, _ in forms) else 0
         if len(forms) != 1:
@@ -95,7 +96,7 @@ class ShapeMasses(Functions):
 
 
 def _moved(frame: Matrix, place: Any) -> Matrix:
-    """Return a frame with its origin at a place in it."""
+    """Return a frame with its origin moved to a place in it."""
     x, y, z = frames.transform(frame, place)
     return (*frame[:3], x, *frame[4:7], y, *frame[8:11], z)
 

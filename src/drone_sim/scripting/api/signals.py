@@ -1,4 +1,4 @@
-"""`sim`: signals and tubes, by which one script leaves something for another, or for itself."""
+"""`sim`: signals and tubes, which transfer data between scripts."""
 
 from __future__ import annotations
 
@@ -14,44 +14,44 @@ from drone_sim.scripting.api.types import Handle, Name, Number, Text, WrongValue
 _MOST = 10_000  # signals of a kind
 _LONGEST_NAME = 200  # characters
 _LARGEST = 2**31 - 1
-_MOST_ENDS = 1000  # of tubes
-_LONGEST = 1000  # packets that wait at one end
+_MOST_ENDS = 1000  # open ends of tubes
+_LONGEST = 1000  # packets waiting at one end
 
 
 class Signals:
-    """Float, integer and string signals; a name may be used once for each kind."""
+    """Float, integer and string signals; each kind has its own names."""
 
     def __init__(self) -> None:
-        """Start with none."""
+        """Create it without tubes."""
         self.clear()
 
     def clear(self) -> None:
-        """Forget all."""
+        """Remove all signals."""
         self._values: dict[type[Any], dict[str, Any]] = {float: {}, int: {}, str: {}}
 
     def get(self, kind: type[Any], name: str) -> Any:
-        """Return the value of a signal of a kind, None where it is not set."""
+        """Return the value of a signal, None if it is not set."""
         return self._values[kind].get(name)
 
     def find(self, name: str) -> Any:
-        """Return the value of a signal of any kind, None where it is not set."""
+        """Return the value of a signal of any kind, None if it is not set."""
         return next((values[name] for kind in (int, float, str) if name in (values := self._values[kind])), None)
 
     def of_name(self, name: str) -> tuple[Any, ...] | None:
-        """Return the values of the signals of a name, one of each kind; None where none of them is set."""
+        """Return the values of the float, integer and string signal with a name; None if none of them is set."""
         found = tuple(values.get(name) for values in self._values.values())
-        return None if all(one is None for one in found) else found
+        return None if all(value is None for value in found) else found
 
     def names(self) -> list[str]:
-        """Return the names of all signals that are set."""
+        """Return the names of all signals."""
         return [name for values in self._values.values() for name in values]
 
     def numbers(self) -> dict[str, float]:
-        """Return the values of all float and integer signals, by name; of two of a name the float."""
+        """Return the values of all float and integer signals by name; a float takes precedence."""
         return {**self._values[int], **self._values[float]}
 
     def set(self, kind: type[Any], name: str, value: Any) -> None:
-        """Set a signal; raises WrongValue and ValueError, also for more than signals may hold."""
+        """Set a signal. Raises WrongValue, and ValueError for too many signals or too long strings."""
         if not isinstance(name, str):
             raise WrongValue("the name of a signal must be a string")
         if len(name) > _LONGEST_NAME:
@@ -73,12 +73,12 @@ class Signals:
             self._values[kind].pop(name, None)
 
     def add_those_of(self, others: Signals) -> None:
-        """Set what others are set to, where nothing is set yet."""
+        """Add the signals of `others` that are not set here."""
         for kind, values in others._values.items():
             self._values[kind] = {**values, **self._values[kind]}
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings the present signals back."""
+        """Return a function that restores the present signals."""
         kept = copy.deepcopy(self._values)
 
         def restore() -> None:
@@ -91,24 +91,24 @@ class SignalFunctions:
     """Signals: named values that scripts share."""
 
     def __init__(self, signals: Signals):
-        """Take the signals of the simulation."""
+        """`signals` are those of the simulation."""
         self._signals = signals
 
     @sim("345", setDoubleSignal="345")
     def setFloatSignal(self, name: Name, value: Number) -> None:
-        """Set a number."""
+        """Set a float signal."""
         self._signals.set(float, name, float(value))
 
     @sim("5", setIntegerSignal="345")
     def setInt32Signal(self, name: Name, value: int) -> None:
-        """Set a whole number."""
-        if not abs(value) <= _LARGEST:  # so written, it refuses NaN
+        """Set an integer signal."""
+        if not abs(value) <= _LARGEST:  # this form also refuses NaN
             raise WrongValue(f"expected a whole number within +-{_LARGEST}")
         self._signals.set(int, name, int(value))
 
     @sim("345", setBufferSignal="5")
     def setStringSignal(self, name: Name, value: Text) -> None:
-        """Set a string; a number becomes a text with up to 14 digits."""
+        """Set a string signal; a number becomes a text with up to 14 digits."""
         value = written(value)
         if not isinstance(value, (str, bytes)):
             raise WrongValue("a string is expected")
@@ -116,7 +116,7 @@ class SignalFunctions:
 
 
 def _add_kind(word: str, kind: type[Any], what: str, generations: str = "345", **others: str) -> None:
-    """Add the functions that read and clear signals of a kind; `others`: their other names, with generations."""
+    """Add the functions that read and clear signals of a kind; `others`: other words for the kind, with generations."""
 
     def get(self: SignalFunctions, name: Name) -> Any:
         return self._signals.get(kind, name)
@@ -124,16 +124,16 @@ def _add_kind(word: str, kind: type[Any], what: str, generations: str = "345", *
     def clear(self: SignalFunctions, name: Name | None = None) -> None:
         self._signals.forget(kind, name)
 
-    docs = {get: f"Return {what}, or nothing if it is not set.", clear: f"Forget {what}, or all of them."}
+    docs = {get: f"Return {what}, or nothing if it is not set.", clear: f"Clear {what}, or all of them."}
     for function, doc in docs.items():
         verb = function.__name__
         names = {f"{verb}{other}Signal": since for other, since in others.items()}
         sim.add(SignalFunctions, function, f"{verb}{word}Signal", doc, generations, **names)
 
 
-_add_kind("Float", float, "a number", Double="345")
-_add_kind("Int32", int, "a whole number", "5", Integer="345")
-_add_kind("String", str, "a string", Buffer="5")
+_add_kind("Float", float, "a float signal", Double="345")
+_add_kind("Int32", int, "an integer signal", "5", Integer="345")
+_add_kind("String", str, "a string signal", Buffer="5")
 
 
 class _End(NamedTuple):
@@ -142,16 +142,16 @@ class _End(NamedTuple):
 
 
 class Tubes:
-    """The tubes between the scripts of a simulation: each has one header and name, and two ends."""
+    """Tubes between scripts: each has a header, a name, and two ends."""
 
     def __init__(self) -> None:
-        """Start with none."""
+        """Create it without tubes."""
         self._ends: dict[int, _End] = {}
         self._last_handle = 0
 
     def open(self, kind: int, name: str, length: int) -> int:
-        """Open one end, at which so many packets wait; return its handle. Raises ValueError."""
-        if sum(one.tube == (kind, name) for one in self._ends.values()) >= 2:
+        """Open an end at which up to `length` packets wait; return its handle. Raises ValueError."""
+        if sum(end.tube == (kind, name) for end in self._ends.values()) >= 2:
             raise ValueError(f"the tube '{name:.80}' already has two ends")
         if len(self._ends) >= _MOST_ENDS:
             raise ValueError(f"at most {_MOST_ENDS} ends of tubes can be open: close some")
@@ -160,33 +160,33 @@ class Tubes:
         return self._last_handle
 
     def close(self, handle: int) -> None:
-        """Close one end. Raises ValueError for a handle that there is not."""
+        """Close an end. Raises ValueError for an unknown handle."""
         self.waiting(handle)
         del self._ends[handle]
 
     def __iter__(self) -> Iterator[int]:
-        """Yield the handle of every end that is open."""
+        """Return an iterator over the handles of open ends."""
         return iter(self._ends)
 
     def waiting(self, handle: int) -> deque[Any]:
-        """Return what waits at an end. Raises ValueError for a handle that there is not."""
+        """Return the packets that wait at an end. Raises ValueError for an unknown handle."""
         if handle not in self._ends:
             raise ValueError(f"there is no tube with the handle {handle}")
         return self._ends[handle].waiting
 
     def waiting_at_other(self, handle: int) -> deque[Any] | None:
-        """Return what waits at the other end, None where that is not open. Raises ValueError."""
+        """Return the packets that wait at the other end, None if that is not open. Raises ValueError."""
         self.waiting(handle)
         tube = self._ends[handle].tube
-        return next((one.waiting for number, one in self._ends.items() if one.tube == tube and number != handle), None)
+        return next((end.waiting for number, end in self._ends.items() if end.tube == tube and number != handle), None)
 
     def clear(self) -> None:
-        """Close all, as at the beginning of a run."""
+        """Close all tubes, as at the beginning of a run."""
         self._ends.clear()
         self._last_handle = 0
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings back the tubes, and what waits in them."""
+        """Return a function that restores the present tubes and their packets."""
         kept, last = copy.deepcopy(self._ends), self._last_handle
 
         def restore() -> None:
@@ -196,26 +196,26 @@ class Tubes:
 
 
 class TubeFunctions:
-    """Tubes: two-way pipes between two scripts, which sensors of V-REP 3.x use."""
+    """Tubes: two-way connections between two scripts, which sensors of V-REP 3.x use."""
 
     def __init__(self, tubes: Tubes):
-        """Take the tubes of the simulation."""
+        """`tubes` are those of the simulation."""
         self._tubes = tubes
 
     @sim("345")
     def tubeOpen(self, header: Number, name: Name, size: Number = 1, *_unused: Any) -> int:
-        """Open one end of a tube, at which up to `size` packets wait; return its handle.
+        """Open an end of a tube, at which up to `size` packets wait; return its handle.
 
-        It is connected once somebody opens the other end, with the same header and name.
+        It is connected when another call opens the other end with the same header and name.
         """
-        kind, length = (int(one) for one in numbers((header, size), 2))
+        kind, length = map(int, numbers((header, size), 2))
         if not isinstance(name, str):
             raise WrongValue("the name of a tube must be a string")
         return self._tubes.open(kind, name, length)
 
     @sim("345")
     def tubeClose(self, handle: Handle) -> None:
-        """Close one end of a tube."""
+        """Close an end of a tube."""
         self._tubes.close(handle)
 
     @sim("345")
@@ -226,7 +226,7 @@ class TubeFunctions:
 
     @sim("345")
     def tubeWrite(self, handle: Handle, data: Text) -> int:
-        """Send a string to the other end, which drops its oldest if it is full; return 1, or 0 without another end."""
+        """Send a string to the other end, which drops its oldest if it is full; return 1, or 0 if it is not open."""
         if not isinstance(data, (str, bytes)):
             raise WrongValue("a string is expected")
         refuse_if_too_large(data)
@@ -237,6 +237,6 @@ class TubeFunctions:
 
     @sim("345")
     def tubeRead(self, handle: Handle, _wait: Any = False) -> Any:
-        """Return the oldest string that waits at this end; nothing if there is none."""
+        """Return and remove the oldest string that waits at this end; nothing if there is none."""
         waiting = self._tubes.waiting(handle)
         return waiting.popleft() if waiting else None

@@ -1,4 +1,4 @@
-"""`sim`: the simulation as a whole: its state, its time, and the parameters of the simulator."""
+"""`sim`: state and time of the simulation, and parameters of the simulator."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from drone_sim.scripting.api.host import Functions, Host, SceneServices
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.types import Number, numbers
 
-VERSION, REVISION = 40600, 0  # the CoppeliaSim whose API this is nearest to
+VERSION, REVISION = 40600, 0  # of the CoppeliaSim whose API is the most similar
 _LINUX = 2
-_ROUNDED = 1e-6  # s, of single precision
-_PLUGINS = ("RosInterface", "ROSInterface", "ROS", "simROS", "CustomUI", "simUI")  # by every name that they had
+_TOLERANCE = 1e-6  # s, for single precision
+_PLUGINS = ("RosInterface", "ROSInterface", "ROS", "simROS", "CustomUI", "simUI")  # with all their names over time
 
 
 class SimulationFunctions(Functions):
-    """The simulation as a whole: its state, its time, and the parameters of the simulator."""
+    """The simulation: its state and time, and parameters of the simulator."""
 
     def __init__(self, host: Host, services: SceneServices, ignored: Ignored):
-        """Take what all functions take."""
+        """Create it; the arguments are those of Functions."""
         super().__init__(host, services, ignored)
-        self._random = random.Random(1)  # the same flight every time
+        self._random = random.Random(1)  # constant seed, so that every flight is the same
         self._values: dict[str, dict[int, Any]] = {
             "intparam": _by_number(
                 "intparam",
@@ -59,19 +59,19 @@ class SimulationFunctions(Functions):
 
     @sim("345")
     def stopSimulation(self, *_wait: Any) -> int:
-        """Let the simulation stop after this step; return 1."""
+        """Stop the simulation after this step; return 1."""
         self._context.control.asked = STOP
         return 1
 
     @sim("345")
     def pauseSimulation(self) -> int:
-        """Let the simulation pause after this step; return 1."""
+        """Pause the simulation after this step; return 1."""
         self._context.control.asked = PAUSE
         return 1
 
     @sim("345")
     def startSimulation(self) -> int:
-        """Cancel a stop or pause of this step (the simulation runs already); return 1."""
+        """Cancel a stop or pause requested in this step (the simulation is running already); return 1."""
         self._context.control.asked = ""
         return 1
 
@@ -87,23 +87,23 @@ class SimulationFunctions(Functions):
 
     @sim("345")
     def getSystemTime(self) -> float:
-        """Return the simulated time in seconds, so that a flight is the same at any speed of the computer."""
+        """Return the simulated time in seconds, so that flights do not depend on the speed of the computer."""
         return self._context.clock.time
 
     @sim("345", getSystemTimeInMilliseconds="3")
     def getSystemTimeInMs(self, since: Number = -1) -> int:
-        """Return the simulated time in ms, or the ms since such a time; -1 and -2 are not times."""
+        """Return the simulated time in ms, or the ms since an earlier one; -1 and -2 mean none."""
         now = round(1000 * self._context.clock.time)
         return now if since < 0 else now - int(since)
 
     @sim("345")
     def getModuleName(self, index: int) -> tuple[str | None, int]:
-        """Return name and version of a plugin by its index, from 0; nothing after the last."""
+        """Return name and version of a plugin by its index, from 0; nothing and 0 after the last."""
         return (_PLUGINS[int(index)], 1) if 0 <= index < len(_PLUGINS) else (None, 0)
 
     @sim("345")
     def getRandom(self, seed: Number | None = None) -> float:
-        """Return a random number from 0 to 1; the series is the same in every run, and a seed starts another series."""
+        """Return a random number from 0 to 1; the sequence is the same in every run, and a seed starts another."""
         if seed is not None:
             self._random = random.Random(float(seed))
         return self._random.random()
@@ -124,17 +124,17 @@ class SimulationFunctions(Functions):
 
     @sim("5", getBoolParameter="345", getBooleanParameter="3")
     def getBoolParam(self, parameter: int) -> bool:
-        """Return whether the simulator has what a sim.boolparam_... names: dynamics and vision sensors."""
+        """Return whether a sim.boolparam_... is enabled; dynamics and vision sensors are."""
         return bool(self._read("boolparam", parameter, False))
 
     @sim("5", getStringParameter="345")
     def getStringParam(self, parameter: int) -> str:
-        """Return '' for any sim.stringparam_...: there is no application, and no scene of CoppeliaSim's."""
+        """Return '' for any sim.stringparam_..., because there is no application and no scene of CoppeliaSim."""
         return str(self._read("stringparam", parameter, ""))
 
     @sim("5", getArrayParameter="345")
     def getArrayParam(self, parameter: int) -> list[float]:
-        """Return sim.arrayparam_gravity in m/s²; there is no other."""
+        """Return sim.arrayparam_gravity in m/s²; other parameters are zero."""
         return list(self._read("arrayparam", parameter, [0.0, 0.0, 0.0]))
 
     @sim("5", setFloatParameter="345", setFloatingParameter="3")
@@ -143,34 +143,36 @@ class SimulationFunctions(Functions):
         if parameter == CONSTANTS["floatparam_simulation_time_step"]:
             self.setSimulationTimeStep(value)
         else:
-            self._ignored.say("setFloatParam", f"{_name('floatparam', parameter)} is accepted and ignored")
+            self._ignored.log("setFloatParam", f"{_name('floatparam', parameter)} is accepted and ignored")
 
     @sim("")
     def setSimulationTimeStep(self, step: Number) -> None:
         """Raise an error if the time step (s) differs from the current one (3.x)."""
-        (wanted,), there = numbers((step,), 1), self._context.clock.time_step
-        if abs(wanted - there) > _ROUNDED:
-            raise ValueError(f"the time step stays {there:g} s, not {wanted:g}: `time_step` in the scene file sets it")
+        (wanted,), current = numbers((step,), 1), self._context.clock.time_step
+        if abs(wanted - current) > _TOLERANCE:
+            raise ValueError(
+                f"the time step stays {current:g} s, not {wanted:g}: `time_step` in the scene file sets it"
+            )
 
-    def _read(self, kind: str, parameter: int, otherwise: Any) -> Any:
-        """Return a parameter; raises ValueError for a number that is none of that kind."""
+    def _read(self, kind: str, parameter: int, default: Any) -> Any:
+        """Return a parameter. Raises ValueError for a number without a constant of this kind."""
         values = self._values[kind]
         if parameter not in values:
             name = _name(kind, parameter)
-            self._ignored.say(name, f"is not supported: {otherwise!r} is returned")
-            return otherwise
+            self._ignored.log(name, f"is not supported: {default!r} is returned")
+            return default
         return values[parameter]
 
 
-def _add_setter(word: str, kind: str, old: str, so: str = "") -> None:
-    """Add what sets parameters of a kind; `old`: what 3.x calls these."""
+def _add_setter(word: str, kind: str, old: str, note: str = "") -> None:
+    """Add the function that sets parameters of a kind; `old` is the word in V-REP 3.x names."""
     name = f"set{word}Param"
 
     def put(self: SimulationFunctions, parameter: int, _value: Any) -> None:
-        self._ignored.say(name, f"{_name(kind, parameter)} is accepted and ignored")
+        self._ignored.log(name, f"{_name(kind, parameter)} is accepted and ignored")
 
     others = {f"set{word}Parameter": "345"} | ({f"set{old}Parameter": "3"} if old else {})
-    sim.add(SimulationFunctions, put, name, f"Accept any sim.{kind}_... and ignore it{so}.", "5", **others)
+    sim.add(SimulationFunctions, put, name, f"Accept any sim.{kind}_... and ignore it{note}.", "5", **others)
 
 
 _add_setter("Int32", "intparam", "Integer")
@@ -184,7 +186,7 @@ def _by_number(kind: str, **values: Any) -> dict[int, Any]:
 
 
 def _name(kind: str, parameter: int) -> str:
-    """Return the name of a parameter; raises ValueError where it is none of that kind."""
+    """Return the name of a parameter. Raises ValueError for a number without a constant of this kind."""
     known = {value: name for name, value in CONSTANTS.items() if name.startswith(f"{kind}_")}
     if parameter not in known:
         raise ValueError(f"{parameter!r} is not a sim.{kind}_...; {near_names(kind, known.values())}")

@@ -1,9 +1,9 @@
-"""`sim`: threads, which wait while the simulation goes on.
+"""`sim`: threads, which can wait while the simulation runs.
 
-They are coroutines: one runs until it waits or switches, or has called so many functions of the API that it is switched
-by itself, and goes on in the next step, before the actuation of all scripts. So a flight is the same every time.
-What a function waits for is decided here, for Lua and for clients outside, too; Lua leaves its coroutines itself, and
-counts the calls, in threads.lua: they cannot be left through Python.
+They are coroutines. A thread runs until it waits or switches, or has called a number of API functions; it continues in
+the next step, before the actuation of all scripts. So every flight is the same. The functions here define the waits for
+Lua, Python and remote clients. In Lua, threads.lua suspends the coroutines and counts their calls, because they cannot
+be suspended through Python.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ _THREAD = 1
 
 
 class Threads(Functions):
-    """Threads, which wait while the simulation goes on."""
+    """Threads, which can wait while the simulation runs."""
 
     @sim("345")
     def switchThread(self) -> Wait:
-        """Let the simulation go on; return in the next step."""
+        """Suspend the thread until the next step."""
         now = self._context.clock.steps
         return self._wait_for(lambda: self._context.clock.steps != now)
 
-    @sim("5", **{"yield": "5"})  # a word that Python keeps for itself
+    @sim("5", **{"yield": "5"})  # a keyword in Python
     def step(self, _wait: bool = True) -> Wait:
-        """Let the simulation go on; return in the next step (4.x)."""
+        """Suspend the thread until the next step (4.x)."""
         return self.switchThread()
 
     @sim("345")
     def wait(self, seconds: Number, _simulated: bool = True) -> Wait:
-        """Wait for so many simulated seconds, whatever the second argument says; return by how much it is late."""
+        """Wait for a simulated time in s; the second argument is ignored. Return the delay beyond it."""
         (duration,) = numbers((seconds,), 1)
         clock = self._context.clock
         end = clock.time + duration
@@ -44,7 +44,7 @@ class Threads(Functions):
 
     @sim("345")
     def waitForSignal(self, name: Name) -> Wait:
-        """Return the value of a signal of any kind, as soon as it is set."""
+        """Wait until a signal of any kind is set; return its value."""
         if not isinstance(name, str):
             raise WrongValue("the name of a signal must be a string")
         find = functools.partial(self._context.signals.find, name)
@@ -55,59 +55,59 @@ class Threads(Functions):
     ) -> Wait:
         return Wait(over, value, self.getThreadExitRequest, by_steps)
 
-    # ---- when it is switched by itself
+    # ---- automatic switching
 
     @sim("345")
     def setThreadSwitchTiming(self, milliseconds: Number) -> None:
-        """Switch by itself after so many "milliseconds", 2 to 200: 100 calls of the API stand for one."""
-        self._surroundings.turns.set_timing(numbers((milliseconds,), 1)[0])
+        """Set the "milliseconds" (2 to 200) until a thread is switched automatically; one is 100 calls of the API."""
+        self._services.turns.set_timing(numbers((milliseconds,), 1)[0])
 
     @sim("345", setAutoYield="", setThreadSwitchAllowed="4")
     def setThreadAutomaticSwitch(self, allowed: bool | int) -> int:
-        """Forbid (false) or allow again (true) that the thread is switched by itself.
+        """Forbid (false) or allow again (true) automatic switching of the thread.
 
-        A number sets the level: how many times it is forbidden. Return the level before.
+        A number sets how many times it is forbidden. Return the number before.
         """
-        return self._surroundings.turns.set_automatic(allowed)
+        return self._services.turns.set_automatic(allowed)
 
     @sim("345", getAutoYield="", getThreadSwitchAllowed="4")
     def getThreadAutomaticSwitch(self) -> bool:
-        """Tell whether the thread is switched by itself."""
-        return self._surroundings.turns.is_automatic
+        """Return whether the thread is switched automatically."""
+        return self._services.turns.is_automatic
 
     @sim("5")
     def setStepping(self, enabled: bool) -> int:
-        """Switch only where the thread calls `step` (4.x)."""
-        return self._surroundings.turns.set_automatic(not enabled)
+        """Enable or disable stepping, in which the thread is switched only when it calls `step` (4.x)."""
+        return self._services.turns.set_automatic(not enabled)
 
     @sim("5")
     def acquireLock(self) -> None:
-        """Forbid that the thread is switched by itself, until releaseLock (4.x)."""
-        self._surroundings.turns.set_automatic(False)
+        """Forbid automatic switching of the thread until releaseLock (4.x)."""
+        self._services.turns.set_automatic(False)
 
     @sim("5")
     def releaseLock(self) -> None:
-        """Allow again that the thread is switched by itself (4.x)."""
-        self._surroundings.turns.set_automatic(True)
+        """Allow automatic switching of the thread again (4.x)."""
+        self._services.turns.set_automatic(True)
 
-    # ---- what is as it is
+    # ---- other functions
 
     @sim("345")
     def getThreadId(self) -> int:
         """Return 1: a script has one thread."""
         return _THREAD
 
-    @sim("5", getThreadExistRequest="5")  # so spelt in older versions
+    @sim("5", getThreadExistRequest="5")  # spelled like this in older versions
     def getThreadExitRequest(self) -> bool:
-        """Tell whether the simulation ends, and the thread should."""
+        """Return whether the simulation is ending, so that the thread should end."""
         return self._context.control.is_exit_requested
 
     @sim("345")
     def setThreadResumeLocation(self, _location: int, _order: int = 0) -> int:
-        """Do nothing: threads go on before the actuation of all scripts, in the order of the tree."""
+        """Do nothing: threads continue before the actuation of all scripts, in the order of the tree."""
         return 1
 
     @sim("3")
     def delegateChildScriptExecution(self) -> int:
-        """Do nothing: the simulation calls the scripts below by itself (3.0)."""
+        """Do nothing: the simulation calls the scripts of descendants itself (3.0)."""
         return 1

@@ -1,4 +1,4 @@
-"""The topics and services that one script subscribes to and offers, by handle, and what waits there."""
+"""Subscriptions and services of a script by handle, with their waiting messages and requests."""
 
 from __future__ import annotations
 
@@ -10,31 +10,32 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from drone_sim.scripting.api.script import Script
-from drone_sim.scripting.api.service_servers import ServiceRequest, carry_out
+from drone_sim.scripting.api.service_servers import ServiceRequest, execute
 from drone_sim.scripting.api.types import Callback
 
-Begin = Callable[[Callable[[Any], None]], Callable[[], None]]  # takes what takes messages, returns what ends it
+# Called with a message handler; returns a function that ends the subscription.
+Begin = Callable[[Callable[[Any], None]], Callable[[], None]]
 _NONE: list[Callback] = []
-SERVICE = "service {}"  # instead of a topic, whose full name begins with a slash
+SERVICE = "service {}"  # stored in place of a topic, whose name begins with a slash
 
 
 class OwnTopic:
-    """Sender for a topic that the drone itself receives; a Backend sends the other topics."""
+    """Sender for a topic that the drone itself receives; a Backend sends all other topics."""
 
     def __init__(self, said: dict[str, Any], topic: str):
-        """`said` is where the last message of the `topic` is left."""
+        """The last message of `topic` is stored in `said`."""
         self._said, self._topic = said, topic
 
     def publish(self, message: Any) -> None:
-        """Leave a message."""
+        """Store a message."""
         self._said[self._topic] = message
 
     def subscribers(self) -> int:
-        """Return how many listen: the drone."""
+        """Return 1, for the drone."""
         return 1
 
     def shutdown(self) -> None:
-        """Forget what was said."""
+        """Remove the message."""
         self._said.pop(self._topic, None)
 
 
@@ -48,27 +49,28 @@ class _Subscription(NamedTuple):
 
 
 class Subscriptions:
-    """Subscriptions by handle. One thread owns them; any other may leave a message."""
+    """Subscriptions by handle. One thread owns them; any thread may post a message."""
 
     def __init__(self) -> None:
-        """Start with none."""
+        """Create it without subscriptions."""
         self._by_handle: dict[int, _Subscription] = {}
         self._lock = threading.Lock()
         self._new_callbacks: list[Callback] = []
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Return the number of subscriptions."""
         return len(self._by_handle)
 
     def same(self, topic: str, kind: str, callback: Callback) -> int | None:
-        """Return the handle of the subscription of a callback to a topic of a type, None where there is none."""
-        for handle, one in self._by_handle.items():
-            if one.topic == topic and one.kind == kind and _are_same(one.callback, callback):
+        """Return the handle of an equal subscription, None if there is none."""
+        for handle, subscription in self._by_handle.items():
+            is_same_topic = subscription.topic == topic and subscription.kind == kind
+            if is_same_topic and _are_same(subscription.callback, callback):
                 return handle
         return None
 
     def add(self, handle: int, topic: str, kind: str, callback: Callback, queue: int, begin: Begin) -> None:
-        """Subscribe to a topic, or offer a service, of a type; of what waits the last `queue` are kept."""
+        """Subscribe to a topic, or offer a service, of a type; the last `queue` messages are kept."""
         messages: deque[Any] = deque(maxlen=queue)
         subscription = _Subscription(topic, kind, callback, messages, begin, begin(messages.append))
         with self._lock:
@@ -76,13 +78,13 @@ class Subscriptions:
         self._new_callbacks.append(callback)
 
     def check(self, handle: int, is_service: bool) -> None:
-        """Raise ValueError where no subscription to a topic, or no service that is offered, has that handle."""
+        """Raise ValueError if no subscription (or no offered service) has this handle."""
         if handle not in self._by_handle or self._by_handle[handle].topic.startswith("/") == is_service:
             what = "service that the script offers" if is_service else "subscription"
             raise ValueError(f"there is no {what} with the handle {handle}")
 
     def end(self, handle: int) -> None:
-        """End a subscription; raises ValueError where there is none of that handle."""
+        """End a subscription. Raises ValueError for an unknown handle."""
         with self._lock:
             subscription = self._by_handle.pop(handle, None)
         if subscription is None:
@@ -96,44 +98,44 @@ class Subscriptions:
             self.end(handle)
 
     def post(self, topic: str, message: Any) -> None:
-        """Leave a message; any thread may call it."""
+        """Post a message; any thread may call this."""
         with self._lock:
             for subscription in self._by_handle.values():
                 if subscription.topic == topic:
                     subscription.messages.append(message)
 
     def has(self, topic: str) -> bool:
-        """Whether there is one to that topic, or that service is offered; any thread may call it."""
+        """Return whether a topic is subscribed, or a service is offered; any thread may call this."""
         with self._lock:
-            return any(one.topic == topic for one in self._by_handle.values())
+            return any(subscription.topic == topic for subscription in self._by_handle.values())
 
     def new_callbacks(self) -> list[Callback]:
-        """Return the callbacks of the subscriptions since the last call."""
+        """Return the callbacks of the subscriptions that were added since the last call."""
         if not self._new_callbacks:
             return _NONE
         new, self._new_callbacks = self._new_callbacks, []
         return new
 
     def deliver(self, script: Script) -> None:
-        """Hand over every waiting message and request, of each subscription the oldest first."""
+        """Pass every waiting message and request to the script, for each subscription the oldest first."""
         for callback, message in self.take():
             if type(message) is ServiceRequest:
-                carry_out(message, functools.partial(script.answer, callback))
+                execute(message, functools.partial(script.answer, callback))
             else:
                 script.callback(callback, message)
 
     def take(self) -> list[tuple[Callback, Any]]:
-        """Return the messages and requests that wait, and whom each is for; of each subscription the oldest first."""
+        """Return and remove waiting messages and requests, with callbacks; for each subscription, the oldest first."""
         waiting: list[tuple[Callback, Any]] = []
-        for subscription in self._by_handle.values():  # which no other thread changes
+        for subscription in self._by_handle.values():  # not changed by other threads
             while subscription.messages:
                 waiting.append((subscription.callback, subscription.messages.popleft()))
         return waiting
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings back what is subscribed to now, and the messages that wait."""
+        """Return a function that restores the present subscriptions and waiting messages."""
         kept = dict(self._by_handle)
-        waiting = {handle: _copied(one.messages) for handle, one in kept.items()}
+        waiting = {handle: _copied(subscription.messages) for handle, subscription in kept.items()}
 
         def restore() -> None:
             for handle in set(self._by_handle) - set(kept):
@@ -150,14 +152,14 @@ class Subscriptions:
 
 
 def _are_same(one: Callback, other: Callback) -> bool:
-    """Tell whether two callbacks are the same function: by its name, or itself."""
+    """Return whether two callbacks have the same name, or are the same function."""
     return one == other if isinstance(one, str) and isinstance(other, str) else one is other
 
 
 def _copied(messages: deque[Any]) -> deque[Any]:
-    """Return copies of messages, which a callback may change; other threads may append meanwhile."""
+    """Return deep copies of messages, because callbacks may change messages; other threads may append meanwhile."""
     kept = messages.copy()
     try:
         return copy.deepcopy(kept)
-    except Exception:  # whatever a message's class raises when it is copied
+    except Exception:  # any exception that a message's class raises when it is copied
         return kept

@@ -1,6 +1,6 @@
-"""What the API's functions take, by the names that messages call it: 'expected (handle: Handle, position: ...)'.
+"""Types of the API's arguments, with the names for error messages: 'expected (handle: Handle, position: ...)'.
 
-And how numbers are read.
+Also, conversion of numbers.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ Callback = str | Callable[[Any], Any]
 
 
 class WrongValue(TypeError):
-    """A value is of the wrong kind; the message says what is expected instead."""
+    """A value of the wrong type; the message says what is expected."""
 
 
 def written(value: Any) -> Any:
-    """Return a number written out, with up to 14 digits, as Lua takes it where a string is expected; else the value."""
+    """Return a number as text with up to 14 digits, like Lua where a string is expected; other values unchanged."""
     if type(value) in (int, float):
         return str(value) if type(value) is int else f"{value:.14g}"
     return value
 
 
 def numbers(values: Sequence[float], count: int) -> tuple[float, ...]:
-    """Return `count` finite numbers; raises WrongValue."""
-    if type(values) is list and len(values) == count:  # most often what another call returned
+    """Return `count` finite numbers. Raises WrongValue."""
+    if type(values) is list and len(values) == count:  # fast path for a list that another call has returned
         try:
             total = sum(values)
         except TypeError:
@@ -44,7 +44,7 @@ def numbers(values: Sequence[float], count: int) -> tuple[float, ...]:
     expected = f"{count} numbers are expected" if count != 1 else "a number is expected"
     try:
         found = tuple(map(float, values))
-    except OverflowError:  # a whole number beyond all floats
+    except OverflowError:  # an integer that is too large for a float
         raise WrongValue("finite numbers are expected") from None
     except (TypeError, ValueError):
         raise WrongValue(expected) from None

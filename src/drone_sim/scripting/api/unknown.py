@@ -1,4 +1,4 @@
-"""What CoppeliaSim has and this simulator has not, and what is said to a script that asks for it."""
+"""Functions and plugins of CoppeliaSim that do not exist here, and messages for scripts that use them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Iterable
 
 from drone_sim.message_text import near_names
 
-_LONGEST = 80  # characters of a name that is looked at
+_LONGEST = 80  # characters of a name that is shown
 
-# Plugins that a script may ask for by name: nil where Lua reads them, as in a CoppeliaSim without them.
+# Plugins whose names a script may look up: they are nil in Lua, as in a CoppeliaSim without them.
 PLUGINS = {
     "simROS2": "this is ROS 1: simROS has the same functions",
     "simB0": "the ZeroMQ remote API does what B0 did",
@@ -30,8 +30,8 @@ PLUGINS = {
     "simSkeleton": "there is no such plugin here",
 }
 
-# Functions of CoppeliaSim, by the beginning of their names, and why they are not here. Flat names are looked up as if
-# they stood in their module: simCreateIkGroup is sim.createIkGroup.
+# Patterns for the names of CoppeliaSim's functions that do not exist here, with the reasons. Flat names are converted
+# to names in modules: simCreateIkGroup is sim.createIkGroup.
 ABSENT: dict[str, str] = {
     r"simExtROS_\w+": "the plugin of V-REP 3.0 to 3.2; use simROS.advertise, simROS.publish and simROS.subscribe",
     r"simros_\w+": "the plugin of V-REP 3.0 to 3.2; use simROS.advertise, simROS.publish and simROS.subscribe",
@@ -66,9 +66,9 @@ _FLAT = re.compile(r"sim([A-Z]\w*)")
 
 
 def not_there(prefix: str, name: str, known: Iterable[str]) -> str:
-    """Return one line on a name that the API does not have: why not, or the near names.
+    """Return a one-line message for a name that the API does not have: the reason, or similar names.
 
-    `prefix` is 'sim.' for what was looked for in that module, '' for a global.
+    `prefix` is 'sim.' for a name in this module, '' for a global.
     """
     name = name[:_LONGEST]
     if not prefix and name in PLUGINS:
@@ -81,7 +81,7 @@ def not_there(prefix: str, name: str, known: Iterable[str]) -> str:
 
 
 def why_absent(name: str) -> str:
-    """Return why a function of CoppeliaSim's is not here, '' for a name that is none of those."""
+    """Return why a function of CoppeliaSim does not exist here, '' for other names."""
     flat = _FLAT.fullmatch(name)
     in_module = f"sim.{flat.group(1)[0].lower()}{flat.group(1)[1:]}" if flat else name
     for pattern, reason in ABSENT.items():

@@ -1,10 +1,10 @@
-"""`sim`: what vision sensors see.
+"""`sim`: pictures of vision sensors.
 
-An image is a string of width · height · 3 bytes, red, green, blue, **the bottom row first**, as V-REP
-gives it (OpenGL's order); simROS.imageTransportPublish turns it over. It shows the scene as of the last
-step, or as of now where nobody has looked since. Depth is in m along the sensor's z, and infinite beyond the far plane.
-Every sensor has both, whichever of them it publishes. A sensor of the scene may see handles in the place of colours
-(sim.visionintparam_render_mode 2), and one object or collection alone (sim.visionintparam_entity_to_render).
+An image is a string of width · height · 3 bytes: red, green, blue, **bottom row first**, as in V-REP (OpenGL's order);
+simROS.imageTransportPublish flips it. It shows the scene after the last step, or the present scene if no picture was
+rendered since. Depth is in m along the sensor's z axis, and infinite beyond the far plane. Every sensor has both,
+whatever it publishes. A sensor of the scene may show handles instead of colors (sim.visionintparam_render_mode 2), or
+only one object or collection (sim.visionintparam_entity_to_render).
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.sensors import EVERY_SENSOR, EVERYTHING
 from drone_sim.scripting.api.types import Handle, Number, WrongValue, numbers
 
-# A state, then packets. An empty tuple stands for a documented packet that the sensor does not have; Lua gets nil.
+# A state, then packets. An empty tuple is a documented packet that the sensor does not have; in Lua, it is nil.
 VisionReading = tuple[Any, ...]
 
-_GREY, _DEPTH_IN_METRES = 1, 1  # options of 4.x
-_ALL = (0, 0)  # the corner and size of a whole picture
-NO_OBJECT = 0xFFFFFF  # the handle where a picture of handles shows nothing: white, as in V-REP
+_GREY, _DEPTH_IN_METRES = 1, 1  # options in 4.x
+_ALL = (0, 0)  # corner and size for the whole picture
+NO_OBJECT = 0xFFFFFF  # the handle of the background in a picture of handles: white, as in V-REP
 _LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)  # ITU-R BT.601
 
 
 class Detected(NamedTuple):
-    """What a sensor's own script has found in its picture: whether it triggers, and packets of floats, as strings."""
+    """Result of a sensor's own script: whether it triggers, and packets of floats, as strings."""
 
     trigger: bool = False
     packets: tuple[bytes, ...] = ()
@@ -39,22 +39,22 @@ class Detected(NamedTuple):
 
 @runtime_checkable
 class Eye(Protocol):
-    """A vision sensor of the scene: its picture in px, its near and far planes in m, the angle of its larger side."""
+    """A vision sensor of the scene: picture size in px, near and far plane in m, angle (rad) of the larger side."""
 
     width: int
     height: int
     near: float
     far: float
     angle: float
-    orthographic_size: float | None  # m, of its larger side, where it is orthographic
+    orthographic_size: float | None  # m, of the larger side; None for a perspective sensor
     detected: Detected
-    entity: int  # handle of the object or collection that it sees alone, or EVERYTHING
-    color_coded: bool  # whether its colours are handles: red + 256 green + 65536 blue
+    entity: int  # handle of the only visible object or collection, or EVERYTHING
+    color_coded: bool  # whether its colors are handles: red + 256 green + 65536 blue
 
     def picture(self, kind: str = "color", only: Collection[str] | None = None) -> np.ndarray:
-        """Return what it sees: "color", (h, w, 3) uint8, or "depth", (h, w) in m, NaN beyond the far plane.
+        """Return a picture: "color", (h, w, 3) uint8, or "depth", (h, w) in m, NaN beyond the far plane.
 
-        Or "handles", (h, w) uint32, NO_OBJECT where there is none; of `only` the objects of these names, or of all.
+        Or "handles", (h, w) uint32, NO_OBJECT for the background. `only`: names of the visible objects, None for all.
         """
 
 
@@ -65,23 +65,23 @@ class VisionSensors(Functions):
     def getVisionSensorCharImage(
         self, handle: Handle, x: Number = 0, y: Number = 0, width: Number = 0, height: Number = 0, *_options: Any
     ) -> tuple[bytes, int, int]:
-        """Return image, width and height of a part of a picture; the whole picture if width and height are 0.
+        """Return image, width and height of a part of a picture, or of the whole picture if width and height are 0.
 
-        With sim.handleflag_greyscale added to the handle the image is grey, one byte for each pixel.
+        With sim.handleflag_greyscale added to the handle, the image is grey, with one byte for each pixel.
         """
         picture = self._colors(handle, (x, y), (width, height))
         if has(handle, GREYSCALE):
             picture = (picture @ _LUMINANCE).astype(np.uint8)
         rows, columns = picture.shape[:2]
-        return b"".join(picture[::-1]), columns, rows  # row by row: `tobytes` takes forty times as long
+        return b"".join(picture[::-1]), columns, rows  # `tobytes` would take forty times as long
 
     @sim("5")
     def getVisionSensorImg(
         self, handle: Handle, options: int = 0, _cutoff: Number = 0.0, pos: Any = _ALL, size: Any = _ALL
     ) -> tuple[bytes, list[int]]:
-        """Return image and [width, height] of a part of a picture; `options` 1: gray."""
+        """Return image and [width, height] of a part of a picture; `options`: 1 grey."""
         flag = GREYSCALE if int(options) & _GREY else 0
-        image, width, height = self.getVisionSensorCharImage(bare(handle) + flag, *_two(pos), *_two(size))
+        image, width, height = self.getVisionSensorCharImage(bare(handle) + flag, *_pair(pos), *_pair(size))
         return image, [width, height]
 
     @sim("345")
@@ -96,19 +96,19 @@ class VisionSensors(Functions):
     def getVisionSensorDepth(
         self, handle: Handle, options: int = 0, pos: Any = _ALL, size: Any = _ALL
     ) -> tuple[bytes, list[int]]:
-        """Return depths as a string of floats, the bottom row first, and [width, height].
+        """Return depths as a string of floats, bottom row first, and [width, height].
 
-        `options` 1: in m; else from 0, at the near plane, to 1, at the far one.
+        `options`: 1 in m; otherwise from 0 at the near plane to 1 at the far plane.
         """
         flag = CODED + (METRES if int(options) & _DEPTH_IN_METRES else 0)
-        depths = self._depths(bare(handle) + flag, _two(pos), _two(size))
+        depths = self._depths(bare(handle) + flag, _pair(pos), _pair(size))
         return depths.tobytes(), [depths.shape[1], depths.shape[0]]
 
     @sim("345")
     def getVisionSensorDepthBuffer(
         self, handle: Handle, x: Number = 0, y: Number = 0, width: Number = 0, height: Number = 0
     ) -> Any:
-        """Return depths as numbers, the bottom row first, from 0 at the near plane to 1 at the far one.
+        """Return depths as numbers, bottom row first, from 0 at the near plane to 1 at the far plane.
 
         Flags added to the handle: sim.handleflag_depthbuffermeters (m), _codedstring (a string of floats).
         """
@@ -123,29 +123,29 @@ class VisionSensors(Functions):
 
     @sim("345")
     def handleVisionSensor(self, handle: Handle) -> VisionReading:
-        """Do what readVisionSensor does; for sim.handle_all, and _all_except_explicit, count those that trigger."""
+        """Like readVisionSensor; for sim.handle_all and _all_except_explicit, count the sensors that trigger."""
         if handle not in EVERY_SENSOR:
             return self.readVisionSensor(handle)
-        every = [self._objects[one] for one in self._objects]
-        return sum(one.detected.trigger for one in every if isinstance(one, Eye)), (), ()
+        sensors = (item for item in map(self._objects.__getitem__, self._objects) if isinstance(item, Eye))
+        return sum(sensor.detected.trigger for sensor in sensors), (), ()
 
     @sim("345")
     def readVisionSensor(self, handle: Handle) -> VisionReading:
         """Return whether the sensor's own script triggers (1 or 0), 15 numbers, and the packets of that script.
 
-        They are intensity, red, green, blue and depth (0 to 1): the least, the largest, and the mean of each. Depth is
-        0 at the near plane, and 1 at the far one. Where colours are handles, the numbers are those of what is seen.
-        In Python there are three values at least, as CoppeliaSim documents: the third is empty without such a script.
+        The numbers are the minima, then the maxima, then the means of intensity, red, green, blue and depth (0 to 1).
+        Depth is 0 at the near plane and 1 at the far plane. If colors are handles, the numbers are the visible handles.
+        Python gets at least three values, as CoppeliaSim documents; the third is empty without a script.
         """
         detected = self._detected(handle)
-        packets = [np.frombuffer(one, "<f4").tolist() for one in detected.packets]
+        packets = [np.frombuffer(packet, "<f4").tolist() for packet in detected.packets]
         return int(detected.trigger), self._statistics(handle), *(packets or [()])
 
     @sim("345")
     def checkVisionSensor(self, handle: Handle, entity: Handle) -> VisionReading:
-        """Return whether a sensor would see an object or collection if there were nothing else, 1 or 0, and 15 numbers.
+        """Return 1 if a sensor sees an object or collection, without all others, otherwise 0; and 15 numbers.
 
-        They are those of readVisionSensor, of that picture. The sensor's script is not asked: V-REP's is, and triggers.
+        The numbers are those of readVisionSensor for this picture. Unlike in V-REP, the sensor's script is not called.
         """
         only = self._names(entity)
         is_seen = np.isfinite(self._picture(handle, "depth", only)).any()
@@ -153,33 +153,33 @@ class VisionSensors(Functions):
 
     @sim("345")
     def checkVisionSensorEx(self, handle: Handle, entity: Handle, returnImage: bool) -> list[float]:
-        """Return the image (0 to 1), or the depths (0 to 1), of only one object or collection.
+        """Return the image (0 to 1) or the depths (0 to 1) of an object or collection without all others.
 
-        The bottom row comes first. Pixels that do not show it have the depth 1; all others are its mask.
+        The bottom row is first. Pixels that do not show it have the depth 1; all others are its mask.
         """
         only = self._names(entity)
         if returnImage:
-            seen: Any = self._colors(handle, only=only)[::-1] / np.float32(255)
+            picture: Any = self._colors(handle, only=only)[::-1] / np.float32(255)
         else:
-            seen = self._depths(bare(handle), only=only)
-        values: list[float] = seen.ravel().tolist()
+            picture = self._depths(bare(handle), only=only)
+        values: list[float] = picture.ravel().tolist()
         return values
 
     def _names(self, entity: int) -> set[str] | None:
-        """Return the names of the objects that an entity is, None for all."""
+        """Return the names of the objects of an entity, None for all."""
         if entity == EVERYTHING:
             return None
         found = members(entity, self._objects, self._context.collections)
-        return {name for one in found for name in self._objects[one].names}
+        return {name for member in found for name in self._objects[member].names}
 
     def _statistics(self, handle: int, only: Collection[str] | None = None) -> list[float]:
-        """Return the first packet of a picture."""
+        """Return the first packet of readVisionSensor for a picture."""
         colors, found = self._colors(handle, only=only).reshape(-1, 3), self._objects[bare(handle)]
         if isinstance(found, Eye) and found.color_coded:
             handles = np.unique(colors @ (1, 256, 65536))
-            return [float(one) for one in handles if one != NO_OBJECT]
-        shares, depths = colors / np.float32(255), self._depths(bare(handle), only=only)[::-1].ravel()
-        channels = np.column_stack([shares.mean(1), shares, depths])
+            return [float(visible) for visible in handles if visible != NO_OBJECT]
+        intensities, depths = colors / np.float32(255), self._depths(bare(handle), only=only)[::-1].ravel()
+        channels = np.column_stack([intensities.mean(1), intensities, depths])
         return [*channels.min(0).tolist(), *channels.max(0).tolist(), *channels.mean(0).tolist()]
 
     def _detected(self, handle: int) -> Detected:
@@ -193,7 +193,7 @@ class VisionSensors(Functions):
         size: Sequence[float] = _ALL,
         only: Collection[str] | None = None,
     ) -> np.ndarray:
-        """Return colours (height, width, 3)."""
+        """Return colors (height, width, 3), top row first."""
         found = self._objects[bare(handle)]
         if isinstance(found, Eye) and found.color_coded:
             handles = self._picture(handle, "handles", only).astype("<u4")
@@ -208,36 +208,36 @@ class VisionSensors(Functions):
         size: Sequence[float] = _ALL,
         only: Collection[str] | None = None,
     ) -> np.ndarray:
-        """Return depths (height, width), the bottom row first."""
+        """Return depths (height, width), bottom row first."""
         picture, found = self._picture(handle, "depth", only), self._objects[bare(handle)]
         depths = np.nan_to_num(_part(picture, pos, size)[::-1].astype("<f4"), nan=np.inf)
         if has(handle, METRES):
             return depths
-        near, far = (found.near, found.far) if isinstance(found, Eye) else self._surroundings.planes[found.name]
+        near, far = (found.near, found.far) if isinstance(found, Eye) else self._services.planes[found.name]
         return np.clip((depths - near) / max(far - near, 1e-9), 0.0, 1.0).astype("<f4")
 
     def _picture(self, handle: int, kind: str = "", only: Collection[str] | None = None) -> np.ndarray:
-        """Return what a sensor sees, of `only` these objects or of all: without a `kind` what it is made for."""
-        found, pictures = self._objects[bare(handle)], self._surroundings.pictures
+        """Return a picture of a kind ('': the kind that the sensor is for); `only`: names of the visible objects."""
+        found, pictures = self._objects[bare(handle)], self._services.pictures
         if isinstance(found, Eye) and only is None:
             only = self._names(found.entity)
         take = found.picture if isinstance(found, Eye) else pictures.get(found.name)
         if take is None:
-            eyes = [one.name for one in map(self._objects.__getitem__, self._objects) if isinstance(one, Eye)]
+            eyes = [item.name for item in map(self._objects.__getitem__, self._objects) if isinstance(item, Eye)]
             known = ", ".join([*pictures, *eyes]) or "none"
             raise WrongValue(f"'{found.name}' is not a vision sensor; there are: {known}")
-        # Not the script's time: the first picture compiles shaders.
-        given = (kind, only) if only is not None else (kind,) if kind else ()
-        return self._surroundings.outside(lambda: take(*given))
+        # Without the script's time limit, because the first picture compiles shaders.
+        arguments = (kind, only) if only is not None else (kind,) if kind else ()
+        return self._services.outside(lambda: take(*arguments))
 
 
-def _two(values: Any) -> tuple[float, ...]:
+def _pair(values: Any) -> tuple[float, ...]:
     return numbers(values, 2) if len(values) else (0.0, 0.0)
 
 
 def _part(picture: np.ndarray, pos: Sequence[float], size: Sequence[float]) -> np.ndarray:
-    """Return a part of a picture from its lower left corner; raises WrongValue for one beyond it."""
-    (x, y), (width, height) = (map(int, numbers(two, 2)) for two in (pos, size))
+    """Return a part of a picture, counted from its lower left corner. Raises WrongValue if it is not inside."""
+    (x, y), (width, height) = (map(int, numbers(pair, 2)) for pair in (pos, size))
     if not (x or y or width or height):
         return picture
     rows, columns = picture.shape[:2]

@@ -1,4 +1,4 @@
-"""`sim`: floating views, dialogs and consoles: what scripts open for a person to look at, all of it bounded."""
+"""`sim`: floating views, dialogs and consoles, limited in number and size."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.script_log import say, shown
 
-MOST = 16  # of each kind; of more, the oldest go
-_TITLE, _TEXT, _LINE, _LINES = 200, 4000, 300, 100  # characters, and lines of a console
+MOST = 16  # windows of each kind; if there are more, the oldest are closed
+_TITLE, _TEXT, _LINE, _LINES = 200, 4000, 300, 100  # characters; the last one: lines of a console
 
 OK = "ok"
 _Kind = TypeVar("_Kind")
-_STILL_OPEN, _STYLE = CONSTANTS["dlgret_still_open"], 0x1F  # the bits that say which buttons
+_STILL_OPEN, _STYLE = CONSTANTS["dlgret_still_open"], 0x1F  # _STYLE: the bits for the buttons
 _INPUT = CONSTANTS["dlgstyle_input"]
 _BUTTONS = {
     _INPUT: (OK,),
@@ -31,7 +31,7 @@ _BUTTONS = {
 
 @dataclass
 class View:
-    """A picture of a vision sensor, by the name of its object; '' before a script has chosen one."""
+    """A view of a vision sensor's picture; `sensor` is the object's name, '' before a script has chosen one."""
 
     sensor: str = ""
     label: str = ""
@@ -39,9 +39,9 @@ class View:
 
 @dataclass
 class Dialog:
-    """A title, a text, buttons, and a field to write into, unless `typed` is None.
+    """A dialog with a title, a text, buttons, and an input field unless `typed` is None.
 
-    `answer` is the button that was pressed, '' before one was.
+    `answer` is the pressed button, '' before.
     """
 
     title: str
@@ -53,7 +53,7 @@ class Dialog:
 
 @dataclass
 class Console:
-    """The last lines that were printed there."""
+    """A console with its last lines."""
 
     title: str
     lines: deque[str] = field(default_factory=deque)
@@ -61,24 +61,24 @@ class Console:
 
 
 class Windows:
-    """The open windows of a run, by handle. `changes` is a counter: viewers see by it that something has changed."""
+    """The open windows of a run, by handle. `changes` is a counter from which viewers notice changes."""
 
     def __init__(self) -> None:
-        """Begin with none, and with nobody who could answer a dialog."""
-        self.readers: set[Callable[[], bool]] = set()  # each says whether it can answer now
+        """Create it without windows, and without viewers."""
+        self.readers: set[Callable[[], bool]] = set()  # viewers; each returns whether it can answer dialogs now
         self.views: dict[int, View] = {}
         self.dialogs: dict[int, Dialog] = {}
         self.consoles: dict[int, Console] = {}
         self.changes = 0
 
-    # ---- what scripts do
+    # ---- for scripts
 
     def add_view(self, handle: int) -> None:
-        """Open a view, of nothing yet."""
+        """Open an empty view."""
         self._put(self.views, handle, View())
 
     def aim(self, handle: int, sensor: str, label: str) -> None:
-        """Let a view show what a vision sensor sees."""
+        """Show a vision sensor's picture in a view."""
         self.views[handle] = View(sensor, label[:_TITLE])
         self.changes += 1
 
@@ -90,12 +90,12 @@ class Windows:
         self._put(self.dialogs, handle, dialog)
 
     def add_console(self, handle: int, title: str, lines: int) -> None:
-        """Open a console that keeps so many lines, where that is not too many."""
+        """Open a console with a number of lines, which is limited."""
         kept: deque[str] = deque(maxlen=min(max(1, lines), _LINES))
         self._put(self.consoles, handle, Console(title[:_TITLE], kept))
 
     def print(self, handle: int, text: str | None) -> None:
-        """Print to a console, where the last line ended; None empties it."""
+        """Print to a console, at the end of its last line; None clears it."""
         console = self.consoles[handle]
         self.changes += 1
         if text is None:
@@ -103,15 +103,15 @@ class Windows:
             return
         first, *others = text[-_LINE * _LINES :].split("\n")
         before = console.lines.pop() if console.lines else ""
-        console.lines.extend(one[:_LINE] for one in (before + first, *others))
+        console.lines.extend(line[:_LINE] for line in (before + first, *others))
 
     def show_console(self, handle: int, shown: bool) -> None:
-        """Show a console, or hide it."""
+        """Show or hide a console."""
         self.consoles[handle].shown = shown
         self.changes += 1
 
     def close(self, kind: dict[int, Any], handle: int) -> bool:
-        """Close a window of one of the kinds; return whether it was there."""
+        """Close a window of a kind; return whether it was open."""
         self.changes += handle in kind
         return kind.pop(handle, None) is not None
 
@@ -121,36 +121,37 @@ class Windows:
         kind[handle] = window
         self.changes += 1
 
-    # ---- what a person does
+    # ---- for viewers
 
     def can_answer(self) -> bool:
-        """Tell whether anybody is there to answer a dialog."""
-        return any(can() for can in self.readers)
+        """Return whether any viewer can answer dialogs."""
+        return any(can_answer() for can_answer in self.readers)
 
     def answer(self, handle: int, button: str, typed: str = "") -> None:
-        """Press a button of a dialog that is open. Raises ValueError for one that there is not."""
+        """Press a button of an open dialog. Raises ValueError if the dialog or the button does not exist."""
         dialog = self.dialogs.get(handle)
         if dialog is None or dialog.answer:
             raise ValueError(f"there is no open dialog with the handle {handle}")
         if button not in dialog.buttons:
-            raise ValueError(f"the dialog '{dialog.title}' has no button '{button[:80]}', but {_said(dialog.buttons)}")
+            known = " and ".join(dialog.buttons) or "none"
+            raise ValueError(f"the dialog '{dialog.title}' has no button '{button[:80]}', but {known}")
         dialog.answer = button
         if dialog.typed is not None:
             dialog.typed = typed[:_TEXT]
         self.changes += 1
 
     def assume_ok(self, handle: int) -> None:
-        """Let a dialog count as answered with ok, and nothing typed: nobody is there."""
+        """Answer a dialog with ok and without text, because there is no viewer."""
         dialog = self.dialogs[handle]
         dialog.answer, dialog.typed = OK, None
         self.changes += 1
 
     def state(self) -> dict[str, list[dict[str, Any]]]:
-        """Return what is to be seen, as JSON has it."""
-        open_dialogs = {handle: one for handle, one in self.dialogs.items() if not one.answer}
-        shown = {handle: one for handle, one in self.consoles.items() if one.shown}
+        """Return the visible windows for JSON."""
+        open_dialogs = {handle: dialog for handle, dialog in self.dialogs.items() if not dialog.answer}
+        shown = {handle: console for handle, console in self.consoles.items() if console.shown}
         return {
-            "views": [{"handle": handle, **vars(one)} for handle, one in self.views.items() if one.sensor],
+            "views": [{"handle": handle, **vars(view)} for handle, view in self.views.items() if view.sensor],
             "dialogs": [
                 {"handle": handle, "title": one.title, "text": one.text, "buttons": one.buttons, "typed": one.typed}
                 for handle, one in open_dialogs.items()
@@ -163,41 +164,37 @@ class Windows:
     # ---- runs and snapshots
 
     def clear(self) -> None:
-        """Close all, as at the beginning of a run."""
-        self._be({}, {}, {})
+        """Close all windows, as at the beginning of a run."""
+        self._replace({}, {}, {})
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings back what is open now."""
+        """Return a function that restores the present windows."""
         kept = copy.deepcopy((self.views, self.dialogs, self.consoles))
-        return lambda: self._be(*copy.deepcopy(kept))
+        return lambda: self._replace(*copy.deepcopy(kept))
 
-    def _be(self, views: dict[int, View], dialogs: dict[int, Dialog], consoles: dict[int, Console]) -> None:
+    def _replace(self, views: dict[int, View], dialogs: dict[int, Dialog], consoles: dict[int, Console]) -> None:
         if views or dialogs or consoles or self.views or self.dialogs or self.consoles:
             self.changes += 1
         self.views, self.dialogs, self.consoles = views, dialogs, consoles
 
 
-def read_answer(given: Any) -> tuple[int, str, str]:
-    """Return handle, button and text of an answer as JSON has it. Raises ValueError."""
-    if not isinstance(given, Mapping) or not isinstance(given.get("handle"), int):
+def read_answer(answer: Any) -> tuple[int, str, str]:
+    """Return handle, button and text of an answer from JSON. Raises ValueError."""
+    if not isinstance(answer, Mapping) or not isinstance(answer.get("handle"), int):
         raise ValueError("an answer must have a handle (a whole number) and a button, and may have a typed text")
-    button, typed = given.get("button"), given.get("typed") or ""
+    button, typed = answer.get("button"), answer.get("typed") or ""
     if not (isinstance(button, str) and isinstance(typed, str)):
         raise ValueError("the button and the typed text of an answer must be strings")
-    return given["handle"], button, typed
-
-
-def _said(buttons: tuple[str, ...]) -> str:
-    return " and ".join(buttons) or "none"
+    return answer["handle"], button, typed
 
 
 class Dialogs:
     """Dialogs and consoles, in the log and in the cockpit.
 
-    Nothing waits: a modal dialog is shown, and counts as answered."""
+    No function waits: a modal dialog is shown, and counts as answered."""
 
     def __init__(self, windows: Windows, new_handle: Callable[[], int], ignored: Ignored):
-        """`windows` are open, `new_handle` gives a handle that nothing else has, `ignored` says what is ignored."""
+        """`windows` are those of the run, `new_handle` returns an unused handle, `ignored` logs what is ignored."""
         self._new_handle = new_handle
         self._windows = windows
         self._ignored = ignored
@@ -217,12 +214,12 @@ class Dialogs:
 
     @sim("345")
     def getDialogResult(self, handle: int) -> int:
-        """Return the pressed button; sim.dlgret_still_open before; sim.dlgret_ok if nobody can see the dialog."""
+        """Return the pressed button: sim.dlgret_still_open before, sim.dlgret_ok if there is no viewer."""
         dialog = self._windows.dialogs.get(handle)
         if dialog is not None and dialog.buttons and not dialog.answer:
             if self._windows.can_answer():
                 return _STILL_OPEN
-            self._ignored.say("getDialogResult", "nobody can answer here: sim.dlgret_ok is returned")
+            self._ignored.log("getDialogResult", "nobody can answer here: sim.dlgret_ok is returned")
             self._windows.assume_ok(handle)
         answer = dialog.answer if dialog is not None else ""
         return CONSTANTS[f"dlgret_{answer or OK}"]
@@ -247,7 +244,7 @@ class Dialogs:
 
     @sim("345")
     def auxiliaryConsolePrint(self, handle: int, text: Any = None) -> int:
-        """Print there, and to the log; without a text, empty the console; return 1."""
+        """Print to a console and to the log; without a text, clear the console; return 1."""
         if handle in self._windows.consoles:
             self._windows.print(handle, None if text is None else _text(text))
         if text is not None:
@@ -276,21 +273,21 @@ class Views:
     """Floating views, in the cockpit."""
 
     def __init__(self, windows: Windows, new_handle: Callable[[], int], objects: ObjectTree):
-        """`windows`: what is open; `new_handle` gives a handle that nothing else has; `objects` are to be seen."""
+        """`windows` are those of the run, `new_handle` returns an unused handle, `objects` include the sensors."""
         self._new_handle = new_handle
         self._objects = objects
         self._windows = windows
 
     @sim("345")
     def floatingViewAdd(self, *_place: Any) -> int:
-        """Open a floating view; it is empty until sim.adjustView; return a handle."""
+        """Open a floating view, which is empty until sim.adjustView; return its handle."""
         handle = self._new_handle()
         self._windows.add_view(handle)
         return handle
 
     @sim("345")
     def adjustView(self, view: int, sensor: int, _options: Any = 0, label: Any = None) -> int:
-        """Let a floating view show a vision sensor's picture, -1 for nothing; return 1, or 0 for another view."""
+        """Show a vision sensor's picture in a floating view (-1: nothing); return 1, or 0 if there is none."""
         if view not in self._windows.views:
             return 0
         name = "" if sensor == -1 else self._objects[sensor].name

@@ -1,4 +1,4 @@
-"""`sim`: data that scripts send to each other without wires (3.x): who is in reach of an antenna may receive them."""
+"""`sim`: wireless data between scripts (3.x), which scripts near an antenna can receive."""
 
 from __future__ import annotations
 
@@ -15,32 +15,33 @@ from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.registry import Attachment
 from drone_sim.scripting.api.types import Handle, Name, Number, Text, WrongValue, numbers
 
-_SELF, _WORLD, _ALL, _TREE, _CHAIN = (CONSTANTS[f"handle_{one}"] for one in ("self", "default", "all", "tree", "chain"))
-_STEPS = 1.5  # that data can be received, where nothing else is said
-_REACH = (100.0, math.pi, math.tau, 0.0)  # m, rad, rad, s
-_ROUND = 0.99  # of a half or a whole turn, from which on it is one
+_SELF, _WORLD, _ALL, _TREE, _CHAIN = (CONSTANTS[f"handle_{key}"] for key in ("self", "default", "all", "tree", "chain"))
+_STEPS = 1.5  # default persistence
+_REACH = (100.0, math.pi, math.tau, 0.0)  # defaults: m, rad, rad, s
+_ROUND = 0.99  # fraction of a half or full circle that counts as a whole one
 
 
 class Wireless(Functions):
-    """Data that scripts send to each other without wires (3.x)."""
+    """Wireless data between scripts (3.x)."""
 
     @sim("345")
     def sendData(
         self, target: Handle, header: int, name: Name, data: Text, antenna: Handle | None = None, *reach: Number | None
     ) -> int:
-        """Send a string to sim.handle_all, _tree (below this script), _chain (above it) or a script; return 1.
+        """Send a string to sim.handle_all, _tree (descendants), _chain (ancestors) or a script; return 1.
 
-        A receiver must be in reach: at most `actionRadius` (100 m) from the object `antenna` (sim.handle_default: the
-        world's origin), within `emissionAngle1` (pi) up and down and `emissionAngle2` (2 pi) about its z axis. It must
-        ask within `persistence` seconds (one and a half steps).
+        A receiver must be within `actionRadius` (100 m) of the object `antenna` (sim.handle_default: the world's
+        origin), and within `emissionAngle1` (pi) vertically and `emissionAngle2` (2 pi) about its z axis. It must call
+        receiveData within `persistence` seconds (one and a half steps).
         """
         if not isinstance(name, str) or not isinstance(data, (str, bytes)) or not name or not data:
             raise WrongValue("name and data must be strings that are not empty")
         if target not in (_ALL, _TREE, _CHAIN):
             self._context.scripts[target]
         clock = self._context.clock
-        said = itertools.zip_longest(reach[: len(_REACH)], _REACH)
-        radius, vertical, level, seconds = numbers([usual if one is None else one for one, usual in said], len(_REACH))
+        pairs = itertools.zip_longest(reach[: len(_REACH)], _REACH)
+        values = [default if value is None else value for value, default in pairs]
+        radius, vertical, level, seconds = numbers(values, len(_REACH))
         until = clock.time + (seconds if seconds > 0 else _STEPS * clock.time_step)
         place = self._antenna(antenna)
         self._context.broadcasts.send(
@@ -52,9 +53,10 @@ class Wireless(Functions):
     def receiveData(
         self, header: int | None = None, name: Name | None = None, antenna: Handle | None = None, index: int = -1
     ) -> tuple[Text, int, int, str] | None:
-        """Return the oldest data that this script has not received, its sender, header and name; nothing if none.
+        """Return the oldest data that this script has not received, sender, header and name; nothing if there is none.
 
-        With a header or a name only those; with an `index` from 0 the one of that number, which then still waits.
+        A header or a name selects data. With an `index` from 0, return the data with this number, and do not remove
+        them.
         """
         place = self._place(self._antenna(antenna)) or IDENTITY
         found = list(self._in_reach(frames.position(place), header, name))
@@ -67,13 +69,17 @@ class Wireless(Functions):
 
     def _in_reach(self, here: frames.Vector, header: int | None, name: str | None) -> Iterator[Broadcast]:
         own = self._own
-        for one in self._context.broadcasts.waiting(self._context.clock.time):
-            is_wanted = header in (None, -1, one.header) and name in (None, one.name)
-            if own.handle == one.sender or own.handle in one.received_by or not is_wanted:
+        for sent in self._context.broadcasts.waiting(self._context.clock.time):
+            is_selected = header in (None, -1, sent.header) and name in (None, sent.name)
+            if own.handle == sent.sender or own.handle in sent.received_by or not is_selected:
                 continue
-            place = self._place(one.antenna)
-            if place is not None and self._is_for(one) and _reaches(one, frames.transform(frames.invert(place), here)):
-                yield one
+            place = self._place(sent.antenna)
+            if (
+                place is not None
+                and self._is_for(sent)
+                and _reaches(sent, frames.transform(frames.invert(place), here))
+            ):
+                yield sent
 
     @property
     def _own(self) -> Attachment:
@@ -85,23 +91,23 @@ class Wireless(Functions):
         return _WORLD if handle == _WORLD else self._objects.handle_of(self._objects[handle or 0])
 
     def _place(self, antenna: int) -> Matrix | None:
-        """Return where an antenna is, None where it is gone."""
+        """Return the transform of an antenna, None if it does not exist any more."""
         if antenna == _WORLD:
             return IDENTITY
         return self._objects.matrix(antenna) if antenna in set(self._objects) else None
 
     def _is_for(self, broadcast: Broadcast) -> bool:
-        """Tell whether data are sent to this script."""
+        """Return whether data are sent to this script."""
         sender = self._context.scripts.get(broadcast.sender)
         if broadcast.target == _ALL or sender is None or broadcast.target not in (_TREE, _CHAIN):
             return broadcast.target in (_ALL, self._own.handle)
         objects = self._objects
-        there, here = (objects[objects.handle(one.name)] for one in (sender, self._own))
-        return here.is_part_of(there) if broadcast.target == _TREE else there.is_part_of(here)
+        sending, receiving = (objects[objects.handle(script.name)] for script in (sender, self._own))
+        return receiving.is_part_of(sending) if broadcast.target == _TREE else sending.is_part_of(receiving)
 
 
 def _reaches(broadcast: Broadcast, place: frames.Vector) -> bool:
-    """Tell whether data reach a place in the antenna's frame."""
+    """Return whether data reach a position in the antenna's frame."""
     x, y, z = place
     vertical, level = broadcast.angles
     return (

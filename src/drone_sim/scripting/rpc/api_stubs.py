@@ -93,7 +93,7 @@ class ApiStubs:
         self._succeeded: set[Any] = set()
         self._places = Places()
         self._threads = Threads.__new__(Threads)
-        self._threads._surroundings = SceneServices(turns=turns)
+        self._threads._services = SceneServices(turns=turns)
         self.modules = {
             name: Api(
                 name, {key: self._local(func) or self._stub(name, func) for key, func in functions.items()}, constants
