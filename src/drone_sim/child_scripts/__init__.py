@@ -1,1 +1,1 @@
-"""The built-in child scripts. They are not imported: they are run, as a student's are."""
+"""The built-in child scripts. They are not imported, but loaded like a student's scripts."""

@@ -1,7 +1,7 @@
-"""The pilot on six propellers: all of its states and commands, and a mixing of its own."""
+"""The pilot's script for six propellers, with the same states and commands."""
 
 import pilot
-from pilot import (  # called as they are
+from pilot import (  # called by the simulation
     on_goto,
     on_home,
     on_land,
@@ -12,13 +12,13 @@ from pilot import (  # called as they are
     sysCall_sensing,
 )
 
-# Propellers 1 to 6, from the front left once around: how far ahead and to the left, in 0.1 m, which gives corrections
-# the effect that they have on the quadricopter; and which way they turn.
+# Propellers 1 to 6, counterclockwise from the front left: distance ahead and to the left in 0.1 m, so that corrections
+# have the same effect as on the quadricopter; and direction of rotation.
 MIXING = ((1.559, 0.9, -1), (0, 1.8, 1), (-1.559, 0.9, -1), (-1.559, -0.9, 1), (0, -1.8, -1), (1.559, -0.9, 1))
 
 
 def sysCall_init():
-    """Begin as the pilot does, with all propellers."""
+    """Initialize the pilot, with all propellers."""
     pilot.sysCall_init()
     self.propellerScripts = [sim.getScriptHandle(f"Quadricopter_propeller_respondable{i}") for i in range(1, 7)]
 

@@ -1,4 +1,4 @@
-"""No child script: what it is attached to falls, unless somebody else flies it."""
+"""Empty child script: the vehicle falls, unless another script or a client flies it."""
 
 
 def sysCall_init():

@@ -1,32 +1,32 @@
-"""The tutorial's child script with a pilot: it takes off, lands, goes places, and begins anew when asked to.
+"""The tutorial's child script, extended by take-off, landing, flights to a position, and reset.
 
-The flying is the tutorial's, unchanged: the pilot only sets its commands, and stops the propellers on the ground.
-Topics, in the drone's namespace: takeoff, land, reset, home (std_msgs/Empty), goto (geometry_msgs/PoseStamped,
-world); state (std_msgs/String) says which of the five states it is in.
+The controller is the tutorial's, unchanged: the pilot only sets its commands, and stops the propellers on the ground.
+Topics in the drone's namespace: takeoff, land, reset, home (std_msgs/Empty), goto (geometry_msgs/PoseStamped, world);
+state (std_msgs/String) is one of five states.
 """
 
 import math
 
 import tutorial
-from tutorial import sysCall_actuation  # called as it is
+from tutorial import sysCall_actuation  # called by the simulation
 
 LANDED, TAKING_OFF, FLYING, LANDING, CRASHED = "landed", "taking off", "flying", "landing", "crashed"
 
 CLIMB = 0.6  # m/s
-AT_HEIGHT, SETTLED = 0.01, 0.05  # m, m/s: the take-off is over
-DESCENT, SLOWEST_DESCENT, DESCENT_PER_HEIGHT = 0.4, 0.2, 0.5  # m/s, m/s, 1/s: slower towards the floor
-STANDS, STANDS_FOR = 0.1, 0.8  # m/s, s: so slow so long while it is to descend, it stands on something
-FASTEST, LIFT, TURN = 1.0, 0.5, 1.0  # m/s, m/s, rad/s, on the way to somewhere
-APPROACH, TURNING = 0.5, 1.0  # 1/s, speed per distance that is left
-NEAR = 0.3  # m of height, from which the tutorial's law holds it by itself
-LEANING = math.radians(60)  # no flight leans so far
-AGAIN = 5.0  # s, until it is said again that a request is refused; of twists, which come all the time, it is said once
-LIES, LIES_FOR = 0.1, 1.0  # m/s, s: leaning and so slow so long, it lies there
+AT_HEIGHT, SETTLED = 0.01, 0.05  # m, m/s: tolerances for the end of the take-off
+DESCENT, SLOWEST_DESCENT, DESCENT_PER_HEIGHT = 0.4, 0.2, 0.5  # m/s, m/s, 1/s: slower near the floor
+STANDS, STANDS_FOR = 0.1, 0.8  # m/s, s: if it descends more slowly than this for this time, it has landed
+FASTEST, LIFT, TURN = 1.0, 0.5, 1.0  # m/s, m/s, rad/s: largest speeds to a goal
+APPROACH, TURNING = 0.5, 1.0  # 1/s: speed per remaining distance or angle
+NEAR = 0.3  # m: difference in height below which the tutorial's controller goes to the height itself
+LEANING = math.radians(60)  # more than in any flight
+AGAIN = 5.0  # s until the same refusal is logged again; refusals of twists, which are frequent, are logged once
+LIES, LIES_FOR = 0.1, 1.0  # m/s, s: if it leans and is slower than this for this time, it has crashed
 
 
 def sysCall_init():
-    """Begin as the tutorial does, or on the ground."""
-    # Before the tutorial's own subscription: a reset forgets the twists that came with it.
+    """Initialize the tutorial's script; start in flight, or on the ground."""
+    # Before the tutorial's own subscription, so that a reset discards twists from the same step.
     self.requests = [
         simROS.subscribe("reset", "std_msgs/Empty", "on_reset"),
         simROS.subscribe("takeoff", "std_msgs/Empty", "on_takeoff"),
@@ -38,7 +38,7 @@ def sysCall_init():
     tutorial.sysCall_init()
     x, y, z = sim.getObjectPosition(self.d, -1)
     yaw = sim.getObjectOrientation(self.d, -1)[2]
-    self.still = 0.0  # s, that it stands or lies where it should move
+    self.still = 0.0  # s for which it has not moved although it should
     self.goal = None  # x, y, z (m), yaw (rad)
     height = takeoff_height()
     if sim.getScriptSimulationParameter(sim.handle_self, "start") == LANDED:
@@ -50,7 +50,7 @@ def sysCall_init():
 
 
 def sysCall_sensing():
-    """Compute thrust and corrections as the tutorial does; then do what the state asks for."""
+    """Compute thrust and corrections with the tutorial's script; then call the function of the state."""
     tutorial.sysCall_sensing()
     if not (-LEANING < self.roll_prev < LEANING and -LEANING < self.pitch_prev < LEANING):
         watch_lean()
@@ -59,18 +59,18 @@ def sysCall_sensing():
 
 
 def sysCall_cleanup():
-    """End all that was begun."""
+    """End subscriptions and publications."""
     for handle in self.requests:
         simROS.shutdownSubscriber(handle)
     simROS.shutdownPublisher(self.state_publisher)
     tutorial.sysCall_cleanup()
 
 
-# ---- what is asked for
+# ---- commands
 
 
 def on_twist(msg):
-    """Obey in flight; a command that comes during the take-off counts after it."""
+    """Follow a velocity command in flight; a command during the take-off is followed afterwards."""
     if self.state == TAKING_OFF:
         self.waiting = msg
     elif self.state == FLYING:
@@ -81,12 +81,12 @@ def on_twist(msg):
 
 
 def takeoff_height():
-    """Return how far up (m) a take-off goes; it may be tuned in flight."""
+    """Return the height (m) of a take-off, which may be tuned in flight."""
     return sim.getScriptSimulationParameter(sim.handle_self, "takeoff_height")
 
 
 def on_takeoff(_msg):
-    """Climb, and hold the height."""
+    """Climb to the height of a take-off, and hold it."""
     if self.state in (LANDED, LANDING):
         enter(TAKING_OFF, climb)
         z = sim.getObjectPosition(self.d, -1)[2]
@@ -96,7 +96,7 @@ def on_takeoff(_msg):
 
 
 def on_land(_msg):
-    """Descend, whatever is below, and stop the propellers there."""
+    """Descend until the drone stands on something, and stop the propellers."""
     if self.state in (FLYING, TAKING_OFF):
         enter(LANDING, descend)
     elif self.state == CRASHED:
@@ -104,24 +104,24 @@ def on_land(_msg):
 
 
 def on_goto(msg):
-    """Fly to a place, turn as the pose is turned, and hold both until the next command."""
+    """Fly to a pose, and hold its position and heading until the next command."""
     p, q = msg.pose.position, msg.pose.orientation
     go((p.x, p.y, p.z, math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))), "goto")
 
 
 def on_home(_msg):
-    """Fly to where it began."""
+    """Fly to the start."""
     go(self.home, "home")
 
 
 def on_reset(_msg):
-    """Begin anew: the drone has been put back already."""
+    """Restart the script; the simulation has already reset the drone's pose."""
     sysCall_cleanup()
     sysCall_init()
 
 
 def go(goal, topic):
-    """Fly to a goal, as far as it flies at all."""
+    """Fly to a goal, if the drone is flying."""
     if self.state == FLYING:
         self.goal, self.work = goal, approach
     else:
@@ -129,7 +129,7 @@ def go(goal, topic):
 
 
 def refuse(topic):
-    """Say why nothing moves."""
+    """Log why a command is not followed."""
     now = sim.getSimulationTime()
     if now - self.refused.get(topic, -math.inf) >= AGAIN:
         self.refused[topic] = math.inf if topic == "cmd_vel" else now
@@ -138,19 +138,19 @@ def refuse(topic):
             CRASHED: "`reset` puts it back at its start",
             LANDING: "`takeoff` interrupts the landing",
         }
-        said = (
+        message = (
             f"{topic} does not move the drone: it is {self.state}; {cures.get(self.state, 'wait until it is flying')}"
         )
-        sim.addLog(sim.verbosity_scriptwarnings, said)
+        sim.addLog(sim.verbosity_scriptwarnings, message)
 
 
 # ---- the states
 
 
 def enter(state, work=None):
-    """Change to a state, and do its work in every step; commands from the state before are cancelled."""
+    """Change to a state and cancel commands; `work` is called in every step."""
     self.state, self.work = state, work
-    self.refused, self.waiting, self.still = {}, None, 0.0  # refused: when that was last said (s), by topic
+    self.refused, self.waiting, self.still = {}, None, 0.0  # refused: time (s) of the last log line by topic
     self.vx = self.vy = self.vz = self.rz = 0
     simROS.publish(self.state_publisher, {"data": state})
 
@@ -162,12 +162,12 @@ def rest(state):
 
 
 def stop():
-    """Command no thrust, whatever the controller has computed."""
+    """Set the thrust to zero, instead of the controller's."""
     self.thrust = 0
 
 
 def climb():
-    """Raise the setpoint of the height, and wait until the drone has reached the top."""
+    """Raise the setpoint of the height until the drone has reached the top."""
     self.zref = min(self.zref + CLIMB * self.dt, self.top)
     vz = sim.getObjectVelocity(self.d)[0][2]
     if abs(sim.getObjectPosition(self.d, -1)[2] - self.top) < AT_HEIGHT and abs(vz) < SETTLED:
@@ -178,7 +178,7 @@ def climb():
 
 
 def descend():
-    """Sink, more slowly near the floor, until the drone stands."""
+    """Descend, more slowly near the floor, until the drone stands."""
     z = sim.getObjectPosition(self.d, -1)[2]
     self.vz = -min(max(DESCENT_PER_HEIGHT * z, SLOWEST_DESCENT), DESCENT)
     vz = sim.getObjectVelocity(self.d)[0][2]
@@ -188,7 +188,7 @@ def descend():
 
 
 def approach():
-    """Fly towards the goal, the slower the nearer."""
+    """Fly towards the goal, more slowly near it."""
     x, y, z, yaw = self.goal
     here, (_, _, heading) = sim.getObjectPosition(self.d, -1), sim.getObjectOrientation(self.d, -1)
     dx, dy, dz = x - here[0], y - here[1], z - here[2]
@@ -205,7 +205,7 @@ def approach():
 
 
 def watch_lean():
-    """Consider the drone crashed if it has not moved for a while; called when it leans too far."""
+    """Set the state to crashed if the drone has not moved for a while; called if it leans too far."""
     self.still = self.still + self.dt if math.hypot(*sim.getObjectVelocity(self.d)[0]) < LIES else 0.0
     if self.still > LIES_FOR and self.state != CRASHED:
         rest(CRASHED)

@@ -1,30 +1,30 @@
-"""The stock quadricopter's child script: fly to the green sphere, and turn as it is turned.
+"""Child script of V-REP's original quadricopter, which follows position and heading of the green sphere.
 
-V-REP's target-following controller, before the tutorial removes it. Its gains are tied to the step of
-0.05 s: what they call changes are differences from one step to the next.
+The tutorial replaces this controller. Its gains depend on the time step of 0.05 s, because its derivatives are
+differences between two steps.
 """
 
-THRUST_GRAVITY = {"3.x": 5.335, "4.x": 5.45}  # m/s, by the propellers' law
+THRUST_GRAVITY = {"3.x": 5.335, "4.x": 5.45}  # m/s, by thrust model of the propellers
 
 
 def sysCall_init():
-    """Find the objects; let go of the sphere, so that it stays where it is put."""
+    """Find the objects; detach the sphere, so that it does not move with the drone."""
     self.d = sim.getObjectHandle("Quadricopter_base")
     self.heli = sim.getObjectHandle("Drone")
     self.target = sim.getObjectHandle("DronePosition")
     sim.setObjectParent(self.target, -1, True)
-    self.trackBase = sim.getObjectHandle("Track_base@silentError")  # which V-REP's own quadricopter has not
+    self.trackBase = sim.getObjectHandle("Track_base@silentError")  # V-REP's original quadricopter has none
     if self.trackBase != -1:
         sim.setObjectParent(self.trackBase, -1, True)
     self.propellerScripts = [sim.getScriptHandle(f"Quadricopter_propeller_respondable{i}") for i in (1, 2, 3, 4)]
     self.thrust_gravity = THRUST_GRAVITY[sim.getScriptSimulationParameter(sim.handle_self, "propeller_law")]
-    self.alphaE = self.betaE = 0  # height of the tips of the base's y and x axes over its origin
-    self.sp = [0, 0, 0]  # the sphere, seen from the base
+    self.alphaE = self.betaE = 0  # height of the ends of the base's y and x axes above its origin
+    self.sp = [0, 0, 0]  # position of the sphere in the base's frame
     self.gamma = 0
 
 
 def sysCall_actuation():
-    """Compute thrust and corrections, mix them into the propellers."""
+    """Compute thrust and corrections, and mix them into the propeller velocities."""
     thrust = vertical_control()
     alpha, beta = horizontal_control()
     rotation = rotational_control()
@@ -58,7 +58,7 @@ def horizontal_control():
 
 
 def rotational_control():
-    """Return the correction about the vertical."""
+    """Return the correction about the vertical axis."""
     gamma = sim.getObjectOrientation(self.d, self.target)[2]
     rotation = 0.1 * gamma + 2 * (gamma - self.gamma)
     self.gamma = gamma
@@ -66,7 +66,7 @@ def rotational_control():
 
 
 def sysCall_sensing():
-    """Move the track frame, if there is one, which the tracking camera hangs on."""
+    """Move the track frame of the tracking camera, if there is one."""
     if self.trackBase == -1:
         return
     orientation = sim.getObjectOrientation(self.d, -1)

@@ -1,8 +1,8 @@
 """The tutorial's child script: velocity commands in, four propeller velocities out.
 
-Same names, gains and order of arithmetic as the Lua script that the tutorial builds, with two additions:
-the collective thrust is kept within `thrust_limits`, and a drone that leans by `recovery_margin`
-more than it is ever told to, as against a wall, first rights itself.
+It has the names, gains and order of operations of the Lua script in the tutorial, and two additions: the collective
+thrust is limited to `thrust_limits`, and a drone that leans by `recovery_margin` more than the largest target angle,
+for example after hitting a wall, levels out first.
 """
 
 import math
@@ -22,7 +22,7 @@ GAINS = (
     "recovery_margin",
     "Precovery",
 )
-RECOVERY_YAW = 0.3  # yaw_corr beyond this would leave nothing of the propellers to level the drone
+RECOVERY_YAW = 0.3  # with a larger yaw_corr, the propellers could not level the drone
 
 
 def sysCall_init():
@@ -41,30 +41,30 @@ def sysCall_init():
     self.vx = self.vy = self.vz = self.rz = 0  # current twist command
 
     self.twist_subscriber = simROS.subscribe("cmd_vel", "geometry_msgs/Twist", "on_twist", 1)
-    # The function itself, not its name: a script that imports this one need not have it.
+    # The function itself, because a script that imports this one does not need a function with this name.
     self.gains_subscriber = simROS.subscribe("parameter_updates", "dynamic_reconfigure/Config", on_parameters, 1)
 
 
 def read_gains():
-    """Set the gains as they are now."""
+    """Read the present gains."""
     for name in GAINS:
         setattr(self, name, sim.getScriptSimulationParameter(sim.handle_self, name))
     self.most_lean = self.angle_max + self.recovery_margin if self.recovery_margin else math.inf
 
 
 def on_parameters(_msg):
-    """Obey what was tuned in flight."""
+    """Use gains that were tuned in flight."""
     read_gains()
 
 
 def on_twist(msg):
-    """Keep the command: front, lateral and vertical speed (track frame, m/s), yaw speed (rad/s)."""
+    """Store the command: forward, lateral and vertical speed (track frame, m/s), yaw rate (rad/s)."""
     self.vx, self.vy, self.vz = msg.linear.x, msg.linear.y, msg.linear.z
     self.rz = msg.angular.z
 
 
 def sysCall_actuation():
-    """Mix thrust and corrections into the propellers: front left, back left, back right, front right."""
+    """Set the propellers' velocities: front left, back left, back right, front right."""
     particlesTargetVelocities = (
         self.thrust * (1 - self.pitch_corr - self.roll_corr - self.yaw_corr),
         self.thrust * (1 + self.pitch_corr - self.roll_corr + self.yaw_corr),
@@ -108,7 +108,7 @@ def sysCall_sensing():
 
 
 def control_elevation(z, vz):
-    """Hold the elevation zref, or follow a vertical speed and remember where it led."""
+    """Hold the elevation zref, or follow a vertical speed and update zref."""
     if self.vz == 0:
         self.thrust = self.thrust_gravity + self.Kzref * (self.zref - z) - self.Dzref * vz
     else:
@@ -120,10 +120,10 @@ def control_elevation(z, vz):
 
 
 def recover(w):
-    """Level out, wherever the commands would lead; `w` is the angular velocity (rad/s, world).
+    """Level out, instead of following commands; `w` is the angular velocity (rad/s, world).
 
-    Far from level the Euler angles turn into one another, so the tilt is taken from where the body sees the
-    world's z axis. Velocity commands count again when the drone leans less.
+    At large tilts, Euler angles are coupled, so the tilt is computed from the world's z axis in the body's frame.
+    Velocity commands are followed again when the drone leans less.
     """
     m = sim.getObjectMatrix(self.d, -1)
     up_x, up_y, up_z = m[8], m[9], m[10]
@@ -136,7 +136,7 @@ def recover(w):
 
 
 def target_angle(command, speed):
-    """Lean (rad) towards the commanded speed; further for speeding up than for braking."""
+    """Return the target angle (rad) for a commanded speed, which may be larger for accelerating than for braking."""
     target = self.Kvcorr * (command - speed)
     if command >= 0:
         return min(max(target, -self.angle_min), self.angle_max)

@@ -185,7 +185,7 @@ class MotionFunctions(Functions):
         moved, relative = parameters.get("object"), parameters.get("relObject", -1)
         if "pose" not in parameters:
             if moved is None:
-                raise ValueError("`object` or `pose` must be parameters")
+                raise ValueError("`object` or `pose` must be given")
             parameters["pose"] = to_pose(self._objects.matrix(moved, relative))
         start, goal = (_matrix_of(parameters, name) for name in ("pose", "targetPose"))
         way = [b - a for a, b in zip(frames.position(start), frames.position(goal))]
@@ -306,7 +306,7 @@ def _numbers(parameters: Parameters, name: str, count: int | None, otherwise: li
     """Return `count` numbers (None: all). Before 4.6, there may be more, which are ignored."""
     values = parameters.get(name, otherwise)
     if not isinstance(values, Sequence) or isinstance(values, (str, bytes)) or not values:
-        raise WrongValue(f"`{name}`: a list of {f'{count} ' if count else ''}numbers must be parameters")
+        raise WrongValue(f"`{name}`: a list of {f'{count} ' if count else ''}numbers must be given")
     if count and "legacy" in parameters:
         values = values[:count]
     try:
@@ -325,7 +325,7 @@ def _least(parameters: Parameters, name: str, most: str, count: int, is_behind: 
 def _cyclic(parameters: Parameters, start: Sequence[float]) -> Sequence[bool]:
     found = parameters.get("cyclicJoints") or [False] * len(start)
     if not isinstance(found, Sequence) or len(found) < len(start):
-        raise WrongValue(f"`cyclicJoints`: {len(start)} values must be parameters")
+        raise WrongValue(f"`cyclicJoints`: {len(start)} values must be given")
     return found
 
 

@@ -1,20 +1,20 @@
--- What Python calls: the script itself, its phases, callbacks and snapshots.
--- Each call returns which phases the script has now, and then what within_limits returns.
+-- Functions for Python: the script, its phases, callbacks and snapshots.
+-- Each returns the bits of the script's present phases, and then the results of within_limits.
 local bridge, sandbox = ...
 
 local error, type, next, rawget, rawset = error, type, next, rawget, rawset
 local match, concat = string.match, table.concat
 local getinfo = sandbox.debug.getinfo
 local within_limits, protected, take_snapshot = sandbox.within_limits, sandbox.protected, sandbox.take_snapshot
-local take_turn, thread_has_ended, hand_back = sandbox.take_turn, sandbox.thread_has_ended, sandbox.hand_back
+local take_turn, thread_has_ended, pass = sandbox.take_turn, sandbox.thread_has_ended, sandbox.pass
 local env, callbacks, sources = sandbox.globals, sandbox.callbacks, sandbox.sources
 
 local PHASES, CALL_TYPES = {bridge.phases()}, {bridge.call_types()}
 local may_have_thread = bridge.threads
 local THREADS = {'sysCall_thread', 'sysCall_threadmain'}
-local INIT, ACTUATION, SENSING, CLEANUP, THREAD = 1, 2, 4, 8, 16 -- bits of what a script has
-local MISSING = 3 -- beside the numbers of the limits
-local chunk, chunk_has -- the script, where it runs as a whole; in which phases it does
+local INIT, ACTUATION, SENSING, CLEANUP, THREAD = 1, 2, 4, 8, 16 -- bits of a script's phases
+local MISSING = 3 -- in addition to the numbers of the limits
+local chunk, chunk_has -- the script, if it is run as a whole; bits of the phases in which it is
 
 local function thread_function()
   for _, name in next, THREADS do
@@ -23,7 +23,7 @@ local function thread_function()
   end
 end
 
--- Tell which phases the script has, and whether it has a thread that has not ended: the sum of their bits.
+-- Return the sum of the bits of the script's phases, with THREAD for an unfinished thread.
 local function phases()
   local found, bit = chunk_has, INIT
   if not found then
@@ -55,7 +55,7 @@ local WHOLE = { -- the forms of a script that is run as a whole
 
 sandbox.run = run
 
--- Compile the script; run it, unless it has a form that is run as a whole later.
+-- Compile the script; run it, unless it has a form that each phase runs as a whole.
 function sandbox.open(text, form)
   return run(function()
     local f, message = sandbox.compile(text, sandbox.source)
@@ -71,42 +71,42 @@ function sandbox.phase(number)
   return run(chunk or rawget(env, PHASES[number]))
 end
 
--- Call a function, whose results are handed over.
+-- Call a function and pass its results to Python.
 function sandbox.called(name, ...)
   local f = rawget(env, name)
   if type(f) ~= 'function' then return phases(), MISSING, 0 end
-  return run(function(...) return hand_back(name, f(...)) end, ...)
+  return run(function(...) return pass(name, f(...)) end, ...)
 end
 
--- Call a function of the script for the script itself, which runs now: within its limits.
+-- Like `called`, for a call by the script itself, which is running: within its limits.
 function sandbox.called_own(name, ...)
   local f = rawget(env, name)
   if type(f) ~= 'function' then return MISSING end
-  return protected(function(...) return hand_back(name, f(...)) end, ...)
+  return protected(function(...) return pass(name, f(...)) end, ...)
 end
 
--- Run a text in the script, and hand over what it returns.
+-- Run a text in the script, and pass its results to Python.
 local function execute(text)
   local f, message = sandbox.compile_once(text, '=(text)')
   if not f then error(message, 0) end
-  return hand_back('executeScriptString', f())
+  return pass('executeScriptString', f())
 end
 
 function sandbox.executed(text)
   return run(execute, text)
 end
 
--- Do so for the script itself, which runs now: within its limits.
+-- Like `executed`, for a call by the script itself, which is running: within its limits.
 function sandbox.executed_own(text)
   return protected(execute, text)
 end
 
--- Call a function back with a message; `answered`: what it returns is handed over.
-function sandbox.called_back(name, message, answered)
+-- Call a callback with a message; if `returns`, its results are passed to Python.
+function sandbox.called_back(name, message, returns)
   local f = callbacks[name]
   if f == nil then f = rawget(env, name) end
   if type(f) ~= 'function' then return phases(), MISSING, 0 end
-  if answered then return run(function() return hand_back(name, f(message)) end) end
+  if returns then return run(function() return pass(name, f(message)) end) end
   return run(f, message)
 end
 
@@ -118,7 +118,7 @@ function sandbox.has(name)
   return run(has_function, name)
 end
 
--- Return name, line and file of the script's global functions, each on a line of its own.
+-- Return name, line and file of each of the script's global functions, on separate lines.
 local function list_functions()
   local found, count = {}, 0
   for name, value in next, env do

@@ -1,4 +1,4 @@
--- The script's code: how its files are compiled, what it requires, and other scripts' functions.
+-- Compilation of the script and its helpers, `require`, copies of tables, and calls of other scripts.
 local bridge, sandbox = ...
 
 local error, type, tostring, select, setmetatable = error, type, tostring, select, setmetatable
@@ -9,17 +9,17 @@ local newer = _VERSION ~= 'Lua 5.1'
 local sources, protected = sandbox.sources, sandbox.protected
 
 local env = {} -- the script's globals
-local modules, loaded = {}, {} -- the API's and Lua's own; what the script required, by name
-local own_modules = {} -- CoppeliaSim's
-local texts = {} -- of the script and what it requires
+local modules, loaded = {}, {} -- of the API and of Lua; required by the script; both by name
+local own_modules = {} -- of CoppeliaSim
+local texts = {} -- of the script and its helpers
 local chunk -- the file that is being required
-local seen, made, LOADING = {}, {}, {}
+local seen, created, LOADING = {}, {}, {} -- compiled texts; modules created by `module`; a mark
 sandbox.globals, sandbox.modules, sandbox.loaded, sandbox.texts = env, modules, loaded, texts
 sandbox.own_modules = own_modules
 
 local function compile(text, name)
   if byte(text) == 27 then return nil, 'precompiled code' end
-  if not seen[text] then -- one may be run in every step
+  if not seen[text] then -- the same text may be compiled in every step
     seen[text] = true
     texts[#texts + 1] = text
   end
@@ -30,7 +30,7 @@ local function compile(text, name)
 end
 sandbox.compile = compile
 
--- Return a function of a text that comes while the script runs: of its value, where it is an expression.
+-- Compile a text while the script runs; if it is an expression, the function returns its value.
 function sandbox.compile_once(text, name)
   if byte(text) == 27 then return nil, 'precompiled code' end
   local read, message
@@ -60,19 +60,19 @@ local function load_module(name)
   local ok, value = protected(f, name)
   loaded[name], chunk = nil, outer
   if not ok then error(value, 0) end
-  if value == nil then value = made[name] or true end
+  if value == nil then value = created[name] or true end
   loaded[name] = value
   return value
 end
 
--- Lua 5.1's way to write a helper: what the file defines from here on belongs to a table, which is a global, too.
+-- Lua 5.1's form of a module: definitions after this call are stored in a table, which also becomes a global.
 function env.module(name, ...)
   if newer then error('module is of Lua 5.1: let the file return a table instead', 2) end
   if type(name) ~= 'string' or not chunk then error('module: only works in a file that `require` loads by its name', 2) end
-  local its = type(env[name]) == 'table' and env[name] or {}
-  its._NAME, its._M, env[name], made[name] = name, its, its, its
-  for i = 1, select('#', ...) do (select(i, ...))(its) end
-  setfenv(chunk, its)
+  local module = type(env[name]) == 'table' and env[name] or {}
+  module._NAME, module._M, env[name], created[name] = name, module, module, module
+  for i = 1, select('#', ...) do (select(i, ...))(module) end
+  setfenv(chunk, module)
 end
 
 function env.require(name)
@@ -83,7 +83,7 @@ function env.require(name)
   return module
 end
 
----- copies of tables, which cannot be made in Python: functions stay what they are, and what is one table stays one
+---- copies of tables, which are made in Lua to keep functions, and references to the same table
 
 local function copied(value, copies)
   if type(value) ~= 'table' then return value end
@@ -91,7 +91,7 @@ local function copied(value, copies)
   if not copy then
     copy = {}
     copies[value] = copy
-    for key, one in next, value do rawset(copy, copied(key, copies), copied(one, copies)) end
+    for key, item in next, value do rawset(copy, copied(key, copies), copied(item, copies)) end
     setmetatable(copy, getmetatable(value))
   end
   return copy
@@ -101,12 +101,12 @@ local function copy_table(value) return copied(value, {}) end
 
 sandbox.own['sim.copyTable'], sandbox.own.simCopyTable = copy_table, copy_table
 
----- other scripts' functions, as if they were a table's
+---- functions of other scripts, as fields of a table
 
 local api, own = sandbox.api, sandbox.own
 
 local function functions_of(script)
-  api['sim.getScriptName'](script) -- or there is none
+  api['sim.getScriptName'](script) -- raises an error if it does not exist
   return setmetatable({}, {__index = function(functions, name)
     return function(first, ...)
       if first == functions then return api['sim.callScriptFunction'](name, script, ...) end

@@ -1,7 +1,7 @@
--- Files and programs: a Lua script reads what lies beside it, writes nothing, and starts nothing.
+-- `io` and `os`: a Lua script may read files in its folder, but write no files and start no programs.
 --
--- What it would write goes nowhere, which is said once: a script that keeps a record of its flight flies. Whatever else
--- it asks of io or os is refused in one line, with what to use instead.
+-- Writing is ignored, with one log line, so that a script that records its flight can fly. Other functions of io and os raise
+-- an error that says what to use instead.
 local bridge, sandbox = ...
 
 local error, type, tostring, select, pairs = error, type, tostring, select, pairs
@@ -19,12 +19,12 @@ local LONGEST = 80 -- characters of a name in a message
 
 local function refuse(where, names, why)
   for _, name in pairs(names) do
-    local said = where .. '.' .. name
-    env[where][name] = function() error(said .. ': ' .. why, 2) end
+    local message = where .. '.' .. name .. ': ' .. why
+    env[where][name] = function() error(message, 2) end
   end
 end
 
-local function line_of(...)
+local function log_line(...)
   local words = {}
   for i = 1, select('#', ...) do words[i] = tostring((select(i, ...))) end
   local line = sub(concat(words), 1, bridge.longest_line)
@@ -46,14 +46,14 @@ local function methods_of(write)
   return methods
 end
 
-local function a_file(methods)
+local function new_file(methods)
   return setmetatable({}, {__index = methods, __name = 'FILE*'})
 end
 
-local nowhere, words = methods_of(function() end), methods_of(line_of)
-local has_said = false
+local nowhere, words = methods_of(function() end), methods_of(log_line)
+local is_logged = false
 
-env.io = {stdout = a_file(words), stderr = a_file(words), write = line_of}
+env.io = {stdout = new_file(words), stderr = new_file(words), write = log_line}
 refuse('io', {'input', 'read'}, READING)
 refuse('io', {'output', 'tmpfile'}, WRITING)
 refuse('io', {'popen'}, STARTING)
@@ -62,7 +62,7 @@ refuse('os', {'exit'}, 'sim.stopSimulation() ends a flight')
 refuse('os', {'getenv', 'setlocale'}, ENVIRONMENT)
 refuse('os', {'remove', 'rename', 'tmpname'}, WRITING)
 
--- Return the methods of a file with that text: one place in it, from which is read.
+-- Return the methods of a file with this text, and a position for reading.
 local function methods_of_text(text)
   local methods, here = {}, 1
 
@@ -74,7 +74,7 @@ local function methods_of_text(text)
     return found
   end
 
-  local function one(format)
+  local function read_item(format)
     if type(format) == 'number' then
       if here > #text and format > 0 then return nil end
       here = here + floor(format)
@@ -99,13 +99,13 @@ local function methods_of_text(text)
     local found, count = {}, select('#', ...)
     if count == 0 then return line() end
     for i = 1, count do
-      found[i] = one((select(i, ...)))
+      found[i] = read_item((select(i, ...)))
       if found[i] == nil then return unpack(found, 1, i) end
     end
     return unpack(found, 1, count)
   end
 
-  function methods.lines(_, format) return function() return one(format or 'l') end end
+  function methods.lines(_, format) return function() return read_item(format or 'l') end end
 
   function methods.seek(_, whence, offset)
     local from = {set = 0, ['end'] = #text, cur = here - 1}
@@ -121,10 +121,10 @@ local function methods_of_text(text)
   return methods
 end
 
-local function read_file(asked_by, name)
+local function read_file(caller, name)
   local found, text, why = bridge.data(name)
-  if found then return a_file(methods_of_text(text)) end
-  if why == 'refused' then error(asked_by .. ': ' .. text, 3) end
+  if found then return new_file(methods_of_text(text)) end
+  if why == 'refused' then error(caller .. ': ' .. text, 3) end
   return nil, text
 end
 
@@ -132,14 +132,14 @@ function env.io.open(name, mode)
   if type(name) ~= 'string' then error('io.open: the name of a file is expected', 2) end
   local first = type(mode) == 'string' and sub(mode, 1, 1)
   if first ~= 'w' and first ~= 'a' then
-    local file, message = read_file('io.open', name) -- no tail call, or the error would not know the script's line
+    local file, message = read_file('io.open', name) -- not a tail call, or the error would not have the script's line
     return file, message
   end
-  if not has_said then
-    has_said = true
+  if not is_logged then
+    is_logged = true
     log("io.open: '" .. sub(name, 1, LONGEST) .. "' is not written: " .. WRITING .. ' (accepted and ignored)')
   end
-  return a_file(nowhere)
+  return new_file(nowhere)
 end
 
 function env.io.lines(name, format)
@@ -157,7 +157,7 @@ end
 
 modules.io = env.io
 
----- code beside the script
+---- .lua files in the script's folder
 
 local function load_file(name)
   if type(name) ~= 'string' then return nil, 'the name of a .lua file beside the script is expected' end

@@ -1,8 +1,8 @@
--- The script's globals: what of Lua it finds, what it may not reach, and which names are refused.
+-- The script's globals: Lua's functions that it may use, and errors for unknown names.
 --
--- They are the script's own; the real ones, which lupa looks at, stay as they are. Nothing of Python is in reach: API
--- functions are Lua closures over Python functions, and an error that is a Python object passes through every pcall.
--- Finalizers run with hooks switched off, and so do the handlers of Lua's own xpcall: neither is to be had.
+-- They are a separate table; Lua's own globals, which lupa uses, do not change. No Python object is accessible: API functions
+-- are Lua closures over Python functions, and a Python exception passes through every pcall. Finalizers and the handlers of
+-- Lua's own xpcall run without hooks, so scripts cannot use them.
 local bridge, sandbox = ...
 
 local error, type, tostring, select, pairs = error, type, tostring, select, pairs
@@ -18,7 +18,8 @@ local check, checked, tonumber = sandbox.check, sandbox.checked, tonumber
 local env, modules = sandbox.globals, sandbox.modules
 local texts, place_in_script = sandbox.texts, sandbox.place_in_script
 local newer = _VERSION ~= 'Lua 5.1'
-sandbox.find, sandbox.match, sandbox.gsub = find, string.match, string.gsub -- for patterns that end: a script may have none of them
+-- Only for patterns that end, because a script may not have these functions.
+sandbox.find, sandbox.match, sandbox.gsub = find, string.match, string.gsub
 
 local function pack(...)
   return {n = select('#', ...), ...}
@@ -30,14 +31,14 @@ for _, name in pairs{'_VERSION', 'assert', 'collectgarbage', 'error', 'getmetata
   env[name] = _G[name]
 end
 env._G = env
-env.package = {path = '', cpath = '', loaded = {}} -- which changes nothing: what a script requires lies beside it
-function env.package.seeall(its) setmetatable(its, {__index = env}) end
+env.package = {path = '', cpath = '', loaded = {}} -- without effect: required files are in the script's folder
+function env.package.seeall(module) setmetatable(module, {__index = env}) end
 env.debug = {traceback = sandbox.debug.traceback}
 env.os = {time = os.time, clock = os.clock, date = os.date, difftime = os.difftime}
 for _, name in pairs{'math', 'string', 'table', 'coroutine', 'os', 'utf8'} do modules[name] = env[name] end
 string.dump = nil
 
--- uint8[] fields of messages are strings here, and tables in V-REP, where data[1] is the first byte; it would be nil.
+-- uint8[] fields of messages are strings here. In V-REP they are tables, where data[1] is the first byte; here it would be nil.
 setmetatable(string, {__index = function(_, key)
   if type(key) == 'number' then
     error('a string has no [' .. key .. ']: a uint8[] field is a string here; read its i-th byte with string.byte(data, i)', 2)
@@ -80,7 +81,7 @@ end
 
 if close then
   function coroutine.close(thread)
-    check() -- one that the hook has ended closes its variables without hooks
+    check() -- a coroutine that the hook has ended closes its variables without hooks
     return caught(close(thread))
   end
 end
@@ -117,9 +118,9 @@ function env.load(text, name, mode, ...)
   text = read_all(text)
   if byte(text) == 27 or mode == 'b' then return nil, 'only text can be loaded' end
   if newer then
-    local its = env
-    if select('#', ...) > 0 then its = ... end
-    return load(text, name or '=(load)', 't', its)
+    local environment = env
+    if select('#', ...) > 0 then environment = ... end
+    return load(text, name or '=(load)', 't', environment)
   end
   local f, message = loadstring(text, name or '=(load)')
   if f then setfenv(f, env) end
@@ -127,9 +128,9 @@ function env.load(text, name, mode, ...)
 end
 env.loadstring = env.load
 
----- what Lua 5.1 and newer call differently
+---- differences between Lua 5.1 and newer versions
 
-if not newer then -- whose matcher takes a piece of the C stack for each item of a pattern
+if not newer then -- its matcher uses some C stack for each item of a pattern
   for _, name in pairs{'find', 'match', 'gmatch', 'gsub'} do
     local f = string[name]
     string[name] = function(text, pattern, third, plain, ...)
@@ -150,7 +151,7 @@ for _, name in pairs{'insert', 'remove', 'concat'} do
 end
 local rep = string.rep
 string.rep = checked(function(text, count, separator)
-  if text == '' and (separator or '') == '' then return '' end -- which would be joined one by one
+  if text == '' and (separator or '') == '' then return '' end -- Lua would join them one by one
   return rep(text, count, separator)
 end, function(text, count)
   return (type(text) == 'string' and #text or 0) * (tonumber(count) or 0)
@@ -176,35 +177,35 @@ math.tanh = math.tanh or function(x) return 1 - 2 / (math.exp(2 * x) + 1) end
 table.getn = table.getn or function(t) return #t end
 string.gfind = string.gmatch and (string.gfind or string.gmatch)
 local seed = math.randomseed
-function math.randomseed(number) -- newer Lua takes whole numbers alone, and without one any that comes
+function math.randomseed(number) -- newer versions accept only integers, and use a random seed without one
   if number == nil then number = 1 end
   if type(number) == 'number' then number = math.floor(number % 1 == 0 and number or number % 2 ^ 53) end
   return seed(number)
 end
-math.randomseed(1) -- the same flight every time
+math.randomseed(1) -- constant seed, so that every flight is the same
 
----- names that the API does not have: reading one is an error that names near ones, as it is in Python
+---- unknown names of the API: reading one is an error that lists similar names, as in Python
 
--- In CoppeliaSim it is nil, and the script falls much later, or does the wrong thing without a word. Two ways of asking
--- stay: whether a plugin is there (`if simROS2 then`), and whether a global that the script itself sets has been set.
-local own, read = {}, 0 -- names that the script gives a value to; how many of its texts have been read for them
+-- In CoppeliaSim, such a name is nil, and the script fails much later, or does something wrong silently. Two cases stay nil: a
+-- plugin that does not exist (`if simROS2 then`), and a global that the script itself sets later.
+local own, read = {}, 0 -- names that the script assigns; number of its texts that were searched for them
 
--- Tell whether the script, or a file that it requires, gives a global of that name a value.
+-- Return whether the script or a helper assigns a global with this name.
 local function is_own(name)
   while read < #texts do
     read = read + 1
-    -- Each piece of the text is read once, whatever stands there: no hook ends a search.
+    -- Each part of the text is matched once, whatever it contains, because no hook can stop a search.
     for names, equals in gmatch(texts[read], '([%w_][%w_%.,%s]*)(=?=?)') do
       if equals == '=' then
-        for one in gmatch(names .. ',', '%f[%w_](sim[A-Z_][%w_]*)%s*,') do own[one] = true end
+        for assigned in gmatch(names .. ',', '%f[%w_](sim[A-Z_][%w_]*)%s*,') do own[assigned] = true end
       end
     end
-    for one in gmatch(texts[read], '%f[%w_]function%s+(sim[A-Z_][%w_]*)') do own[one] = true end
+    for defined in gmatch(texts[read], '%f[%w_]function%s+(sim[A-Z_][%w_]*)') do own[defined] = true end
   end
   return own[name]
 end
 
--- Let a table refuse what it does not have; `message` returns why, or nil for a name that may be nil.
+-- Make unknown names in a table errors; `message` returns the text, or nil for a name that may be nil.
 function sandbox.guard(guarded, message)
   setmetatable(guarded, {__index = function(_, name)
     if type(name) ~= 'string' or (guarded == env and (not find(name, '^sim[A-Z_][%w_]*$') or is_own(name))) then return end

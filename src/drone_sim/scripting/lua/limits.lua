@@ -1,4 +1,4 @@
--- The limits of time and memory, and the errors that nothing in a script may catch.
+-- Limits of time and memory, and errors that a script may not catch.
 local bridge, sandbox, source = ...
 
 local pcall, error, type, tostring, setmetatable = pcall, error, type, tostring, setmetatable
@@ -8,19 +8,19 @@ local sub = string.sub
 local getinfo, sethook = debug.getinfo, debug.sethook
 local look = bridge.look
 
--- A script's C code may take long between two looks at the clock and the memory: comparing or joining strings of
--- 100 MB, say. In the simulation's own thread it may do so only a few times; 1000 instructions are some 10 us.
+-- C code may take long between two checks of time and memory, for example to compare or join strings of 100 MB. In the
+-- simulation's own thread, only a few such operations may happen between checks; 1000 instructions take about 10 us.
 local INSTRUCTIONS = bridge.direct and 200 or 2000
-local FEW = 20 -- of a script that uses much memory: each of them may take long
-local LONG = 1000000 -- bytes of a string that takes long
+local FEW = 20 -- instructions of a script that uses much memory, because each may take long
+local LONG = 1000000 -- bytes of a string for which operations take long
 local running, stopped, stopped_at, stopped_in = false, false, 0, ''
 
 sandbox.debug = debug
-debug = nil -- or lupa looks up its traceback in every call
-local sources = {[source] = sub(source, 2)} -- of the script and what it requires: '=name' -> 'name'
+debug = nil -- otherwise lupa looks up its traceback in every call
+local sources = {[source] = sub(source, 2)} -- chunks of the script and its helpers: '=name' -> 'name'
 sandbox.source, sandbox.sources = source, sources
 
--- Return the line of the script, or of a file that it requires, that runs now, and the name of the file.
+-- Return the running line of the script or a helper, and the name of the file.
 local function place_in_script()
   for level = 3, 250 do
     local info = getinfo(level, 'Sl')
@@ -31,7 +31,7 @@ local function place_in_script()
 end
 sandbox.place_in_script = place_in_script
 
--- Stop the script; why is one of the numbers in state.py.
+-- Stop the script; `why` is one of the numbers in state.py.
 local function stop(why)
   stopped = why
   stopped_at, stopped_in = place_in_script()
@@ -39,7 +39,7 @@ local function stop(why)
 end
 sandbox.stop = stop
 
--- Stop the script where it is time to, or return whether to look again soon.
+-- Stop the script if a limit is exceeded; return whether to check again soon.
 local function check()
   if not running then return end
   if stopped then error('stopped', 0) end
@@ -49,15 +49,15 @@ local function check()
 end
 sandbox.check = check
 
-local counts = setmetatable({}, {__mode = 'k'}) -- after how many instructions a hook comes, unless INSTRUCTIONS
-local is_careful = false -- whether there are any in it
+local counts = setmetatable({}, {__mode = 'k'}) -- instructions between hooks by coroutine, if not INSTRUCTIONS
+local is_careful = false -- whether `counts` has entries
 local limited = setmetatable({}, {__mode = 'k'}) -- coroutines with a hook of their own
-local mask = '' -- or 'l', while there are breakpoints: the hook comes for every line, too
+local mask = '' -- 'l' while there are breakpoints, so that the hook is also called for every line
 local hook
 
--- Let the hook of the coroutine that runs come after so many instructions; to set one looks at the whole stack.
+-- Set the number of instructions between hooks in the running coroutine, if it differs; sethook scans the whole stack.
 local function come_after(count)
-  local here = current() or hook -- 5.1 has none for the first one
+  local here = current() or hook -- 5.1 returns nil for the main coroutine
   if (counts[here] or INSTRUCTIONS) ~= count then
     is_careful, counts[here] = true, count
     sethook(hook, mask, count)
@@ -70,13 +70,13 @@ function hook(event, line)
     return
   end
   if not running or (stopped and getinfo(2, 'f').func == sandbox.within_limits) then return end
-  if stopped then come_after(1) end -- or what closes its variables on the way out begins anew, again and again
+  if stopped then come_after(1) end -- otherwise code that closes variables could run again and again
   local much = check()
   if much or is_careful then come_after(much and FEW or INSTRUCTIONS) end
 end
 sethook(hook, mask, INSTRUCTIONS)
 
--- Let the hook come for every line, or for none.
+-- Switch the hook for every line on or off.
 function sandbox.watch_lines(on)
   mask = on and 'l' or ''
   counts = setmetatable({}, {__mode = 'k'})
@@ -86,14 +86,14 @@ function sandbox.watch_lines(on)
   end
 end
 
--- Every coroutine has a hook of its own, which many short ones never come to: to make one counts, too.
+-- Set a coroutine's hook. Check the limits, because many short coroutines might never reach their hooks.
 function sandbox.limit(thread)
   check()
   limited[thread] = true
   sethook(thread, hook, mask, INSTRUCTIONS)
 end
 
--- Look at the clock and the memory before and after a function of Lua's on a string that is long.
+-- Return a function that checks time and memory before and after calling f with a long string.
 function sandbox.checked(f, length_of)
   return function(text, ...)
     if length_of(text, ...) < LONG then return f(text, ...) end
@@ -104,8 +104,8 @@ function sandbox.checked(f, length_of)
   end
 end
 
--- Hand on the results of a pcall or a resume, unless they are what a script may not catch: that it was stopped, or an
--- exception of Python's. Where the C stack is used up the hook itself fails, and the script gets that error.
+-- Return the results of a pcall or resume, unless the error is one that a script may not catch: that it was stopped, or a
+-- Python exception. If the C stack is exhausted, the hook itself fails, and the script gets that error.
 local function caught(ok, ...)
   if not ok then
     if stopped or type((...)) == 'userdata' then error((...), 0) end
@@ -115,8 +115,8 @@ local function caught(ok, ...)
 end
 sandbox.caught = caught
 
--- Lua itself bounds a pcall within a pcall at some 200, apart from those of a newer Lua's coroutines: there each error
--- takes the longer the more there are. Below that bound the hook has room for itself.
+-- Lua limits nested calls of pcall to about 200, except in the coroutines of newer versions, where each error takes longer the
+-- more there are. This smaller limit leaves room for the hook.
 local MOST_PCALLS = 150
 local depth = 0
 local TOO_DEEP = 'stack overflow: more than ' .. MOST_PCALLS .. ' pcall within each other'
@@ -133,7 +133,7 @@ function sandbox.protected(f, ...)
   return caught(left(before, pcall(f, ...)))
 end
 
--- Resume a coroutine, which may be left within a pcall.
+-- Resume a coroutine, which may be suspended inside a pcall.
 function sandbox.resume(...)
   return left(depth, resume(...))
 end
@@ -144,8 +144,8 @@ local function message_of(value)
   return 'an error that is a ' .. type(value)
 end
 
--- Call f within the limits. Return nothing where it returned nothing; or true and what it returned; or the number of
--- the limit, the line and the name of the file; or false and a message, which may begin with file and line.
+-- Call f within the limits. Return nothing if it returned nothing; or true and its result; or the number of the exceeded limit,
+-- the line and the name of the file; or false and a message, which may begin with file and line.
 function sandbox.within_limits(f, ...)
   if stopped then come_after(INSTRUCTIONS) end
   running, stopped, depth = true, false, 0

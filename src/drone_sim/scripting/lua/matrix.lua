@@ -1,9 +1,9 @@
--- `Matrix`: tables of numbers with rows and columns, which CoppeliaSim's scripts since 4.4 have without `require`, and
--- as `require 'matrix'`; `Vector` is one of a single column.
+-- `Matrix`: matrices of numbers, which scripts since CoppeliaSim 4.4 have as a global, and as `require 'matrix'`; `Vector` is a
+-- matrix with a single column.
 --
--- Matrix(rows, cols, data): data are the numbers row by row, a function of row and column, or nothing: all zero; -1 for
--- rows or cols is as many as the data need. Rows and columns count from 1. What a method returns is a new matrix, but
--- for set, setrow, setcol and assign.
+-- Matrix(rows, cols, data): data are the numbers row by row, a function of row and column, or nil for zeros; -1 for rows or
+-- cols means as many as the data need. Rows and columns count from 1. Methods return new matrices, except set, setrow, setcol
+-- and assign.
 local _, sandbox = ...
 
 local error, select, setmetatable, tostring, type = error, select, setmetatable, tostring, type
@@ -102,7 +102,7 @@ end
 function methods:setrow(i, row) return self:assign(i, 1, new(1, self._cols, data_of(row))) end
 function methods:setcol(j, col) return self:assign(1, j, new(self._rows, 1, data_of(col))) end
 
----- number by number
+---- element-wise operations
 
 local function each(one, other, result)
   if type(one) == 'number' then
@@ -153,7 +153,7 @@ function methods:cross(other)
   return new(3, 1, {a[2] * b[3] - a[3] * b[2], a[3] * b[1] - a[1] * b[3], a[1] * b[2] - a[2] * b[1]})
 end
 
----- sums, of all, or along rows (1) or columns (2)
+---- reductions of all elements, or over the rows (1) or columns (2)
 
 local FOLDED = {
   sum = function(a, b) return a + b end,
@@ -183,7 +183,7 @@ function methods:trace()
   return sum
 end
 
----- elimination: what is left of a square matrix beside another, and the determinant
+---- Gauss-Jordan elimination: the inverse of `left` times `right`, and the determinant
 
 local function eliminated(left, right)
   if left._rows ~= left._cols then fail('Matrix: a square one is expected') end
@@ -225,7 +225,7 @@ function methods:power(exponent)
 end
 meta.__pow = methods.power
 
----- several beside each other, and homogeneous coordinates
+---- concatenation, and homogeneous coordinates
 
 function methods:vertcat(...)
   local result = self
@@ -252,7 +252,7 @@ function methods:nonhom()
   return filled(self._rows - 1, self._cols, function(i, j) return self:get(i, j) / self:get(self._rows, j) end)
 end
 
----- as text, and compared
+---- text and comparison
 
 local function text_of(matrix)
   return 'Matrix(' .. matrix._rows .. ',' .. matrix._cols .. ',{' .. concat(matrix._data, ',') .. '})'
@@ -268,13 +268,13 @@ function methods:print()
   for i = 1, self._rows do env.print(concat(self:row(i)._data, ' ')) end
 end
 
----- how they are made
+---- constructors
 
-local function made(make, more)
-  return setmetatable(more or {}, {__index = methods, __call = function(_, ...) return make(...) end})
+local function constructor(create, functions)
+  return setmetatable(functions or {}, {__index = methods, __call = function(_, ...) return create(...) end})
 end
 
-env.Matrix = made(new, {
+env.Matrix = constructor(new, {
   eye = function(_, size) return eye(size) end,
   ones = function(_, rows, cols) return filled(rows, cols, function() return 1 end) end,
   zeros = function(_, rows, cols) return new(rows, cols) end,
@@ -289,10 +289,10 @@ local function vector(size, data)
   if type(size) == 'table' then size, data = #size, size end
   return new(size, 1, data)
 end
-env.Vector = made(vector)
-for _, size in ipairs{3, 4, 7} do env['Vector' .. size] = made(function(data) return vector(size, data) end) end
+env.Vector = constructor(vector)
+for _, size in ipairs{3, 4, 7} do env['Vector' .. size] = constructor(function(data) return vector(size, data) end) end
 
--- A transform of 12 numbers has the last row 0 0 0 1.
+-- Return a 4 x 4 matrix; a transform of 12 numbers gets the last row 0 0 0 1.
 local function with_last_row(data)
   if type(data) ~= 'table' or #data ~= 12 then return new(4, 4, data) end
   return new(3, 4, data):vertcat(new(1, 4, {0, 0, 0, 1}))
@@ -306,12 +306,12 @@ local function about(axis)
     return turn:set(second, first, math.sin(angle)):set(second, second, math.cos(angle))
   end
 end
-env.Matrix3x3 = made(function(data) return new(3, 3, data) end, {rotx = about(1), roty = about(2), rotz = about(3)})
-env.Matrix4x4 = made(with_last_row, {
+env.Matrix3x3 = constructor(function(data) return new(3, 3, data) end, {rotx = about(1), roty = about(2), rotz = about(3)})
+env.Matrix4x4 = constructor(with_last_row, {
   fromposition = function(_, place) return eye(4):assign(1, 4, new(3, 1, data_of(place))) end,
   fromrotation = function(_, turn) return eye(4):assign(1, 1, turn) end,
   fromrt = function(_, turn, place) return eye(4):assign(1, 1, turn):assign(1, 4, new(3, 1, data_of(place))) end,
   toposition = function(_, matrix) return matrix:slice(1, 4, 3, 4)._data end,
   torotation = function(_, matrix) return matrix:slice(1, 1, 3, 3) end,
 })
-sandbox.own_modules.matrix = env.Matrix -- where no file beside the script has that name
+sandbox.own_modules.matrix = env.Matrix -- unless a file in the script's folder has this name

@@ -1,5 +1,5 @@
--- The products that controllers make in every step, in Lua: crossing over to Python takes five times as long.
--- They do what frames.py does, in the same order, so that flights are the same to the last bit.
+-- Products that controllers compute in every step, in Lua, because a call into Python takes five times as long.
+-- They have the same order of operations as frames.py, so that flights are identical to the last bit.
 local _, sandbox = ...
 
 local type = type
@@ -36,7 +36,7 @@ local function inverted(m, more)
   }
 end
 
--- 3.x inverts a matrix where it stands, in the script's own table, which Python does not see.
+-- In 3.x, a matrix is inverted in place, in the script's table, which Python does not have.
 local function in_place(invert)
   return function(m, ...)
     local inverse = invert(m, ...)
@@ -46,7 +46,7 @@ local function in_place(invert)
 end
 sandbox.wrappers = {['sim.invertMatrix'] = in_place, simInvertMatrix = in_place}
 
--- What returns a function's result, or nil where Python has to look at the values.
+-- Functions that return a result, or nil if Python has to check the values.
 sandbox.shortcuts = {
   ['sim.multiplyVector'] = transformed, simMultiplyVector = transformed,
   ['sim.getMatrixInverse'] = inverted, simGetMatrixInverse = inverted,

@@ -6,8 +6,8 @@ local getinfo, getupvalue, setupvalue = sandbox.debug.getinfo, sandbox.debug.get
 local getmeta, setmeta = sandbox.debug.getmetatable, sandbox.debug.setmetatable
 local env, loaded, callbacks = sandbox.globals, sandbox.loaded, sandbox.callbacks
 
--- Return a function that gives every variable that the script can reach the value that it has now: contents of
--- tables, their metatables, and locals that functions share. Coroutines are left as they are.
+-- Return a function that restores the present values of all variables that the script can access: contents of tables,
+-- metatables, and upvalues of functions. Coroutines are not restored.
 function sandbox.take_snapshot()
   local tables, metatables, locals = {}, {}, {}
   local seen, waiting, count = {}, {}, 0

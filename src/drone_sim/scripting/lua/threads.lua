@@ -1,5 +1,5 @@
--- Threads: coroutines that the simulation resumes once a step. One is left where it waits or switches, or at a call of
--- the API once it has made many of them in its turn: never at a moment that depends on how fast the computer is.
+-- Threads: coroutines that the simulation resumes once in each step. A thread is suspended when it waits or switches, or after a
+-- number of API calls in its turn, so that flights do not depend on the speed of the computer.
 local bridge, sandbox = ...
 
 local error, type, next, select = error, type, next, select
@@ -9,17 +9,17 @@ local running, isyieldable = coroutine.running, coroutine.isyieldable
 local upper = string.upper
 local limit, caught = sandbox.limit, sandbox.caught
 
-local api, own = {}, {} -- functions of the API; those that stand here, in the place of some of them
+local api, own = {}, {} -- functions of the API; functions here that replace some of them
 local called, forbidden, most = 0, 0, bridge.default_ms * bridge.calls_per_ms
 sandbox.api, sandbox.own = api, own
 
--- Tell whether a coroutine runs, and may be left.
+-- Return whether a coroutine runs that can be suspended.
 local function in_thread()
   local thread, is_main = running()
   return thread ~= nil and not is_main and (isyieldable == nil or isyieldable())
 end
 
--- Return a function of the API that counts its calls in threads.
+-- Return a version of an API function that counts its calls in threads.
 function sandbox.counted(f)
   if not bridge.threads then return f end
   return function(...)
@@ -37,7 +37,7 @@ local function after_turn(before, ...)
   return ...
 end
 
--- Resume a coroutine, whose turn begins.
+-- Resume a coroutine for a new turn.
 local function resumed(thread, ...)
   local before = called
   called = 0
@@ -49,10 +49,10 @@ sandbox.resume = resumed
 
 local thread = nil
 
--- Asked for, and not remembered: the end of its time may strike before anything is written down.
+-- Computed and not stored, because the time limit may stop the script before anything is stored.
 function sandbox.thread_has_ended() return thread ~= nil and status(thread) == 'dead' end
 
--- Let the thread, which begins with f, have its turn.
+-- Start the thread with f, or resume it, for a turn.
 function sandbox.take_turn(f)
   if thread == nil then
     thread = create(function() f() end)
@@ -62,7 +62,7 @@ function sandbox.take_turn(f)
   if not caught(ok, message) then error(message, 0) end
 end
 
--- In Lua 5.1 no coroutine can be left through a pcall: there it is another coroutine.
+-- In Lua 5.1, a coroutine cannot be suspended inside a pcall, so pcall runs its function in another coroutine.
 if bridge.threads and _VERSION == 'Lua 5.1' then
   local protected = sandbox.protected
   function sandbox.protected(f, ...)
@@ -77,26 +77,26 @@ if bridge.threads and _VERSION == 'Lua 5.1' then
   end
 end
 
----- what a thread calls
+---- functions for threads
 
 local function pack(...)
   return {n = select('#', ...), ...}
 end
 
--- Return a function of the API that waits: `begun` returns what tells, once a step, whether to wait for longer, and what
--- it has brought, or what to call first; `results` reads that.
-function sandbox.waiting(name, begun, results)
+-- Return a waiting version of an API function. `start` returns a function that returns, in each step, whether to wait longer and
+-- the results, or a function of the script to call first; `results` decodes that.
+function sandbox.waiting(name, start, results)
   return function(...)
-    local ask = begun(...)
-    local function told(waits, f, ...)
+    local poll = start(...)
+    local function with_calls(waits, f, ...)
       if not waits or f == nil then return waits, f, ... end
-      return told(results(ask(0, sandbox.own_function(name, f)(...) and true or false)))
+      return with_calls(results(poll(0, sandbox.own_function(name, f)(...) and true or false)))
     end
-    local answer = pack(told(results(ask(0))))
+    local answer = pack(with_calls(results(poll(0))))
     while answer[1] do
       if not in_thread() then error(name .. ': ' .. bridge.no_thread, 2) end
       yield()
-      answer = pack(told(results(ask(0))))
+      answer = pack(with_calls(results(poll(0))))
     end
     return unpack(answer, 2, answer.n)
   end

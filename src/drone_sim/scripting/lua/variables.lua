@@ -1,7 +1,7 @@
--- The script's variables, as a person reads them, and breakpoints. Nothing of the script is called for it: no
--- metamethod, no __tostring. All of it is bounded.
+-- Variables of the script in readable form, and breakpoints. No function of the script is called: no metamethod, no
+-- __tostring. The size is limited.
 --
--- Rows go to Python as one string: depth, name, type and value of each, between marks that no value has.
+-- Rows are passed to Python as one string: depth, name, type and value of each, separated by characters that no value has.
 local bridge, sandbox = ...
 
 local type, next, select, rawget = type, next, select, rawget
@@ -11,10 +11,10 @@ local format, sub, gsub, concat = string.format, string.sub, sandbox.gsub, table
 local getinfo, getlocal, getupvalue = sandbox.debug.getinfo, sandbox.debug.getlocal, sandbox.debug.getupvalue
 local env, sources, modules = sandbox.globals, sandbox.sources, sandbox.modules
 local MOST, MOST_INSIDE, LONGEST = bridge.most_rows, bridge.most_inside, bridge.longest_value
-local FEW, SEEN = 13, 20000 -- values in a line; entries that are looked at
+local FEW, SEEN = 13, 20000 -- values in a line; entries that are examined
 local FIELD, ROW = '\31', '\30'
 
-local own, known = {sim_call_type = true}, nil -- names of Lua's; of the API's, once they are asked for
+local own, known = {sim_call_type = true}, nil -- names of Lua; names of the API, when they are needed first
 for name in next, env do own[name] = true end
 
 local function clean(text, longest)
@@ -25,7 +25,7 @@ local function number_text(value, digits)
   return value % 1 == 0 and format('%.0f', value) or format(digits, value)
 end
 
--- Return the numbers of a short list in a line; nil for any other table.
+-- Return the numbers of a short list as text; nil for other tables.
 local function vector(t)
   local length = rawlen(t)
   if length == 0 or length > FEW then return end
@@ -84,11 +84,11 @@ local function add(name, value)
     inside = inside + 1
     row('2', key_text(index), rawget(value, index))
   end
-  for key, one in next, value do
+  for key, item in next, value do
     if inside >= MOST_INSIDE then return end
     if not (type(key) == 'number' and key >= 1 and key <= length and key % 1 == 0) then
       inside = inside + 1
-      row('2', key_text(key), one)
+      row('2', key_text(key), item)
     end
   end
 end
@@ -123,7 +123,7 @@ local function add_globals()
     if type(name) == 'string' and not (own[name] or known[name] or is_api(value)) then
       if type(value) ~= 'function' then
         add(clean(name, 60), value)
-      elseif functions < MOST and sources[getinfo(value, 'S').source] then -- the file's own locals, which it sees
+      elseif functions < MOST and sources[getinfo(value, 'S').source] then -- the file's locals that it uses
         functions = functions + 1
         add_upvalues(value)
       end
@@ -146,9 +146,9 @@ end
 
 ---- breakpoints
 
-local lines = {} -- tables of names of files, by lines
+local lines = {} -- sets of file names by line
 
--- Hear of a line, from the hook: level 3 is what has it.
+-- Check a line for the hook; stack level 3 is the function with the line.
 function sandbox.at_line(line)
   local files = lines[line]
   if not files then return end
@@ -181,7 +181,7 @@ local function break_at(...)
   sandbox.watch_lines(next(lines) ~= nil)
 end
 
--- Look at these lines from now on: a file and a line, again and again. Without any no hook is called for a line.
+-- Set the breakpoints, given as file, line, file, line and so on. Without breakpoints, the hook is not called for lines.
 function sandbox.break_at(...)
   return sandbox.run(break_at, ...)
 end

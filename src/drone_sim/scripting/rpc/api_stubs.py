@@ -2,7 +2,7 @@
 
 Most calls of a controller need no message of their own: the results of its usual reads arrive with the start of the
 phase, and are valid until the script changes something of that kind. Writes are sent with the end of the phase, once a
-call of the same form has succeeded. A `stretch` is a segment of a phase between two requests to the simulation; the
+call of the same form has succeeded. A segment is the part of a phase between two requests to the simulation; the
 expected reads of each segment are remembered.
 """
 
@@ -26,7 +26,7 @@ from drone_sim.scripting.rpc import effects
 from drone_sim.scripting.rpc.places import Place, Places
 
 MOST_EXPECTED = 200  # reads of a segment
-_MAX_STRETCHES = 50  # of a phase; more are not remembered
+_MAX_SEGMENTS = 50  # of a phase; more are not remembered
 _MAX_FORMS = 10_000  # remembered forms of successful calls
 _UNKNOWN = object()
 _PLAIN = frozenset((int, float, str, bool, type(None)))
@@ -37,13 +37,13 @@ Answers = tuple[list[Any], list[Place]]  # results of expected reads (Ellipsis: 
 NO_ANSWERS: Answers = ([], [])
 
 
-class Asking(Protocol):
-    """Connection to the simulation."""
+class SimulationLink(Protocol):
+    """Connection to the simulation. A Protocol because the implementation, script_process, imports this module."""
 
-    def ask(self, item: list[Any]) -> tuple[Any, Answers]:
+    def request(self, item: list[Any]) -> tuple[Any, Answers]:
         """Send an item; return its result and the results of the expected reads. Raises the error received."""
 
-    def leave(self, item: list[Any]) -> None:
+    def queue(self, item: list[Any]) -> None:
         """Queue an item for the next message."""
 
     def marked(self, value: Any) -> Any:
@@ -60,7 +60,7 @@ class Expected(NamedTuple):
 _NOTHING = Expected()
 
 
-class Stretch:
+class Segment:
     """A segment of a phase: before its first request, or between two requests."""
 
     __slots__ = ("changed", "handles", "known", "number", "phase", "reads")
@@ -82,13 +82,13 @@ class Stretch:
 class ApiStubs:
     """The API modules of a script."""
 
-    def __init__(self, end: Asking, called: Callable[[Callable[[], Any]], Any], turns: Turns):
-        """`end` leads to the simulation; `called` calls a blocking function outside the script's time limit.
+    def __init__(self, link: SimulationLink, call_outside: Callable[[Callable[[], Any]], Any], turns: Turns):
+        """`link` leads to the simulation; `call_outside` calls a blocking function outside the script's time limit.
 
-        `turns` are those of the script's thread.
+        `turns` switch the script's thread.
         """
-        self._end, self._called = end, called
-        self._stretches: list[Stretch] = []  # of the running phases, each nested in the previous one
+        self._link, self._call_outside = link, call_outside
+        self._segments: list[Segment] = []  # of the running phases, each nested in the previous one
         self._expected: dict[tuple[str, int], Expected] = {}
         self._succeeded: set[Any] = set()
         self._places = Places()
@@ -111,20 +111,20 @@ class ApiStubs:
         values, places = answers
         reads = self._expected.get((phase, number), _NOTHING).reads
         known = {read: value for read, value in zip(reads, values) if value is not Ellipsis}
-        self._stretches.append(Stretch(phase, number, known))
+        self._segments.append(Segment(phase, number, known))
         self._places.take(places)
 
     def end(self) -> None:
         """End the phase, and announce its reads if they are not the expected ones."""
-        stretch = self._stretches.pop()
-        key = stretch.phase, stretch.number
+        segment = self._segments.pop()
+        key = segment.phase, segment.number
         expected = self._expected.get(key, _NOTHING)
-        if expected.reads == (*stretch.reads,) and expected.handles == (*stretch.handles,):
+        if expected.reads == (*segment.reads,) and expected.handles == (*segment.handles,):
             return
-        if stretch.number < _MAX_STRETCHES:
-            self._expected[key] = Expected(tuple(stretch.reads), tuple(stretch.handles))
-            reads = [[name, *self._end.marked(list(arguments))] for name, arguments in stretch.reads]
-            self._end.leave(["reads", stretch.phase, stretch.number, reads, list(stretch.handles)])
+        if segment.number < _MAX_SEGMENTS:
+            self._expected[key] = Expected(tuple(segment.reads), tuple(segment.handles))
+            reads = [[name, *self._link.marked(list(arguments))] for name, arguments in segment.reads]
+            self._link.queue(["reads", segment.phase, segment.number, reads, list(segment.handles)])
 
     # ---- calls
 
@@ -159,42 +159,42 @@ class ApiStubs:
 
     def _forwarding_stub(self, name: str) -> Function:
         def call(*arguments: Any, **named: Any) -> Any:
-            return self._ask(name, arguments, named)
+            return self._request(name, arguments, named)
 
         return call
 
     def _reading_stub(self, name: str, kind: str) -> Function:
-        stretches = self._stretches
+        segments = self._segments
 
         def read(*arguments: Any, **named: Any) -> Any:
-            stretch, key = stretches[-1], (name, arguments)
-            if named or kind in stretch.changed:
-                return self._ask(name, arguments, named)
+            segment, key = segments[-1], (name, arguments)
+            if named or kind in segment.changed:
+                return self._request(name, arguments, named)
             try:
-                result = stretch.known.get(key, _UNKNOWN)
+                result = segment.known.get(key, _UNKNOWN)
             except TypeError:  # unhashable arguments, such as a list
-                return self._ask(name, arguments, named)
-            if len(stretch.reads) < MOST_EXPECTED:
-                stretch.reads[key] = None
+                return self._request(name, arguments, named)
+            if len(segment.reads) < MOST_EXPECTED:
+                segment.reads[key] = None
             if result is _UNKNOWN:
-                result = stretch.known[key] = self._send(name, arguments, named, -1)[0]
+                result = segment.known[key] = self._send(name, arguments, named, -1)[0]
             return _copied(result)
 
         return read
 
     def _pose_reading_stub(self, name: str, function: Function) -> Function:
-        stretches, places = self._stretches, self._places
+        segments, places = self._segments, self._places
 
         def read(*arguments: Any, **named: Any) -> Any:
-            stretch = stretches[-1]
-            if named or effects.PLACES in stretch.changed or not 1 <= len(arguments) <= 2:
-                return self._ask(name, arguments, named)
+            segment = segments[-1]
+            if named or effects.PLACES in segment.changed or not 1 <= len(arguments) <= 2:
+                return self._request(name, arguments, named)
             handle, frame = arguments if len(arguments) == 2 else (*arguments, WORLD)
             if type(handle) is not int or type(frame) is not int:
-                return self._ask(name, arguments, named)
-            stretch.handles[handle] = None
+                return self._request(name, arguments, named)
+            segment.handles[handle] = None
             if frame != WORLD:
-                stretch.handles[frame] = None
+                segment.handles[frame] = None
             if places.knows(handle, frame):
                 return function(handle, frame)
             return self._send(name, arguments, named, -1)[0]
@@ -203,39 +203,39 @@ class ApiStubs:
 
     def _pose_changing_stub(self, name: str, function: Function) -> Function:
         change = self._changing_stub(name, (effects.PLACES, effects.MOTION))
-        stretches, places, succeeded, end = self._stretches, self._places, self._succeeded, self._end
+        segments, places, succeeded, link = self._segments, self._places, self._succeeded, self._link
 
         def put(*arguments: Any, **named: Any) -> Any:
-            stretch = stretches[-1]
-            if named or effects.PLACES in stretch.changed or not arguments or type(arguments[0]) is not int:
+            segment = segments[-1]
+            if named or effects.PLACES in segment.changed or not arguments or type(arguments[0]) is not int:
                 return change(*arguments, **named)
             handle = arguments[0]
-            stretch.handles[handle] = None
+            segment.handles[handle] = None
             if not places.is_mark(handle) or _form(name, arguments) not in succeeded:
                 return change(*arguments, **named)
             try:
                 function(*arguments)
             except Exception:  # the simulation's error text is better
                 return change(*arguments, **named)
-            end.leave(["set", name, *arguments])
+            link.queue(["set", name, *arguments])
             places.forget_below(handle)
-            for key in [read for read in stretch.known if effects.READS[read[0]] == effects.MOTION]:
+            for key in [read for read in segment.known if effects.READS[read[0]] == effects.MOTION]:
                 if not places.is_apart(bare(key[1][0]), handle):
-                    del stretch.known[key]
+                    del segment.known[key]
             return None
 
         return put
 
     def _changing_stub(self, name: str, kinds: tuple[str, ...]) -> Function:
-        stretches, succeeded, end = self._stretches, self._succeeded, self._end
+        segments, succeeded, link = self._segments, self._succeeded, self._link
 
         def change(*arguments: Any, **named: Any) -> Any:
-            stretch = stretches[-1]
+            segment = segments[-1]
             for kind in kinds:
-                stretch.forget(kind)
+                segment.forget(kind)
             form = None if named else _form(name, arguments)
             if form in succeeded and form is not None:
-                end.leave(["set", name, *arguments])
+                link.queue(["set", name, *arguments])
                 return None
             result, _ = self._send(name, arguments, named, -1)
             if form is not None and result is None and len(succeeded) < _MAX_FORMS:
@@ -244,37 +244,37 @@ class ApiStubs:
 
         return change
 
-    def _ask(self, name: str, arguments: Any, named: Any) -> Any:
+    def _request(self, name: str, arguments: Any, named: Any) -> Any:
         """Call a function in the simulation's process; afterwards known results may be invalid."""
-        stretch = self._stretches[-1]
+        segment = self._segments[-1]
         try:
-            result, answers = self._send(name, arguments, named, stretch.number + 1)
+            result, answers = self._send(name, arguments, named, segment.number + 1)
         except Exception:  # the function may have changed something before it failed
             for kind in effects.KINDS:
-                stretch.forget(kind)
+                segment.forget(kind)
             self._places.take(())
             raise
-        phase, number = stretch.phase, stretch.number + 1
+        phase, number = segment.phase, segment.number + 1
         self.end()
         self._begin(phase, number, answers)
         return result
 
-    def _send(self, name: str, arguments: Any, named: Any, stretch: int) -> tuple[Any, Answers]:
-        marked = self._end.marked
+    def _send(self, name: str, arguments: Any, named: Any, segment: int) -> tuple[Any, Answers]:
+        marked = self._link.marked
         by_name = [[key, marked(value)] for key, value in named.items()]
-        item = ["call", name, stretch, by_name, *map(marked, arguments)]
-        return self._called(lambda: self._end.ask(item))  # type: ignore[no-any-return]
+        item = ["call", name, segment, by_name, *map(marked, arguments)]
+        return self._call_outside(lambda: self._link.request(item))  # type: ignore[no-any-return]
 
     # ---- waits
 
     def _waiting_stub(self, name: str) -> Function:
         def call(*arguments: Any, **named: Any) -> Wait:
-            return _RemoteWait(self._ask(name, arguments, named), self._step)
+            return _RemoteWait(self._request(name, arguments, named), self._step)
 
         return call
 
     def _step(self, number: int, answer: Any) -> Any:
-        return self._ask("wait", (number, answer), {})
+        return self._request("wait", (number, answer), {})
 
 
 class _RemoteWait(Wait):

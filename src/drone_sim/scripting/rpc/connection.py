@@ -66,7 +66,7 @@ class ScriptConnection:
         self._channel.send(marshal.dumps(message))
 
     def next_item(self, deadline: float) -> list[Any]:
-        """Return the next item. Raises NoMessage, Disconnected, and TimeoutError after `deadline`."""
+        """Return the next item. Raises InvalidMessage, Disconnected, and TimeoutError after `deadline`."""
         while not self.items:
             if monotonic() > deadline:
                 raise TimeoutError

@@ -10,7 +10,7 @@ from drone_sim.scripting.api.calls import Function
 from drone_sim.scripting.rpc import effects, values
 from drone_sim.scripting.rpc.connection import ScriptConnection
 from drone_sim.scripting.rpc.places import Place, place_of
-from drone_sim.scripting.rpc.values import NoMessage
+from drone_sim.scripting.rpc.values import InvalidMessage
 
 _LOG = logging.getLogger(__name__)
 _MAX_READS = 200  # in a list, and lists
@@ -28,23 +28,23 @@ class ExpectedReads:
         self._expected: dict[tuple[str, int], tuple[list[tuple[Function, list[Any]]], list[int]]] = {}
 
     def note(self, item: list[Any]) -> None:
-        """Store the reads that the script announces for a segment of a phase. Raises NoMessage."""
+        """Store the reads that the script announces for a segment of a phase. Raises InvalidMessage."""
         if [type(field) for field in item[1:]] != [str, int, list, list]:
-            raise NoMessage("malformed list of reads")
+            raise InvalidMessage("malformed list of reads")
         if max(len(item[3]), len(item[4]), len(self._expected)) > _MAX_READS:
-            raise NoMessage("too many reads")
+            raise InvalidMessage("too many reads")
         if not all(type(handle) is int for handle in item[4]):
-            raise NoMessage("handles must be integers")
+            raise InvalidMessage("handles must be integers")
         reads = [self._read(read) for read in item[3]]
         handles = [handle for handle in item[4] if self._is_permitted(_POSE_FUNCTION, [handle])]
         self._expected[item[1][:_MAX_PHASE_LENGTH], item[2]] = reads, handles
 
     def _read(self, read: Any) -> tuple[Function, list[Any]]:
         if type(read) is not list or not read or type(read[0]) is not str:
-            raise NoMessage("not a read")
+            raise InvalidMessage("not a read")
         name = read[0]
         if name not in effects.READS or name not in self._functions:
-            raise NoMessage("not a read")
+            raise InvalidMessage("not a read")
         arguments = [self._value(value) for value in read[1:]]
         return (self._functions[name] if self._is_permitted(name, arguments) else _refused), arguments
 
@@ -55,9 +55,9 @@ class ExpectedReads:
             return False
         return True
 
-    def answers(self, phase: str, stretch: int) -> tuple[list[Any], list[Place]]:
+    def results_of(self, phase: str, segment: int) -> tuple[list[Any], list[Place]]:
         """Return the results of the expected reads (Ellipsis if a read fails), and poses of objects."""
-        reads, handles = self._expected.get((phase, stretch), _NOTHING)
+        reads, handles = self._expected.get((phase, segment), _NOTHING)
         results = []
         for function, arguments in reads:
             try:

@@ -25,11 +25,11 @@ _MAX_FUNCTIONS = 100_000  # passed to the simulation
 
 
 def serve(worker: ScriptWorker, end: socket.socket, path: str) -> None:
-    """Execute the commands for the script file at `path` that the other end sends, until it disconnects."""
+    """Execute the commands of the simulation for the script file at `path`, until it disconnects."""
     worker.open(Channel(end), path)
     try:
         while True:
-            worker.obey(worker.receive())
+            worker.execute(worker.receive())
     except Disconnected:
         return
 
@@ -64,7 +64,7 @@ class ScriptWorker:
         content: tuple[Any, ...] = marshal.loads(message)
         return content
 
-    def leave(self, item: list[Any]) -> None:
+    def queue(self, item: list[Any]) -> None:
         """Queue an item for the next message."""
         self._queued.append(item)
         if len(self._queued) > _MAX_QUEUED:
@@ -74,7 +74,7 @@ class ScriptWorker:
         items, self._queued = self._queued, []
         self._channel.send(values.written(items))
 
-    def ask(self, item: list[Any]) -> tuple[Any, Answers]:
+    def request(self, item: list[Any]) -> tuple[Any, Answers]:
         """Send an item; return its result, and the results of the expected reads. Raises the error received."""
         self._queued.append(item)
         self._send()
@@ -82,14 +82,14 @@ class ScriptWorker:
         while True:
             message = self.receive()
             if message[0] == "go":
-                self.obey(message)
+                self.execute(message)
             elif message[0] == "is":
                 _, value, (answers, places) = message
                 return self._decoded(value), (self._decoded(answers), places)
             else:
-                _, kind, text, line = message
+                _, kind, text, explanation = message
                 error = values.ERRORS.get(kind, RuntimeError)(text)
-                error.explained = line
+                error.explained = explanation
                 raise error
 
     def _decoded(self, value: Any) -> Any:
@@ -113,9 +113,9 @@ class ScriptWorker:
 
     # ---- commands for the scripts
 
-    def obey(self, message: tuple[Any, ...]) -> None:
+    def execute(self, message: tuple[Any, ...]) -> None:
         """Execute a command, and send how it ended."""
-        _, number, command, arguments, (answers, places), may_go_on = message
+        _, number, command, arguments, (answers, places), may_run_ahead = message
         script = self._scripts.get(number)
         if script is None:
             script = self._scripts[number] = self._next if not self._scripts else _LoadedScript(self)
@@ -126,7 +126,7 @@ class ScriptWorker:
             has_succeeded = self._do(script, command, decoded, (self._decoded(answers), places))
             if command == "call" and arguments == ["actuation"]:
                 script.is_silent = not self._requests
-            if may_go_on and has_succeeded and script.is_silent and not self._requests:
+            if may_run_ahead and has_succeeded and script.is_silent and not self._requests:
                 self._queued[-1].append("goes on")
                 self._do(script, "call", ["actuation"], NO_ANSWERS)
                 script.is_silent = not self._requests
@@ -202,5 +202,5 @@ def prepared() -> ScriptWorker:
     with simulation_socket, script_socket:  # warm up: forks share what the first script has read and compiled
         first = ScriptWorker()
         first.open(Channel(script_socket), _WARM_UP_SCRIPT)
-        first.obey(("go", 1, "load", [0.0, None], NO_ANSWERS, False))
+        first.execute(("go", 1, "load", [0.0, None], NO_ANSWERS, False))
     return ScriptWorker()

@@ -23,7 +23,7 @@ from drone_sim.scripting.rpc.channel import Disconnected
 from drone_sim.scripting.rpc.connection import ScriptConnection
 from drone_sim.scripting.rpc.expected_reads import ExpectedReads
 from drone_sim.scripting.rpc.places import Place
-from drone_sim.scripting.rpc.values import NoMessage, ScriptFunction, kind_of
+from drone_sim.scripting.rpc.values import InvalidMessage, ScriptFunction, kind_of
 from drone_sim.scripting.time_limit import TimeLimit
 
 GRACE = 5.0  # s beyond the time limit, which the script's process should enforce itself
@@ -56,7 +56,7 @@ class ScriptProxy(Script):
         self._failure: tuple[str, Exception] | None = None  # of a call whose reply the script did not wait for
         self._deadline = 0.0
         self._phase = ""  # the current one
-        self._has_gone_on = False  # whether it ran the next actuation right after a sensing
+        self._is_ahead = False  # whether it ran the next actuation right after a sensing
         self.language = "python" if path.endswith(".py") else "lua"
         self._thread_is_alive = False
         result = self._do("load", [self._limit.seconds, self._connection.processor])
@@ -65,7 +65,7 @@ class ScriptProxy(Script):
     # ---- interface of a script
 
     def _run_phase(self, phase: str) -> None:
-        if self._has_gone_on and phase == "actuation":
+        if self._is_ahead and phase == "actuation":
             self._finish()
         elif not self._connection.why_closed or phase != "cleanup":
             self._do("call", [phase], phase == "sensing" and self._connection.is_quiet())
@@ -127,16 +127,16 @@ class ScriptProxy(Script):
 
     def _finish(self) -> None:
         """Execute the requests of an actuation that the script has already run."""
-        self._has_gone_on = False
+        self._is_ahead = False
         self._phase = "call actuation"
-        self._guarded("actuation")
+        self._exchange("actuation")
 
-    def _do(self, command: str, arguments: list[Any], may_go_on: bool = False) -> Any:
+    def _do(self, command: str, arguments: list[Any], may_run_ahead: bool = False) -> Any:
         """Send a command to the script, execute the calls that it requests, and return its result.
 
-        `may_go_on`: whether the script may run the next step's actuation right after this sensing.
+        `may_run_ahead`: whether the script may run the next step's actuation right after this sensing.
         """
-        if self._has_gone_on:  # the flight ends before that step
+        if self._is_ahead:  # the flight ends before that step
             with contextlib.suppress(ScriptError):
                 self._finish()
         is_text = command.startswith("execute")
@@ -146,10 +146,10 @@ class ScriptProxy(Script):
         if self._connection.why_closed:
             raise ConnectionClosed(shown, self._path, 0, self._connection.why_closed)
         encoded = [values.outgoing(argument) for argument in arguments]
-        message = "go", self._number, command, encoded, self._reads(phase, 0), may_go_on
-        return self._guarded(shown, message)
+        message = "go", self._number, command, encoded, self._reads(phase, 0), may_run_ahead
+        return self._exchange(shown, message)
 
-    def _guarded(self, phase: str, message: tuple[Any, ...] | None = None) -> Any:
+    def _exchange(self, phase: str, message: tuple[Any, ...] | None = None) -> Any:
         """Send a message, and handle the script's items until it returns; `phase` is for error texts."""
         limit = self._limit.seconds
         outer, self._deadline = self._deadline, monotonic() + (limit + GRACE if limit else 1e9)
@@ -162,7 +162,7 @@ class ScriptProxy(Script):
         except Disconnected:
             self._connection.is_gone = True
             self._end(phase, "its process has ended")
-        except NoMessage as error:
+        except InvalidMessage as error:
             self._end(phase, f"its process sent an invalid message: {error}")
         finally:
             self._deadline = outer
@@ -190,14 +190,14 @@ class ScriptProxy(Script):
                 elif kind == "failed":
                     self._failed(item)
                 else:
-                    raise NoMessage(f"unknown reply '{kind:.20}'")
+                    raise InvalidMessage(f"unknown reply '{kind:.20}'")
         finally:
             self._failure = outer
 
     def _returned(self, phase: str, item: list[Any]) -> Any:
         if not 3 <= len(item) <= 4:
-            raise NoMessage("malformed end of a call")
-        self._has_gone_on = len(item) == 4
+            raise InvalidMessage("malformed end of a call")
+        self._is_ahead = len(item) == 4
         self._thread_is_alive = item[1] is True
         if self._failure is not None:
             raise ScriptError(phase, self._path, 0, self._explained(*self._failure))
@@ -205,7 +205,7 @@ class ScriptProxy(Script):
 
     def _failed(self, item: list[Any]) -> NoReturn:
         if len(item) != 6 or [type(field) for field in item[2:]] != [str, str, int, str]:
-            raise NoMessage("malformed failure")
+            raise InvalidMessage("malformed failure")
         _, threaded, phase, path, line, reason = item
         self._thread_is_alive = threaded is True
         raise ScriptError(phase[:_MAX_TEXT], path[:_MAX_TEXT], line, reason)
@@ -217,7 +217,7 @@ class ScriptProxy(Script):
         name, arguments = item[1], item[2:]
         function = self._changes.get(name) if type(name) is str else None
         if function is None:
-            raise NoMessage("function that needs a reply")
+            raise InvalidMessage("function that needs a reply")
         if self._failure is not None:
             return
         if not _ALL_PLAIN(map(type, arguments)):
@@ -233,7 +233,7 @@ class ScriptProxy(Script):
     def _serve_call(self, item: list[Any]) -> None:
         """Execute a call, and send its result with the results of the reads that are expected next."""
         if len(item) < 4 or type(item[2]) is not int or type(item[3]) is not list:
-            raise NoMessage("malformed call")
+            raise InvalidMessage("malformed call")
         began = monotonic()
         phase = self._phase
         try:
@@ -242,7 +242,7 @@ class ScriptProxy(Script):
                 raise failure
             result = self._called(item[1], item[4:], _named_arguments(item[3]))
             answer: tuple[Any, ...] = "is", values.outgoing(self._waits.kept(result)), self._reads(phase, item[2])
-        except (NoMessage, ConnectionClosed):
+        except (InvalidMessage, ConnectionClosed):
             raise
         except Exception as error:
             answer = "no", kind_of(error), _text(error), self._explained(item[1], error)
@@ -257,7 +257,7 @@ class ScriptProxy(Script):
         if name == "wait":
             return self._waits.step(*in_order)
         if function is None:
-            raise NoMessage("unknown function of the API")
+            raise InvalidMessage("unknown function of the API")
         on_result = self._connection.permit(name, _in_order(function, in_order, by_name))
         result = function(*in_order, **by_name)
         if on_result is not None:
@@ -270,7 +270,7 @@ class ScriptProxy(Script):
     def _function_there(self, number: int) -> ScriptFunction:
         if number not in self._handed:
             if len(self._handed) >= _MAX_FUNCTIONS:
-                raise NoMessage("too many functions")
+                raise InvalidMessage("too many functions")
             self._handed[number] = ScriptFunction(number)
         return self._handed[number]
 
@@ -280,16 +280,16 @@ class ScriptProxy(Script):
             text = f"{name if isinstance(error, ValueError) else type(error).__name__}: {_text(error)}"
         return text[: 2 * _MAX_TEXT]
 
-    def _reads(self, phase: str, stretch: int) -> tuple[list[Any], list[Place]]:
+    def _reads(self, phase: str, segment: int) -> tuple[list[Any], list[Place]]:
         """Start a segment of a phase; return the results of its expected reads."""
         self._phase = phase
-        return self._expected.answers(phase, stretch)
+        return self._expected.results_of(phase, segment)
 
 
 def _named_arguments(pairs: list[Any]) -> dict[str, Any]:
-    """Return arguments by name. Raises NoMessage."""
+    """Return arguments by name. Raises InvalidMessage."""
     if not all(type(pair) is list and len(pair) == 2 and type(pair[0]) is str for pair in pairs):
-        raise NoMessage("malformed named arguments")
+        raise InvalidMessage("malformed named arguments")
     return dict(pairs)
 
 

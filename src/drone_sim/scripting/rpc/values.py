@@ -48,7 +48,7 @@ def kind_of(error: Exception) -> str:
     return next((base.__name__ for base in type(error).__mro__ if base.__name__ in ERRORS), RuntimeError.__name__)
 
 
-class NoMessage(ValueError):
+class InvalidMessage(ValueError):
     """The script's process has sent an invalid message."""
 
 
@@ -184,27 +184,33 @@ def written(items: list[Any]) -> bytes:
 
 
 def read(message: bytes) -> list[Any]:
-    """Return the items of a message of the script's process, each a list beginning with a string. Raises NoMessage."""
+    """Return the items of a message of the script's process, each a list beginning with a string.
+
+    Raises InvalidMessage.
+    """
     try:
         text = message.decode()
         items, end = _decode(text)
     except (ValueError, RecursionError):
-        raise NoMessage("not JSON") from None
+        raise InvalidMessage("not JSON") from None
     if type(items) is not list or end != len(text):
-        raise NoMessage("not a list of items")
+        raise InvalidMessage("not a list of items")
     for item in items:
         if type(item) is not list or not item or type(item[0]) is not str:
-            raise NoMessage("not a list of items")
+            raise InvalidMessage("not a list of items")
     return items
 
 
 def unmarked(value: Any, function: Callable[[int], Any], depth: int = 0) -> Any:
-    """Return the value that `marked` has encoded; `function` returns a function by its number. Raises NoMessage."""
+    """Return the value that `marked` has encoded; `function` returns a function by its number.
+
+    Raises InvalidMessage.
+    """
     kind = type(value)
     if kind in _PLAIN:
         return value
     if depth > DEEPEST:
-        raise NoMessage("values nested too deeply")
+        raise InvalidMessage("values nested too deeply")
     if kind is list:
         return value if _ALL_PLAIN(map(type, value)) else [unmarked(item, function, depth + 1) for item in value]
     mark, inner = _mark(value)
@@ -218,25 +224,25 @@ def unmarked(value: Any, function: Callable[[int], Any], depth: int = 0) -> Any:
 
 
 def _mark(value: dict[str, Any]) -> tuple[str, Any]:
-    """Return a mark and its content. Raises NoMessage."""
+    """Return a mark and its content. Raises InvalidMessage."""
     if len(value) == 1:
         ((mark, inner),) = value.items()
         if type(inner) is _MARKS.get(mark):
             return mark, inner
-    raise NoMessage("unknown mark")
+    raise InvalidMessage("unknown mark")
 
 
 def _mapping(mark: str, pairs: list[Any], function: Callable[[int], Any], depth: int) -> Any:
     if not all(type(item) is list and len(item) == 2 for item in pairs):
-        raise NoMessage("not a list of pairs")
+        raise InvalidMessage("not a list of pairs")
     decoded = [(unmarked(key, function, depth + 1), unmarked(item, function, depth + 1)) for key, item in pairs]
     try:
         if mark == "d":
             return dict(decoded)
     except TypeError:
-        raise NoMessage("not a valid key") from None
+        raise InvalidMessage("not a valid key") from None
     if not all(type(key) is str and key.isidentifier() and not key.startswith("_") for key, _ in decoded):
-        raise NoMessage("unknown field")
+        raise InvalidMessage("unknown field")
     return SimpleNamespace(**dict(decoded))
 
 
@@ -244,4 +250,4 @@ def _bytes(text: str) -> bytes:
     try:
         return base64.b64decode(text, validate=True)
     except (binascii.Error, ValueError):
-        raise NoMessage("not base64") from None
+        raise InvalidMessage("not base64") from None
