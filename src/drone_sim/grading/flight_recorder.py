@@ -61,7 +61,7 @@ class FlightRecorder:
         signals = self._simulation.context.signals
         for signal in dict.fromkeys(name for criterion in plan.criteria for name in criterion.signals):
             self._record_changes(signal, functools.partial(signals.find, signal))
-        own_topics = self._vehicle.bus.said
+        own_topics = self._vehicle.bus.own_messages
         for topic, full in backend.topics.items():
             self._record_changes(topic, lambda name=full: backend.last.get(name, own_topics.get(name)))  # type: ignore[misc]
 

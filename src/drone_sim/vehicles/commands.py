@@ -144,7 +144,7 @@ class FlightState:
     def __str__(self) -> str:
         """Return the state that a script publishes, or `unknown`."""
         for bus in self._commands.buses:
-            message = bus.said and bus.said.get(bus.resolve(_TOPIC))
+            message = bus.own_messages and bus.own_messages.get(bus.resolve(_TOPIC))
             if message:
                 return str(message.get("data", message) if isinstance(message, dict) else message)
         return self._missing or UNKNOWN

@@ -55,7 +55,7 @@ class MessageBus:
         self.new_callbacks, self.deliver = self._subscriptions.new_callbacks, self._subscriptions.deliver
         self.take = self._subscriptions.take
         self._publishers: dict[int, _Publisher] = {}
-        self.said: dict[str, Any] = {}  # the last message on each of the drone's own topics, by complete name
+        self.own_messages: dict[str, Any] = {}  # the last message on each of the drone's own topics, by complete name
         self._last_handle = 0
 
     # ---- for scripts
@@ -113,7 +113,7 @@ class MessageBus:
 
         def begin() -> MessageSender | None:
             if resolved in self._own_topics:
-                return OwnTopic(self.said, resolved)
+                return OwnTopic(self.own_messages, resolved)
             return self.backend.advertise(resolved, kind, _length(queue), latch) if self.backend else None
 
         self._check_type(resolved, kind)
@@ -177,7 +177,7 @@ class MessageBus:
     def save_state(self) -> Callable[[], None]:
         """Return a function that restores the present subscriptions, publications and waiting messages."""
         restore_subscriptions, kept = self._subscriptions.save_state(), dict(self._publishers)
-        last, said = self._last_handle, dict(self.said)
+        last, kept_messages = self._last_handle, dict(self.own_messages)
 
         def restore() -> None:
             restore_subscriptions()
@@ -187,8 +187,8 @@ class MessageBus:
                 kept[handle] = kept[handle]._replace(sender=kept[handle].begin())
             self._publishers = dict(kept)
             self._last_handle = last
-            self.said.clear()
-            self.said.update(said)
+            self.own_messages.clear()
+            self.own_messages.update(kept_messages)
 
         return restore
 

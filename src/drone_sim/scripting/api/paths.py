@@ -236,7 +236,7 @@ def _control_point(given: Sequence[float], is_flat: bool) -> dict[str, Any]:
     x, y, z = given[:3]
     turn = frames.to_quaternion(frames.from_euler((0.0, 0.0, 0.0), given[3:6]))
     count = min(max(round(given[8]), 1), 100)
-    said = {
+    entry = {
         "position": [x, y, 0.0 if is_flat else z],
         "turn": list(turn),
         "pause": min(max(given[7], 0.0), 1000.0),
@@ -244,7 +244,7 @@ def _control_point(given: Sequence[float], is_flat: bool) -> dict[str, Any]:
         "factors": [min(max(one, 0.1), 0.99) for one in given[9:11]],
     }
     data = {"flags": round(given[11]), "channels": list(given[12:])} if len(given) == _WITH_DATA else {}
-    return {**said, **data}
+    return {**entry, **data}
 
 
 def smoothed(points: Sequence[Sequence[float]], closed: bool, smoothness: float, count: int) -> list[list[float]]:

@@ -22,13 +22,13 @@ SERVICE = "service {}"  # stored in place of a topic, whose name begins with a s
 class OwnTopic:
     """Sender for a topic that the drone itself receives; a Backend sends all other topics."""
 
-    def __init__(self, said: dict[str, Any], topic: str):
-        """The last message of `topic` is stored in `said`."""
-        self._said, self._topic = said, topic
+    def __init__(self, messages: dict[str, Any], topic: str):
+        """The last message is stored in `messages` under `topic`."""
+        self._messages, self._topic = messages, topic
 
     def publish(self, message: Any) -> None:
         """Store a message."""
-        self._said[self._topic] = message
+        self._messages[self._topic] = message
 
     def subscribers(self) -> int:
         """Return 1, for the drone."""
@@ -36,7 +36,7 @@ class OwnTopic:
 
     def shutdown(self) -> None:
         """Remove the message."""
-        self._said.pop(self._topic, None)
+        self._messages.pop(self._topic, None)
 
 
 class _Subscription(NamedTuple):
