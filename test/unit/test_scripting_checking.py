@@ -14,7 +14,7 @@ def _check():
 
 
 def said(found):
-    return [(one.line, one.column, one.end, one.message) for one in found]
+    return [(one.line, one.column, one.end, one.said) for one in found]
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def said(found):
 )
 def test_python(check, text, place, words):
     (found,) = check(text, False)
-    assert (found.line, found.column) == place and words in found.message
+    assert (found.line, found.column) == place and words in found.said
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_what_is_right_in_python(check, text):
 )
 def test_lua(check, text, place, words):
     (found,) = check(text, True)
-    assert (found.line, found.column) == place and words in found.message
+    assert (found.line, found.column) == place and words in found.said
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ def test_who_hangs_is_left_behind_and_finds_the_api_closed(thread):
         def readers(self):
             return (tuple,)
 
-        def answer_of(self, function):
+        def encoder_of(self, function):
             return lambda value: (1, value)
 
     state = SimpleNamespace(executor=thread, values=Values(), used=int)

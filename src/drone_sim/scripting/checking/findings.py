@@ -19,7 +19,7 @@ class Finding(NamedTuple):
     line: int
     column: int
     end: int
-    message: str
+    said: str  # the name in the cockpit's page
     severity: str = "error"  # or "warning"
 
 
