@@ -1,4 +1,4 @@
-"""The tree of frames, on which markers hang."""
+"""The tree of tf frames, in which markers have their poses."""
 
 from __future__ import annotations
 
@@ -10,44 +10,41 @@ from drone_sim.ros.core.message_conversion import WORLD_FRAME, xyz, xyzw
 
 
 class FrameTree:
-    """What is where, as it was last heard. Any thread may call."""
+    """Latest parent and pose of each frame. Thread-safe."""
 
     def __init__(self) -> None:
-        """Begin with the root alone."""
         self._lock = threading.Lock()
-        self._heard: dict[str, tuple[str, Pose]] = {}  # parent and place, by frame
+        self._frames: dict[str, tuple[str, Pose]] = {}  # parent and pose, by name
         self._changed: set[str] = set()
-        self._rooted: set[str] = set()
-        self.came = threading.Event()  # when something has been heard
+        self.has_news = threading.Event()  # set by each message
 
     def on_transforms(self, message: Any) -> None:
-        """Take a tfMessage: all in it is shown together."""
+        """Store the transforms of a tfMessage."""
         with self._lock:
-            for one in message.transforms:
-                pose = (*xyz(one.transform.translation), *xyzw(one.transform.rotation))
-                self._heard[one.child_frame_id] = one.header.frame_id, pose
-                self._changed.add(one.child_frame_id)
-        self.came.set()
+            for transform in message.transforms:
+                pose = (*xyz(transform.transform.translation), *xyzw(transform.transform.rotation))
+                self._frames[transform.child_frame_id] = transform.header.frame_id, pose
+                self._changed.add(transform.child_frame_id)
+        self.has_news.set()
 
     def take(self) -> dict[str, tuple[str, Pose]]:
-        """Return parent ('' for the world) and pose of what has changed, parents first.
+        """Return parent ('' for the world) and pose of the frames that have changed since the last call, parents first.
 
-        What hangs on a frame that is not known waits for it.
+        A frame without a path to the world is returned once it has one.
         """
         with self._lock:
-            parents = {frame: parent for frame, (parent, _) in self._heard.items()}
+            parents = {frame: parent for frame, (parent, _) in self._frames.items()}
             depths = {frame: _depth(frame, parents) for frame in self._changed}
-            ready = sorted((frame for frame in self._changed if depths[frame]), key=lambda one: depths[one])
+            ready = sorted((frame for frame in self._changed if depths[frame]), key=lambda frame: depths[frame])
             self._changed -= set(ready)
-            return {frame: (_above(parents[frame]), self._heard[frame][1]) for frame in ready}
-
-
-def _above(parent: str) -> str:
-    return "" if parent == WORLD_FRAME else parent
+            return {
+                frame: ("" if parents[frame] == WORLD_FRAME else parents[frame], self._frames[frame][1])
+                for frame in ready
+            }
 
 
 def _depth(frame: str, parents: dict[str, str]) -> int:
-    """Return how many frames there are from the root to this one, 0 where it does not hang on the root."""
+    """Return the number of frames on the path from the world to `frame`; 0 if there is no path."""
     for depth in range(len(parents) + 1):
         if frame == WORLD_FRAME:
             return depth

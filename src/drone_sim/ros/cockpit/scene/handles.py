@@ -1,7 +1,7 @@
-"""Things to drag in the browser: the handles that the simulation offers to rviz, and who holds which of them.
+"""Handles to drag in the browser, which are the simulation's interactive markers, and the browsers that hold them.
 
-A handle is sent to the browsers as a marker of the kind `handle`: its name is `ns`, its server is `layer`. If it is
-always visible, such as the green sphere, its looks are sent as markers of their own, in the same layer.
+A handle is sent to the browsers as a marker of the kind `handle`: its name is `ns`, its server is `layer`. The markers
+of a handle that is always visible, such as the green sphere, are sent as separate markers of the same layer.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from drone_sim.ros.cockpit.scene.markers import entry_of, pose_of
 from drone_sim.ros.cockpit.scene.scene_state import Entry, Key
 from drone_sim.ros.core.message_conversion import WORLD_FRAME
 
-_STILL = 0.25  # s, after which the simulation is told once more that a handle is held
-_UNSEEN = 0.05  # opacity of what is there for the mouse alone
-_FARTHEST = 1e6  # m, of what a browser may ask for
+_KEEP_ALIVE_PERIOD = 0.25  # s, between messages to the simulation while a handle is held
+_MAX_INVISIBLE = 0.05  # opacity of markers that are only for the mouse
+_MAX_COORDINATE = 1e6  # m, in a browser's message
 PHASES = {
     "start": InteractiveMarkerFeedback.MOUSE_DOWN,
     "move": InteractiveMarkerFeedback.POSE_UPDATE,
@@ -41,7 +41,7 @@ PHASES = {
 
 
 class Drag(NamedTuple):
-    """What a browser says of a handle: start, move or end, and where it is now in the world."""
+    """A browser's message about a handle: start, move or end of a drag, and the pose in the world."""
 
     server: str
     name: str
@@ -64,22 +64,23 @@ def _read_pose(given: Any) -> scene_state.Pose:
     wrong = ValueError("pose: must be x, y, z (m), and a quaternion x, y, z, w")
     if not isinstance(given, list) or len(given) != len(scene_state.AT_REST):
         raise wrong
-    if any(not isinstance(one, (int, float)) or isinstance(one, bool) or abs(one) > _FARTHEST for one in given):
+    for value in given:
+        if not isinstance(value, (int, float)) or isinstance(value, bool) or abs(value) > _MAX_COORDINATE:
+            raise wrong
+    norm = sum(value * value for value in given[3:]) ** 0.5
+    if norm < 0.5:
         raise wrong
-    length = sum(one * one for one in given[3:]) ** 0.5
-    if length < 0.5:
-        raise wrong
-    return (*map(float, given[:3]), *(one / length for one in given[3:]))
+    return (*map(float, given[:3]), *(value / norm for value in given[3:]))
 
 
-class _Held(NamedTuple):
+class _Hold(NamedTuple):
     browser: int
-    said: float  # s, when the simulation was told last
+    sent_at: float  # s, of the last message to the simulation
     pose: scene_state.Pose
 
 
 class DragControls:
-    """The handles of one interactive marker server. Any thread may call."""
+    """The handles of one interactive marker server. Thread-safe."""
 
     def __init__(
         self,
@@ -87,98 +88,99 @@ class DragControls:
         publish: Callable[[InteractiveMarkerFeedback], None],
         clock: Callable[[], float] = time.monotonic,
     ):
-        """Begin without handles.
-
-        `publish` sends what is dragged to the topic `…/feedback`; `clock` returns s.
-        """
+        """`publish` sends feedback to the simulation; `clock` must be monotonic (s)."""
         self._server = server
         self._publish, self._clock = publish, clock
         self._lock = threading.RLock()
-        self._there: dict[str, tuple[InteractiveMarker, Pose]] = {}
+        self._handles: dict[str, tuple[InteractiveMarker, Pose]] = {}
         self._changed: set[str] = set()
-        self._told: dict[str, set[Key]] = {}
-        self._held: dict[str, _Held] = {}
+        self._taken: dict[str, set[Key]] = {}  # keys of the markers that `take` has returned, by handle
+        self._holds: dict[str, _Hold] = {}
 
     def on_init(self, message: InteractiveMarkerInit) -> None:
-        """Take all that there are."""
+        """Replace all handles."""
         with self._lock:
-            self._changed |= self._there.keys()
-            self._there = {one.name: (one, one.pose) for one in message.markers}
-            self._changed |= self._there.keys()
+            self._changed |= self._handles.keys()
+            self._handles = {marker.name: (marker, marker.pose) for marker in message.markers}
+            self._changed |= self._handles.keys()
 
     def on_update(self, message: InteractiveMarkerUpdate) -> None:
-        """Take what has come, gone or moved."""
+        """Add, move and remove handles."""
         with self._lock:
-            for one in message.markers:
-                self._there[one.name] = one, one.pose
-                self._changed.add(one.name)
+            for marker in message.markers:
+                self._handles[marker.name] = marker, marker.pose
+                self._changed.add(marker.name)
             for pose in message.poses:
-                if pose.name in self._there:
-                    self._there[pose.name] = self._there[pose.name][0], pose.pose
+                if pose.name in self._handles:
+                    self._handles[pose.name] = self._handles[pose.name][0], pose.pose
                     self._changed.add(pose.name)
             for name in message.erases:
-                self._there.pop(name, None)
+                self._handles.pop(name, None)
                 self._changed.add(name)
 
     def take(self) -> dict[Key, Entry | None]:
-        """Return what has changed of the handles since the last call, None for what is gone."""
+        """Return the handles' markers that have changed since the last call; None for a marker that is gone."""
         with self._lock:
             names, self._changed = self._changed, set()
             changed: dict[Key, Entry | None] = {}
             for name in names:
-                told = self._entries(*self._there[name]) if name in self._there else {}
-                changed.update(dict.fromkeys(self._told.pop(name, set()) - told.keys()))
-                changed.update(told)
-                if told:
-                    self._told[name] = set(told)
+                entries = self._entries(*self._handles[name]) if name in self._handles else {}
+                changed.update(dict.fromkeys(self._taken.pop(name, set()) - entries.keys()))
+                changed.update(entries)
+                if entries:
+                    self._taken[name] = set(entries)
             return changed
 
     def _entries(self, handle: InteractiveMarker, pose: Pose) -> dict[Key, Entry | None]:
-        said = {"kind": "handle", "layer": self._server, "ns": handle.name, "frame": WORLD_FRAME}
-        entries: dict[Key, Entry | None] = {(self._server, handle.name, ""): Entry(said, {}, pose_of(pose))}
-        looks = [one for control in handle.controls if control.always_visible for one in control.markers]
-        for number, look in enumerate(one for one in looks if one.type == Marker.SPHERE and one.color.a > _UNSEEN):
-            entry = entry_of(look, self._server, lambda _: None)
+        properties = {"kind": "handle", "layer": self._server, "ns": handle.name, "frame": WORLD_FRAME}
+        entries: dict[Key, Entry | None] = {(self._server, handle.name, ""): Entry(properties, {}, pose_of(pose))}
+        markers = [marker for control in handle.controls if control.always_visible for marker in control.markers]
+        visible = (marker for marker in markers if marker.type == Marker.SPHERE and marker.color.a > _MAX_INVISIBLE)
+        for number, marker in enumerate(visible):
+            entry = entry_of(marker, self._server, lambda _: None)
             if entry is not None:
-                place = _multiply(pose_of(pose), pose_of(look.pose))
-                told = {**entry.said, "ns": handle.name, "frame": WORLD_FRAME}
-                entries[self._server, handle.name, str(number)] = Entry(told, {}, place)
+                in_world = _multiply(pose_of(pose), pose_of(marker.pose))
+                properties = {**entry.properties, "ns": handle.name, "frame": WORLD_FRAME}
+                entries[self._server, handle.name, str(number)] = Entry(properties, {}, in_world)
         return entries
 
     # ---- dragging
 
-    def drag(self, browser: int, given: Drag) -> None:
-        """Tell the simulation what a browser drags. A second browser is ignored until the first one lets go."""
+    def drag(self, browser: int, drag: Drag) -> None:
+        """Send a browser's drag to the simulation. While one browser holds a handle, others are ignored."""
         with self._lock:
-            held = self._held.get(given.name)
-            is_ours = held is not None and held.browser == browser
-            if given.name not in self._there or (is_ours if given.phase == "start" else not is_ours):
-                return
-            if given.phase == "start" and held is not None:
-                return
-            self._tell(given.name, browser, PHASES[given.phase], given.pose)
+            hold = self._holds.get(drag.name)
+            is_start = drag.phase == "start"
+            is_allowed = hold is None if is_start else hold is not None and hold.browser == browser
+            if is_allowed and drag.name in self._handles:
+                self._send(drag.name, browser, PHASES[drag.phase], drag.pose)
 
     def keep(self, browsers: Collection[int]) -> None:
-        """Tell the simulation which handles are still held; release those that have gone, or whose browser has gone."""
+        """Keep held handles alive in the simulation; release those that are gone, or whose browser is not connected."""
         with self._lock:
-            for name, held in list(self._held.items()):
-                if held.browser not in browsers or name not in self._there:
-                    self._tell(name, held.browser, InteractiveMarkerFeedback.MOUSE_UP, held.pose)
-                elif self._clock() - held.said > _STILL:
-                    self._tell(name, held.browser, InteractiveMarkerFeedback.KEEP_ALIVE, held.pose)
+            for name, hold in list(self._holds.items()):
+                if hold.browser not in browsers or name not in self._handles:
+                    self._send(name, hold.browser, InteractiveMarkerFeedback.MOUSE_UP, hold.pose)
+                elif self._clock() - hold.sent_at > _KEEP_ALIVE_PERIOD:
+                    self._send(name, hold.browser, InteractiveMarkerFeedback.KEEP_ALIVE, hold.pose)
 
-    def _tell(self, name: str, browser: int, kind: int, pose: scene_state.Pose) -> None:
+    def _send(self, name: str, browser: int, kind: int, pose: scene_state.Pose) -> None:
         if kind == InteractiveMarkerFeedback.MOUSE_UP:
-            self._held.pop(name, None)
+            self._holds.pop(name, None)
         else:
-            self._held[name] = _Held(browser, self._clock(), pose)
-        who = {"header": Header(frame_id=WORLD_FRAME), "client_id": f"cockpit/{browser}", "marker_name": name}
-        place = Pose(Point(*pose[:3]), Quaternion(*pose[3:]))
+            self._holds[name] = _Hold(browser, self._clock(), pose)
+        feedback = InteractiveMarkerFeedback(
+            header=Header(frame_id=WORLD_FRAME),
+            client_id=f"cockpit/{browser}",
+            marker_name=name,
+            event_type=kind,
+            pose=Pose(Point(*pose[:3]), Quaternion(*pose[3:])),
+        )
         with contextlib.suppress(rospy.ROSException):  # the view is being closed
-            self._publish(InteractiveMarkerFeedback(**who, event_type=kind, pose=place))
+            self._publish(feedback)
 
 
-def _multiply(above: scene_state.Pose, below: scene_state.Pose) -> scene_state.Pose:
-    """Return `below`, a pose in the frame of `above`, as a pose in the frame in which `above` is given."""
-    x, y, z = frames.transform(frames.from_quaternion(above[:3], above[3:]), below[:3])
-    return (x, y, z, *frames.multiply_quaternions(above[3:], below[3:]))
+def _multiply(parent: scene_state.Pose, child: scene_state.Pose) -> scene_state.Pose:
+    """Return the pose of `child`, which is relative to `parent`, in the frame of `parent`'s pose."""
+    x, y, z = frames.transform(frames.from_quaternion(parent[:3], parent[3:]), child[:3])
+    return (x, y, z, *frames.multiply_quaternions(parent[3:], child[3:]))

@@ -1,8 +1,8 @@
-"""MarkerArrays, which the simulation makes for rviz, as what the browsers show.
+"""Conversion of MarkerArrays, which the simulation publishes for rviz, for the browsers.
 
-What is said of a marker: `kind`; `layer`, the topic's name; `ns`; `color` r g b a (0..1, as on a screen); `scale`, m;
-and where it has them `text`, `mesh` (an address), `own` (the mesh has its own colours) and `lit` (false: it is as
-bright from everywhere). Its arrays: `points` (x y z each, m), `colors` (r g b a each).
+A marker's properties are `kind`; `layer`, the topic's name; `ns`; `color` r g b a (0..1, sRGB); `scale`, m; and, for
+some kinds, `text`, `mesh` (a URL), `own` (use the mesh's own colors) and `lit` (false: the marker is not shaded). Its
+arrays are `points` (x y z each, m) and `colors` (r g b a each).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_sim.ros.cockpit.scene.scene_state import AT_REST, Entry, Key, Pose
-from drone_sim.ros.core.message_conversion import xyz
+from drone_sim.ros.core.message_conversion import xyz, xyzw
 
 KINDS = {
     Marker.ARROW: "arrow",
@@ -31,12 +31,12 @@ KINDS = {
     Marker.MESH_RESOURCE: "mesh",
     Marker.TRIANGLE_LIST: "triangles",
 }
-_LEAST = {"strip": 2, "lines": 2, "cubes": 1, "spheres": 1, "points": 1, "triangles": 3}  # points, to be seen
-_DIGITS, _SHADES = 3, 3  # of a size in m, of a colour: who could tell more apart
+_MIN_POINTS = {"strip": 2, "lines": 2, "cubes": 1, "spheres": 1, "points": 1, "triangles": 3}
+_SIZE_DECIMALS, _COLOR_DECIMALS = 3, 3  # finer differences (m; 0..1) are not visible
 
 
 class MarkerTopic:
-    """The markers of one topic; any thread may call."""
+    """The markers of one topic. Thread-safe."""
 
     def __init__(
         self,
@@ -46,86 +46,81 @@ class MarkerTopic:
         hidden: Collection[str] = (),
         is_shaded: bool = False,
     ):
-        """Begin with none; `mesh_url` returns where a browser gets a mesh, None where it cannot be read.
+        """`mesh_url` returns the URL of a mesh for browsers, None for an unreadable mesh.
 
-        `hidden` are namespaces that the browser has in another way. With `is_shaded` the light that is painted on for
-        rviz is left out: the browser has a sun.
+        Markers in the namespaces `hidden` are ignored. If `is_shaded`, markers with colors for each point, which have
+        rviz's light in them, are sent without these: the browser has a sun of its own.
         """
         self.layer = layer
         self._mesh_url = mesh_url
         self._hidden, self._is_shaded = hidden, is_shaded
         self._lock = threading.Lock()
-        self._there: dict[Key, Entry] = {}
+        self._entries: dict[Key, Entry] = {}
         self._changed: dict[Key, Entry | None] = {}
 
     def on_markers(self, message: MarkerArray) -> None:
-        """Take a message."""
+        """Add, change and delete markers."""
         numbers: dict[str, int] | None = None
         fresh: dict[Key, Entry | None] = {}
         for marker in message.markers:
             if marker.action == Marker.DELETEALL:
-                # All is told anew: the n-th of its namespace is the one that was the n-th, whatever its id is now.
-                numbers, fresh = {}, dict.fromkeys(self._there)
+                # All markers follow again, maybe with other ids. The n-th of a namespace replaces the n-th before.
+                numbers, fresh = {}, dict.fromkeys(self._entries)
                 continue
             number = marker.id if numbers is None else numbers.get(marker.ns, 0)
             if numbers is not None:
                 numbers[marker.ns] = number + 1
-            key = (self.layer, marker.ns, str(number))
-            fresh[key] = None if marker.action == Marker.DELETE else self._entry(marker)
-        self._put(fresh)
-
-    def take(self) -> dict[Key, Entry | None]:
-        """Return what has changed since the last call, None for what is gone."""
-        with self._lock:
-            changed, self._changed = self._changed, {}
-        return changed
-
-    def _put(self, fresh: dict[Key, Entry | None]) -> None:
+            key: Key = (self.layer, marker.ns, str(number))
+            is_gone = marker.action == Marker.DELETE or marker.ns in self._hidden
+            fresh[key] = None if is_gone else entry_of(marker, self.layer, self._mesh_url, self._is_shaded)
         with self._lock:
             for key, entry in fresh.items():
                 if entry is None:
-                    self._there.pop(key, None)
+                    self._entries.pop(key, None)
                 else:
-                    self._there[key] = entry
+                    self._entries[key] = entry
             self._changed.update(fresh)
 
-    def _entry(self, marker: Marker) -> Entry | None:
-        return None if marker.ns in self._hidden else entry_of(marker, self.layer, self._mesh_url, self._is_shaded)
+    def take(self) -> dict[Key, Entry | None]:
+        """Return the markers that have changed since the last call; None for a marker that is gone."""
+        with self._lock:
+            changed, self._changed = self._changed, {}
+        return changed
 
 
 def entry_of(
     marker: Marker, layer: str, mesh_url: Callable[[str], str | None], is_shaded: bool = False
 ) -> Entry | None:
-    """Return what a browser is told of a marker, None where there is nothing to see."""
+    """Return a marker for the browsers; None if it is not visible."""
     kind = KINDS.get(marker.type, "")
-    points = np.array([(one.x, one.y, one.z) for one in marker.points], dtype=np.float32)
-    if not kind or len(points) < _LEAST.get(kind, 0):
+    points = np.array([xyz(point) for point in marker.points], dtype=np.float32)
+    if not kind or len(points) < _MIN_POINTS.get(kind, 0):
         return None
     color = marker.color
-    said: dict[str, Any] = {
+    properties: dict[str, Any] = {
         "kind": kind,
         "layer": layer,
         "ns": marker.ns,
         "frame": marker.header.frame_id,
-        "color": [round(one, _SHADES) for one in (color.r, color.g, color.b, color.a)],
-        "scale": [round(one, _DIGITS) for one in xyz(marker.scale)],
+        "color": [round(value, _COLOR_DECIMALS) for value in (color.r, color.g, color.b, color.a)],
+        "scale": [round(value, _SIZE_DECIMALS) for value in xyz(marker.scale)],
     }
     if kind == "text":
-        said["text"] = marker.text
+        properties["text"] = marker.text
     if kind == "mesh":
-        said["mesh"], said["own"] = mesh_url(marker.mesh_resource), bool(marker.mesh_use_embedded_materials)
-        if said["mesh"] is None:
+        properties["mesh"] = mesh_url(marker.mesh_resource)
+        properties["own"] = bool(marker.mesh_use_embedded_materials)
+        if properties["mesh"] is None:
             return None
     arrays = {"points": points.ravel()} if len(points) else {}
     if len(points) and len(marker.colors) == len(points) and not is_shaded:
-        shades = np.array([(one.r, one.g, one.b, one.a) for one in marker.colors], dtype=np.float32)
-        arrays["colors"] = np.round(shades, _SHADES).ravel()
-        said["lit"] = False
-    return Entry(said, arrays, pose_of(marker.pose))
+        colors = np.array([(color.r, color.g, color.b, color.a) for color in marker.colors], dtype=np.float32)
+        arrays["colors"] = np.round(colors, _COLOR_DECIMALS).ravel()
+        properties["lit"] = False
+    return Entry(properties, arrays, pose_of(marker.pose))
 
 
 def pose_of(pose: Any) -> Pose:
-    """Return a message's pose; one without an orientation is upright, as in rviz."""
-    turn = pose.orientation
-    quaternion = (turn.x, turn.y, turn.z, turn.w)
+    """Return a message's pose. As in rviz, the quaternion 0 0 0 0 means no rotation."""
+    quaternion = xyzw(pose.orientation)
     return (*xyz(pose.position), *(quaternion if any(quaternion) else AT_REST[3:]))

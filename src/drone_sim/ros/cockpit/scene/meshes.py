@@ -6,7 +6,6 @@ import hashlib
 import logging
 import threading
 from collections import OrderedDict
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -20,42 +19,41 @@ from drone_sim.files.resources import resolve
 from drone_sim.ros.cockpit.server.access_control import Content
 
 _LOG = logging.getLogger(__name__)
-_LARGEST = 64 << 20  # bytes of a mesh file
-_MOST = 200  # meshes that are kept; those that nobody has asked for since longest go
+_MAX_SIZE = 64 << 20  # bytes of a mesh file
+_MAX_MESHES = 200  # in memory; the least recently used are removed
 _FOLDER, _ENDING, _KIND = "/mesh/", ".glb", "model/gltf-binary"
 _File = tuple[str, int, int]  # resource, time of its last change, size
 
 
 class MeshStore:
-    """The meshes of what is shown, each once; any thread may call."""
+    """Meshes as glTF, by URL. Thread-safe."""
 
     def __init__(self) -> None:
-        """Begin with none."""
         self._lock = threading.Lock()
-        self._addresses: dict[_File, str | None] = {}
+        self._urls: dict[_File, str | None] = {}
         self._contents: OrderedDict[str, bytes] = OrderedDict()
 
     def url(self, resource: str) -> str | None:
-        """Return the address of a mesh file, which has a `file:` or `package:` URL; None for one that cannot be read.
+        """Return the URL for browsers of a mesh file with a `file:` or `package:` URL.
 
-        That is told in the log, once.
+        Return None for an unreadable file, after one line in the log for each file.
         """
         try:
             path = _path(resource)
             state = path.stat()
             file = resource, state.st_mtime_ns, state.st_size
-            if not self._knows(file):
-                self._keep(file, as_glb(path))
-        except Exception as error:  # trimesh raises what it likes on other people's files
+            if not self._is_known(file):
+                self._store(file, as_glb(path))
+        except Exception as error:  # for a broken file, trimesh raises exceptions of any type
             file = resource, 0, 0
-            if not self._knows(file):
+            if not self._is_known(file):
                 _LOG.warning("the cockpit cannot show %s: %s", resource, " ".join(str(error).split()))
-                self._keep(file, None)
+                self._store(file, None)
         with self._lock:
-            return self._addresses.get(file)
+            return self._urls.get(file)
 
     def find(self, path: str) -> Content:
-        """Return type and content of what is asked for by its path, None for no mesh."""
+        """Return type and content of the mesh with a URL path; None if there is none."""
         with self._lock:
             content = self._contents.get(path)
             if content is None:
@@ -63,21 +61,21 @@ class MeshStore:
             self._contents.move_to_end(path)
         return _KIND, content
 
-    def _knows(self, file: _File) -> bool:
+    def _is_known(self, file: _File) -> bool:
         with self._lock:
-            address = self._addresses.get(file, "unknown")
-            return address is None or address in self._contents
+            url = self._urls.get(file, "unknown")
+            return url is None or url in self._contents
 
-    def _keep(self, file: _File, content: bytes | None) -> None:
-        address = None
-        if content is not None:
-            address = f"{_FOLDER}{hashlib.sha256(content).hexdigest()[:24]}{_ENDING}"
+    def _store(self, file: _File, content: bytes | None) -> None:
         with self._lock:
-            self._addresses[file] = address
-            if address is not None and content is not None:
-                self._contents[address] = content
-                while len(self._contents) > _MOST:
-                    self._contents.popitem(last=False)
+            if content is None:
+                self._urls[file] = None
+                return
+            url = f"{_FOLDER}{hashlib.sha256(content).hexdigest()[:24]}{_ENDING}"
+            self._urls[file] = url
+            self._contents[url] = content
+            while len(self._contents) > _MAX_MESHES:
+                self._contents.popitem(last=False)
 
 
 def _path(resource: str) -> Path:
@@ -86,22 +84,18 @@ def _path(resource: str) -> Path:
 
 
 def as_glb(path: Path) -> bytes:
-    """Return a mesh file as glTF, of no metal. Raises OSError, ValueError, and whatever trimesh does."""
-    if path.stat().st_size > _LARGEST:
-        raise ValueError(f"larger than {_LARGEST} bytes")
+    """Return a mesh file as glTF without metallic materials. Raises OSError, ValueError, and what trimesh raises."""
+    if path.stat().st_size > _MAX_SIZE:
+        raise ValueError(f"larger than {_MAX_SIZE} bytes")
     loaded = trimesh.load(path, process=False)
-    _take_paint(loaded)
-    whole = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene(loaded)
-    return bytes(export_glb(whole, tree_postprocessor=_finish))
+    scene = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene(loaded)
+    _merge_light(scene)
+    return bytes(export_glb(scene, tree_postprocessor=_set_materials))
 
 
-def _meshes(loaded: Any) -> Iterable[Any]:
-    return loaded.geometry.values() if isinstance(loaded, trimesh.Scene) else [loaded]
-
-
-def _take_paint(loaded: Any) -> None:
-    """Give textured meshes one brightness, the sum of the shares of light that their material defines for rviz."""
-    for mesh in _meshes(loaded):
+def _merge_light(scene: trimesh.Scene) -> None:
+    """Give textured meshes a single color: the sum of the ambient, diffuse and emissive light that rviz uses."""
+    for mesh in scene.geometry.values():
         material: Any = getattr(mesh.visual, "material", None)
         image = getattr(material, "image", None)
         if image is not None:
@@ -110,10 +104,10 @@ def _take_paint(loaded: Any) -> None:
             mesh.visual.material = PBRMaterial(baseColorTexture=image, baseColorFactor=tint, doubleSided=True)
 
 
-def _finish(tree: dict[str, Any]) -> None:
-    """Give all that is in a glTF a material, of no metal."""
+def _set_materials(tree: dict[str, Any]) -> None:
+    """Give each primitive of a glTF a material, and make no material metallic."""
     materials = tree.setdefault("materials", [])
-    for primitive in (one for mesh in tree["meshes"] for one in mesh["primitives"]):
+    for primitive in (primitive for mesh in tree["meshes"] for primitive in mesh["primitives"]):
         if "material" not in primitive:
             primitive["material"] = len(materials)
             materials.append({"doubleSided": True})

@@ -1,18 +1,18 @@
-"""What the browsers show, by versions: each gets what has changed since it was told last, a new one the whole.
+"""Frames and markers that the browsers show, with versions: a browser gets the changes since its version.
 
 A message is a line of JSON, a line feed, and numbers (float32, little-endian):
 
-| in the line | |
+| key | value |
 |---|---|
 | `scene` | the version |
-| `whole` | true where all that was there before is gone |
-| `frames` | [index, name, index of the parent, -1 for the world], new, or with another parent |
-| `markers` | what is new, or looks different: `id`, `frame`, and what `markers.py` and `handles.py` say of it |
-| `gone` | the ids of markers that are no more |
+| `whole` | true if the browser must remove everything that it had before |
+| `frames` | [index, name, index of the parent, -1 for the world] of frames that are new or have another parent |
+| `markers` | markers that are new or look different: `id`, and the properties in `markers.py` and `handles.py` |
+| `gone` | ids of removed markers |
 | `moved`, `placed` | indices of frames, and ids of markers, whose poses follow |
 
-The numbers are x y z qx qy qz qw (m) for each that is `moved`, then `placed`, seen from the parent, or from the frame;
-then what each of `markers` has in its `arrays`, [name, numbers], in that order.
+The numbers are x y z qx qy qz qw (m) for each frame in `moved`, in its parent, and for each marker in `placed`, in its
+frame; then the arrays of each of `markers`, in the order of its `arrays`, [name, number of values].
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from __future__ import annotations
 import json
 import threading
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -29,19 +29,19 @@ import numpy as np
 Pose = tuple[float, ...]  # x, y, z in m, and a quaternion x, y, z, w
 Key = tuple[str, ...]
 AT_REST: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-_KEPT = 10_000  # ids that are gone; who was told last before the oldest of them gets the whole
+_MAX_GONE = 10_000  # removed ids; a browser with an older version than these gets everything again
 
 
 class Entry(NamedTuple):
-    """What is said of a marker, what it is made of, and where it is."""
+    """A marker's properties, its arrays, and its pose."""
 
-    said: Mapping[str, Any]
+    properties: Mapping[str, Any]
     arrays: Mapping[str, np.ndarray]  # float32
     pose: Pose
 
     def looks_like(self, other: Entry) -> bool:
-        """Tell whether both differ by their pose alone."""
-        if self.said != other.said or self.arrays.keys() != other.arrays.keys():
+        """Return whether properties and arrays are equal."""
+        if self.properties != other.properties or self.arrays.keys() != other.arrays.keys():
             return False
         return all(np.array_equal(array, other.arrays[name]) for name, array in self.arrays.items())
 
@@ -51,53 +51,53 @@ class _Frame:
     index: int
     parent: int
     pose: Pose
-    hung: int  # versions: when it came, or was hung on another parent,
-    moved: int = 0  # and when it moved
+    attached: int  # version in which it got its parent
+    moved: int = 0  # version in which it got its pose
 
 
 @dataclass
-class _Shown:
+class _Marker:
     number: int
     entry: Entry
-    made: int
-    moved: int = 0
+    changed: int  # version in which it got its properties and arrays
+    moved: int = 0  # version in which it got its pose
 
 
 @dataclass
 class SceneState:
-    """All that is to be seen now. One thread changes it, any thread asks."""
+    """The scene for all browsers. One thread changes it, any thread may read it."""
 
     version: int = 0
     _lock: threading.RLock = field(default_factory=threading.RLock)
     _frames: dict[str, _Frame] = field(default_factory=dict)
-    _markers: dict[Key, _Shown] = field(default_factory=dict)
-    _gone: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=_KEPT))
-    _begun: int = 0  # version before which there was something else
-    _numbers: int = 0
-    _made: tuple[int, int, bytes] = (-2, -2, b"")  # the last message: since when, until when
+    _markers: dict[Key, _Marker] = field(default_factory=dict)
+    _gone: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=_MAX_GONE))  # version and id
+    _cleared: int = 0  # version of the last `clear`
+    _last_number: int = 0
+    _last_message: tuple[int, int, bytes] = (-2, -2, b"")  # from and to version
 
     def change(
         self,
         frames: Mapping[str, tuple[str, Pose]],
         markers: Mapping[Key, Entry | None],
     ) -> bool:
-        """Take frames with their parent ('' for the world) and pose, parents before children; markers, None for gone.
+        """Set frames and markers, as one version; return whether anything has changed.
 
-        All of it is one version. Return whether anything has changed.
+        Frames have their parent ('' for the world) and pose, and come after their parents; None removes a marker.
         """
         with self._lock:
             version, self.version = self.version, self.version + 1
-            changed = [self._put_frame(name, *one) for name, one in frames.items()]
-            changed += [self._put_marker(key, one) for key, one in markers.items()]
+            changed = [self._put_frame(name, *frame) for name, frame in frames.items()]
+            changed += [self._put_marker(key, entry) for key, entry in markers.items()]
             if not any(changed):
                 self.version = version
             return any(changed)
 
     def clear(self) -> None:
-        """Have nothing to show."""
+        """Remove all frames and markers."""
         with self._lock:
             self.version += 1
-            self._begun = self.version
+            self._cleared = self.version
             self._frames.clear()
             self._markers.clear()
             self._gone.clear()
@@ -108,15 +108,15 @@ class SceneState:
             return list(self._markers)
 
     def _put_frame(self, name: str, parent: str, pose: Pose) -> bool:
-        above = self._frames[parent].index if parent else -1
+        parent_index = self._frames[parent].index if parent else -1
         known = self._frames.get(name)
         if known is None:
-            self._frames[name] = _Frame(len(self._frames), above, pose, self.version, self.version)
+            self._frames[name] = _Frame(len(self._frames), parent_index, pose, self.version, self.version)
             return True
-        if (known.parent, known.pose) == (above, pose):
+        if (known.parent, known.pose) == (parent_index, pose):
             return False
-        known.hung = self.version if known.parent != above else known.hung
-        known.parent, known.pose, known.moved = above, pose, self.version
+        known.attached = self.version if known.parent != parent_index else known.attached
+        known.parent, known.pose, known.moved = parent_index, pose, self.version
         return True
 
     def _put_marker(self, key: Key, entry: Entry | None) -> bool:
@@ -127,56 +127,51 @@ class SceneState:
                 self._gone.append((self.version, known.number))
             return known is not None
         if known is None:
-            self._numbers += 1
-            self._markers[key] = _Shown(self._numbers, entry, self.version, self.version)
+            self._last_number += 1
+            self._markers[key] = _Marker(self._last_number, entry, self.version, self.version)
             return True
-        is_like, stands = known.entry.looks_like(entry), known.entry.pose == entry.pose
-        known.made = known.made if is_like else self.version
-        known.moved = known.moved if stands else self.version
+        looks_equal, is_still = known.entry.looks_like(entry), known.entry.pose == entry.pose
+        known.changed = known.changed if looks_equal else self.version
+        known.moved = known.moved if is_still else self.version
         known.entry = entry
-        return not (is_like and stands)
+        return not (looks_equal and is_still)
 
-    # ---- what a browser is told
+    # ---- messages to the browsers
 
     def since(self, version: int) -> tuple[int, bytes]:
-        """Return the version now, and the message on what has changed since another one, empty for nothing.
+        """Return the present version, and the message with the changes since `version`; b"" if there are none.
 
-        A version of -1 is that of a browser that knows nothing.
+        `version` is -1 for a new browser.
         """
         with self._lock:
             if version == self.version:
                 return version, b""
-            if self._made[:2] != (version, self.version):
-                self._made = (version, self.version, self._message(version))
-            return self.version, self._made[2]
+            if self._last_message[:2] != (version, self.version):
+                self._last_message = (version, self.version, self._message(version))
+            return self.version, self._last_message[2]
 
     def _message(self, version: int) -> bytes:
-        lost = len(self._gone) == _KEPT and self._gone[0][0] > version
-        whole = version < self._begun or lost or version < 0
-        since = -1 if whole else version
-        frames = [(name, one) for name, one in self._frames.items() if one.moved > since]
-        made = [one for one in self._markers.values() if one.made > since]
-        placed = [one for one in self._markers.values() if one.moved > since or one.made > since]
-        said = {
+        is_too_old = len(self._gone) == _MAX_GONE and self._gone[0][0] > version
+        is_whole = version < self._cleared or is_too_old or version < 0
+        since = -1 if is_whole else version
+        frames = [(name, frame) for name, frame in self._frames.items() if frame.moved > since]
+        changed = [marker for marker in self._markers.values() if marker.changed > since]
+        placed = [marker for marker in self._markers.values() if marker.moved > since or marker.changed > since]
+        header = {
             "scene": self.version,
-            "whole": whole,
-            "frames": [[one.index, name, one.parent] for name, one in frames if one.hung > since],
-            "markers": [_told(one) for one in made],
-            "gone": [] if whole else [number for when, number in self._gone if when > since],
-            "moved": [one.index for _, one in frames],
-            "placed": [one.number for one in placed],
+            "whole": is_whole,
+            "frames": [[frame.index, name, frame.parent] for name, frame in frames if frame.attached > since],
+            "markers": [_description(marker) for marker in changed],
+            "gone": [] if is_whole else [number for when, number in self._gone if when > since],
+            "moved": [frame.index for _, frame in frames],
+            "placed": [marker.number for marker in placed],
         }
-        poses = [one.pose for _, one in frames] + [one.entry.pose for one in placed]
-        numbers = [np.array(poses, dtype="<f4").tobytes(), *_bytes(made)]
-        return json.dumps(said, separators=(",", ":")).encode() + b"\n" + b"".join(numbers)
+        poses = [frame.pose for _, frame in frames] + [marker.entry.pose for marker in placed]
+        arrays = [array for marker in changed for array in marker.entry.arrays.values()]
+        numbers = [np.ascontiguousarray(array, dtype="<f4").tobytes() for array in (np.array(poses), *arrays)]
+        return json.dumps(header, separators=(",", ":")).encode() + b"\n" + b"".join(numbers)
 
 
-def _told(one: _Shown) -> dict[str, Any]:
-    arrays = [[name, int(array.size)] for name, array in one.entry.arrays.items()]
-    return {"id": one.number, **one.entry.said, **({"arrays": arrays} if arrays else {})}
-
-
-def _bytes(made: Iterable[_Shown]) -> Iterable[bytes]:
-    for one in made:
-        for array in one.entry.arrays.values():
-            yield np.ascontiguousarray(array, dtype="<f4").tobytes()
+def _description(marker: _Marker) -> dict[str, Any]:
+    arrays = [[name, int(array.size)] for name, array in marker.entry.arrays.items()]
+    return {"id": marker.number, **marker.entry.properties, **({"arrays": arrays} if arrays else {})}

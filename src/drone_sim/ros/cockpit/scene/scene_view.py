@@ -1,4 +1,4 @@
-"""The scene in the browser: everything that the simulation shows rviz, listened to while a browser is open."""
+"""Subscriptions to the simulation's topics for rviz, which the browsers show, while a browser is open."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from drone_sim.ros.cockpit.scene.meshes import MeshStore
 from drone_sim.ros.cockpit.scene.scene_state import SceneState
 from drone_sim.ros.core.message_conversion import WORLD_FRAME
 
-_SCENE, _BODIES, _AROUND = "scene", "view/bodies", "view/surroundings"
-_OTHERS = ("drawing", "view/path", "view/height", "view/command", "view/forces", "view/state")
+_SCENE, _BODIES, _SURROUNDINGS = "scene", "view/bodies", "view/surroundings"
+_OTHER_TOPICS = ("drawing", "view/path", "view/height", "view/command", "view/forces", "view/state")
 _SERVERS = ("markers", "objects")
-_STRONGEST = 100.0  # N, of a push
+_MAX_PUSH = 100.0  # N
 
 
 class SceneView:
-    """Everything at one namespace, that of the only drone or of the node."""
+    """The topics in one namespace, which is that of the only drone, or the node's."""
 
     def __init__(self, state: SceneState, meshes: MeshStore, namespace: str):
-        """Listen at `namespace`; put what is heard into `state`, and mesh files into `meshes`."""
+        """Subscribe in `namespace`; frames and markers go into `state`, mesh files into `meshes`."""
         self.namespace = namespace
         self._state = state
         self._pushers: dict[str, rospy.Publisher] = {}
@@ -44,68 +44,68 @@ class SceneView:
         self._markers = {
             _SCENE: MarkerTopic(_SCENE, meshes.url, is_shaded=True),
             _BODIES: MarkerTopic(_BODIES, meshes.url, is_shaded=True),
-            _AROUND: MarkerTopic(_AROUND, meshes.url, hidden=("sky", "ground")),
-            **{name: MarkerTopic(name, meshes.url) for name in _OTHERS},
+            _SURROUNDINGS: MarkerTopic(_SURROUNDINGS, meshes.url, hidden=("sky", "ground")),
+            **{name: MarkerTopic(name, meshes.url) for name in _OTHER_TOPICS},
         }
         self._feedback = {
             name: rospy.Publisher(f"{namespace}/{name}/feedback", InteractiveMarkerFeedback, queue_size=10)
             for name in _SERVERS
         }
-        self._handles = {name: DragControls(name, one.publish) for name, one in self._feedback.items()}
-        heard: list[tuple[str, Any, Callable[[Any], None]]] = [
-            *((f"{namespace}/{name}", MarkerArray, one.on_markers) for name, one in self._markers.items()),
+        self._handles = {name: DragControls(name, publisher.publish) for name, publisher in self._feedback.items()}
+        subscriptions: list[tuple[str, Any, Callable[[Any], None]]] = [
+            *((f"{namespace}/{name}", MarkerArray, topic.on_markers) for name, topic in self._markers.items()),
             ("/tf", TFMessage, self._frames.on_transforms),
             ("/tf_static", TFMessage, self._frames.on_transforms),
         ]
         for name, handles in self._handles.items():
-            heard.append((f"{namespace}/{name}/update_full", InteractiveMarkerInit, handles.on_init))
-            heard.append((f"{namespace}/{name}/update", InteractiveMarkerUpdate, handles.on_update))
-        self._listening = [*self._feedback.values(), *(rospy.Subscriber(*one, queue_size=20) for one in heard)]
+            subscriptions.append((f"{namespace}/{name}/update_full", InteractiveMarkerInit, handles.on_init))
+            subscriptions.append((f"{namespace}/{name}/update", InteractiveMarkerUpdate, handles.on_update))
+        self._subscribers = [rospy.Subscriber(*subscription, queue_size=20) for subscription in subscriptions]
 
     def wait(self, seconds: float) -> None:
-        """Wait until something has moved, or so many s."""
-        self._frames.came.wait(seconds)
-        self._frames.came.clear()
+        """Wait until a frame has moved, for at most `seconds`."""
+        self._frames.has_news.wait(seconds)
+        self._frames.has_news.clear()
 
     def keep(self, browsers: Collection[int]) -> None:
-        """Tell the simulation which handles are still held; release those of browsers that are not open any more."""
+        """Keep held handles alive in the simulation; release those of browsers that are not in `browsers`."""
         for handles in self._handles.values():
             handles.keep(browsers)
 
     def collect(self) -> bool:
-        """Put what is new into the state; return whether there is anything."""
+        """Put changed frames and markers into the state; return whether there are any."""
         markers = {}
-        # A handle is shown once the simulation would hear of it: what is said before that is lost.
-        heard = [self._handles[name] for name, one in self._feedback.items() if one.get_num_connections()]
-        sources: list[MarkerTopic | DragControls] = [*self._markers.values(), *heard]
+        # A handle is shown once the simulation has subscribed to its feedback: earlier feedback would be lost.
+        ready = [self._handles[name] for name, publisher in self._feedback.items() if publisher.get_num_connections()]
+        sources: list[MarkerTopic | DragControls] = [*self._markers.values(), *ready]
         for source in sources:
             markers.update(source.take())
         return self._state.change(self._frames.take(), markers)
 
     def drag(self, browser: int, message: Mapping[str, Any]) -> None:
-        """Take what a browser says of a handle. Raises ValueError."""
-        given = read_drag(message)
-        if given.server not in self._handles:
-            raise ValueError(f"server = {shown(given.server)}: must be one of {', '.join(_SERVERS)}")
-        self._handles[given.server].drag(browser, given)
+        """Process a browser's message about a handle. Raises ValueError."""
+        drag = read_drag(message)
+        if drag.server not in self._handles:
+            raise ValueError(f"server = {shown(drag.server)}: must be one of {', '.join(_SERVERS)}")
+        self._handles[drag.server].drag(browser, drag)
 
     def push(self, message: Mapping[str, Any]) -> None:
-        """Push the vehicle that a browser names, along the `ray` (world), with `newtons`. Raises ValueError."""
+        """Push a vehicle along `ray` (world) with `newtons`, as a browser's message says. Raises ValueError."""
         vehicle, ray, newtons = read_push(message)
         if vehicle not in self._pushers:
             raise ValueError(f"push = {shown(vehicle)}: {near_names(vehicle, self._pushers)}")
         push(self._pushers[vehicle].publish, ray, newtons)
 
     def meet(self, vehicles: Collection[str]) -> None:
-        """Advertise pushes to these vehicles early: nobody hears the first message of a new publisher."""
-        for one in vehicles:
-            if one not in self._pushers:
-                self._pushers[one] = rospy.Publisher(f"/{one}/push", WrenchStamped, queue_size=1)
+        """Advertise pushes to these vehicles early, because the first message of a new publisher may be lost."""
+        for vehicle in vehicles:
+            if vehicle not in self._pushers:
+                self._pushers[vehicle] = rospy.Publisher(f"/{vehicle}/push", WrenchStamped, queue_size=1)
 
     def close(self) -> None:
-        """Listen no more, and show nothing."""
-        for one in (*self._listening, *self._pushers.values()):
-            one.unregister()
+        """Unsubscribe from all topics, and clear the state."""
+        for endpoint in (*self._feedback.values(), *self._subscribers, *self._pushers.values()):
+            endpoint.unregister()
         self._state.clear()
 
 
@@ -115,19 +115,19 @@ def read_push(message: Mapping[str, Any]) -> tuple[str, Sequence[float], float]:
     newtons: Any = message.get("newtons")
     if not isinstance(vehicle, str):
         raise ValueError(f"push = {shown(vehicle)}: must be the name of a vehicle")
-    if not isinstance(ray, list) or len(ray) != 3 or not all(_is_number(one) for one in ray) or not any(ray):
+    if not isinstance(ray, list) or len(ray) != 3 or not all(map(_is_number, ray)) or not any(ray):
         raise ValueError("ray: must be x, y and z of a direction")
-    if not _is_number(newtons) or not 0 < newtons <= _STRONGEST:
-        raise ValueError(f"newtons = {shown(newtons)}: must be a number above 0, {_STRONGEST:g} at most")
+    if not _is_number(newtons) or not 0 < newtons <= _MAX_PUSH:
+        raise ValueError(f"newtons = {shown(newtons)}: must be a number above 0, {_MAX_PUSH:g} at most")
     return vehicle, ray, float(newtons)
 
 
-def _is_number(given: Any) -> bool:
-    return isinstance(given, (int, float)) and not isinstance(given, bool) and math.isfinite(given)
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def push(publish: Callable[[WrenchStamped], None], direction: Sequence[float], strength: float) -> None:
-    """Push with so many N in a direction of the world."""
-    along = np.asarray(direction, dtype=float)
-    force = Vector3(*(along / np.linalg.norm(along) * strength))
+def push(publish: Callable[[WrenchStamped], None], direction: Sequence[float], newtons: float) -> None:
+    """Publish a push with a force of `newtons` in a direction (world)."""
+    vector = np.asarray(direction, dtype=float)
+    force = Vector3(*(vector / np.linalg.norm(vector) * newtons))
     publish(WrenchStamped(Header(frame_id=WORLD_FRAME), Wrench(force=force)))
