@@ -17,7 +17,7 @@ from std_msgs.msg import String
 
 from drone_sim.ros.cockpit.panel import cameras as cameras_module
 from drone_sim.ros.cockpit.panel.board import Board
-from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows, camera_name, packed
+from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows, camera_name, encode
 from drone_sim.ros.cockpit.panel.overlays import color_of
 from drone_sim.ros.cockpit.server.page_socket import SendQueue
 from drone_sim.ros.cockpit.topics import ImageTopic, find_topics
@@ -76,7 +76,7 @@ def message(image, encoding):
 
 
 def test_compressed_pictures_go_as_they_came():
-    assert packed(CompressedImage(data=b"\xff\xd8 a JPEG")) == (b"\xff\xd8 a JPEG", "")
+    assert encode(CompressedImage(data=b"\xff\xd8 a JPEG")) == (b"\xff\xd8 a JPEG", "")
 
 
 @pytest.mark.parametrize("encoding, unit", [("32FC1", 1.0), ("16UC1", 1000)])
@@ -84,7 +84,7 @@ def test_depths_are_coloured_and_say_what_the_colours_mean(encoding, unit):
     depths = np.full((60, 80), 2.0)
     depths[:, 40:] = 8.0
     depths[:20] = 0.0
-    content, note = packed(message((depths * unit).astype(np.uint16 if unit == 1000 else np.float32), encoding))
+    content, note = encode(message((depths * unit).astype(np.uint16 if unit == 1000 else np.float32), encoding))
     assert note == "2.00 m (blue) to 8.00 m (red)"
     near, far, nothing = (picture(content)[at].astype(int) for at in ((40, 10), (40, 70), (5, 40)))
     assert near[0] > near[2] and far[2] > far[0] and nothing.max() < 20
@@ -92,21 +92,21 @@ def test_depths_are_coloured_and_say_what_the_colours_mean(encoding, unit):
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.0])
 def test_depths_of_nothing_are_black(value):
-    content, note = packed(message(np.full((10, 10), value, np.float32), "32FC1"))
+    content, note = encode(message(np.full((10, 10), value, np.float32), "32FC1"))
     assert picture(content).max() == 0 and note == "nothing within range"
 
 
 def test_colours_and_greys_of_any_size():
     red = np.zeros((8, 2000, 3), np.uint8)
     red[:, :, 0] = 255
-    shown = picture(packed(message(red, "rgb8"))[0])
+    shown = picture(encode(message(red, "rgb8"))[0])
     assert shown.shape[1] == 500 and shown[1, 250, 2] > 200 > 50 > shown[1, 250, 0]
-    assert picture(packed(message(red, "bgr8"))[0])[1, 250, 0] > 200
-    assert picture(packed(message(red, "8UC3"))[0])[1, 250, 0] > 200
-    assert picture(packed(message(red.astype(np.uint16) * 257, "rgb16"))[0])[1, 100, 2] > 200
-    assert picture(packed(message(np.full((4, 4), 200, np.uint8), "mono8"))[0])[2, 2].min() > 190
+    assert picture(encode(message(red, "bgr8"))[0])[1, 250, 0] > 200
+    assert picture(encode(message(red, "8UC3"))[0])[1, 250, 0] > 200
+    assert picture(encode(message(red.astype(np.uint16) * 257, "rgb16"))[0])[1, 100, 2] > 200
+    assert picture(encode(message(np.full((4, 4), 200, np.uint8), "mono8"))[0])[2, 2].min() > 190
     red_under_its_filter = np.tile(np.array([[255, 0], [0, 0]], np.uint8), (20, 20))
-    assert picture(packed(message(red_under_its_filter, "bayer_rggb8"))[0])[20, 20, 2] > 150
+    assert picture(encode(message(red_under_its_filter, "bayer_rggb8"))[0])[20, 20, 2] > 150
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_colours_and_greys_of_any_size():
 )
 def test_what_is_no_picture_is_refused_in_one_line(wrong):
     with pytest.raises(ValueError, match=r"^[^\n]+$"):
-        packed(wrong)
+        encode(wrong)
 
 
 def test_every_topic_of_pictures_is_offered_once():
@@ -235,9 +235,9 @@ def test_boxes_and_mask_are_those_of_the_pictures_stamp(cameras, sent):
         {"topic": "/drone/front", "on": True},
     ):
         with pytest.raises(ValueError, match="does not exist"):
-            cameras.overlay_asked(wrong)
+            cameras.answer_overlay(wrong)
     for kind in ("boxes", "mask"):
-        cameras.overlay_asked({"topic": "/drone/front", "overlay": kind, "on": True})
+        cameras.answer_overlay({"topic": "/drone/front", "overlay": kind, "on": True})
     truth = {name: Subscriber.there[f"/drone/front/truth/{name}"] for name in ("labels", "boxes", "categories")}
     truth["labels"](String(json.dumps({"categories": {"1": "Gate"}})))
     mask = np.zeros((20, 30), np.uint16)
@@ -259,7 +259,7 @@ def test_boxes_and_mask_are_those_of_the_pictures_stamp(cameras, sent):
     assert said["legend"] == [{"name": "Gate", "color": color}] and said["overlays"] == ["boxes", "mask"]
     painted = picture(content)[7, 7].astype(int), picture(content)[15, 25].astype(int)
     assert np.ptp(painted[0]) > 60 > 10 > np.ptp(painted[1])
-    cameras.overlay_asked({"topic": "/drone/front", "overlay": "mask", "on": False})
+    cameras.answer_overlay({"topic": "/drone/front", "overlay": "mask", "on": False})
     assert "/drone/front/truth/categories" not in Subscriber.there
     cameras.turn("/drone/front", False)
     assert not Subscriber.there
@@ -269,7 +269,7 @@ def test_a_picture_waits_for_its_boxes_unless_none_come_at_all(cameras, sent):
     cameras.rest(False)
     cameras.offer((ImageTopic("/drone/front", has_truth=True),))
     cameras.turn("/drone/front", True)
-    cameras.overlay_asked({"topic": "/drone/front", "overlay": "boxes", "on": True})
+    cameras.answer_overlay({"topic": "/drone/front", "overlay": "boxes", "on": True})
     hear, truth = Subscriber.there["/drone/front"], Subscriber.there["/drone/front/truth/boxes"]
 
     def take(number):
@@ -342,7 +342,7 @@ def test_cameras_go_by_the_names_that_people_use(topic, vehicles, name):
 )
 def test_what_a_browser_asks_of_a_camera_is_checked(cameras, wrong, said):
     with pytest.raises(ValueError, match=f"^{re.escape(said)}"):
-        cameras.turn_asked(wrong)
+        cameras.answer_camera(wrong)
     assert cameras.shown == []
-    cameras.turn_asked({"topic": "/drone/front", "on": True})
+    cameras.answer_camera({"topic": "/drone/front", "on": True})
     assert cameras.shown == ["/drone/front"]

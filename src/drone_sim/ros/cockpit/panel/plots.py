@@ -1,4 +1,4 @@
-"""Numbers of the last half minute, which the page draws: what a vehicle does, its sensors, what scripts signal."""
+"""Values of the last half minute for the page's charts: a vehicle's motion, its sensors, and signals of scripts."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from drone_sim.ros.cockpit.panel.board import Board
 from drone_sim.ros.cockpit.topics import PLOTTED
 from drone_sim.ros.core.message_conversion import level_motion, odometry_row
 
-_SECONDS = 30.0  # that are kept
-_CLOSEST = 0.02  # s between two rows that are kept, however fast a sensor is
-_PATIENCE = 5.0  # s after which a sensor that nobody has asked about is heard no more
-_MOST = 100  # charts that one question may name
-_LONGEST = 1 << 20  # characters of a message with signals
+_DURATION = 30.0  # s, of the stored rows
+_MIN_PERIOD = 0.02  # s, between two stored rows
+_SENSOR_TIMEOUT = 5.0  # s after the last request for a sensor, after which its topic is unsubscribed
+_MAX_CHARTS = 100  # in one request
+_MAX_LENGTH = 1 << 20  # characters of a message with signals
 _UNKNOWN = (math.nan,) * 4  # a gap in the chart
-SIGNAL = "signal "  # what the name of a signal's chart begins with
+SIGNAL = "signal "  # prefix of the names of signals' charts
 
 
 class Chart(NamedTuple):
-    """A title, a unit ('' for none), a name for each line, what its axis shows at least, and which columns it draws."""
+    """Title, unit ('' for none), names of the lines, smallest range of the axis, and columns of the series."""
 
     title: str
     unit: str
@@ -39,7 +39,7 @@ class Chart(NamedTuple):
     columns: slice = slice(None)
 
 
-_OF_THE_VEHICLE = {
+_VEHICLE_CHARTS = {
     "velocity": Chart(
         "Velocity",
         "m/s",
@@ -49,7 +49,7 @@ _OF_THE_VEHICLE = {
     ),
     "height": Chart("Height", "m", ("height",), (0.0, 1.0), slice(4, 5)),
     "attitude": Chart("Attitude", "rad", ("roll", "pitch", "yaw"), (-0.1, 0.1), slice(5, 8)),
-    # The tutorial's thrust is what all four have in common.
+    # The thrust, as in the tutorial, is the mean of the four propellers.
     "propellers": Chart(
         "Propellers and thrust",
         "m/s",
@@ -61,98 +61,104 @@ _OF_THE_VEHICLE = {
 
 
 class Series:
-    """Rows of numbers by time (s); when that goes back, another run begins."""
+    """Rows of numbers by time (s). If time goes back, a new run begins."""
 
     def __init__(self) -> None:
-        """Begin empty."""
         self.run = 0
         self._rows: deque[tuple[float, ...]] = deque()
 
     def add(self, at: float, values: Sequence[float]) -> None:
-        """Add a row, unless it comes too soon after the last one."""
+        """Add a row, unless it is less than _MIN_PERIOD after the last one."""
         if self._rows and at < self._rows[-1][0]:
             self._rows.clear()
             self.run += 1
-        if self._rows and at - self._rows[-1][0] < _CLOSEST:
+        if self._rows and at - self._rows[-1][0] < _MIN_PERIOD:
             return
         self._rows.append((at, *values))
-        while self._rows[0][0] < at - _SECONDS:
+        while self._rows[0][0] < at - _DURATION:
             self._rows.popleft()
 
     def since(self, run: int, at: float, columns: slice) -> list[list[float | None]]:
         """Return the rows after the time `at`, or all rows if `run` is not the present run; None is a gap."""
-        known = at if run == self.run else -math.inf
+        start = at if run == self.run else -math.inf
         return [
-            [row[0], *(one if math.isfinite(one) else None for one in row[1:][columns])]
+            [row[0], *(value if math.isfinite(value) else None for value in row[1:][columns])]
             for row in self._rows
-            if row[0] > known
+            if row[0] > start
         ]
 
 
 class Plots:
-    """Keeps what a vehicle does and what scripts signal; hears a sensor while a browser asks about it."""
+    """Series for the charts. A sensor's topic is subscribed while browsers request its charts."""
 
     def __init__(self, board: Board, clock: Callable[[], float] = time.monotonic):
-        """Show on `board` which charts there are; `clock` returns s."""
+        """`board` lists the charts; `clock` must be monotonic (s)."""
         self._board, self._clock = board, clock
         self._lock = threading.Lock()
-        self._charts: dict[str, tuple[str, Chart]] = {}  # by name: key of its series, and what it draws
-        self._series: dict[str, Series] = {}  # by topic, '' is the vehicle's, or by the name of a signal
-        self._sensors: dict[str, tuple[rospy.Subscriber, float]] = {}  # by topic, and when somebody asked last
+        self._charts: dict[str, tuple[str, Chart]] = {}  # by name, with the key of its series
+        self._series: dict[str, Series] = {}  # by topic, by the name of a signal's chart, or '' for the vehicle
+        self._sensors: dict[str, tuple[rospy.Subscriber, float]] = {}  # by topic, with the time of the last request
         self._kinds: Mapping[str, str] = {}
         self._signals: dict[str, float] = {}
         self._command, self._propellers = (0.0, 0.0), _UNKNOWN
         self._vehicle = ""
-        self._listening: list[rospy.Subscriber] = []
+        self._subscribers: list[rospy.Subscriber] = []
 
     def follow(self, vehicle: str) -> None:
-        """Listen to a vehicle, '' for none."""
+        """Subscribe to a vehicle's topics, '' for none."""
         if vehicle == self._vehicle:
             return
-        for one in self._listening:
-            one.unregister()
-        self._vehicle, self._listening = vehicle, []
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        self._vehicle, self._subscribers = vehicle, []
         with self._lock:
             self._command, self._propellers = (0.0, 0.0), _UNKNOWN
             self._series.pop("", None)
-        self._offer()
+        self._update_charts()
         if vehicle:
-            self._listening = [
+            self._subscribers = [
                 rospy.Subscriber(f"/{vehicle}/command", TwistStamped, self._on_command, queue_size=5),
                 rospy.Subscriber(f"/{vehicle}/propellers", Float32MultiArray, self._on_propellers, queue_size=5),
                 rospy.Subscriber(f"/{vehicle}/odom", Odometry, self._on_odometry, queue_size=5),
             ]
 
     def offer(self, sensors: Mapping[str, str]) -> None:
-        """Offer these topics of sensors, given with their types."""
+        """Set the topics of sensors, with their types."""
         if sensors != self._kinds:
             self._kinds = dict(sensors)
-            self._offer()
+            self._update_charts()
 
     def rest(self) -> None:
-        """Hear no sensor about which nobody has asked for a while."""
+        """Unsubscribe from sensors whose charts have not been requested for _SENSOR_TIMEOUT."""
         with self._lock:
-            old = [name for name, (_, asked) in self._sensors.items() if self._clock() - asked > _PATIENCE]
-            for name in old:
-                self._sensors.pop(name)[0].unregister()
-                self._series.pop(name, None)
+            now = self._clock()
+            for topic in [topic for topic, (_, last) in self._sensors.items() if now - last > _SENSOR_TIMEOUT]:
+                self._sensors.pop(topic)[0].unregister()
+                self._series.pop(topic, None)
 
-    def _offer(self) -> None:
-        charts = {name: ("", chart) for name, chart in _OF_THE_VEHICLE.items()} if self._vehicle else {}
+    def _update_charts(self) -> None:
+        charts = {name: ("", chart) for name, chart in _VEHICLE_CHARTS.items()} if self._vehicle else {}
         for topic, kind in self._kinds.items():
-            charts.update({f"{topic} {one.title}": (topic, one) for one in _of_sensor(topic, kind, self._vehicle)})
+            of_sensor = _sensor_charts(topic, kind, self._vehicle)
+            charts.update({f"{topic} {chart.title}": (topic, chart) for chart in of_sensor})
         charts.update({f"{SIGNAL}{name}": (f"{SIGNAL}{name}", Chart(name, "", (name,))) for name in self._signals})
         with self._lock:
             self._charts = charts
         self._board.show(
             "charts",
             [
-                {"chart": name, "title": one.title, "unit": one.unit, "lines": list(one.lines), "least": one.least}
-                for name, (_, one) in charts.items()
+                {
+                    "chart": name,
+                    "title": chart.title,
+                    "unit": chart.unit,
+                    "lines": list(chart.lines),
+                    "least": chart.least,
+                }
+                for name, (_, chart) in charts.items()
             ],
         )
 
-    # ---- what comes
+    # ---- messages
 
     def _on_command(self, message: TwistStamped) -> None:
         self._command = message.twist.linear.x, message.twist.linear.y
@@ -162,40 +168,46 @@ class Plots:
 
     def _on_odometry(self, message: Odometry) -> None:
         position, rpy, (vx, vy, _) = level_motion(odometry_row(message))
-        (x, y), four = self._command, self._propellers
-        row = x, vx, y, vy, position[2], *rpy, *four, sum(four) / 4
+        (x, y), propellers = self._command, self._propellers
+        row = x, vx, y, vy, position[2], *rpy, *propellers, sum(propellers) / 4
         self._add("", message.header.stamp.to_sec(), row)
 
     def _on_sensor(self, message: Any, topic: str) -> None:
         self._add(topic, message.header.stamp.to_sec(), PLOTTED[message._type].numbers(message))
 
     def on_signals(self, message: String) -> None:
-        """Take what the node says of signals: JSON of the time (s) and of numbers by name."""
+        """Add the node's signals, which are JSON of the time (s) and of numbers by name."""
         try:
-            said = json.loads(message.data) if len(message.data) <= _LONGEST else {}
-            at, signals = float(said["time"]), {str(name): float(one) for name, one in said["signals"].items()}
+            content = json.loads(message.data) if len(message.data) <= _MAX_LENGTH else {}
+            at, signals = float(content["time"]), {str(name): float(x) for name, x in content["signals"].items()}
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
             return
         for name, value in signals.items():
             self._add(f"{SIGNAL}{name}", at, (value,))
         if signals.keys() != self._signals.keys():
             self._signals = signals
-            self._offer()
+            self._update_charts()
 
     def _add(self, key: str, at: float, row: Sequence[float]) -> None:
         with self._lock:
             self._series.setdefault(key, Series()).add(at, row)
 
-    # ---- what a browser asks
+    # ---- requests
 
     def answer(self, message: Mapping[str, Any]) -> dict[str, Any]:
-        """Return what is new in the charts that are named, each with the run and the time (s) that a browser has."""
-        asked = message.get("charts")
-        if not isinstance(asked, Mapping) or len(asked) > _MOST or not all(map(_is_known, asked.values())):
-            raise ValueError(
-                f"charts = {shown(asked)}: must be a mapping of names to [run, time], with at most {_MOST} charts"
-            )
-        return {"charts": {name: self._since(name, int(run), at) for name, (run, at) in asked.items()}}
+        """Return the new rows of charts; the message has, by chart, run and time (s) of the browser's last row.
+
+        Raises ValueError.
+        """
+        charts = message.get("charts")
+        if (
+            not isinstance(charts, Mapping)
+            or len(charts) > _MAX_CHARTS
+            or not all(map(_is_run_and_time, charts.values()))
+        ):
+            allowed = f"must be a mapping of names to [run, time], with at most {_MAX_CHARTS} charts"
+            raise ValueError(f"charts = {shown(charts)}: {allowed}")
+        return {"charts": {name: self._since(name, int(run), at) for name, (run, at) in charts.items()}}
 
     def _since(self, name: str, run: int, at: float) -> dict[str, Any]:
         with self._lock:
@@ -203,23 +215,26 @@ class Plots:
                 return {"run": run, "rows": []}
             key, chart = self._charts[name]
             if key in self._kinds:
-                self._hear(key)
+                self._subscribe(key)
             series = self._series.setdefault(key, Series())
             return {"run": series.run, "rows": series.since(run, at, chart.columns)}
 
-    def _hear(self, topic: str) -> None:
-        heard = self._sensors.get(topic)
-        kind = PLOTTED[self._kinds[topic]].message
-        subscriber = heard[0] if heard else rospy.Subscriber(topic, kind, self._on_sensor, topic)
+    def _subscribe(self, topic: str) -> None:
+        """Subscribe to a sensor, if that is not done, and note the time of this request."""
+        if topic in self._sensors:
+            subscriber = self._sensors[topic][0]
+        else:
+            kind = PLOTTED[self._kinds[topic]].message
+            subscriber = rospy.Subscriber(topic, kind, self._on_sensor, topic)
         self._sensors[topic] = subscriber, self._clock()
 
 
-def _is_known(one: Any) -> bool:
-    return isinstance(one, list) and len(one) == 2 and all(type(value) in (int, float) for value in one)
+def _is_run_and_time(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(type(number) in (int, float) for number in value)
 
 
-def _of_sensor(topic: str, kind: str, vehicle: str) -> list[Chart]:
-    """Return the charts of a sensor: one for each unit of its numbers."""
+def _sensor_charts(topic: str, kind: str, vehicle: str) -> list[Chart]:
+    """Return the charts of a sensor, one for each unit of its numbers."""
     units: dict[str, list[int]] = {}
     names = [name.rpartition(", ") for name in PLOTTED[kind].names]
     for index, (_, _, unit) in enumerate(names):
@@ -228,7 +243,7 @@ def _of_sensor(topic: str, kind: str, vehicle: str) -> list[Chart]:
     charts = []
     for unit, indices in units.items():
         lines = [names[index][0] for index in indices]
-        what = lines[0].rpartition(" ")[0] if len(lines) > 1 else lines[0]
-        title = f"{own}: {what}" if len(units) > 1 else own
+        quantity = lines[0].rpartition(" ")[0] if len(lines) > 1 else lines[0]
+        title = f"{own}: {quantity}" if len(units) > 1 else own
         charts.append(Chart(title, unit, lines, None, slice(indices[0], indices[-1] + 1)))
     return charts
