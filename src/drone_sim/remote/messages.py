@@ -15,7 +15,7 @@ import cbor2
 import numpy as np
 
 from drone_sim.message_text import shown
-from drone_sim.scripting.api.script_values import DEEPEST, refuse_if_too_large
+from drone_sim.scripting.api.types import DEEPEST, refuse_if_too_large
 
 EXECUTED = "_*executed*_"
 END = "_*end*_"  # ends the session

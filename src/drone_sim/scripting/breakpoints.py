@@ -20,7 +20,6 @@ class Row(NamedTuple):
     inside: tuple[Row, ...] = ()
 
     def as_json(self) -> list[Any]:
-        """Return it for JSON."""
         return [self.name, self.type, self.value, [row.as_json() for row in self.inside]]
 
 
@@ -31,7 +30,6 @@ class Scope(NamedTuple):
     rows: list[Row]
 
     def as_json(self) -> list[Any]:
-        """Return it for JSON."""
         return [self.name, [row.as_json() for row in self.rows]]
 
 

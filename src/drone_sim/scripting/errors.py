@@ -32,7 +32,6 @@ class ScriptError(Exception):
         super().__init__(phase, path, line, self.reason)
 
     def __str__(self) -> str:
-        """Return the one-line message."""
         place = f"{self.path}:{self.line}" if self.line else self.path
         return encodable(f"[{self.phase}] {place}: {self.reason}")
 

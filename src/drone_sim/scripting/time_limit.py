@@ -298,7 +298,6 @@ class _Timer:
         self.next = math.inf
 
     def switch_off(self) -> None:
-        """Switch it off."""
         self.forget()
         _setitimer(signal.ITIMER_REAL, 0)
 

@@ -6,8 +6,7 @@ import copy
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from drone_sim.scripting.api.script_values import MOST_BYTES
-from drone_sim.scripting.api.types import Text
+from drone_sim.scripting.api.types import MOST_BYTES, Text
 
 _MOST = 10_000  # waiting broadcasts
 
@@ -32,7 +31,6 @@ class Broadcasts:
     """The broadcasts that can still be received."""
 
     def __init__(self) -> None:
-        """Create it without broadcasts."""
         self.sent: list[Broadcast] = []
 
     def clear(self) -> None:

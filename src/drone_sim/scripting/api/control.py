@@ -21,7 +21,6 @@ class Control:
     """Requests of scripts to stop or pause the simulation; the Player reads `asked` after each step."""
 
     def __init__(self) -> None:
-        """Create it without requests."""
         self.clear()
 
     def clear(self) -> None:

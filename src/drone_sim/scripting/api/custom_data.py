@@ -12,8 +12,7 @@ from drone_sim.mechanics.path import Path
 from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.script_values import MOST_BYTES, refuse_if_too_large
-from drone_sim.scripting.api.types import Handle, Name, WrongValue, written
+from drone_sim.scripting.api.types import MOST_BYTES, Handle, Name, WrongValue, refuse_if_too_large, written
 
 _MOST = 10_000  # values of all objects
 _LONGEST_NAME = 200  # characters
@@ -29,7 +28,6 @@ class CustomData:
     """Values by object and name, shared by all scripts."""
 
     def __init__(self) -> None:
-        """Create it without values."""
         self.values: dict[tuple[int, str], Any] = {}
 
     def clear(self) -> None:

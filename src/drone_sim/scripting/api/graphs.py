@@ -17,7 +17,6 @@ class Graphs:
     """Streams of graphs by handle: each with its graph, its name, and its latest value (None before the first)."""
 
     def __init__(self) -> None:
-        """Create it without streams."""
         self.clear()
 
     def clear(self) -> None:

@@ -9,8 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from drone_sim.scripting.api.calls import sim
-from drone_sim.scripting.api.script_values import refuse_if_too_large
-from drone_sim.scripting.api.types import Numbers, Text, WrongValue
+from drone_sim.scripting.api.types import Numbers, Text, WrongValue, refuse_if_too_large
 
 # Types of numbers: the name in 4.x, the name in 3.x, and the format for struct.
 _KINDS = {

@@ -58,7 +58,6 @@ class Scripts:
     are_own = True
 
     def __init__(self) -> None:
-        """Create it without scripts."""
         # Raises ValueError if a script (the first argument) may not call a function of another; '' means executing a
         # text.
         self.permit: PermitCall = _all_permitted

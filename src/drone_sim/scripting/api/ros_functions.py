@@ -14,8 +14,7 @@ from drone_sim.mechanics.clock import Clock
 from drone_sim.scripting.api.backend import Backend, Image
 from drone_sim.scripting.api.calls import simROS
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.script_values import refuse_if_too_large
-from drone_sim.scripting.api.types import Callback, Handle, Name, WrongValue
+from drone_sim.scripting.api.types import Callback, Handle, Name, WrongValue, refuse_if_too_large
 
 _MOST = 100  # service clients
 

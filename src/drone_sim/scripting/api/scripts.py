@@ -24,8 +24,7 @@ from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.names import NameFunctions
 from drone_sim.scripting.api.registry import Attachment, ScriptParameters
 from drone_sim.scripting.api.script import Script
-from drone_sim.scripting.api.script_values import refuse_if_too_large
-from drone_sim.scripting.api.types import Handle, Name, WrongValue
+from drone_sim.scripting.api.types import Handle, Name, WrongValue, refuse_if_too_large
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import say
 

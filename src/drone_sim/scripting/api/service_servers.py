@@ -10,7 +10,7 @@ from concurrent.futures import Future, InvalidStateError
 from typing import Any
 
 from drone_sim.scripting.api.calls import show
-from drone_sim.scripting.api.script_values import refuse_if_too_large
+from drone_sim.scripting.api.types import refuse_if_too_large
 from drone_sim.scripting.script_log import LOG
 
 PATIENCE = 5.0  # s of real time, after which a request is refused; the simulation never waits

@@ -8,8 +8,17 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from drone_sim.scripting.api.calls import sim
-from drone_sim.scripting.api.script_values import MOST_BYTES, refuse_if_too_large
-from drone_sim.scripting.api.types import Handle, Name, Number, Text, WrongValue, numbers, written
+from drone_sim.scripting.api.types import (
+    MOST_BYTES,
+    Handle,
+    Name,
+    Number,
+    Text,
+    WrongValue,
+    numbers,
+    refuse_if_too_large,
+    written,
+)
 
 _MOST = 10_000  # signals of a kind
 _LONGEST_NAME = 200  # characters
@@ -22,7 +31,6 @@ class Signals:
     """Float, integer and string signals; each kind has its own names."""
 
     def __init__(self) -> None:
-        """Create it without tubes."""
         self.clear()
 
     def clear(self) -> None:
@@ -145,7 +153,6 @@ class Tubes:
     """Tubes between scripts: each has a header, a name, and two ends."""
 
     def __init__(self) -> None:
-        """Create it without tubes."""
         self._ends: dict[int, _End] = {}
         self._last_handle = 0
 

@@ -52,7 +52,6 @@ class Subscriptions:
     """Subscriptions by handle. One thread owns them; any thread may post a message."""
 
     def __init__(self) -> None:
-        """Create it without subscriptions."""
         self._by_handle: dict[int, _Subscription] = {}
         self._lock = threading.Lock()
         self._new_callbacks: list[Callback] = []

@@ -25,7 +25,6 @@ class TrajectoryFunctions:
     """Trajectories with limited velocity, acceleration and jerk, which a script follows itself."""
 
     def __init__(self) -> None:
-        """Create it without trajectories."""
         self._trajectories: dict[int, Trajectory] = {}
         self._handles = itertools.count(1)
 

@@ -1,11 +1,11 @@
-"""Types of the API's arguments, with the names for error messages: 'expected (handle: Handle, position: ...)'.
+"""Types, conversion and size limits of values from scripts.
 
-Also, conversion of numbers.
+Error messages show the types' names: 'expected (handle: Handle, position: ...)'.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
@@ -19,6 +19,14 @@ FourNumbers = Sequence[float]
 SevenNumbers = Sequence[float]
 TwelveNumbers = Sequence[float]
 Callback = str | Callable[[Any], Any]
+
+DEEPEST = 16  # levels of nested tables, lists and mappings
+MOST_VALUES = 3 * 2048 * 2048  # in one call or message, as in the largest picture of a vision sensor
+MOST_BYTES = 64 * 1024 * 1024  # of all strings in it
+
+_PLAIN = frozenset((float, int, bool, type(None)))
+_STRINGS = (str, bytes, bytearray, memoryview)
+Fields = Callable[[Any], Mapping[Any, Any] | None]
 
 
 class WrongValue(TypeError):
@@ -53,3 +61,48 @@ def numbers(values: Sequence[float], count: int) -> tuple[float, ...]:
     if not isfinite(sum(found)):
         raise WrongValue("finite numbers are expected")
     return found
+
+
+def refuse_if_too_large(
+    value: Any, fields: Fields = lambda value: value if isinstance(value, Mapping) else None
+) -> None:
+    """Raise ValueError for a value from a script that is too large, nested too deeply, or contains itself.
+
+    Lists, tuples and mappings are searched, and objects for which `fields` returns a mapping.
+    """
+    if type(value) in _PLAIN:
+        return
+    count = size = 0
+    waiting: list[tuple[Any, int]] = [(value, 0)]
+    while waiting:
+        value, depth = waiting.pop()
+        if isinstance(value, _STRINGS):
+            size += len(value)
+            if size > MOST_BYTES:
+                raise ValueError(f"more than {MOST_BYTES} bytes cannot be passed")
+            continue
+        inner = _inner(value, fields)
+        if inner is None:
+            continue
+        if depth >= DEEPEST:
+            raise ValueError(f"a table is nested too deeply: at most {DEEPEST} levels are allowed")
+        count += len(inner)
+        if count > MOST_VALUES:
+            raise ValueError(f"more than {MOST_VALUES} values are too many")
+        waiting.extend((item, depth + 1) for item in _not_plain(inner))
+
+
+def _not_plain(values: list[Any]) -> list[Any]:
+    """Return the values that are not plain; fast if there are none, as in images with millions of values."""
+    return [] if _PLAIN.issuperset(map(type, values)) else [value for value in values if type(value) not in _PLAIN]
+
+
+def _inner(value: Any, fields: Fields) -> list[Any] | None:
+    named = fields(value)
+    if named is not None:
+        return [*named.keys(), *named.values()]
+    if not hasattr(value, "__len__") or not hasattr(value, "__iter__"):
+        return None
+    if len(value) > MOST_VALUES:
+        raise ValueError(f"more than {MOST_VALUES} values are too many")
+    return list(value)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 from typing import Any
 
-from drone_sim.scripting.api.script_values import DEEPEST, MOST_BYTES, MOST_VALUES, refuse_if_too_large
+from drone_sim.scripting.api.types import DEEPEST, MOST_BYTES, MOST_VALUES, refuse_if_too_large
 
 _NUMBERS = frozenset((float, int, bool))
 _ALL_NUMBERS = _NUMBERS.issuperset

@@ -310,7 +310,6 @@ class PendingWaits:
     """The waits of a script's coroutines; the script's process identifies each by a number."""
 
     def __init__(self) -> None:
-        """Create an empty table."""
         self._waits: dict[int, tuple[Any, Wait]] = {}
         self._last = 0
 

@@ -21,9 +21,8 @@ import numpy as np
 
 from drone_sim.scripting.api.calls import UnknownName
 from drone_sim.scripting.api.control import NoThread
-from drone_sim.scripting.api.script_values import DEEPEST
 from drone_sim.scripting.api.scripts import FunctionsOfScript, handle_of
-from drone_sim.scripting.api.types import WrongValue
+from drone_sim.scripting.api.types import DEEPEST, WrongValue
 from drone_sim.scripting.lua.values import fields
 
 _PLAIN = frozenset((float, int, bool, str, type(None)))
