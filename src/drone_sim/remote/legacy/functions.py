@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from drone_sim.remote.legacy.asked import Asked, Served, Table
 from drone_sim.remote.legacy.groups import GROUPS
 from drone_sim.remote.legacy.joints import JOINTS
 from drone_sim.remote.legacy.objects import OBJECTS
+from drone_sim.remote.legacy.request import Handler, Request, Table
 from drone_sim.remote.legacy.scripts import SCRIPTS
 from drone_sim.remote.legacy.sensors import SENSORS
 from drone_sim.remote.legacy.signals import SIGNALS
@@ -28,11 +28,11 @@ _UNSUPPORTED = {
 }
 
 
-def _refused(name: str, why: str) -> Served:
-    def refuse(ask: Asked) -> bytes:
-        raise ask.refused(why)
+def _refused(name: str, why: str) -> Handler:
+    def refuse(request: Request) -> bytes:
+        raise request.refused(why)
 
-    return Served(name, refuse)
+    return Handler(name, refuse)
 
 
 FUNCTIONS: Table = {
@@ -48,6 +48,6 @@ FUNCTIONS: Table = {
 }
 
 
-def served(code: int) -> Served:
+def served(code: int) -> Handler:
     """Return the handler of a command; for an unknown one, a handler that refuses it."""
     return FUNCTIONS.get(code) or _refused(f"command {code:#06x}", "there is no such command")

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from drone_sim.remote.legacy.asked import Asked, Served, Table, nothing
+from drone_sim.remote.legacy.request import Handler, Request, Table, nothing
 from drone_sim.remote.legacy.values import floats
 
 
-def _number(function: str) -> Served:
-    return Served(f"simxG{function[1:]}", lambda ask: floats(ask.sim(function, *ask.key)))
+def _number(function: str) -> Handler:
+    return Handler(f"simxG{function[1:]}", lambda request: floats(request.sim(function, *request.key)))
 
 
-def _set_number(function: str) -> Served:
-    return Served(f"simxS{function[1:]}", lambda ask: nothing(ask.sim(function, *ask.key, *ask.take("f"))))
+def _set_number(function: str) -> Handler:
+    return Handler(
+        f"simxS{function[1:]}", lambda request: nothing(request.sim(function, *request.key, *request.take("f")))
+    )
 
 
-def _set_spherical_matrix(ask: Asked) -> bytes:
-    return nothing(ask.sim("setSphericalJointMatrix", *ask.key, list(ask.take("12f"))))
+def _set_spherical_matrix(request: Request) -> bytes:
+    return nothing(request.sim("setSphericalJointMatrix", *request.key, list(request.take("12f"))))
 
 
 JOINTS: Table = {
@@ -26,6 +28,6 @@ JOINTS: Table = {
     0x100D: _number("getJointForce"),
     0x100E: _set_number("setJointForce"),
     0x1038: _number("getJointMaxForce"),
-    0x100A: Served("simxGetJointMatrix", lambda ask: floats(*ask.sim("getJointMatrix", *ask.key))),
-    0x100B: Served("simxSetSphericalJointMatrix", _set_spherical_matrix),
+    0x100A: Handler("simxGetJointMatrix", lambda request: floats(*request.sim("getJointMatrix", *request.key))),
+    0x100B: Handler("simxSetSphericalJointMatrix", _set_spherical_matrix),
 }

@@ -2,74 +2,78 @@
 
 from __future__ import annotations
 
-from drone_sim.remote.legacy.asked import Asked, Served, Table, nothing
+from drone_sim.remote.legacy.request import Handler, Request, Table, nothing
 from drone_sim.remote.legacy.values import counted, floats, ints
 
 _SCENE = -12  # sim.handle_scene
 
 
-def _get_pose(function: str) -> Served:
-    return Served(f"simxG{function[1:]}", lambda ask: floats(*ask.sim(function, *ask.key)))
+def _get_pose(function: str) -> Handler:
+    return Handler(f"simxG{function[1:]}", lambda request: floats(*request.sim(function, *request.key)))
 
 
-def _get_pose_3_1(function: str) -> Served:
+def _get_pose_3_1(function: str) -> Handler:
     """Return the older form of a command, whose data is the handle of the reference object."""
-    return Served(f"simxG{function[1:]}", lambda ask: floats(*ask.sim(function, *ask.key, *ask.take("i"))))
+    return Handler(
+        f"simxG{function[1:]}", lambda request: floats(*request.sim(function, *request.key, *request.take("i")))
+    )
 
 
-def _set_pose(function: str, count: int) -> Served:
-    def put(ask: Asked) -> bytes:
-        relative_to, *place = ask.take(f"i{count}f")
-        return nothing(ask.sim(function, *ask.key, relative_to, place))
+def _set_pose(function: str, count: int) -> Handler:
+    def put(request: Request) -> bytes:
+        relative_to, *place = request.take(f"i{count}f")
+        return nothing(request.sim(function, *request.key, relative_to, place))
 
-    return Served(f"simxS{function[1:]}", put)
+    return Handler(f"simxS{function[1:]}", put)
 
 
-def _velocity(ask: Asked) -> bytes:
-    linear, angular = ask.sim("getObjectVelocity", *ask.key)
+def _velocity(request: Request) -> bytes:
+    linear, angular = request.sim("getObjectVelocity", *request.key)
     return floats(*linear, *angular)
 
 
-def _set_parent(ask: Asked) -> bytes:
-    parent, keep_in_place = ask.take("iB")
-    return nothing(ask.sim("setObjectParent", *ask.key, parent, bool(keep_in_place)))
+def _set_parent(request: Request) -> bytes:
+    parent, keep_in_place = request.take("iB")
+    return nothing(request.sim("setObjectParent", *request.key, parent, bool(keep_in_place)))
 
 
-def _parameter(function: str, layout: str) -> Served:
-    def read(ask: Asked) -> bytes:
-        is_supported, value = ask.sim(function, *ask.key)
+def _parameter(function: str, layout: str) -> Handler:
+    def read(request: Request) -> bytes:
+        is_supported, value = request.sim(function, *request.key)
         if not is_supported:
-            raise ask.refused(f"the parameter {ask.key[1]} is not supported")
+            raise request.refused(f"the parameter {request.key[1]} is not supported")
         return floats(value) if layout == "f" else ints(value)
 
-    return Served(f"simxG{function[1:]}", read)
+    return Handler(f"simxG{function[1:]}", read)
 
 
-def _set_parameter(function: str, layout: str) -> Served:
-    return Served(f"simxS{function[1:]}", lambda ask: nothing(ask.sim(function, *ask.key, *ask.take(layout))))
+def _set_parameter(function: str, layout: str) -> Handler:
+    return Handler(
+        f"simxS{function[1:]}", lambda request: nothing(request.sim(function, *request.key, *request.take(layout)))
+    )
 
 
-def _copy(ask: Asked) -> bytes:
-    return counted(ask.sim("copyPasteObjects", ask.handles()))
+def _copy(request: Request) -> bytes:
+    return counted(request.sim("copyPasteObjects", request.handles()))
 
 
-def _select(ask: Asked) -> bytes:
-    ask.reach.selected[:] = ask.handles()
+def _select(request: Request) -> bytes:
+    request.context.selected[:] = request.handles()
     return b""
 
 
-def _create_dummy(ask: Asked) -> bytes:
-    size, *_ = ask.take("f13B")
-    return ints(ask.sim("createDummy", size))
+def _create_dummy(request: Request) -> bytes:
+    size, *_ = request.take("f13B")
+    return ints(request.sim("createDummy", size))
 
 
 OBJECTS: Table = {
-    0x3001: Served("simxGetObjectHandle", lambda ask: ints(ask.sim("getObjectHandle", *ask.key))),
-    0x3019: Served("simxGetCollectionHandle", lambda ask: ints(ask.sim("getCollectionHandle", *ask.key))),
-    0x102A: Served("simxGetObjects", lambda ask: counted(ask.sim("getObjectsInTree", _SCENE, *ask.key))),
-    0x1012: Served("simxGetObjectParent", lambda ask: ints(ask.sim("getObjectParent", *ask.key))),
-    0x101C: Served("simxSetObjectParent", _set_parent),
-    0x200B: Served("simxGetObjectChild", lambda ask: ints(ask.sim("getObjectChild", *ask.key))),
+    0x3001: Handler("simxGetObjectHandle", lambda request: ints(request.sim("getObjectHandle", *request.key))),
+    0x3019: Handler("simxGetCollectionHandle", lambda request: ints(request.sim("getCollectionHandle", *request.key))),
+    0x102A: Handler("simxGetObjects", lambda request: counted(request.sim("getObjectsInTree", _SCENE, *request.key))),
+    0x1012: Handler("simxGetObjectParent", lambda request: ints(request.sim("getObjectParent", *request.key))),
+    0x101C: Handler("simxSetObjectParent", _set_parent),
+    0x200B: Handler("simxGetObjectChild", lambda request: ints(request.sim("getObjectChild", *request.key))),
     0x200E: _get_pose("getObjectPosition"),
     0x200D: _get_pose("getObjectOrientation"),
     0x2801: _get_pose("getObjectQuaternion"),
@@ -78,17 +82,20 @@ OBJECTS: Table = {
     0x101B: _set_pose("setObjectPosition", 3),
     0x101A: _set_pose("setObjectOrientation", 3),
     0x1801: _set_pose("setObjectQuaternion", 4),
-    0x1036: Served("simxGetObjectVelocity", _velocity),
+    0x1036: Handler("simxGetObjectVelocity", _velocity),
     0x2007: _parameter("getObjectFloatParameter", "f"),
     0x2008: _parameter("getObjectIntParameter", "i"),
     0x2009: _set_parameter("setObjectFloatParameter", "f"),
     0x200A: _set_parameter("setObjectIntParameter", "i"),
-    0x1034: Served("simxGetModelProperty", lambda ask: ints(ask.sim("getModelProperty", *ask.key))),
-    0x1035: Served("simxSetModelProperty", lambda ask: nothing(ask.sim("setModelProperty", *ask.key, *ask.take("i")))),
-    0x102E: Served("simxCopyPasteObjects", _copy),
-    0x1028: Served("simxRemoveObject", lambda ask: nothing(ask.sim("removeObject", *ask.key))),
-    0x1037: Served("simxRemoveModel", lambda ask: nothing(ask.sim("removeModel", *ask.key))),
-    0x0006: Served("simxGetObjectSelection", lambda ask: counted(ask.reach.selected)),
-    0x102F: Served("simxSetObjectSelection", _select),
-    0x0009: Served("simxCreateDummy", _create_dummy),
+    0x1034: Handler("simxGetModelProperty", lambda request: ints(request.sim("getModelProperty", *request.key))),
+    0x1035: Handler(
+        "simxSetModelProperty",
+        lambda request: nothing(request.sim("setModelProperty", *request.key, *request.take("i"))),
+    ),
+    0x102E: Handler("simxCopyPasteObjects", _copy),
+    0x1028: Handler("simxRemoveObject", lambda request: nothing(request.sim("removeObject", *request.key))),
+    0x1037: Handler("simxRemoveModel", lambda request: nothing(request.sim("removeModel", *request.key))),
+    0x0006: Handler("simxGetObjectSelection", lambda request: counted(request.context.selected)),
+    0x102F: Handler("simxSetObjectSelection", _select),
+    0x0009: Handler("simxCreateDummy", _create_dummy),
 }

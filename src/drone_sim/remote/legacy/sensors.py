@@ -2,63 +2,63 @@
 
 from __future__ import annotations
 
-from drone_sim.remote.legacy.asked import Asked, Served, Table, nothing
+from drone_sim.remote.legacy.request import Handler, Request, Table, nothing
 from drone_sim.remote.legacy.values import floats, ints
 
 _GREY = 1  # option of getVisionSensorImg
 
 
-def _image(options: int) -> Served:
-    def image(ask: Asked) -> bytes:
-        picture, (width, height) = ask.sim("getVisionSensorImg", *ask.key, options)
+def _image(options: int) -> Handler:
+    def image(request: Request) -> bytes:
+        picture, (width, height) = request.sim("getVisionSensorImg", *request.key, options)
         return ints(width, height) + picture
 
-    return Served("simxGetVisionSensorImage", image)
+    return Handler("simxGetVisionSensorImage", image)
 
 
-def _depths(ask: Asked) -> bytes:
-    depths, (width, height) = ask.sim("getVisionSensorDepth", *ask.key)
+def _depths(request: Request) -> bytes:
+    depths, (width, height) = request.sim("getVisionSensorDepth", *request.key)
     return ints(width, height) + depths
 
 
-def _show(ask: Asked) -> bytes:
-    return nothing(ask.sim("setVisionSensorCharImage", *ask.key, ask.data))
+def _show(request: Request) -> bytes:
+    return nothing(request.sim("setVisionSensorCharImage", *request.key, request.data))
 
 
-def _read_vision(ask: Asked) -> bytes:
-    triggers, *packets = ask.sim("readVisionSensor", *ask.key)
+def _read_vision(request: Request) -> bytes:
+    triggers, *packets = request.sim("readVisionSensor", *request.key)
     packets = [packet for packet in packets if packet != ()]  # () is a packet that the sensor does not have
     sizes = ints(len(packets), *map(len, packets))
     return bytes([bool(triggers)]) + sizes + b"".join(floats(*packet) for packet in packets)
 
 
-def _proximity(ask: Asked) -> bytes:
-    state, _, point, handle, normal = ask.sim("readProximitySensor", *ask.key)
+def _proximity(request: Request) -> bytes:
+    state, _, point, handle, normal = request.sim("readProximitySensor", *request.key)
     return bytes([state > 0]) + floats(*point) + ints(handle) + floats(*normal)
 
 
-def _force(ask: Asked) -> bytes:
-    state, force, torque = ask.sim("readForceSensor", *ask.key)
+def _force(request: Request) -> bytes:
+    state, force, torque = request.sim("readForceSensor", *request.key)
     return bytes([state]) + floats(*force, *torque)
 
 
-def _distance(ask: Asked) -> bytes:
-    is_measured, segment, _ = ask.sim("checkDistance", *ask.key)
+def _distance(request: Request) -> bytes:
+    is_measured, segment, _ = request.sim("checkDistance", *request.key)
     if not is_measured:
-        raise ask.refused("the distance between the two objects cannot be measured")
+        raise request.refused("the distance between the two objects cannot be measured")
     return floats(segment[6])
 
 
 SENSORS: Table = {
     0x1004: _image(0),
     0x1003: _image(_GREY),
-    0x1017: Served("simxGetVisionSensorDepthBuffer", _depths),
-    0x1005: Served("simxSetVisionSensorImage", _show),
-    0x1006: Served("simxSetVisionSensorImage", _show),
-    0x1011: Served("simxReadVisionSensor", _read_vision),
-    0x1009: Served("simxReadProximitySensor", _proximity),
-    0x100F: Served("simxReadForceSensor", _force),
-    0x1010: Served("simxBreakForceSensor", lambda ask: nothing(ask.sim("breakForceSensor", *ask.key))),
-    0x200F: Served("simxCheckCollision", lambda ask: ints(ask.sim("checkCollision", *ask.key)[0])),
-    0x2010: Served("simxCheckDistance", _distance),
+    0x1017: Handler("simxGetVisionSensorDepthBuffer", _depths),
+    0x1005: Handler("simxSetVisionSensorImage", _show),
+    0x1006: Handler("simxSetVisionSensorImage", _show),
+    0x1011: Handler("simxReadVisionSensor", _read_vision),
+    0x1009: Handler("simxReadProximitySensor", _proximity),
+    0x100F: Handler("simxReadForceSensor", _force),
+    0x1010: Handler("simxBreakForceSensor", lambda request: nothing(request.sim("breakForceSensor", *request.key))),
+    0x200F: Handler("simxCheckCollision", lambda request: ints(request.sim("checkCollision", *request.key)[0])),
+    0x2010: Handler("simxCheckDistance", _distance),
 }

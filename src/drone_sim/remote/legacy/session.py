@@ -13,8 +13,8 @@ from drone_sim.message_text import encodable, printable
 from drone_sim.remote.client import Client
 from drone_sim.remote.conversation import Task, Until
 from drone_sim.remote.legacy import wire
-from drone_sim.remote.legacy.asked import Asked, Handler, Reach, Refused
 from drone_sim.remote.legacy.functions import served
+from drone_sim.remote.legacy.request import HandlerFunction, Refused, Request, RequestContext
 from drone_sim.remote.legacy.signals import TAKE_STRING
 from drone_sim.remote.legacy.values import ints, text
 from drone_sim.remote.legacy.wire import Answer, Command
@@ -35,8 +35,8 @@ _WORD, _SIGN = 0xFFFFFFFF, 0x80000000
 class _Stream:
     """A command that is executed repeatedly."""
 
-    def __init__(self, command: Command, ask: Asked, do: Handler):
-        self.command, self.ask, self.do = command, ask, do
+    def __init__(self, command: Command, request: Request, do: HandlerFunction):
+        self.command, self.request, self.do = command, request, do
         self.step = (-1, -1)  # run and step of the last execution
         self.last = -math.inf  # s, time of the last execution
 
@@ -62,7 +62,7 @@ class Session:
         self.is_over = False  # whether the client has ended it
         self._client, self._player, self._clock = client, player, clock
         self._selected = selected
-        self._reach = Reach({}, selected)
+        self._context = RequestContext({}, selected)
         self._streams: dict[tuple[int, bytes], _Stream] = {}
         self._split: dict[tuple[int, bytes], bytearray] = {}
         self._errors: deque[str] = deque(maxlen=_MAX_ERRORS)
@@ -117,10 +117,10 @@ class Session:
 
     def _update_functions(self) -> None:
         functions = self._client.functions()
-        if functions is not self._reach.functions:
-            self._reach = Reach(functions, self._selected)
+        if functions is not self._context.functions:
+            self._context = RequestContext(functions, self._selected)
             for stream in self._streams.values():
-                stream.ask.reach = self._reach
+                stream.request.context = self._context
 
     def _put_together(self, command: Command) -> Command | None:
         """Return a command with all of its data, None if parts are missing."""
@@ -145,13 +145,13 @@ class Session:
         if command.code in (_SYNCHRONOUS, _FREE, _NEXT, _ERRORS, _GOODBYE):
             return Answer(command, self._execute_session_command(command.code))
         function = served(command.code)
-        ask = Asked(function.name, command, self._reach)
+        request = Request(function.name, command, self._context)
         if command.mode not in (wire.STREAMING, wire.STREAMING_SPLIT):
-            return self._call(command, ask, function.do)
+            return self._call(command, request, function.do)
         if key not in self._streams and len(self._streams) >= _MAX_STREAMS:
             self._report(f"{function.name}: at most {_MAX_STREAMS} commands can stream at once")
             return Answer(command, None)
-        self._streams[key] = _Stream(command, ask, function.do)
+        self._streams[key] = _Stream(command, request, function.do)
         return None
 
     def _execute_session_command(self, code: int) -> bytes:
@@ -172,18 +172,18 @@ class Session:
         for key, stream in list(self._streams.items()):
             if stream.is_due(step, now):
                 stream.step, stream.last = step, now
-                answer = self._call(stream.command, stream.ask, stream.do)
+                answer = self._call(stream.command, stream.request, stream.do)
                 if answer is not None:
                     answers.append(answer)
                     if stream.command.code == TAKE_STRING and answer.data is not None:
                         del self._streams[key]  # the client waits for one value
         return answers
 
-    def _call(self, command: Command, ask: Asked, do: Handler) -> Answer | None:
+    def _call(self, command: Command, request: Request, do: HandlerFunction) -> Answer | None:
         try:
             if self._size > _MAX_REPLY_SIZE:
-                raise ask.refused(f"the reply has more than {_MAX_REPLY_SIZE} bytes")
-            data = do(ask)
+                raise request.refused(f"the reply has more than {_MAX_REPLY_SIZE} bytes")
+            data = do(request)
             self._size += len(data or b"")
         except Refused as refused:
             _LOG.debug("a command failed:", exc_info=True)

@@ -4,53 +4,58 @@ from __future__ import annotations
 
 from typing import Any
 
-from drone_sim.remote.legacy.asked import Asked, Refused, Served, Table, nothing
+from drone_sim.remote.legacy.request import Handler, Refused, Request, Table, nothing
 from drone_sim.remote.legacy.values import floats, ints, raw, string
 
 
-def _value(ask: Asked, function: str) -> Any:
+def _value(request: Request, function: str) -> Any:
     """Return the value of a signal. Raises Refused, without a text, if it is not set."""
-    value = ask.sim(function, *ask.key)
+    value = request.sim(function, *request.key)
     if value is None:
         raise Refused("")
     return value
 
 
-def _set_string(ask: Asked) -> bytes:
-    return nothing(ask.sim("setStringSignal", *ask.key, string(ask.data)))
+def _set_string(request: Request) -> bytes:
+    return nothing(request.sim("setStringSignal", *request.key, string(request.data)))
 
 
-def _append(ask: Asked) -> bytes:
-    before = ask.sim("getStringSignal", *ask.key)
-    return nothing(ask.sim("setStringSignal", *ask.key, string(raw(before or "") + ask.data)))
+def _append(request: Request) -> bytes:
+    before = request.sim("getStringSignal", *request.key)
+    return nothing(request.sim("setStringSignal", *request.key, string(raw(before or "") + request.data)))
 
 
-def _take(ask: Asked) -> bytes:
-    value = raw(_value(ask, "getStringSignal"))
-    ask.sim("clearStringSignal", *ask.key)
+def _take(request: Request) -> bytes:
+    value = raw(_value(request, "getStringSignal"))
+    request.sim("clearStringSignal", *request.key)
     return value
 
 
-def _read_stream(ask: Asked) -> bytes | None:
+def _read_stream(request: Request) -> bytes | None:
     """Return what was written since the last call; the client appends it to its unread data."""
-    return _take(ask) if ask.sim("getStringSignal", *ask.key) else None
+    return _take(request) if request.sim("getStringSignal", *request.key) else None
 
 
-def _clear(function: str, clears: str) -> Served:
-    return Served(function, lambda ask: nothing(ask.sim(clears, ask.key[0] or None)))
+def _clear(function: str, clears: str) -> Handler:
+    return Handler(function, lambda request: nothing(request.sim(clears, request.key[0] or None)))
 
 
 TAKE_STRING = 0x3017
 SIGNALS: Table = {
-    0x3010: Served("simxGetFloatSignal", lambda ask: floats(_value(ask, "getFloatSignal"))),
-    0x3011: Served("simxGetIntegerSignal", lambda ask: ints(_value(ask, "getIntegerSignal"))),
-    0x3012: Served("simxGetStringSignal", lambda ask: raw(_value(ask, "getStringSignal"))),
-    0x3013: Served("simxSetFloatSignal", lambda ask: nothing(ask.sim("setFloatSignal", *ask.key, *ask.take("f")))),
-    0x3014: Served("simxSetIntegerSignal", lambda ask: nothing(ask.sim("setIntegerSignal", *ask.key, *ask.take("i")))),
-    0x3015: Served("simxSetStringSignal", _set_string),
-    0x3016: Served("simxAppendStringSignal", _append),
-    TAKE_STRING: Served("simxGetAndClearStringSignal", _take),
-    0x3018: Served("simxReadStringStream", _read_stream),
+    0x3010: Handler("simxGetFloatSignal", lambda request: floats(_value(request, "getFloatSignal"))),
+    0x3011: Handler("simxGetIntegerSignal", lambda request: ints(_value(request, "getIntegerSignal"))),
+    0x3012: Handler("simxGetStringSignal", lambda request: raw(_value(request, "getStringSignal"))),
+    0x3013: Handler(
+        "simxSetFloatSignal", lambda request: nothing(request.sim("setFloatSignal", *request.key, *request.take("f")))
+    ),
+    0x3014: Handler(
+        "simxSetIntegerSignal",
+        lambda request: nothing(request.sim("setIntegerSignal", *request.key, *request.take("i"))),
+    ),
+    0x3015: Handler("simxSetStringSignal", _set_string),
+    0x3016: Handler("simxAppendStringSignal", _append),
+    TAKE_STRING: Handler("simxGetAndClearStringSignal", _take),
+    0x3018: Handler("simxReadStringStream", _read_stream),
     0x300D: _clear("simxClearFloatSignal", "clearFloatSignal"),
     0x300E: _clear("simxClearIntegerSignal", "clearIntegerSignal"),
     0x300F: _clear("simxClearStringSignal", "clearStringSignal"),

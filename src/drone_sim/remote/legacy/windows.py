@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from drone_sim.remote.legacy.asked import Asked, Served, Table, nothing
+from drone_sim.remote.legacy.request import Handler, Request, Table, nothing
 from drone_sim.remote.legacy.values import ints, text
 
 _NO_BUTTON = -1
@@ -12,57 +12,61 @@ _SKIPPED = 0  # clients skip a number, because they expect a key of two numbers
 _COLORS = 48  # bytes, of a dialog's title and text
 
 
-def _open_console(ask: Asked) -> bytes:
-    lines, *_ = ask.take("6i6f")
-    return ints(ask.sim("auxiliaryConsoleOpen", *ask.key, lines))
+def _open_console(request: Request) -> bytes:
+    lines, *_ = request.take("6i6f")
+    return ints(request.sim("auxiliaryConsoleOpen", *request.key, lines))
 
 
-def _print(ask: Asked) -> bytes:
-    printed = ask.data.rstrip(b"\0").decode("utf-8", "replace") if ask.data else None
-    return nothing(ask.sim("auxiliaryConsolePrint", *ask.key, printed))
+def _print(request: Request) -> bytes:
+    printed = request.data.rstrip(b"\0").decode("utf-8", "replace") if request.data else None
+    return nothing(request.sim("auxiliaryConsolePrint", *request.key, printed))
 
 
-def _show(ask: Asked) -> bytes:
-    return nothing(ask.sim("auxiliaryConsoleShow", *ask.key, *ask.take("i")))
+def _show(request: Request) -> bytes:
+    return nothing(request.sim("auxiliaryConsoleShow", *request.key, *request.take("i")))
 
 
-def _open_dialog(ask: Asked) -> bytes:
-    message, end, rest = ask.data.partition(b"\0")
+def _open_dialog(request: Request) -> bytes:
+    message, end, rest = request.data.partition(b"\0")
     if not end or len(rest) < struct.calcsize("<i") + 1 + _COLORS:
-        raise ask.refused(f"{len(ask.data)} bytes of data are not a valid dialog")
+        raise request.refused(f"{len(request.data)} bytes of data are not a valid dialog")
     (style,) = struct.unpack_from("<i", rest)
     initial = rest[4:-_COLORS].rstrip(b"\0")
     texts = message.decode("utf-8", "replace"), initial.decode("utf-8", "replace")
-    handle = ask.sim("displayDialog", *ask.key, texts[0], style, False, texts[1])
+    handle = request.sim("displayDialog", *request.key, texts[0], style, False, texts[1])
     return ints(handle, handle)
 
 
-def _close_dialog(ask: Asked) -> bytes:
-    if not ask.sim("endDialog", *ask.key):
-        raise ask.refused(f"there is no dialog with the handle {ask.key[0]}")
+def _close_dialog(request: Request) -> bytes:
+    if not request.sim("endDialog", *request.key):
+        raise request.refused(f"there is no dialog with the handle {request.key[0]}")
     return b""
 
 
-def _set_ui(name: str, function: str) -> Served:
-    return Served(name, lambda ask: nothing(ask.sim(function, *ask.key)))
+def _set_ui(name: str, function: str) -> Handler:
+    return Handler(name, lambda request: nothing(request.sim(function, *request.key)))
 
 
 WINDOWS: Table = {
-    0x3008: Served("simxAddStatusbarMessage", lambda ask: nothing(ask.sim("addStatusbarMessage", *ask.key))),
-    0x3009: Served("simxAuxiliaryConsoleOpen", _open_console),
-    0x1014: Served("simxAuxiliaryConsoleClose", lambda ask: nothing(ask.sim("auxiliaryConsoleClose", *ask.key))),
-    0x1015: Served("simxAuxiliaryConsolePrint", _print),
-    0x1016: Served("simxAuxiliaryConsoleShow", _show),
-    0x300C: Served("simxDisplayDialog", _open_dialog),
-    0x102B: Served("simxEndDialog", _close_dialog),
-    0x102C: Served("simxGetDialogInput", lambda ask: text(ask.sim("getDialogInput", *ask.key))),
-    0x102D: Served("simxGetDialogResult", lambda ask: ints(ask.sim("getDialogResult", *ask.key))),
-    0x3007: Served("simxGetUIHandle", lambda ask: ints(ask.sim("getUIHandle", *ask.key))),
-    0x2001: Served("simxGetUISlider", lambda ask: ints(ask.sim("getUISlider", *ask.key))),
+    0x3008: Handler(
+        "simxAddStatusbarMessage", lambda request: nothing(request.sim("addStatusbarMessage", *request.key))
+    ),
+    0x3009: Handler("simxAuxiliaryConsoleOpen", _open_console),
+    0x1014: Handler(
+        "simxAuxiliaryConsoleClose", lambda request: nothing(request.sim("auxiliaryConsoleClose", *request.key))
+    ),
+    0x1015: Handler("simxAuxiliaryConsolePrint", _print),
+    0x1016: Handler("simxAuxiliaryConsoleShow", _show),
+    0x300C: Handler("simxDisplayDialog", _open_dialog),
+    0x102B: Handler("simxEndDialog", _close_dialog),
+    0x102C: Handler("simxGetDialogInput", lambda request: text(request.sim("getDialogInput", *request.key))),
+    0x102D: Handler("simxGetDialogResult", lambda request: ints(request.sim("getDialogResult", *request.key))),
+    0x3007: Handler("simxGetUIHandle", lambda request: ints(request.sim("getUIHandle", *request.key))),
+    0x2001: Handler("simxGetUISlider", lambda request: ints(request.sim("getUISlider", *request.key))),
     0x2002: _set_ui("simxSetUISlider", "setUISlider"),
     0x1029: _set_ui("simxRemoveUI", "removeUI"),
-    0x2003: Served("simxGetUIEventButton", lambda ask: ints(_SKIPPED, _NO_BUTTON, 0, 0)),
-    0x2004: Served("simxGetUIButtonProperty", lambda ask: ints(ask.sim("getUIButtonProperty", *ask.key))),
+    0x2003: Handler("simxGetUIEventButton", lambda request: ints(_SKIPPED, _NO_BUTTON, 0, 0)),
+    0x2004: Handler("simxGetUIButtonProperty", lambda request: ints(request.sim("getUIButtonProperty", *request.key))),
     0x2005: _set_ui("simxSetUIButtonProperty", "setUIButtonProperty"),
     0x2006: _set_ui("simxSetUIButtonLabel", "setUIButtonLabel"),
 }

@@ -15,7 +15,7 @@ class Refused(Exception):
     """A command cannot be executed; the one-line reason, '' if it is not worth reporting."""
 
 
-class Reach(NamedTuple):
+class RequestContext(NamedTuple):
     """What a client's commands can access: functions of the script API by name, such as sim.getObject, and a selection.
 
     The selection is only a list, of the objects that clients have selected.
@@ -25,19 +25,19 @@ class Reach(NamedTuple):
     selected: list[int]
 
 
-class Asked:
+class Request:
     """A command; handlers read its key and data, and call functions of the script API."""
 
-    def __init__(self, name: str, command: Command, reach: Reach):
+    def __init__(self, name: str, command: Command, context: RequestContext):
         """`name` is the client's function, such as simxGetObjectHandle."""
         self.name = name
         self.key: Any = command.key
         self.data = command.data
-        self.reach = reach
+        self.context = context
 
     def sim(self, function: str, *arguments: Any) -> Any:
         """Call a function of `sim`. Raises Refused."""
-        method = self.reach.functions[f"sim.{function}"]
+        method = self.context.functions[f"sim.{function}"]
         try:
             return method(*arguments)
         except Exception as error:
@@ -61,17 +61,17 @@ class Asked:
 
 
 # Returns the data of the reply; None if there is no reply yet.
-Handler = Callable[[Asked], bytes | None]
+HandlerFunction = Callable[[Request], bytes | None]
 
 
-class Served(NamedTuple):
+class Handler(NamedTuple):
     """A function of the client, and its handler."""
 
     name: str
-    do: Handler
+    do: HandlerFunction
 
 
-Table = dict[int, Served]  # by command code
+Table = dict[int, Handler]  # by command code
 
 
 def nothing(_returned: Any) -> bytes:
