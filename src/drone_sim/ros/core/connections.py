@@ -1,4 +1,4 @@
-"""The connections of this node's topics: who is at the other end, and what still waits to be written to them."""
+"""Connections of this node's topics in rospy: the nodes at the other end, and messages that are not written yet."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from typing import Any
 
 from rospy.impl.registration import get_topic_manager
 
-_LOOK = 0.0005  # s, between two looks at what waits to be written
+_POLL_PERIOD = 0.0005  # s
 
 
 def publishers_of(topic: str) -> list[Any]:
     """Return the open connections by which this node receives a topic; `callerid_pub` is the publisher."""
     subscriber = get_topic_manager().get_subscriber_impl(topic)
-    return [one for one in _connections(subscriber) if one.socket is not None and not one.done]
+    return [each for each in _connections(subscriber) if each.socket is not None and not each.done]
 
 
 def subscribers_of(topic: str) -> list[Any]:
     """Return the open connections by which this node sends a topic; `endpoint_id` is the subscriber."""
-    return [one for one in _connections(get_topic_manager().get_publisher_impl(topic)) if not one.done]
+    return [each for each in _connections(get_topic_manager().get_publisher_impl(topic)) if not each.done]
 
 
 def received_topics() -> list[str]:
@@ -26,8 +26,8 @@ def received_topics() -> list[str]:
     return [topic for topic, _ in get_topic_manager().get_subscriptions()]
 
 
-def sent(topic: str) -> int:
-    """Return how many messages this node has published on a topic, to whomever."""
+def sent_count(topic: str) -> int:
+    """Return how many messages this node has published on a topic."""
     publisher = get_topic_manager().get_publisher_impl(topic)
     return int(publisher.seq) if publisher is not None else 0
 
@@ -38,26 +38,19 @@ def all_connections() -> set[tuple[str, str]]:
 
 
 def has_unwritten(connection: Any) -> bool:
-    """Return whether messages wait until rospy's thread writes them to a subscriber's socket."""
+    """Return whether there are messages that rospy's thread has not yet written to a subscriber's socket."""
     return bool(getattr(connection, "_queue", ()))
 
 
-def wait_until_written(patience: float) -> bool:
-    """Wait until no message waits to be written, for `patience` (s); return whether that is so.
-
-    A subscriber that does not read must not block others: its messages are left waiting.
-    """
-    end = time.monotonic() + patience
-    while any(map(has_unwritten, _all_subscribers())):
-        if time.monotonic() > end:
-            return False
-        time.sleep(_LOOK)
-    return True
-
-
-def _all_subscribers() -> list[Any]:
+def wait_until_written(timeout: float) -> bool:
+    """Wait until all messages are written; return False after `timeout` (s), as for a subscriber that does not read."""
+    deadline = time.monotonic() + timeout
     topics = [topic for topic, _ in get_topic_manager().get_publications()]
-    return [connection for topic in topics for connection in subscribers_of(topic)]
+    while any(has_unwritten(connection) for topic in topics for connection in subscribers_of(topic)):
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(_POLL_PERIOD)
+    return True
 
 
 def _connections(topic: Any) -> list[Any]:

@@ -86,7 +86,7 @@ class _Awaited:
     def _could_be_seen_by(self, node: str) -> bool:
         """Return whether the trigger has been published, and been written to the node's socket if it is connected."""
         trigger = self.expected.trigger
-        if connections.sent(trigger) <= self.sent_before:
+        if connections.sent_count(trigger) <= self.sent_before:
             return False
         if trigger == _CLOCK:  # the node may answer any message of the step, and these are written in any order
             return True
@@ -167,7 +167,7 @@ class Lockstep:
             return False
         for name, expected in self._expected.items():
             if expected.is_triggered(self._simulation):
-                senders, before = connections.publishers_of(name), connections.sent(expected.trigger)
+                senders, before = connections.publishers_of(name), connections.sent_count(expected.trigger)
                 self._open[name] = _Awaited(expected, expected.stamp(self._simulation), senders, before)
         return True
 

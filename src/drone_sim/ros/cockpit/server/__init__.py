@@ -1,1 +1,1 @@
-"""The server: who comes in, where, and what is said over the socket."""
+"""The web server: access control, addresses, files, and the socket of the page."""

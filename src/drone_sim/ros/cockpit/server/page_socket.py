@@ -1,4 +1,4 @@
-"""Our own socket: held keys, script editor, windows. Messages are JSON; every question has an `id`, and one answer."""
+"""The page's WebSocket. Messages are JSON, pictures and scenes binary; each request has an `id`, and gets one reply."""
 
 from __future__ import annotations
 
@@ -18,112 +18,117 @@ from websockets.exceptions import ConnectionClosed
 from drone_sim.ros.cockpit.teleop import HeldCommands, read_command
 
 Answer = Callable[[Mapping[str, Any]], Mapping[str, Any]]
-Taken = Callable[[int, Mapping[str, Any]], None]
+Handler = Callable[[int, Mapping[str, Any]], None]
 SceneSince = Callable[[int], tuple[int, bytes]]
 _LOG = logging.getLogger(__name__)
-_MESSAGES = 32  # after which the oldest go: this browser does not take them
-_SCENE = "scene"  # the name under which a browser says that it has shown a message of the scene
-_UNSHOWN = 2  # messages of the scene that are on their way at most: over a slow line one is shown while another comes
+_MAX_MESSAGES = 32  # in the queue of a browser; then the oldest are dropped
+_SCENE = "scene"  # name by which a browser reports that it has shown a message of the scene
+_MAX_SCENES = 2  # sent messages of the scene that are not shown yet: one can be sent while the browser shows another
 
 
 class PageSocket:
-    """The browsers that are connected; what one asks is answered in a thread, for it may take its time."""
+    """The connections to browsers. Requests are answered in threads, because an answer may take long."""
 
     def __init__(
         self,
         held: HeldCommands,
         answers: Mapping[str, Answer],
-        takes: Mapping[str, Taken] | None = None,
+        handlers: Mapping[str, Handler] | None = None,
         scene: SceneSince = lambda version: (version, b""),
     ):
-        """Leave commands in `held`; `answers` answer questions, by their `ask`, and raise ValueError.
+        """`held` gets the keys' commands; `answers` answer requests, by the value of `ask`, and may raise ValueError.
 
-        `takes` take messages that are not answered, with the number of the browser, by what they begin with; they are
-        called in their order and must be quick. `scene` returns what has changed since a version, and the version now.
+        `handlers` process messages without a reply, by a key that such a message has. They get the browser's number,
+        are called in the order of the messages, and must return quickly. `scene` returns the present version of the
+        scene, and the changes since another version.
         """
         self._held = held
         self._answers = answers
-        self._takes = takes or {}
+        self._handlers = handlers or {}
         self._scene = scene
         self._numbers = itertools.count()
-        self._out: dict[int, tuple[asyncio.AbstractEventLoop, SendQueue]] = {}
+        self._queues: dict[int, tuple[asyncio.AbstractEventLoop, SendQueue]] = {}
 
     async def serve(self, connection: ServerConnection) -> None:
-        """Talk with one browser until it goes."""
+        """Serve one browser until it disconnects."""
         browser = next(self._numbers)
-        box = SendQueue(self._scene)
-        self._out[browser] = asyncio.get_running_loop(), box
-        sending = asyncio.create_task(_send_from(box, connection))
+        queue = SendQueue(self._scene)
+        self._queues[browser] = asyncio.get_running_loop(), queue
+        sender = asyncio.create_task(_send_from(queue, connection))
         try:
             async for text in connection:
-                await self._take(browser, text, connection)
+                await self._process(browser, text, connection)
         except ConnectionClosed:
             pass
         finally:
-            del self._out[browser]
-            sending.cancel()
+            del self._queues[browser]
+            sender.cancel()
             await asyncio.to_thread(self._held.release, browser)
+
+    # ---- for any thread
 
     @property
     def browsers(self) -> set[int]:
-        """The numbers of those that are connected; any thread may ask."""
-        return set(self._out)
+        """The numbers of the connected browsers."""
+        return set(self._queues)
 
     def show_scene(self) -> None:
-        """Send what has changed in the scene to each browser that has shown what it got; any thread may call."""
-        self._leave(SendQueue.wake)
+        """Send the changes of the scene to each browser that has shown the last ones."""
+        self._call_queues(SendQueue.wake)
 
     def tell(self, message: Mapping[str, Any]) -> None:
-        """Send something to all browsers; any thread may call."""
+        """Send a message to all browsers."""
         text = json.dumps(message)
-        self._leave(lambda box: box.put(text))
+        self._call_queues(lambda queue: queue.put(text))
 
     def wants_picture(self, name: str) -> bool:
-        """Whether any browser has shown the last picture of that name; any thread may call."""
-        return any(box.wants(name) for _, box in list(self._out.values()))
+        """Return whether any browser has shown the last picture with this name."""
+        return any(queue.wants(name) for _, queue in list(self._queues.values()))
 
-    def show_picture(self, said: Mapping[str, str], content: bytes) -> None:
-        """Send a picture to all browsers that have shown the last one of its name; any thread may call.
+    def show_picture(self, header: Mapping[str, Any], content: bytes) -> None:
+        """Send a picture to all browsers that have shown the last one with its name.
 
-        `said` has its name as `picture`, and what else the page is to know of it; `content` is a JPEG or PNG.
+        `header` has the name as `picture`, and other properties for the page; `content` is a JPEG or PNG.
         """
-        picture = json.dumps(said).encode() + b"\n" + content
-        self._leave(lambda box: box.put_picture(said["picture"], picture))
+        picture = json.dumps(header).encode() + b"\n" + content
+        self._call_queues(lambda queue: queue.put_picture(header["picture"], picture))
 
     def close_picture(self, name: str) -> None:
-        """Send no more of that name; any thread may call."""
-        self._leave(lambda box: box.forget(name))
+        """Remove the pictures with this name from the queues."""
+        self._call_queues(lambda queue: queue.forget(name))
 
-    def _leave(self, leave: Callable[[SendQueue], None]) -> None:
-        for loop, box in list(self._out.values()):
-            with contextlib.suppress(RuntimeError):  # the server ends, and its loop with it
-                loop.call_soon_threadsafe(leave, box)
+    def _call_queues(self, call: Callable[[SendQueue], None]) -> None:
+        for loop, queue in list(self._queues.values()):
+            with contextlib.suppress(RuntimeError):  # the server has ended, and its loop with it
+                loop.call_soon_threadsafe(call, queue)
 
-    async def _take(self, browser: int, text: str | bytes, connection: ServerConnection) -> None:
+    # ---- messages
+
+    async def _process(self, browser: int, text: str | bytes, connection: ServerConnection) -> None:
         try:
-            message = _read(text)
+            message = _parse(text)
             if "hold" in message:
                 self._held.hold(browser, read_command(message["hold"]))
                 return
             if isinstance(message.get("shown"), str):
-                self._out[browser][1].shown(message["shown"])
+                self._queues[browser][1].shown(message["shown"])
                 return
-            take = next((take for name, take in self._takes.items() if name in message), None)
-            if take is not None:
-                take(browser, message)
+            handler = next((handler for key, handler in self._handlers.items() if key in message), None)
+            if handler is not None:
+                handler(browser, message)
                 return
-            asked = message.get("ask")
-            ask = self._answers.get(asked) if isinstance(asked, str) else None
-            if ask is None:
+            name = message.get("ask")
+            answer = self._answers.get(name) if isinstance(name, str) else None
+            if answer is None:
                 raise ValueError(f"ask: must be one of {', '.join(self._answers)}, or hold")
         except (ValueError, RecursionError) as error:
             await connection.send(json.dumps({"id": None, "error": str(error)}))
             return
-        await connection.send(await asyncio.to_thread(_answered, ask, message))
+        await connection.send(await asyncio.to_thread(_reply, answer, message))
 
 
-def _read(text: str | bytes) -> dict[str, Any]:
-    """Return a message. Raises ValueError, RecursionError."""
+def _parse(text: str | bytes) -> dict[str, Any]:
+    """Return a browser's message. Raises ValueError and RecursionError."""
     message = json.loads(text, parse_constant=_finite, parse_float=_finite)
     if not isinstance(message, dict):
         raise ValueError("a message must be a mapping")
@@ -140,10 +145,10 @@ def _finite(text: str) -> float:
     return value
 
 
-def _answered(ask: Answer, message: Mapping[str, Any]) -> str:
+def _reply(answer: Answer, message: Mapping[str, Any]) -> str:
     try:
-        return json.dumps({"id": message.get("id"), **ask(message)})
-    except Exception as error:  # an OSError for an impossible name, or a fault of our own: the socket stays open
+        return json.dumps({"id": message.get("id"), **answer(message)})
+    except Exception as error:  # an OSError, or a bug: the socket must stay open
         if not isinstance(error, (ValueError, OSError, RecursionError)):
             _LOG.exception("the question '%s' could not be answered", message.get("ask"))
         return json.dumps(
@@ -151,76 +156,76 @@ def _answered(ask: Answer, message: Mapping[str, Any]) -> str:
         )
 
 
-async def _send_from(box: SendQueue, connection: ServerConnection) -> None:
+async def _send_from(queue: SendQueue, connection: ServerConnection) -> None:
     try:
         while True:
-            await connection.send(await box.take())
+            await connection.send(await queue.take())
     except ConnectionClosed:
         return
 
 
 class SendQueue:
-    """What waits to be sent to one browser; used in the thread of its event loop.
+    """Messages to one browser. All methods but `wants` are for the thread of its event loop.
 
-    A picture is sent when the browser has shown the last one of that name. So is the scene, of which a browser gets
-    what has changed since the message before.
+    A picture is sent once the browser has shown the last one with that name. Changes of the scene are sent while fewer
+    than _MAX_SCENES messages are not shown.
     """
 
     def __init__(self, scene: SceneSince = lambda version: (version, b"")):
-        """Begin empty; `scene` returns what has changed since a version, and the version now."""
+        """`scene` is as for PageSocket."""
         self._scene, self._version = scene, -1
-        self._unshown = 0
-        self._messages: deque[str] = deque(maxlen=_MESSAGES)
+        self._unshown_scenes = 0
+        self._messages: deque[str] = deque(maxlen=_MAX_MESSAGES)
         self._pictures: dict[str, bytes] = {}
-        self._owed: set[str] = set()  # names of those that are on their way
-        self._came = asyncio.Event()
+        self._unshown_pictures: set[str] = set()  # names of sent pictures
+        self._has_news = asyncio.Event()
 
     def put(self, message: str) -> None:
-        """Leave a message."""
+        """Add a message."""
         self._messages.append(message)
-        self._came.set()
+        self._has_news.set()
 
     def wake(self) -> None:
-        """Hear that there may be something new in the scene."""
-        self._came.set()
+        """Check again whether the scene has changed."""
+        self._has_news.set()
 
     def wants(self, name: str) -> bool:
-        """Whether a picture of that name would be taken now; any thread may ask."""
-        return name not in self._owed
+        """Return whether a picture with this name would be sent now. Thread-safe."""
+        return name not in self._unshown_pictures
 
     def put_picture(self, name: str, picture: bytes) -> None:
-        """Leave a picture in the place of the last one."""
+        """Add a picture; it replaces a picture with the same name that is not sent yet."""
         self._pictures[name] = picture
-        self._came.set()
+        self._has_news.set()
 
     def shown(self, name: str) -> None:
-        """Hear that a picture, or a message of the scene, has been shown."""
-        self._owed.discard(name)
+        """Note that the browser has shown a picture, or a message of the scene."""
+        self._unshown_pictures.discard(name)
         if name == _SCENE:
-            self._unshown = max(0, self._unshown - 1)
-        self._came.set()
+            self._unshown_scenes = max(0, self._unshown_scenes - 1)
+        self._has_news.set()
 
     def forget(self, name: str) -> None:
-        """Hear that a picture is closed, whether or not the last one has been shown."""
+        """Remove a picture that the browser has closed."""
         self._pictures.pop(name, None)
-        self._owed.discard(name)
+        self._unshown_pictures.discard(name)
 
     async def take(self) -> str | bytes:
-        """Return what is to be sent next; wait for it."""
+        """Wait for the next message to send, and return it."""
         while True:
-            for found in self._ready():
-                return found
-            self._came.clear()
-            await self._came.wait()
+            for message in self._ready():
+                return message
+            self._has_news.clear()
+            await self._has_news.wait()
 
     def _ready(self) -> Iterator[str | bytes]:
         if self._messages:
             yield self._messages.popleft()
-        if self._unshown < _UNSHOWN:
-            self._version, changed = self._scene(self._version)
-            if changed:
-                self._unshown += 1
-                yield changed
-        for name in self._pictures.keys() - self._owed:
-            self._owed.add(name)
+        if self._unshown_scenes < _MAX_SCENES:
+            self._version, changes = self._scene(self._version)
+            if changes:
+                self._unshown_scenes += 1
+                yield changes
+        for name in self._pictures.keys() - self._unshown_pictures:
+            self._unshown_pictures.add(name)
             yield self._pictures.pop(name)
