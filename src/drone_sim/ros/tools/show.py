@@ -37,7 +37,7 @@ INSTEAD = (
 )
 _RVIZ = "rviz"
 _CRASHES = (-signal.SIGSEGV, -signal.SIGABRT)
-_MAX_STARTS, _EARLY_CRASH = 3, 20.0  # rviz is started again only after a crash within so many s
+_MAX_STARTS, _EARLY_CRASH = 3, 20.0  # s; rviz is started again only after a crash within this time
 _PATHS = "ROS_PACKAGE_PATH"
 _FRAME_TIMEOUT = 5.0  # s, for the frame that rviz follows
 _TOPIC = "/view/state"  # the last topic that the simulator advertises for rviz
