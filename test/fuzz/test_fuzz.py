@@ -5,7 +5,7 @@ from pool import Trier
 from run import KINDS, keep, run_kind
 
 CASES = 6  # of each kind
-MORE = {"archives": 100}  # none of which needs a simulation
+MORE = {"archives": 30}  # none of which needs a simulation
 SEED = 8
 
 
