@@ -16,6 +16,7 @@ class Drone:
         from std_msgs.msg import String
 
         self.place = self.command = self.pose = self.velocity = self.state = None
+        self.heard = 0  # messages of odometry
         self.flown = {}  # places and commands (vx, vy, vz, wz), by their stamps
         rospy.Subscriber(f"/{name}/odom", Odometry, self._on_odometry)
         rospy.Subscriber(f"/{name}/command", TwistStamped, self._on_command)
@@ -25,6 +26,7 @@ class Drone:
         self.pose, self.velocity = message.pose.pose, message.twist.twist.linear
         at = self.pose.position
         self.place = at.x, at.y, at.z
+        self.heard += 1
         self.flown.setdefault(message.header.stamp, {})["place"] = self.place
 
     def _on_command(self, message):
@@ -50,6 +52,17 @@ def wait_until(page, condition, seconds=90):
 def wait_for(page, expression, *argument):
     """Wait until an expression is true in a page. Playwright's `wait_for_function` is one that our pages forbid."""
     wait_until(page, lambda: page.evaluate(expression, *argument))
+
+
+def let_pass(page, milliseconds):
+    """Wait until the page's own clock has gone on by so much: what the page counts is over by then."""
+    wait_for(page, "end => Date.now() >= end", page.evaluate("Date.now()") + milliseconds)
+
+
+def let_fly(page, drone, steps):
+    """Wait until the simulation has made so many steps, each of 0.05 s."""
+    seen = len(drone.flown)
+    wait_until(page, lambda: len(drone.flown) >= seen + steps)
 
 
 # Where a point of the world is in the page, px.

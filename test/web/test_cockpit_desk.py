@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import open_page, wait_until
+from cockpit_page import let_pass, open_page, wait_until
 
 COUNTS = """\
 import helper
@@ -93,7 +93,7 @@ def open_counts(cockpit, page, name):
 
 def accept(page):
     """Take what is offered; in its first 75 ms, Enter begins a line, for people who have not seen it yet."""
-    page.wait_for_timeout(200)
+    let_pass(page, 100)
     page.keyboard.press("Enter")
 
 
@@ -225,6 +225,12 @@ def shown(page, name):
     return row.locator("td").first.inner_text()
 
 
+def goes_on(cockpit, page):
+    """End the pause, and return whether it has ended: a breakpoint that is gone may still hold it once more."""
+    cockpit.call("pause", False)
+    return not page.locator("#text .cm-paused").count()
+
+
 def test_a_breakpoint_pauses_with_the_variables_of_its_line(cockpit, desk):
     open_counts(cockpit, desk, "breaks.py")
     line_number(desk, 8).click()  # an empty line, and then the function's head: its first line is meant
@@ -249,9 +255,7 @@ def test_a_breakpoint_pauses_with_the_variables_of_its_line(cockpit, desk):
     assert shown(desk, "'p'") == "1.5"
     line_number(desk, 11).click()
     wait_until(desk, lambda: not desk.locator("#text .cm-breakpoint").count())
-    while desk.locator("#text .cm-paused").count():  # the simulation hears of it a little later
-        cockpit.call("pause", False)
-        desk.wait_for_timeout(500)
+    wait_until(desk, lambda: goes_on(cockpit, desk))
     desk.get_by_label("live").check()
     wait_until(desk, lambda: "breaks.py: flying" in desk.inner_text("#variables-of"))
     before = int(shown(desk, "count"))
@@ -273,9 +277,7 @@ def test_a_breakpoint_stays_with_its_line(cockpit, browser):
         page.keyboard.press("Control+End")
         line_number(page, 12).click()
         wait_until(page, lambda: not page.locator("#text .cm-breakpoint").count())
-        while page.locator("#text .cm-paused").count():
-            cockpit.call("pause", False)
-            page.wait_for_timeout(500)
+        wait_until(page, lambda: goes_on(cockpit, page))
 
 
 # ---- files

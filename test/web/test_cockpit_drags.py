@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import PROJECT, TIP, wait_until
+from cockpit_page import PROJECT, TIP, let_fly, wait_until
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import InteractiveMarkerFeedback, MarkerArray
 
@@ -150,7 +150,7 @@ def test_an_object_that_is_clicked_on_has_arrows_and_falls_when_it_is_let_go(coc
     tip = mouse.take(1)
     mouse.drag(tip + aside)
     wait_until(opened, lambda: np.allclose(crate(), before + aside, atol=0.1))
-    opened.wait_for_timeout(1500)
+    let_fly(opened, cockpit.drone, 30)
     assert abs(crate()[0, 2] - before[2]) < 0.1, "it is held"
     mouse.drop()
     wait_until(opened, lambda: crate()[0, 2] < 0.2)

@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import Panel, open_page, wait_until
+from cockpit_page import Panel, let_pass, open_page, wait_until
 
 STAGES = ("1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros", "7_camera", "8_gate")
 GAIN = 'self.thrust = gain("thrust_gravity")'
@@ -67,7 +67,7 @@ def test_from_the_address_to_a_gain_that_is_tuned(cockpit, student):
     type_into(student, "prnt('hello')", ["End", "Shift+Home"], "sim.getObjectPosi")
     options = student.locator(".cm-tooltip-autocomplete li")
     wait_until(student, lambda: options.count() and options.first.inner_text().startswith("getObjectPosition"))
-    student.wait_for_timeout(200)  # in its first 75 ms, Enter begins a line
+    let_pass(student, 100)  # in its first 75 ms, Enter begins a line
     student.keyboard.press("Enter")
     student.keyboard.press("Home")
     student.keyboard.type("print('at', ")

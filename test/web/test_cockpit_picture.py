@@ -11,7 +11,7 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
 import trimesh
-from cockpit_page import Panel, open_page, wait_until
+from cockpit_page import Panel, let_pass, open_page, wait_until
 from geometry_msgs.msg import WrenchStamped
 from PIL import Image
 from visualization_msgs.msg import Marker, MarkerArray
@@ -192,10 +192,10 @@ def test_a_click_on_the_drone_pushes_it_away_from_who_looks(cockpit, picture):
     box, (across, down) = picture.canvas.bounding_box(), picture.project([cockpit.drone.place])[0]
     picture.page.mouse.click(box["x"] + across, box["y"] + down)
     wait_until(picture.page, lambda: heard)
-    picture.page.wait_for_timeout(600)
+    let_pass(picture.page, 600)
     picture.page.mouse.dblclick(box["x"] + across, box["y"] + down)  # it is selected by now; this looks at it
     wait_until(picture.page, lambda: len(heard) > 1)
-    picture.page.wait_for_timeout(600)
+    let_pass(picture.page, 600)
     assert len(heard) == 2, "a double click is one push"
     pushes.unregister()
     force = heard[0].wrench.force
@@ -301,7 +301,7 @@ def stand_still(cockpit, page):
 
     def is_still():
         before = page.evaluate("scene.canvas.frames")
-        page.wait_for_timeout(1000)
+        let_pass(page, 1000)
         return page.evaluate("scene.canvas.frames") - before <= 1
 
     cockpit.call("pause", True)

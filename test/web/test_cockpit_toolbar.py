@@ -7,7 +7,7 @@ pytest.importorskip("rospy", reason="needs ROS")
 from pathlib import Path
 
 import rospy
-from cockpit_page import Drone, ready, wait_for, wait_until
+from cockpit_page import Drone, let_pass, ready, wait_for, wait_until
 from diagnostic_msgs.msg import KeyValue
 
 HOSTILE = '<img src=x onerror="window.top.hacked = true">'
@@ -39,11 +39,11 @@ def _afresh(cockpit, panel):
 
 
 def stands(panel, drone):
-    """Return where the paused drone is, once odometry says so."""
+    """Return where the paused drone is, once odometry says so again and again."""
     place = None
     while place != drone.place:
-        place = drone.place
-        panel.page.wait_for_timeout(150)
+        place, heard = drone.place, drone.heard
+        wait_until(panel.page, lambda heard=heard: drone.heard >= heard + 2)
     return place
 
 
@@ -110,7 +110,7 @@ def test_a_message_moves_nothing_and_an_error_stays_until_the_next_action(cockpi
     panel.press("Stop")
     wait_until(page, lambda: panel.status == "stopped")
     panel.press("Step", "failed")
-    page.wait_for_timeout(300)
+    let_pass(page, 2000)
     assert "failed" in panel.message and page.locator("#scene").bounding_box() == before
     panel.press("Put the message away")
     assert panel.message == ""

@@ -25,6 +25,15 @@ def sysCall_actuation():
         self.dialog = None
 """
 
+# Adds up the bytes of all films, which come about every second.
+COUNT_RECORDED = """() => {
+    window.recorded = 0;
+    const { start } = MediaRecorder.prototype;
+    MediaRecorder.prototype.start = function (...options) {
+        this.addEventListener("dataavailable", ({ data }) => { window.recorded += data.size; });
+        start.apply(this, options);
+    };
+}"""
 PLACES = "all => all.map((one) => document.querySelector(one).getBoundingClientRect().toJSON())"
 
 
@@ -76,7 +85,6 @@ def test_the_pace_is_changed_and_follows(cockpit, opened):
 def test_boxes_and_a_mask_lie_over_the_picture_of_a_camera_with_truth(cockpit, opened):
     rospy.set_param("/drone_sim/scene_file", str(Path(__file__).parents[2] / "docs/tutorial/8_scene.yaml"))
     cockpit.call("load_scene")
-    opened.wait_for_timeout(2500)  # the cockpit asks the master every second which cameras there are
     try:
         switch_camera(opened)
         for kind in ("Boxes", "Mask"):
@@ -100,9 +108,10 @@ def test_a_camera_is_recorded_and_the_films_name_says_which(cockpit, opened):
     picture = opened.locator(".picture img")
     wait_until(opened, lambda: picture.evaluate_all("all => all.some(one => one.naturalWidth === 640)"))
     film = opened.get_by_role("button", name="Record /drone/front")
+    opened.evaluate(COUNT_RECORDED)
     film.click()
     wait_until(opened, lambda: film.get_attribute("aria-pressed") == "true")
-    opened.wait_for_timeout(5000)  # of the film: a busy browser begins late
+    wait_for(opened, "recorded > 1000")
     with opened.expect_download() as saved:
         film.click()
     assert saved.value.suggested_filename.startswith("drone_sim-drone_front-")
