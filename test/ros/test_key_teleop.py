@@ -21,6 +21,8 @@ from listening import Listener, connected
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from drone_sim.files.resources import package_path
+
 PATIENCE = 90.0  # s; nothing here takes nearly as long unless it hangs
 UP, LEFT = b"\x1b[A", b"\x1bOD"
 
@@ -33,7 +35,7 @@ class Terminal:
         self._screen = pyte.Screen(100, 24)
         self._stream = pyte.ByteStream(self._screen)
         environment = {**os.environ, "TERM": "xterm"}
-        command = ["rosrun", "drone_sim", "key_teleop"]
+        command = [sys.executable, str(package_path() / "scripts/key_teleop")]
         self.process = subprocess.Popen(
             command, env=environment, stdin=other, stdout=other, stderr=other, start_new_session=True
         )

@@ -36,8 +36,7 @@ class Flight(NamedTuple):
 
 
 FLIGHTS = {
-    "slow_real": Flight(1, False, 0.8),
-    "slow_simulated": Flight(1, True, 0.8),
+    "slow": Flight(1, False, 0.8),
     "real": Flight(5, False, 0.4),
     "simulated": Flight(5, True, 4.0),  # longer: its bag is played by the clock, and a busy machine joins what is close
 }
@@ -67,7 +66,7 @@ def path(messages):
 
 
 class States(unittest.TestCase):
-    """Four simulators with a drone each, at once; /use_sim_time counts when a node begins."""
+    """Three simulators with a drone each, at once; /use_sim_time counts when a node begins."""
 
     @classmethod
     def setUpClass(cls):
