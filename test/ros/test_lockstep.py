@@ -245,10 +245,10 @@ class Lockstep(unittest.TestCase):
                     flight.until(0.5)
                     processes[0].send_signal(signal.SIGSTOP)
                 simulator.wait_for("time stands at 0.05 s until there is" if not nodes else "waiting on")
-                began = time.monotonic()
                 os.killpg(simulator.process.pid, signal.SIGINT)
-                self.assertEqual(simulator.process.wait(HANGS), 0)
-                self.assertLess(time.monotonic() - began, 20)
+                self.assertEqual(
+                    simulator.process.wait(HANGS), 0
+                )  # the watchdog would have killed it
 
     def test_8_two_instances_are_told(self):
         node = (OTHER, "plain", "1", "drone", "--anonymous")

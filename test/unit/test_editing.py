@@ -352,7 +352,7 @@ OPERATION = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(requests=st.lists(st.one_of(OPERATION.map(lambda one: {"edit": [one]}), JUNK), min_size=1, max_size=3))
 def test_rubbish_is_refused(shared, requests):
     for one in requests:
