@@ -246,9 +246,7 @@ class Lockstep(unittest.TestCase):
                     processes[0].send_signal(signal.SIGSTOP)
                 simulator.wait_for("time stands at 0.05 s until there is" if not nodes else "waiting on")
                 os.killpg(simulator.process.pid, signal.SIGINT)
-                self.assertEqual(
-                    simulator.process.wait(HANGS), 0
-                )  # the watchdog would have killed it
+                self.assertEqual(simulator.process.wait(HANGS), 0)  # the watchdog would have killed it
 
     def test_8_two_instances_are_told(self):
         node = (OTHER, "plain", "1", "drone", "--anonymous")
