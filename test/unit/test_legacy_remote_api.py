@@ -3,6 +3,7 @@
 import logging
 import socket
 import struct
+import time
 
 import pytest
 from legacy_client import (
@@ -88,7 +89,8 @@ class Stage:
         return self.simulation.steps - before
 
     def settled(self, condition):
-        for _ in range(2000):
+        end = time.monotonic() + 60
+        while time.monotonic() < end:
             if condition():
                 return True
             self.server.wait(0.001)
@@ -119,6 +121,7 @@ def _stage(theatre):
     theatre.clients.clear()
     assert theatre.settled(lambda: not theatre.server._guests)
     theatre.player.stop()
+    theatre.server.serve()  # closes the ports of the script
     theatre.simulation.context.signals.clear()
 
 
