@@ -1,6 +1,7 @@
 // The page: the scene, held keys, the script in an editor with its text, panels, and what floats over the scene.
 import { Teleop } from "./teleop.js";
 import { Desk } from "./desk.js";
+import { at } from "./dom.js";
 import { Lesson } from "./lesson.js";
 import { Scripts } from "./scripts.js";
 import { Panels } from "./panels.js";
@@ -11,7 +12,6 @@ import { Windows } from "./windows.js";
 import { PageSocket } from "./socket.js";
 
 const LINE_FEED = 10;
-const at = (id) => document.getElementById(id);
 
 function show({ saved, said, bad = false, lists, script, of, question, flown }) {
   if (flown !== undefined) flies(flown);

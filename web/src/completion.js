@@ -45,8 +45,8 @@ export class Known {
   }
 
   take({ functions, constants }) {
-    for (const [module, name, flat, generations, given, sentence, page] of functions) {
-      const one = { label: name, shown: `${module}.${name}(${given})`, flat, generations, given, sentence, page };
+    for (const [module, name, flat, generations, given, sentence, page, isIgnored] of functions) {
+      const one = { label: name, shown: `${module}.${name}(${given})`, flat, generations, given, sentence, page, isIgnored };
       if (!this.modules.has(module)) this.modules.set(module, new Map());
       this.modules.get(module).set(name, one);
       this.flat.set(flat, { ...one, label: flat, shown: `${flat}(${given})` });
@@ -83,7 +83,7 @@ function card({ shown, sentence, page }) {
 }
 
 function option(one, type) {
-  const boost = one.generations === undefined ? -1 : one.sentence.startsWith("Accepted, and") ? -2 : one.generations.includes("5") ? 1 : 0;
+  const boost = one.generations === undefined ? -1 : one.isIgnored ? -2 : one.generations.includes("5") ? 1 : 0;
   const detail = one.given === undefined ? String(one.value ?? "") : `(${one.given})`;
   return { label: one.label, type, detail, boost, info: () => card(one) };
 }

@@ -1,12 +1,12 @@
 // What stands around the editor: the menu of files, and below it console and variables.
 import { Console } from "./console.js";
 import { Known } from "./completion.js";
+import { at } from "./dom.js";
 import { Files } from "./files.js";
 import { split } from "./split.js";
 import { Variables } from "./variables.js";
 
 const AGAIN = 1000; // ms between two words to the node on what is looked at
-const at = (id) => document.getElementById(id);
 const page = Math.random().toString(36).slice(2); // this page's name
 
 export class Desk {

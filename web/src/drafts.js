@@ -1,50 +1,34 @@
-// What is not on the node's disk yet: kept here, and by the browser, so that neither a dead node nor a reload loses it.
-const PREFIX = "drone_sim/draft/";
+// Texts that the node has not saved yet: { text, version } by script. The browser stores them, so that neither a node
+// that ends nor a reload loses them. Drafts that another tab writes later are not this page's.
+import { forget, isStored, keep, kept, keysBelow } from "./storage.js";
+
+const PREFIX = "draft/";
 
 export class Drafts {
   constructor() {
-    this.kept = new Map(); // { text, version } by script
-    try {
-      for (const key of Object.keys(localStorage)) {
-        if (key.startsWith(PREFIX)) this.kept.set(key.slice(PREFIX.length), JSON.parse(localStorage[key]));
-      }
-    } catch {
-      // A browser that keeps nothing: until the page is closed, this does.
-    }
+    this.drafts = new Map(keysBelow(PREFIX).map((script) => [script, kept(PREFIX + script)]).filter(([, draft]) => draft));
   }
 
   get(script) {
-    return this.kept.get(script);
+    return this.drafts.get(script);
   }
 
   get scripts() {
-    return [...this.kept.keys()];
+    return [...this.drafts.keys()];
   }
 
   put(script, draft) {
-    this.kept.set(script, draft);
-    try {
-      localStorage[PREFIX + script] = JSON.stringify(draft);
-    } catch {
-      // Full, or none: see above.
-    }
+    this.drafts.set(script, draft);
+    keep(PREFIX + script, draft);
   }
 
   drop(script) {
-    this.kept.delete(script);
-    try {
-      localStorage.removeItem(PREFIX + script);
-    } catch {
-      // There is none.
-    }
+    this.drafts.delete(script);
+    forget(PREFIX + script);
   }
 
-  // Whether the browser has it, too, so that the page may be closed.
+  // Whether the page may be closed: there is no draft, or the browser has stored it.
   isSafe(script) {
-    try {
-      return !this.kept.has(script) || localStorage[PREFIX + script] === JSON.stringify(this.kept.get(script));
-    } catch {
-      return false;
-    }
+    return !this.drafts.has(script) || isStored(PREFIX + script, this.drafts.get(script));
   }
 }

@@ -3,7 +3,7 @@ import { Board } from "./board.js";
 import { Build } from "./edit/build.js";
 import { Cameras } from "./cameras.js";
 import { at, icon } from "./dom.js";
-import { keep, kept } from "./kept.js";
+import { keep, kept } from "./storage.js";
 import { Log } from "./log.js";
 import { Notice } from "./notice.js";
 import { Plots } from "./plots.js";

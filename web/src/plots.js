@@ -1,7 +1,7 @@
 // Charts of the last half minute: those that are chosen, in the panel or enlarged over the scene; saved as PNG and CSV.
 import uPlot from "uplot";
 import { at, create, iconButton, save, stamp } from "./dom.js";
-import { keep, kept } from "./kept.js";
+import { keep, kept } from "./storage.js";
 
 const AGAIN = 250; // ms between two questions for what is new
 const SECONDS = 30;

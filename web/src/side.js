@@ -1,6 +1,6 @@
 // The icons at the scene's edge, and the one panel that they unfold; which, how wide and on which side is remembered.
 import { at } from "./dom.js";
-import { keep, kept } from "./kept.js";
+import { keep, kept } from "./storage.js";
 import { split } from "./split.js";
 
 export class Side {

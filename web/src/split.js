@@ -1,31 +1,23 @@
 // A bar between two parts of the page that is dragged, or moved by the arrow keys; the browser remembers where it was.
+import { keep, kept } from "./storage.js";
+
 const STEP = 24; // px, of a key
 
 // `property` is the CSS variable (px) that the bar sets on the page's root; `measure` gives its value for a place of
 // the pointer; `along` is "x" or "y".
 export function split(bar, property, along, low, high, measure) {
   const root = document.documentElement;
-  const key = `drone_sim/size/${property}`;
+  const key = `size/${property}`;
   const set = (value) => {
-    const kept = Math.round(Math.min(Math.max(value, low), high()));
-    root.style.setProperty(property, `${kept}px`);
-    bar.setAttribute("aria-valuenow", String(kept));
-    return kept;
+    const size = Math.round(Math.min(Math.max(value, low), high()));
+    root.style.setProperty(property, `${size}px`);
+    bar.setAttribute("aria-valuenow", String(size));
+    return size;
   };
-  const keep = (value) => {
-    try {
-      localStorage[key] = String(set(value));
-    } catch {
-      // It is remembered until the page is closed.
-    }
-  };
-  try {
-    if (Number(localStorage[key])) set(Number(localStorage[key]));
-  } catch {
-    // As the style says.
-  }
+  const move = (value) => keep(key, set(value));
+  if (Number(kept(key, 0))) set(Number(kept(key, 0)));
   bar.addEventListener("pointerdown", (event) => bar.setPointerCapture(event.pointerId));
-  bar.addEventListener("pointermove", (event) => bar.hasPointerCapture(event.pointerId) && keep(measure(event)));
+  bar.addEventListener("pointermove", (event) => bar.hasPointerCapture(event.pointerId) && move(measure(event)));
   const [less, more] = along === "x" ? ["ArrowRight", "ArrowLeft"] : ["ArrowUp", "ArrowDown"];
   bar.addEventListener("keydown", (event) => {
     const way = event.key === more ? 1 : event.key === less ? -1 : 0;
@@ -33,6 +25,6 @@ export function split(bar, property, along, low, high, measure) {
     event.preventDefault();
     event.stopPropagation();
     const box = bar.getBoundingClientRect();
-    keep(measure({ clientX: box.x + box.width / 2, clientY: box.y + box.height / 2 }) + way * STEP);
+    move(measure({ clientX: box.x + box.width / 2, clientY: box.y + box.height / 2 }) + way * STEP);
   });
 }

@@ -1,6 +1,6 @@
 // The start page: where a visitor begins, and the way back to what was open last.
 import { at } from "./dom.js";
-import { keep, kept } from "./kept.js";
+import { keep, kept } from "./storage.js";
 
 export class Start {
   // `go` has what each button does: tutorial, tasks, fly, build; `open(script)` opens the last script again.

@@ -1,6 +1,6 @@
 // Gains and other parameters: sliders and numbers, sent as they are moved, one at a time and at last the latest.
 import { at, create } from "./dom.js";
-import { keep, kept } from "./kept.js";
+import { keep, kept } from "./storage.js";
 
 const OPEN = ["Gains", "Script parameters"]; // groups that are unfolded at first
 const STEPS = 200; // of a slider
@@ -27,7 +27,7 @@ export class Tune {
     at("tune-groups").replaceChildren(...made);
     this.fill(this.board.get("values", {}));
     this.filter();
-    const field = id.startsWith("tune ") && document.getElementById(id);
+    const field = id.startsWith("tune ") && at(id);
     if (!field) return;
     if (field.type === "text") field.value = value;
     field.focus();

@@ -1,6 +1,6 @@
 // From where one looks at the scene, what is shown in it, and which of its objects has handles. The scene remembers it.
 import { at, create } from "./dom.js";
-import { keep, kept } from "./kept.js";
+import { keep, kept } from "./storage.js";
 
 const SHOWN = {
   frames: ["Frames", "The axes of all frames: x red, y green, z blue"],

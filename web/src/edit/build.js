@@ -1,7 +1,7 @@
 // The Edit panel, the bar and the shelf of models about the scene: what V-REP's window is for who builds a scene.
 import { Menu } from "../menu.js";
 import { at, create } from "../dom.js";
-import { keep, kept } from "../kept.js";
+import { keep, kept } from "../storage.js";
 import { split } from "../split.js";
 import { Arrange } from "./arrange.js";
 import { askFor } from "./ask.js";

@@ -1,6 +1,6 @@
 // Position and orientation in numbers, as V-REP's dialogs have them: in m and degrees, of the world or of the parent.
 import { create } from "../dom.js";
-import { keep, kept } from "../kept.js";
+import { keep, kept } from "../storage.js";
 import { numberField } from "./number_field.js";
 import { matrixOfNumbers, numbersOf, seenFrom } from "./poses.js";
 import { FRAMES_OF_NUMBERS } from "./frames.js";

@@ -7,6 +7,7 @@ import { Gizmo } from "./gizmo.js";
 import { Hand, headingOf } from "./hand.js";
 import { Outline } from "./outline.js";
 import { Surroundings } from "./surroundings.js";
+import { keep, kept } from "../storage.js";
 import { Words } from "./text.js";
 import { Tree } from "./tree.js";
 import { BEHIND, FOV, FREE, View } from "./view.js";
@@ -17,7 +18,7 @@ const TARGETS = "markers"; // the server of the handles of vehicles and of their
 const BASE = "base_link", TRACK = "Track_base", EYE = "_optical";
 const STEP = 0.05; // s, of the simulation
 const HOVERED = 0xffffff;
-const STORE = "drone_sim.scene";
+const STORE = "scene"; // the key of what the browser remembers
 const LAYERS = { path: "view/path", command: "view/command", forces: "view/forces", labels: "view/state" };
 const SHOWN = { frames: false, path: true, command: true, forces: false, handles: true, labels: true };
 
@@ -48,10 +49,10 @@ export class Scene {
     this.canvas.dom.setAttribute("role", "application");
     this.canvas.dom.setAttribute("aria-label", "The scene");
     this.shown = { ...SHOWN, shadows: this.canvas.isFast };
-    const kept = recall();
-    this.wanted = kept.view ?? BEHIND; // a camera may come later
-    this.show(kept.shown ?? {});
-    if (kept.view === FREE) this.look(FREE);
+    const { view, shown } = kept(STORE, {});
+    this.wanted = view ?? BEHIND; // a camera may come later
+    this.show(shown ?? {});
+    if (view === FREE) this.look(FREE);
     this.canvas.fit();
   }
 
@@ -178,7 +179,7 @@ export class Scene {
   }
 
   keep() {
-    remember({ view: this.wanted, shown: this.shown });
+    keep(STORE, { view: this.wanted, shown: this.shown });
   }
 
   // A picture of the scene, as PNG.
@@ -297,19 +298,3 @@ const key = (server, name) => `${server} ${name}`;
 
 // Whether the mouse meets it: bodies, objects, green spheres.
 const isThing = ({ layer, kind }) => kind !== "handle" && [BODIES, "scene", TARGETS].includes(layer);
-
-function recall() {
-  try {
-    return JSON.parse(localStorage.getItem(STORE)) ?? {};
-  } catch {
-    return {};
-  }
-}
-
-function remember(what) {
-  try {
-    localStorage.setItem(STORE, JSON.stringify(what));
-  } catch {
-    // a browser that keeps nothing
-  }
-}

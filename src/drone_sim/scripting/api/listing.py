@@ -77,12 +77,21 @@ def first_paragraph(doc: str) -> str:
 def for_editors() -> dict[str, Any]:
     """Return all names of the API, for JSON.
 
-    `functions`: rows of module, name, V-REP 3.x name, generations, arguments, description, address in the manual;
-    `constants`: names and values in `sim`.
+    `functions`: rows of module, name, V-REP 3.x name, generations, arguments, description, address in the manual, and
+    whether the function does nothing; `constants`: names and values in `sim`.
     """
     modules = apis()
     rows = [
-        [module, name, flat_name(module, name), generations, arguments_of(function), _sentence(function), page]
+        [
+            module,
+            name,
+            flat_name(module, name),
+            generations,
+            arguments_of(function),
+            _sentence(function),
+            page,
+            is_ignored(function),
+        ]
         for module, api in modules.items()
         for declaration, function in declared(api)
         for name, generations in declaration.names.items()

@@ -1,0 +1,25 @@
+// Builds the page into the folder from which the node serves it. `npm ci && npm run build` in web/.
+// The script begins with a digest of its sources, by which a test sees that it was built from them.
+import { createHash } from "node:crypto";
+import { copyFileSync, readFileSync, readdirSync } from "node:fs";
+import { build } from "esbuild";
+
+const PAGE = process.env.PAGE ?? "../src/drone_sim/ros/cockpit/page";
+
+function digest() {
+  const scripts = readdirSync("src", { recursive: true }).filter((name) => name.endsWith(".js")).sort();
+  const hash = createHash("sha256");
+  for (const file of [...scripts.map((name) => `src/${name}`), "package-lock.json"]) hash.update(`${file}\n`).update(readFileSync(file));
+  return hash.digest("hex");
+}
+
+await build({
+  entryPoints: ["src/cockpit.js"],
+  outfile: `${PAGE}/cockpit.js`,
+  bundle: true,
+  minify: true,
+  target: "es2020",
+  banner: { js: `// built from web/src, sha256 ${digest()}` },
+});
+for (const name of readdirSync("src").filter((one) => /\.(html|css)$/.test(one))) copyFileSync(`src/${name}`, `${PAGE}/${name}`);
+copyFileSync("node_modules/uplot/dist/uPlot.min.css", `${PAGE}/uPlot.min.css`);

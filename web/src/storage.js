@@ -1,0 +1,61 @@
+// What the browser remembers of the page. A browser that stores nothing remembers it until the page is closed.
+const PREFIX = "drone_sim/";
+const inPage = new Map(); // values by key, as text
+
+function read(key) {
+  if (inPage.has(key)) return inPage.get(key);
+  try {
+    return localStorage.getItem(PREFIX + key);
+  } catch {
+    return null; // this browser has no storage
+  }
+}
+
+// Returns a stored value, `otherwise` if there is none or another program has written it.
+export function kept(key, otherwise) {
+  try {
+    return JSON.parse(read(key)) ?? otherwise;
+  } catch {
+    return otherwise;
+  }
+}
+
+export function keep(key, value) {
+  const text = JSON.stringify(value);
+  inPage.set(key, text);
+  try {
+    localStorage.setItem(PREFIX + key, text);
+  } catch {
+    // The storage is full, or there is none.
+  }
+}
+
+export function forget(key) {
+  inPage.delete(key);
+  try {
+    localStorage.removeItem(PREFIX + key);
+  } catch {
+    // This browser has no storage.
+  }
+}
+
+// Returns the keys that begin with `prefix`, without it.
+export function keysBelow(prefix) {
+  let stored = [];
+  try {
+    stored = Object.keys(localStorage).filter((key) => key.startsWith(PREFIX)).map((key) => key.slice(PREFIX.length));
+  } catch {
+    // This browser has no storage.
+  }
+  const all = new Set([...stored, ...inPage.keys()]);
+  return [...all].filter((key) => key.startsWith(prefix)).map((key) => key.slice(prefix.length));
+}
+
+// Whether `value` will still be there after the page was closed.
+export function isStored(key, value) {
+  try {
+    return localStorage.getItem(PREFIX + key) === JSON.stringify(value);
+  } catch {
+    return false;
+  }
+}
