@@ -185,7 +185,8 @@ def test_what_there_is_not_is_refused_in_one_line(panel, ask, message):
 def test_what_the_simulation_says_is_shown_as_text(panel, told, monkeypatch):
     monkeypatch.setattr("rospy.Subscriber", lambda *_, **__: None)
     socket = type("Socket", (), {"tell": lambda _self, message: told.append(message)})()
-    listener = SimulatorListener("/drone_sim", panel, socket)
+    heard = []
+    listener = SimulatorListener("/drone_sim", panel, socket, lambda: heard.append(True))
     listener._on_log(Log(name="/other", msg="not ours"))
     listener._on_log(Log(name="/drone_sim", msg=HOSTILE, level=Log.WARN))
     assert panel.board.whole({})["lines"] == [f"warning: {HOSTILE}"]
@@ -198,6 +199,7 @@ def test_what_the_simulation_says_is_shown_as_text(panel, told, monkeypatch):
     ]
     listener._on_diagnostics(DiagnosticArray(status=found))
     assert panel.board.get("pace") == "0.98"
+    assert len(heard) == 3, "what other nodes say is no sign of life"
     assert panel.board.get("diagnosis") == [
         {"of": "vehicle drone", "said": "upside down", "wrong": True},
         {"of": "simulation", "said": "flying", "wrong": False},

@@ -20,6 +20,7 @@ from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
 from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows
 from drone_sim.ros.cockpit.panel.panel import Panel, SimulatorListener
+from drone_sim.ros.cockpit.panel.pulse import Pulse
 from drone_sim.ros.cockpit.scene.meshes import MeshStore
 from drone_sim.ros.cockpit.scene.scene_state import SceneState
 from drone_sim.ros.cockpit.scene.scene_view import SceneView
@@ -62,10 +63,13 @@ class Cockpit:
         self._panel = Panel(self._simulator, self._commands, SceneList(scripts), self._socket.tell)
         self._cameras = CameraSwitches(self._panel.board, self._socket)
         self._windows = ScriptWindows(self._simulator.node, self._cameras, self._socket)
+        self._pulse = Pulse(self._simulator.node, self._socket.tell)
         answers.update({**self._panel.answers, **self._windows.answers})
+        answers["pass"] = lambda _: {"pass": server.return_pass.key}  # by which the page returns after a new start
         server.begin(self._socket.serve, self._find)
         for hold in (lambda: held.run(lambda: not rospy.is_shutdown()), self._hold):
             threading.Thread(target=hold, daemon=True).start()
+        self._pulse.start()
 
     def run(self) -> None:
         """Show what is new, again and again."""
@@ -117,7 +121,10 @@ class Cockpit:
             if one is not None:
                 one.close()
         self._view = SceneView(self._state, self._meshes, namespace) if namespace else None
-        self._listener = SimulatorListener(self._simulator.node, self._panel, self._socket) if namespace else None
+        self._pulse.expect(bool(namespace))
+        self._listener = None
+        if namespace:
+            self._listener = SimulatorListener(self._simulator.node, self._panel, self._socket, self._pulse.hear)
         self._cameras.rest(not namespace)
         self._windows.listen(bool(namespace))
         if not namespace:

@@ -129,14 +129,17 @@ class Panel:
 class SimulatorListener:
     """Listens to one node, and shows what it says."""
 
-    def __init__(self, node: str, panel: Panel, socket: PageSocket):
-        """Listen to `node`; show it on `panel`, and send a script's failure through `socket`."""
-        self._node = node
+    def __init__(self, node: str, panel: Panel, socket: PageSocket, hear: Callable[[], None]):
+        """Listen to `node`; show it on `panel`, and send a script's failure through `socket`.
+
+        `hear` is called with every message that shows that the node is alive.
+        """
+        self._node, self._hear = node, hear
         self._panel, self._socket = panel, socket
         heard = (
             ("/rosout_agg", Log, self._on_log),
             ("/diagnostics", DiagnosticArray, self._on_diagnostics),
-            (f"{node}/state", String, lambda message: panel.show_status(message.data)),
+            (f"{node}/state", String, self._on_state),
             (f"{node}/signals", String, panel.plots.on_signals),
             (f"{node}/parameter_updates", Config, panel.speed.on_set),
         )
@@ -147,9 +150,14 @@ class SimulatorListener:
         for one in self._listening:
             one.unregister()
 
+    def _on_state(self, message: Any) -> None:
+        self._hear()
+        self._panel.show_status(message.data)
+
     def _on_log(self, message: Any) -> None:
         if message.name != self._node:
             return
+        self._hear()
         self._panel.board.log(f"{_LEVELS.get(message.level, '')}{message.msg}")
         failure = script_failure(message.msg) if message.level >= Log.ERROR else None
         if failure is not None:
@@ -160,6 +168,7 @@ class SimulatorListener:
         found = {one.name.removeprefix(own): one for one in message.status if one.name.startswith(own)}
         if not found:  # another node's
             return
+        self._hear()
         said = [
             {"of": name, "said": one.message, "wrong": one.level != DiagnosticStatus.OK} for name, one in found.items()
         ]

@@ -7,7 +7,7 @@ import hmac
 import http
 import logging
 import re
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from functools import lru_cache
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
@@ -19,6 +19,8 @@ from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.exceptions import ConnectionClosedError
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
+
+from drone_sim.ros.cockpit.server.return_pass import ReturnPass
 
 SUBPROTOCOL = "drone_sim"  # of our own socket
 _LARGEST = 8 << 20  # bytes of a message from a browser: a script, with all that JSON makes longer
@@ -36,6 +38,7 @@ _POLICY = (
     "connect-src 'self' blob: {sockets}; "
     "frame-ancestors 'self'; base-uri 'none'; form-action {forms}"
 )
+RETURN = "/return"  # where a tab of an earlier cockpit asks for a challenge, and answers it
 MANUAL = "/manual/"  # whose search is a form
 _ONCE = ("Host", "Cookie", "Origin", "Upgrade", "Accept-Encoding")  # of what is read here
 _HOST = re.compile(r"[\w.:\[\]-]+", re.ASCII)
@@ -49,9 +52,15 @@ _BROKEN = (CloseCode.PROTOCOL_ERROR, CloseCode.INVALID_DATA, CloseCode.MESSAGE_T
 class AccessControl:
     """The check in front of the page and its socket: only requests with the token get in."""
 
-    def __init__(self, token: str, page: Callable[[str], Content], socket: Handler):
-        """Let in whoever has `token`; `page` finds what is asked for by its path, `socket` serves our `SUBPROTOCOL`."""
+    def __init__(
+        self, token: str, page: Callable[[str], Content], socket: Handler, return_pass: ReturnPass | None = None
+    ):
+        """Let in whoever has `token`, and tabs that return; `page` finds a page by its path, `socket` serves sockets.
+
+        `return_pass` checks tabs of an earlier cockpit; None lets none of them in.
+        """
         self._token = token
+        self._return_pass = return_pass
         self._page = page
         self._socket = socket
 
@@ -83,6 +92,8 @@ class AccessControl:
         path, _, query = request.path.partition("?")
         if self._is_token(parse_qs(query).get("token", [""])[0]) and not _is_socket(request):
             return self._let_in(request)
+        if path == RETURN and self._return_pass is not None and not _is_socket(request):
+            return self._let_return(self._return_pass, parse_qs(query), request)
         if not self._is_token(_cookie(request, self._name_of_cookie(request))):
             return _response(http.HTTPStatus.FORBIDDEN, _REFUSED)
         if _is_socket(request):
@@ -94,11 +105,24 @@ class AccessControl:
 
     def _let_in(self, request: Request) -> Response:
         """Remember the token in a cookie, and take it out of the address, which people send to each other."""
-        cookie = f"{self._name_of_cookie(request)}={self._token}; Path=/; HttpOnly; SameSite=Strict"
         response = _response(http.HTTPStatus.SEE_OTHER, "")
         response.headers["Location"] = "/"
-        response.headers["Set-Cookie"] = cookie
+        self._remember(request, response)
         return response
+
+    def _let_return(self, return_pass: ReturnPass, query: Mapping[str, list[str]], request: Request) -> Response:
+        """Give a challenge to a tab of an earlier cockpit; if it has signed one, remember the token in a cookie."""
+        if "signature" not in query:
+            return _response(http.HTTPStatus.OK, return_pass.challenge())
+        if not return_pass.is_signed(query.get("challenge", [""])[0], query["signature"][0]):
+            return _response(http.HTTPStatus.FORBIDDEN, _REFUSED)
+        response = _response(http.HTTPStatus.OK, "")
+        self._remember(request, response)
+        return response
+
+    def _remember(self, request: Request, response: Response) -> None:
+        cookie = f"{self._name_of_cookie(request)}={self._token}; Path=/; HttpOnly; SameSite=Strict"
+        response.headers["Set-Cookie"] = cookie
 
     def _is_token(self, given: str) -> bool:
         return hmac.compare_digest(given.encode(errors="backslashreplace"), self._token.encode())

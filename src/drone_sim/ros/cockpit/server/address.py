@@ -101,7 +101,7 @@ def address_file(address: str, port: int) -> Iterator[str]:
     file = Path(rospkg.get_ros_home()) / "drone_sim" / f"cockpit_{port}.txt"
     content = f"{address}\n"
     try:
-        _write(file, content)
+        write_for_user_only(file, content)
     except OSError as error:
         yield f"the address with the token is only in the terminal, because {file} cannot be written ({error.strerror})"
         return
@@ -113,7 +113,8 @@ def address_file(address: str, port: int) -> Iterator[str]:
                 file.unlink()
 
 
-def _write(file: Path, content: str) -> None:
+def write_for_user_only(file: Path, content: str) -> None:
+    """Write a file that only the user can read, in place of an older one. Raises OSError."""
     file.parent.mkdir(parents=True, exist_ok=True)
     file.unlink(missing_ok=True)  # of one that was killed; whoever may read that must not read this
     descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, _MODE)

@@ -14,6 +14,7 @@ from websockets.asyncio.server import ServerConnection
 
 from drone_sim.ros.cockpit.server.access_control import AccessControl, Content, Handler
 from drone_sim.ros.cockpit.server.address import free_place, urls
+from drone_sim.ros.cockpit.server.return_pass import ReturnPass, key_of_port
 
 _KINDS = {
     ".html": "text/html; charset=utf-8",
@@ -41,7 +42,8 @@ class PageServer:
         host, wanted = free_place(address, port)
         self._loop = asyncio.new_event_loop()
         threading.Thread(target=self._loop.run_forever, name="page server", daemon=True).start()
-        listening = AccessControl(token, self._find, self._talk).serve(host, wanted)
+        self.return_pass = ReturnPass(key_of_port(wanted))
+        listening = AccessControl(token, self._find, self._talk, self.return_pass).serve(host, wanted)
         self._server = asyncio.run_coroutine_threadsafe(listening, self._loop).result()
         self.port = int(next(iter(self._server.sockets)).getsockname()[1])
         self.address, self.address_elsewhere = urls(host, self.port, token)
