@@ -52,7 +52,7 @@ class Launched:
 def launched(*arguments):
     """Give a running simulation with a cockpit."""
     with tempfile.TemporaryDirectory() as folder:
-        port = _free_port()
+        port = free_port()
         log = Path(folder) / "launch.log"
         environment = {
             **os.environ,
@@ -63,7 +63,7 @@ def launched(*arguments):
         }
         environment.pop("PYTHONUNBUFFERED", None)  # the address has to be in the log at once without it, too
         command = ["roslaunch", "-p", str(port), "drone_sim", "drone.launch", "rviz:=false", "web:=true"]
-        options = [f"web_port:={_free_port()}", *arguments]
+        options = [f"web_port:={free_port()}", *arguments]
         with log.open("w") as output:
             process = subprocess.Popen([*command, *options], env=environment, stdout=output, stderr=subprocess.STDOUT)
         try:
@@ -89,7 +89,7 @@ def _address(process, log):
     raise RuntimeError("the cockpit did not start")
 
 
-def _free_port():
+def free_port():
     with socket.socket() as one:
         one.bind(("", 0))
         return one.getsockname()[1]

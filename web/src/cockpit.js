@@ -10,35 +10,21 @@ import { putInto } from "./snippets.js";
 import { split } from "./split.js";
 import { Windows } from "./windows.js";
 import { PageSocket } from "./socket.js";
+import { show as showFacts } from "./state/show.js";
+import { Store } from "./state/store.js";
 
 const LINE_FEED = 10;
 
-function show({ saved, said, bad = false, lists, script, of, question, flown }) {
-  if (flown !== undefined) flies(flown);
-  if (saved !== undefined) {
-    at("saved").textContent = saved;
-    at("saved").classList.toggle("bad", bad);
-  }
-  if (said !== undefined) {
-    at("said").textContent = said;
-    at("said").classList.toggle("bad", bad);
-  }
+const store = new Store();
+
+function show({ lists, script, of, question }) {
   if (lists) offer(lists);
   if (script) {
     at("script").value = script;
     panels.opened(script);
   }
-  flies();
   if (of !== undefined) lesson.has(script, of);
   if (question !== undefined) ask(question);
-}
-
-// Which script flies, beside the button that would fly this one, too.
-function flies(flown = flies.flown ?? "") {
-  flies.flown = flown;
-  at("flown").textContent = flown;
-  at("flying").classList.toggle("is-shown", flown === at("script").value);
-  at("flying").textContent = !flown ? "" : flown === at("script").value ? "flies" : `${flown} flies`;
 }
 
 function offer({ groups, lessons, folder }) {
@@ -65,7 +51,7 @@ function ask(question) {
   at("question").replaceChildren(question.said, " ", ...buttons);
 }
 
-const tell = (error) => show({ said: error.message, bad: true });
+const tell = (error) => store.say("trouble", error.message);
 
 function told(message) {
   panels.told(message);
@@ -87,13 +73,14 @@ function took(data) {
 }
 
 const run = () => {
+  if (at("run").disabled) return Promise.resolve();
   desk.console.clear();
   return scripts.run(lesson.name).catch(tell);
 };
 const open = (script) => scripts.open(script).catch(tell);
 const put = (code) => {
   try {
-    show({ said: putInto(scripts.editor.view, scripts.is.script, code) });
+    store.say("inserted", putInto(scripts.editor.view, scripts.is.script, code));
     return true;
   } catch (error) {
     tell(error);
@@ -108,6 +95,7 @@ const first = (isTask) => {
 const scene = new Scene(at("scene"), { say: (message) => socket.say(message), ask: (...question) => socket.ask(...question) });
 window.scene = scene; // for who looks into it from the browser's console, and for tests
 const panels = new Panels({
+  store,
   socket: () => socket,
   scene: () => scene,
   go: { tutorial: () => first(false), tasks: () => first(true) },
@@ -120,32 +108,28 @@ const lesson = new Lesson(
     body: at("lesson-body"), start: at("start"), flies: at("flies"), text: at("lesson-text"),
     grade: at("grade"), graded: at("graded"),
   },
+  store,
   (...question) => socket.ask(...question),
   { open, put, run, save: () => scripts.save() },
 );
-let isLost = false;
-const socket = new PageSocket(
-  told,
-  took,
-  () => {
-    if (isLost) show({ said: "" });
-    isLost = false;
+const socket = new PageSocket(store, {
+  tell: told,
+  picture: took,
+  open: () => {
     panels.connected().catch(tell);
     socket.ask("windows").then(told, () => {}); // told anyway, once the node is ready
     scripts.connected().catch(tell);
     desk.connected().catch(tell);
+    lesson.connected();
   },
-  () => {
-    isLost = true;
+  close: () => {
     panels.lost();
     windows.clear();
-    show({ said: "the cockpit's node does not answer; what you write is kept here until it does. Started anew, it has a new address.", bad: true });
   },
-);
+});
 const windows = new Windows(at("windows"), socket, panels.notice);
-const desk = new Desk(socket, show);
-const shown = { show, say: (line) => desk.say(line), ran: () => desk.tell() };
-const scripts = new Scripts(at("text"), socket, shown, (name) => lesson.go(name), desk.known, () => desk.look());
+const desk = new Desk(socket, store, show);
+const scripts = new Scripts(at("text"), socket, store, { show, say: (line) => desk.say(line) }, (name) => lesson.go(name), desk.known, () => desk.look());
 desk.serve(scripts);
 scripts.onRun = run;
 const teleop = new Teleop(
@@ -156,6 +140,7 @@ const teleop = new Teleop(
   },
 );
 
+store.on(showFacts);
 at("script").onchange = () => open(at("script").value);
 at("run").onclick = run;
 window.addEventListener("keydown", (event) => {

@@ -4,20 +4,22 @@ import { Known } from "./completion.js";
 import { at } from "./dom.js";
 import { Files } from "./files.js";
 import { split } from "./split.js";
+import { pauseOf } from "./state/words.js";
 import { Variables } from "./variables.js";
 
 const AGAIN = 1000; // ms between two words to the node on what is looked at
 const page = Math.random().toString(36).slice(2); // this page's name
 
 export class Desk {
-  // `socket` answers questions; `show` shows messages, as the page's.
-  constructor(socket, show) {
+  // `socket` answers questions; `show` shows questions, as the page's.
+  constructor(socket, store, show) {
     this.socket = socket;
+    this.store = store;
     this.show = show;
     this.known = new Known();
     this.console = new Console(at("console"), (file, line) => this.goTo(file, line));
     this.variables = new Variables(at("variables-of"), at("variables-body"));
-    this.reached = "";
+    this.pause = ""; // the one that was shown last
     at("late").onchange = () => this.console.showTime(at("late").checked);
     at("clear").onclick = () => this.console.clear();
     at("live").onchange = () => this.look();
@@ -38,6 +40,7 @@ export class Desk {
       cancel: at("as-cancel"), drop: at("editor"), pick: at("pick"), items,
     };
     new Files(parts, scripts, this.show);
+    this.store.on((now) => this.follow(now));
   }
 
   // ---- the two tabs
@@ -94,38 +97,27 @@ export class Desk {
     this.known.names = { objects, parameters };
   }
 
-  // Shows what the scripts hold; where one has come to a breakpoint, that line.
+  // Shows what the scripts hold; null if the simulation does not tell it any more.
   take(state) {
-    const { file = "", line = 0, time = 0 } = state?.reached ?? {};
     if (state) this.variables.take(state, this.scripts.is.file);
-    const reached = file && state.state === "paused" ? `${file}:${line}:${time}` : "";
-    if (reached && reached !== this.reached) {
-      this.choose(at("tab-variables"));
-      const isOurs = file === this.scripts.is.file || Object.keys(this.scripts.editor.breakpoints).length > 0;
-      if (isOurs) this.goTo(file, line); // or another browser has set it
-    } else if (this.reached && !reached) this.show({ said: "" });
-    const isNew = reached !== this.reached;
-    this.reached = reached;
-    this.at = { file, line: reached ? line : 0, time };
-    if (isNew) this.tell();
-    this.mark();
+    else this.variables.clear();
+    this.store.take("variables", state);
   }
 
-  // Says where it is paused, if it is at a breakpoint.
-  tell() {
-    if (this.reached) this.show({ said: `paused at line ${this.at.line}, t = ${this.at.time.toFixed(2)} s` });
-  }
-
-  // Marks the line at which it is paused, where its file is shown.
-  mark() {
-    const { file = "", line = 0 } = this.at ?? {};
-    this.scripts.editor.paused(file === this.scripts.is.file ? line : 0);
+  // Shows the line of a breakpoint when the flight pauses there.
+  follow(now) {
+    const pause = pauseOf(now);
+    const name = pause ? `${pause.file}:${pause.line}:${pause.time}` : "";
+    this.variables.say(now);
+    if (name === this.pause) return;
+    this.pause = name;
+    if (!pause) return;
+    this.choose(at("tab-variables"));
+    const isOurs = pause.file === this.scripts.is.file || Object.keys(this.scripts.editor.breakpoints).length > 0;
+    if (isOurs) this.goTo(pause.file, pause.line); // or another browser has set it
   }
 
   goTo(file, line) {
-    return this.scripts.goTo(file, line).then(
-      () => this.mark(),
-      (error) => this.show({ said: error.message, bad: true }),
-    );
+    return this.scripts.goTo(file, line).catch((error) => this.store.say("trouble", error.message));
   }
 }

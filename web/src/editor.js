@@ -1,4 +1,5 @@
-// The text of one script at a time; each keeps its own cursor, its own history of changes, and its breakpoints.
+// The text of one script at a time; each keeps its own cursor, its own history of changes, and its breakpoints. The
+// browser remembers the cursor and what was in sight.
 import { basicSetup } from "codemirror";
 import { indentWithTab } from "@codemirror/commands";
 import { EditorState, Prec } from "@codemirror/state";
@@ -10,8 +11,12 @@ import { lua } from "@codemirror/legacy-modes/mode/lua";
 import { tags } from "@lezer/highlight";
 import { breakpointGutter, linesOf, showPaused } from "./breakpoints.js";
 import { completion } from "./completion.js";
+import { keep, kept } from "./storage.js";
 
 const QUIET = 500; // ms without a key before the text is checked
+const PLACES = "places"; // the key of cursors and first visible lines
+const PLACED = 300; // ms without a move after which the cursor is remembered
+const MOST_PLACES = 100; // scripts whose cursors are remembered
 const FLOWN = "flight"; // the source of a failure while it flew
 
 export const colors = HighlightStyle.define([
@@ -38,18 +43,19 @@ export function fillWith(view, text, annotations = []) {
 export const isLua = (script) => script.endsWith(".lua");
 
 export class Editor {
-  // `on` has change(), run(), check(text, isLua) which answers with findings, and breakpoints(); `known` is the API.
+  // `on` has change(), run(), check(text, isLua), which answers with findings, checked(findings), moved(line), which hears
+  // where the line of a failure is now, 0 if it was written anew, and breakpoints(); `known` is the API.
   constructor(parent, on, known) {
     this.states = new Map(); // of scripts that have been open, by name
     this.script = "";
     this.on = on;
     this.known = known;
     const changed = EditorView.updateListener.of((update) => {
+      if (update.docChanged || update.selectionSet) this.placeSoon();
       if (!update.docChanged) return;
       this.checkSoon();
-      if (this.filling) return;
-      this.unmark(update);
-      on.change();
+      this.follow(update);
+      if (!this.filling) on.change();
     });
     const run = { key: "Mod-Enter", run: () => (on.run(), true) }; // else it would begin a line, too
     this.common = [
@@ -63,6 +69,8 @@ export class Editor {
       changed,
     ];
     this.view = new EditorView({ parent, state: this.begin("", "") });
+    this.view.scrollDOM.addEventListener("scroll", () => this.placeSoon());
+    window.addEventListener("pagehide", () => this.keepPlace());
   }
 
   begin(script, text) {
@@ -82,17 +90,20 @@ export class Editor {
     this.view.setState(known?.state ?? this.begin(script, text));
     this.fill(text);
     if (known) this.view.dispatch({ effects: known.scroll });
+    else this.restorePlace();
     this.check();
     this.on.breakpoints();
   }
 
   leave() {
+    this.keepPlace();
     if (this.script) this.states.set(this.script, { state: this.view.state, scroll: this.view.scrollSnapshot() });
   }
 
   rename(script) {
     this.states.delete(this.script);
     this.script = script;
+    this.keepPlace();
     this.on.breakpoints();
   }
 
@@ -103,9 +114,7 @@ export class Editor {
 
   // Puts another text there, as one change that can be undone; what is the same stays, and the cursor with it.
   fill(text) {
-    const before = this.text;
-    this.mark(null);
-    if (text === before) return;
+    if (text === this.text) return;
     this.filling = true;
     fillWith(this.view, text);
     this.filling = false;
@@ -116,6 +125,35 @@ export class Editor {
     const { from } = doc.line(Math.min(Math.max(1, line), doc.lines));
     this.view.dispatch({ selection: { anchor: from }, effects: EditorView.scrollIntoView(from, { y: "center" }) });
     this.view.focus();
+  }
+
+  // ---- where one was
+
+  placeSoon() {
+    clearTimeout(this.placing);
+    this.placing = setTimeout(() => this.keepPlace(), PLACED);
+  }
+
+  // Remembers cursor and first visible line of the script.
+  keepPlace() {
+    clearTimeout(this.placing);
+    if (!this.script) return;
+    const { anchor, head } = this.view.state.selection.main;
+    const block = this.view.lineBlockAtHeight(this.view.scrollDOM.scrollTop);
+    const top = this.view.state.doc.lineAt(block.from).number;
+    const { [this.script]: _, ...others } = kept(PLACES, {});
+    const places = [...Object.entries(others), [this.script, { anchor, head, top }]].slice(-MOST_PLACES);
+    keep(PLACES, Object.fromEntries(places));
+  }
+
+  restorePlace() {
+    const place = kept(PLACES, {})[this.script];
+    if (!place) return;
+    const { doc } = this.view.state;
+    const within = (position) => Math.min(Math.max(0, position), doc.length);
+    const top = doc.line(Math.min(Math.max(1, place.top), doc.lines)).from;
+    const selection = { anchor: within(place.anchor), head: within(place.head) };
+    this.view.dispatch({ selection, effects: EditorView.scrollIntoView(top, { y: "start", yMargin: 0 }) });
   }
 
   // ---- what is wrong
@@ -130,11 +168,13 @@ export class Editor {
     this.view.dispatch(setDiagnostics(this.view.state, diagnostics));
   }
 
-  // A failure in a line that is written anew is none of that line any more.
-  unmark({ startState, changes }) {
-    let touched = false;
-    forEachDiagnostic(startState, (one, from, to) => (touched ||= one.source === FLOWN && changes.touchesRange(from, to) !== false));
-    if (touched) this.put(this.diagnostics.filter((one) => one.source !== FLOWN));
+  // Tells where the line of a failure is after a change; a line that was written anew has not failed.
+  follow({ startState, state, changes }) {
+    forEachDiagnostic(startState, (one, from, to) => {
+      if (one.source !== FLOWN) return;
+      const line = changes.touchesRange(from, to) ? 0 : state.doc.lineAt(changes.mapPos(from)).number;
+      if (line !== startState.doc.lineAt(from).number) this.on.moved(line);
+    });
   }
 
   // Shows a failure at its line, or none.
@@ -163,6 +203,7 @@ export class Editor {
     if (!found || script !== this.script || text !== this.text) return found ?? [];
     const flown = this.diagnostics.filter((one) => one.source === FLOWN);
     this.put([...flown, ...found.map((one) => this.placed(one))]);
+    this.on.checked(found);
     return found;
   }
 

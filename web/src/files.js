@@ -54,7 +54,7 @@ export class Files {
   }
 
   attempt(action) {
-    return Promise.resolve().then(action).catch((error) => this.show({ said: error.message, bad: true }));
+    return Promise.resolve().then(action).catch((error) => this.scripts.store.say("trouble", error.message));
   }
 
   // A name without an ending gets that of the script.

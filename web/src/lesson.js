@@ -1,10 +1,12 @@
 // The text beside the script: a section of the tutorial, or a task. What it says of a scene, Run flies in.
 import { render } from "./markdown.js";
 import { hasFunctions } from "./snippets.js";
+import { forget, keep, kept } from "./storage.js";
 
 const ASK_AGAIN = 500; // ms, for what is being graded
+const GRADE = "grade"; // the key of the last grade: { task, script, number, isOld }; a reload goes on with it
 
-function showGrade(element, script, { error, points, of, rows = [] }) {
+function showGrade(element, { script, isOld }, { error, points, of, rows = [] }) {
   const table = document.createElement("table");
   for (const one of rows) {
     const row = table.insertRow();
@@ -12,14 +14,18 @@ function showGrade(element, script, { error, points, of, rows = [] }) {
     for (const cell of [one.passed ? "ok" : "no", one.name, `${one.points}/${one.of}`, one.said]) row.insertCell().textContent = cell;
   }
   const sum = rows.length ? `${script}: ${points} of ${of} points` : "";
-  element.replaceChildren([sum, error].filter(Boolean).join(". "), table);
+  const old = isOld ? "The script has been changed since" : "";
+  element.replaceChildren([sum, error, old].filter(Boolean).join(". "), table);
 }
 
 export class Lesson {
   // `parts` are elements: choice, before, after, fold, body, start, flies, grade, graded, text. Of `script`, `open` opens one,
   // `save` saves it, `put` puts lines of Python into it, `run` flies it.
-  constructor(parts, ask, { open, save, put, run }) {
-    Object.assign(this, { parts, ask, open, save, put, run });
+  constructor(parts, store, ask, { open, save, put, run }) {
+    Object.assign(this, { parts, store, ask, open, save, put, run });
+    this.graded = kept(GRADE, null);
+    this.result = null; // of this.graded, null while it flies
+    this.edits = 0; // of the store, when the graded script was saved
     this.all = []; // { lesson, title, task, script } in the order of reading
     this.name = "";
     this.opened = { script: "", lesson: "" };
@@ -29,6 +35,7 @@ export class Lesson {
     parts.fold.onclick = () => this.folded(!parts.body.hidden);
     parts.start.onclick = () => open(this.script);
     parts.grade.onclick = () => this.grade();
+    store.on((now) => this.age(now));
   }
 
   offer(all) {
@@ -55,7 +62,7 @@ export class Lesson {
     if (!name) return this.folded(true);
     const { text, folder, script, flies } = await this.ask("lesson", { lesson: name });
     if (name !== this.name) return; // another one has been chosen meanwhile
-    this.parts.graded.replaceChildren();
+    this.showGraded();
     this.script = this.opened.lesson === name ? this.opened.script : script; // there may be several
     this.parts.flies.textContent = flies && `Run flies ${flies}.`;
     this.folded(false);
@@ -89,27 +96,74 @@ export class Lesson {
     if (next) await this.take(next.lesson);
   }
 
+  // ---- grades
+
   // Grades the script by this task, beside what flies, and shows how it did.
   async grade() {
-    const { grade, graded } = this.parts;
     const task = this.name;
-    grade.disabled = true;
-    graded.textContent = "flying without pictures ...";
+    this.store.take("grading", true);
+    this.parts.graded.textContent = "flying without pictures ...";
     try {
       await this.save();
       const { script } = this.opened;
+      this.edits = this.store.now.edits;
       const { number } = await this.ask("grade", { script, lesson: task });
+      this.graded = { task, script, number, isOld: false };
+      this.result = null;
+      keep(GRADE, this.graded);
+    } catch (error) {
+      this.store.take("grading", false);
+      this.parts.graded.textContent = error.message;
+      return;
+    }
+    await this.followGrade();
+  }
+
+  // Goes on with a grade that was begun before the page was loaded, or before the connection was lost.
+  connected() {
+    if (this.graded && !this.result) this.followGrade(true);
+  }
+
+  async followGrade(isOfBefore = false) {
+    const { number } = this.graded;
+    this.store.take("grading", true);
+    this.showGraded();
+    try {
       let result = {};
       while (!("error" in result)) {
-        await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN));
         result = await this.ask("graded", { number });
+        if (!("error" in result)) await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN));
       }
-      if (task === this.name) showGrade(graded, script, result);
+      this.result = result;
+      this.showGraded();
     } catch (error) {
-      graded.textContent = error.message;
+      this.forgetGrade(isOfBefore ? "" : error.message);
     } finally {
-      grade.disabled = false;
+      this.store.take("grading", false);
     }
+  }
+
+  // A lost connection ends no grade. Another cockpit does not know it, nor does one that has graded another script.
+  forgetGrade(why) {
+    if (this.store.now.connection !== "connected") return;
+    forget(GRADE);
+    this.graded = null;
+    this.parts.graded.textContent = why;
+  }
+
+  showGraded() {
+    const { graded } = this.parts;
+    if (this.graded?.task !== this.name) graded.replaceChildren();
+    else if (this.result) showGrade(graded, this.graded, this.result);
+    else graded.textContent = "flying without pictures ...";
+  }
+
+  // Says it when the graded script is changed.
+  age({ open, edits }) {
+    if (!this.graded || this.graded.isOld || open.script !== this.graded.script || edits === this.edits) return;
+    this.graded.isOld = true;
+    keep(GRADE, this.graded);
+    this.showGraded();
   }
 
   get place() {

@@ -1,26 +1,26 @@
-// The message line, over the scene's lower edge: it moves nothing, and goes by itself; an error stays until the next
-// action, or until it is put away.
-const READ = 6000; // ms
+// The message over the scene's lower edge. The store says when it ends: it can be read for some seconds; an error stays
+// until the next action, until a script has started, or until the user puts it away.
+import { at } from "./dom.js";
 
 export class Notice {
-  constructor(element) {
-    this.element = element;
-    this.text = element.querySelector("span");
-    element.querySelector("button").onclick = () => this.clear();
-    this.clear();
+  constructor(store) {
+    this.store = store;
+    const close = at("notice").querySelector("button");
+    close.onclick = () => this.clear();
+    at("notice").onkeydown = (event) => {
+      if (event.key !== "Escape") return;
+      event.stopPropagation();
+      this.clear();
+    };
   }
 
-  say(line, bad = false) {
-    clearTimeout(this.later);
-    this.text.textContent = line;
-    this.element.classList.toggle("bad", bad);
-    this.element.classList.toggle("empty", !line);
-    if (line && !bad) this.later = setTimeout(() => this.clear(), READ);
+  say(text, bad = false) {
+    this.store.take("notice", { text, bad });
   }
 
-  // A line that takes no error away.
-  warn(line) {
-    if (!this.element.classList.contains("bad")) this.say(line);
+  // Says something that takes no error away.
+  warn(text) {
+    if (!this.store.now.notice?.bad) this.say(text);
   }
 
   clear() {

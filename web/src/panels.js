@@ -14,17 +14,19 @@ import { Tune } from "./tune.js";
 import { View } from "./view.js";
 
 const NO_EFFECT = /^warning: .*: no effect: /; // in the log: why a button did nothing
+const STARTED = /^started(?: in |$)/; // in the log: the simulation has begun anew
 const TOUCH = matchMedia("(pointer: coarse), (max-width: 900px)"); // where the script covers the scene
 
 export class Panels {
   // `socket()` and `scene()` are there once the page is; `go` has what the buttons of the start page do, `open(script)`
   // opens one, `goTo(file, line)` a file's line.
-  constructor({ socket, scene, go, open, goTo }) {
+  constructor({ store, socket, scene, go, open, goTo }) {
+    this.store = store;
     for (const element of document.querySelectorAll("[data-icon]")) element.prepend(icon(element.dataset.icon));
     this.board = new Board();
-    this.notice = new Notice(at("notice"));
+    this.notice = new Notice(store);
     this.ask = (ask, more) => socket().ask(ask, more);
-    this.toolbar = new Toolbar(this.board, (...asked) => this.act(...asked), this.notice, scene);
+    this.toolbar = new Toolbar(store, this.board, (...asked) => this.act(...asked), this.notice, scene);
     this.cameras = new Cameras(this.board, (...asked) => this.act(...asked));
     this.plots = new Plots(this.board, this.ask);
     this.tune = new Tune(this.board, this.ask, this.notice);
@@ -40,7 +42,6 @@ export class Panels {
     });
     at("why").onclick = () => this.side.open("log");
     this.board.on("vehicles", ({ now }) => (scene().vehicle = now));
-    this.board.on("master", (answers) => this.master(answers));
     at("toggle").onclick = () => this.showScript(document.body.classList.contains("wide"));
     this.showScript(!TOUCH.matches);
     const choices = { tutorial: () => this.enter(go.tutorial), tasks: () => this.enter(go.tasks), fly: () => this.showScript(false), build: () => this.enterBuild() };
@@ -108,6 +109,8 @@ export class Panels {
       this.board.take(message);
     }
     if (message.log) this.log.add(message.log);
+    if (STARTED.test(message.log)) this.store.take("started");
+    if (message.pulse) this.store.take("pulse", message.pulse);
     if (NO_EFFECT.test(message.log)) this.notice.warn(message.log);
     this.build.told(message);
     if (message.pictures) this.cameras.show(message.pictures);
@@ -115,16 +118,8 @@ export class Panels {
 
   lost() {
     this.version = undefined; // another node counts anew
-    this.board.take({ panel: { status: "no simulation", flight: "" }, version: Infinity });
     this.board.begin();
     this.build.edit.lost();
-  }
-
-  master(answers) {
-    if (answers !== (this.hasMaster ?? true)) {
-      this.notice.say(answers ? "the ROS master is back" : "no ROS master answers: waiting", !answers);
-    }
-    this.hasMaster = answers;
   }
 
   // The first one is opened by the page itself: that is not what somebody goes on with.

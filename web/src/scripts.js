@@ -1,30 +1,42 @@
 // The scripts: opened, written to the node's disk soon after every change, watched, and flown. No edit is ever lost.
 import { Drafts } from "./drafts.js";
 import { Editor, isLua } from "./editor.js";
+import { NOT_STARTED, isSyntaxError } from "./state/store.js";
+import { markedLines } from "./state/words.js";
+import { keep, kept } from "./storage.js";
 
 const QUIET = 800; // ms without a key before it is saved
 const LOOK = 1000; // ms between two looks at the file
 const RETRY = 4000; // ms after which what could not be saved is tried again
 const LARGEST = 1 << 20; // bytes
 
+const DEFAULT = "built-in/pilot.py"; // flies if the launch names no script
+
+const stemOf = (script) => script.split("/").pop().replace(/\.\w+$/, "");
 const size = (text) => new TextEncoder().encode(text).length;
 
 export class Scripts {
-  // `page` shows what is told: { saved, said, bad, lists, script, question, flown }; `onOpen` hears of the text that a script has.
-  constructor(parent, socket, page, onOpen, known, onBreakpoints) {
+  // `page` has show({ lists, script, of, question }) and say(line), for the console; `onOpen` hears of the text that a
+  // script has.
+  constructor(parent, socket, store, page, onOpen, known, onBreakpoints) {
     this.ask = (...question) => socket.ask(...question);
     this.socket = socket;
+    this.store = store;
     this.page = page;
     this.onOpen = onOpen;
     this.drafts = new Drafts();
     const check = async (text, lua) => (socket.open ? (await this.ask("check", { text, lua })).found : null);
-    this.editor = new Editor(parent, { change: () => this.change(), run: () => this.onRun(), check, breakpoints: onBreakpoints }, known);
+    const checked = (found) => this.store.take("checked", { file: this.is.file, found });
+    const moved = (line) => this.store.take("moved", line);
+    this.editor = new Editor(parent, { change: () => this.change(), run: () => this.onRun(), check, checked, moved, breakpoints: onBreakpoints }, known);
     this.is = { script: "", file: "", version: "", text: "" }; // what the disk has, as far as we know
     this.dirty = false;
     this.conflict = false;
+    this.marked = {}; // what `mark` has shown
     this.turn = Promise.resolve();
     setInterval(() => this.watch(), LOOK);
     document.addEventListener("visibilitychange", () => this.watch());
+    store.on((now) => this.mark(now));
   }
 
   // One after the other: the second would not know the version that the first has made.
@@ -39,19 +51,39 @@ export class Scripts {
     const lists = await this.ask("scripts");
     this.digest = lists.digest;
     this.page.show({ lists, script: this.is.script || lists.flown });
+    this.hear(lists.flown);
     return lists;
   }
 
   // After the connection is there, again: what was not saved comes first.
   async connected() {
+    const isFirst = !this.is.script;
+    const last = isFirst ? this.lastOpen() : "";
     const { flown, groups, folder } = await this.list();
     await this.save().catch(() => {});
     const left = this.drafts.scripts.filter((script) => script !== this.is.script);
-    for (const script of left) await this.open(script).catch((error) => this.page.show({ said: error.message, bad: true }));
-    if (this.is.script) return;
-    if (groups.some(({ scripts }) => scripts.includes(flown))) return this.open(flown);
-    await this.open("built-in/pilot.py");
-    this.page.show({ said: `${flown} flies, from another folder than ${folder}: Upload (⋯) makes a copy that you can edit` });
+    for (const script of left) await this.open(script).catch((error) => this.store.say("trouble", error.message));
+    if (!isFirst || this.conflict) return;
+    const all = groups.flatMap(({ scripts }) => scripts);
+    const isNews = flown !== DEFAULT && flown !== kept("flown", flown); // another launch flies another script
+    keep("flown", flown);
+    const found = (isNews ? [flown, last] : [last, flown]).find((one) => all.includes(one));
+    if (found && found !== this.is.script) await this.open(found);
+    if (found) return;
+    await this.open(DEFAULT);
+    this.store.say("elsewhere", `${flown} flies, from another folder than ${folder}: Upload (⋯) makes a copy that you can edit`);
+  }
+
+  // What the user had open last; a script of the package gives way to the copy that the user has made of it.
+  lastOpen() {
+    const [open, edited] = [kept("script", ""), kept("edited", "")];
+    const isCopied = open && !open.startsWith("mine/") && `${stemOf(edited)}_`.startsWith(`${stemOf(open)}_`);
+    return isCopied ? edited : open;
+  }
+
+  // Hears which script the simulator has.
+  hear(flown) {
+    if (flown !== this.store.now.flown) this.store.take("flown", flown);
   }
 
   open(script) {
@@ -69,8 +101,11 @@ export class Scripts {
     });
     this.know(answer);
     this.conflict = this.dirty = false;
-    this.page.show({ saved: "", script, of: answer.lesson, question: null });
+    this.page.show({ script, of: answer.lesson, question: null });
     this.editor.show(script, answer.text);
+    this.marked = {}; // those of the text that was shown before
+    this.store.take("opened", { script, file: answer.file });
+    keep("script", script);
     if (draft && draft.text !== answer.text) this.resume(draft, failure);
     else this.drafts.drop(script);
     this.onOpen(answer.lesson);
@@ -79,9 +114,10 @@ export class Scripts {
   // Goes on with what was not saved.
   resume(draft, failure) {
     this.editor.fill(draft.text);
+    this.editor.restorePlace();
     this.dirty = true;
     if (failure || (draft.version !== this.is.version && this.isOwn)) return this.disagree(failure);
-    this.page.show({ said: "what was not saved yet is here again" });
+    this.store.say("restored", "what was not saved yet is here again");
     setTimeout(() => this.save().catch(() => {}));
   }
 
@@ -98,8 +134,9 @@ export class Scripts {
   change() {
     this.dirty = true;
     this.drafts.put(this.is.script, { text: this.editor.text, version: this.is.version });
+    this.store.take("edited");
     if (this.conflict) return;
-    this.page.show({ saved: "..." });
+    this.store.take("saving");
     clearTimeout(this.later);
     this.later = setTimeout(() => this.save().catch(() => {}), QUIET);
   }
@@ -120,7 +157,7 @@ export class Scripts {
       this.written(answer, text);
     } catch (error) {
       this.failed = Date.now();
-      this.page.show({ saved: `not saved: ${error.message}`, bad: true });
+      this.store.take("unsaved", `not saved: ${error.message}`);
       throw error;
     }
   }
@@ -132,7 +169,12 @@ export class Scripts {
     this.dirty = this.editor.text !== text; // more has been written meanwhile
     if (this.dirty) this.drafts.put(this.is.script, { text: this.editor.text, version: this.is.version });
     if (before !== this.is.script) this.editor.rename(this.is.script);
-    this.page.show({ saved: `saved as ${this.is.script}`, script: this.is.script, of: answer.lesson });
+    const { script, file } = this.is;
+    this.page.show({ script, of: answer.lesson });
+    if (before !== script) this.store.take("renamed", { script, file });
+    this.store.take("saved", `saved as ${script}`);
+    keep("script", script);
+    keep("edited", script);
     if (before !== this.is.script) return this.list();
   }
 
@@ -225,7 +267,7 @@ export class Scripts {
   async look() {
     const { script, version } = this.is;
     const now = await this.ask("look", { script });
-    this.page.show({ flown: now.flown });
+    this.hear(now.flown);
     if (now.digest !== this.digest) await this.list();
     if (this.conflict) return;
     if (now.version !== version) await this.compare();
@@ -247,7 +289,8 @@ export class Scripts {
     this.drafts.drop(script);
     if (isOurs) return;
     this.editor.fill(theirs.text);
-    this.page.show({ saved: "", said: `${script} has been changed by another program: this is the new text. Ctrl+Z brings yours back.` });
+    this.store.take("saved", "");
+    this.store.say("replaced", `${script} has been changed by another program: this is the new text. Ctrl+Z brings yours back.`);
   }
 
   disagree(failure) {
@@ -262,7 +305,8 @@ export class Scripts {
     const again = ["Write it again", keep(true)];
     const others = gone ? ["Let it go", () => this.letGo()] : ["The other's", keep(false)];
     const choices = failure && !gone ? [again] : [gone ? again : ["Mine", keep(true)], others];
-    this.page.show({ saved: "not saved", said: "", bad: true, question: { said, choices } });
+    this.store.take("unsaved", "not saved");
+    this.page.show({ question: { said, choices } });
   }
 
   async keep(mine) {
@@ -273,7 +317,9 @@ export class Scripts {
       this.editor.fill(answer.text);
       this.know(answer);
       const other = answer.other ? `${mine ? "the other's" : "your"} text is in ${answer.other}` : "";
-      this.page.show({ question: null, saved: `saved as ${answer.script}`, said: other });
+      this.page.show({ question: null });
+      this.store.take("saved", `saved as ${answer.script}`);
+      this.store.say("kept", other);
       await this.list();
     });
   }
@@ -291,26 +337,28 @@ export class Scripts {
   // Saves what is shown, and flies that, unless it cannot even be read.
   async run(lesson) {
     await this.save();
-    const wrong = (await this.editor.check()).find(({ said }) => /^syntax ?error/i.test(said));
+    const wrong = (await this.editor.check()).find(isSyntaxError);
     if (wrong) {
       this.page.say(`error: [load] ${this.is.file}:${wrong.line}: ${wrong.said}`);
-      return this.fail({ file: this.is.file, line: wrong.line, said: wrong.said, phase: "not started" }, false);
+      this.store.take("failure", { file: this.is.file, line: wrong.line, said: wrong.said, phase: NOT_STARTED });
+      return this.editor.goTo(wrong.line);
     }
-    this.editor.mark(null);
     const { script } = this.is;
-    this.page.show({ said: `starting ${script} ...` });
+    this.store.take("run");
+    this.store.say("starting", `starting ${script} ...`);
     const { done, said, failure } = await this.ask("run", { script, lesson });
-    if (done) this.page.show({ flown: script });
-    if (failure) this.fail(failure);
-    else this.page.show({ said, bad: !done });
-    this.page.ran(); // it may have come to a breakpoint before that is told
+    this.store.take("answered");
+    if (done) this.hear(script);
+    if (failure) this.store.take("failure", failure);
+    else this.store.say(done ? "started" : "refused", said);
   }
 
-  // A failure while it flies, or at its start: that one comes as the answer and from the node's log, in either order.
-  fail({ file, line, said, phase }, isToBeMarked = true) {
-    const where = file === this.is.file ? `line ${line}` : `${file.split("/").pop()}, line ${line}`;
-    this.page.show({ said: `${phase}, ${where}: ${said}`, bad: true });
-    if (file === this.is.file && isToBeMarked) this.editor.mark({ line, said });
-    else if (file === this.is.file) this.editor.goTo(line);
+  // Marks the lines at which the open script failed, and at which it is paused. The editor moves the marks with the text.
+  mark(now) {
+    const { failed, paused } = markedLines(now);
+    const failure = failed && `${now.failure.told} ${now.failure.said}`;
+    if (failure !== this.marked.failure) this.editor.mark(failed ? now.failure : null);
+    if (paused !== this.marked.paused) this.editor.paused(paused);
+    this.marked = { failure, paused };
   }
 }

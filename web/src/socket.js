@@ -1,36 +1,109 @@
-// Our socket: questions with answers, and what the node tells by itself. It comes back after the node has.
-const AGAIN = 1000; // ms
+// Our socket: questions with answers, and what the node tells by itself. It connects again when the node is back.
+import { SILENCE } from "./state/words.js";
+
+const AGAIN = [1000, 1000, 2000, 4000, 8000]; // ms before each further attempt; the last one counts from then on
+const REFUSED = 30_000; // ms, while the cockpit does not know this page: nothing changes without the user
+const ABANDON = 7 * SILENCE * 1000; // ms of silence after which another connection is tried
+const PATIENCE = 10_000; // ms for a connection to be opened
+const RETURN = "/return"; // where a page that an earlier cockpit let in asks for a challenge, and signs it
+
+const hex = (bytes) => [...new Uint8Array(bytes)].map((one) => one.toString(16).padStart(2, "0")).join("");
+
+// Signs a challenge with the key; null where the browser cannot (crypto.subtle is for this machine and https alone).
+async function sign(key, challenge) {
+  if (!globalThis.crypto?.subtle) return null;
+  const algorithm = { name: "HMAC", hash: "SHA-256" };
+  const bytes = new Uint8Array(key.match(/../g).map((two) => parseInt(two, 16)));
+  const imported = await crypto.subtle.importKey("raw", bytes, algorithm, false, ["sign"]);
+  return hex(await crypto.subtle.sign("HMAC", imported, new TextEncoder().encode(challenge)));
+}
 
 export class PageSocket {
-  constructor(onTell, onPicture, onOpen, onClose) {
-    this.onTell = onTell;
-    this.onPicture = onPicture;
-    this.onOpen = onOpen;
-    this.onClose = onClose;
+  // `on` has tell(message), picture(bytes), open() and close(); the store hears of the connection.
+  constructor(store, on) {
+    this.store = store;
+    this.on = on;
     this.waiting = new Map();
     this.number = 0;
+    this.attempts = 0;
+    this.key = ""; // by which this page returns to the next cockpit of the port; never stored, and never sent
     this.connect();
+    setInterval(() => this.watch(), 500);
   }
 
   connect() {
-    this.socket = new WebSocket(`ws${location.protocol === "https:" ? "s" : ""}://${location.host}/socket`, "drone_sim");
-    this.socket.onopen = () => this.onOpen();
-    this.socket.binaryType = "arraybuffer";
-    this.socket.onmessage = ({ data }) => (typeof data === "string" ? this.take(JSON.parse(data)) : this.onPicture(data));
-    this.socket.onclose = () => {
-      for (const { reject } of this.waiting.values()) reject(new Error("the connection is lost"));
-      this.waiting.clear();
-      this.onClose();
-      setTimeout(() => this.connect(), AGAIN);
-    };
+    clearTimeout(this.later);
+    const socket = new WebSocket(`ws${location.protocol === "https:" ? "s" : ""}://${location.host}/socket`, "drone_sim");
+    this.socket = socket;
+    this.begun = performance.now();
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => this.opened();
+    socket.onmessage = ({ data }) => this.receive(data);
+    socket.onclose = () => this.closed();
   }
 
-  take(message) {
+  opened() {
+    this.attempts = 0;
+    this.store.take("connected");
+    this.ask("pass").then(({ pass }) => (this.key = pass), () => {});
+    this.on.open();
+  }
+
+  receive(data) {
+    this.store.take("heard");
+    if (typeof data !== "string") return this.on.picture(data);
+    const message = JSON.parse(data);
     const waiting = this.waiting.get(message.id);
-    if (!waiting) return this.onTell(message);
+    if (!waiting) return this.on.tell(message);
     this.waiting.delete(message.id);
     if (message.error) waiting.reject(Object.assign(new Error(message.error), { kind: message.kind, line: message.line }));
     else waiting.resolve(message);
+  }
+
+  closed() {
+    const { connection } = this.store.now;
+    for (const { reject } of this.waiting.values()) reject(new Error("the connection is lost"));
+    this.waiting.clear();
+    if (connection !== "refused") this.store.take("lost");
+    if (connection === "connected") this.on.close();
+    this.tryAgain(connection !== "connected");
+  }
+
+  // Waits longer after every attempt. If the node answers and refuses this page, the page asks to be let in again.
+  async tryAgain(mayBeRefused) {
+    const attempt = this.attempts++;
+    const answer = mayBeRefused ? await this.askToReturn() : "nobody";
+    if (answer === "refused") this.store.take("refused");
+    const wait = { refused: REFUSED, allowed: AGAIN[0], nobody: AGAIN[Math.min(attempt, AGAIN.length - 1)] }[answer];
+    this.later = setTimeout(() => this.connect(), wait);
+  }
+
+  // Returns "nobody" if no cockpit answers, "allowed" if it lets this page in, "refused" if it does not. A cockpit lets
+  // a page in that an earlier one on this port has let in: the page signs a challenge with the key it got from that one.
+  async askToReturn() {
+    try {
+      const answer = await fetch(RETURN, { signal: AbortSignal.timeout(PATIENCE) });
+      if (!answer.ok) return "refused";
+      const challenge = await answer.text();
+      const signature = this.key && (await sign(this.key, challenge));
+      if (!signature) return "refused";
+      const signed = `${RETURN}?challenge=${challenge}&signature=${signature}`;
+      return (await fetch(signed, { signal: AbortSignal.timeout(PATIENCE) })).ok ? "allowed" : "refused";
+    } catch {
+      return "nobody";
+    }
+  }
+
+  // Gives a connection up that is silent, or is not opened: the node may be stopped, or the network has lost it.
+  watch() {
+    this.store.take("tick");
+    const { connection, heard, at } = this.store.now;
+    const isSilent = connection === "connected" && at - heard > ABANDON;
+    const isUnopened = this.socket.readyState === WebSocket.CONNECTING && at - this.begun > PATIENCE;
+    if (!isSilent && !isUnopened) return;
+    this.socket.onopen = this.socket.onmessage = this.socket.onclose = null;
+    this.socket.close();
+    this.closed();
   }
 
   get open() {

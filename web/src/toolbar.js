@@ -2,11 +2,10 @@
 import { Recorder } from "./recorder.js";
 import { at, create, save, stamp } from "./dom.js";
 
+const STARTS = ["start", "restart"];
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 0];
-const OTHER = { "no simulation": "No simulation" };
 
 const speedText = (factor) => (factor === 0 ? "fastest" : `${factor} ×`);
-const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 // Whoever writes, reads or moves a bar presses no keys of ours; on a focused button Space is that button's own.
 const hasKeys = ({ target, key }) =>
@@ -15,7 +14,8 @@ const hasKeys = ({ target, key }) =>
 
 export class Toolbar {
   // `act(ask, more)` asks the node, and shows its answer; `scene()` is the scene, once it is there.
-  constructor(board, act, notice, scene) {
+  constructor(store, board, act, notice, scene) {
+    this.store = store;
     this.board = board;
     this.act = act;
     for (const [id, press] of Object.entries({
@@ -38,7 +38,8 @@ export class Toolbar {
     at("speed").onchange = () => act("speed", { factor: Number(at("speed").value) });
     at("scene-choice").onchange = () => act("scene", { scene: at("scene-choice").value });
     at("vehicle").onchange = () => act("vehicle", { vehicle: at("vehicle").value });
-    for (const part of ["status", "flight", "diagnosis"]) board.on(part, () => this.showStatus());
+    for (const part of ["status", "flight", "master"]) board.on(part, (content) => store.take(part, content));
+    board.on("diagnosis", (all) => store.take("warnings", all.filter((one) => one.wrong).map((one) => one.said)));
     board.on("speed", (factor) => this.showSpeed(factor));
     board.on("pace", (pace) => (at("pace").textContent = Number(pace) ? `${Number(pace).toFixed(2)} ×` : ""));
     board.on("scenes", ({ all, now }) => this.offer(at("scene-choice"), all, now));
@@ -50,7 +51,7 @@ export class Toolbar {
   }
 
   get status() {
-    return this.board.get("status", "no simulation");
+    return this.store.now.status;
   }
 
   is(status) {
@@ -58,6 +59,7 @@ export class Toolbar {
   }
 
   call(service) {
+    if (STARTS.includes(service)) this.store.take("run");
     return this.act("call", { call: service });
   }
 
@@ -82,21 +84,6 @@ export class Toolbar {
       event.preventDefault();
       button.click();
     });
-  }
-
-  showStatus() {
-    const flight = this.board.get("flight", "");
-    const says = this.is("flying") && flight && !flight.startsWith("unknown") ? flight : this.status;
-    const wrong = this.board.get("diagnosis", []).filter((one) => one.wrong).map((one) => one.said);
-    at("status").textContent = OTHER[says] ?? capital(says);
-    at("status").dataset.is = this.status;
-    at("why").hidden = !wrong.length || this.is("no simulation");
-    at("why").textContent = wrong.length === 1 ? "1 warning" : `${wrong.length} warnings`;
-    at("why").title = `${wrong.join("\n")}\n(opens the log)`;
-    at("state").classList.toggle("wrong", !at("why").hidden);
-    at("sim-start").disabled = this.is("flying") || this.is("no simulation");
-    at("sim-pause").setAttribute("aria-pressed", String(this.is("paused")));
-    for (const id of [...["pause", "step", "restart", "stop"].map((one) => `sim-${one}`), "snapshot", "restore"]) at(id).disabled = this.is("no simulation");
   }
 
   showSpeed(factor) {

@@ -1,4 +1,6 @@
 // The variables of a script as a table, as they were at a breakpoint, or as they are; changed ones stand out.
+import { pauseOf } from "./state/words.js";
+
 const made = (tag, className, textContent = "") => Object.assign(document.createElement(tag), { className, textContent });
 
 // Returns all variables in the order in which they are shown; `way` is such as self/pid/sum.
@@ -24,6 +26,8 @@ export class Variables {
     this.built = ""; // the ways for which they are
     this.before = new Map(); // values by ways, at the time before this one
     this.now = { time: null, values: new Map() };
+    this.hint = caption.textContent;
+    this.of = null; // whose values are shown, and when: { name, time }
   }
 
   // Shows what the simulation told; `file` is that of the script in the editor.
@@ -31,7 +35,7 @@ export class Variables {
     const { reached, scripts } = state;
     const script = scripts.find((one) => one.file === file) ?? scripts[0];
     const isAt = Boolean(reached.file);
-    this.say(state, isAt, script);
+    this.of = { name: (script?.file ?? "").split("/").pop(), time: state.time };
     const found = flat(isAt ? reached.scopes : script?.scopes ?? []);
     const ways = JSON.stringify(found.map(({ way, folds }) => [way, folds]));
     if (ways !== this.built) this.build(found); // else every row stays, and what is focused in it
@@ -41,10 +45,23 @@ export class Variables {
     for (const one of found) this.fill(one);
   }
 
-  say({ reached: at, state, time }, isAt, script) {
-    const name = (script?.file ?? "").split("/").pop();
-    const when = `t = ${time.toFixed(2)} s`;
-    this.caption.textContent = isAt ? `Paused at line ${at.line} of ${at.file.split("/").pop()}, t = ${at.time.toFixed(2)} s` : name ? `${name}: ${state}, ${when}` : "No script is loaded.";
+  clear() {
+    this.of = null;
+    this.built = "";
+    this.lines.clear();
+    this.body.replaceChildren();
+  }
+
+  // Says where the flight is paused, or whose values these are.
+  say(now) {
+    const words = this.words(pauseOf(now), now.status);
+    if (this.caption.textContent !== words) this.caption.textContent = words;
+  }
+
+  words(pause, status) {
+    if (pause) return `Paused at line ${pause.line} of ${pause.file.split("/").pop()}, t = ${pause.time.toFixed(2)} s`;
+    if (!this.of) return this.hint;
+    return this.of.name ? `${this.of.name}: ${status}, values of t = ${this.of.time.toFixed(2)} s` : "No script is loaded.";
   }
 
   build(found) {

@@ -1,0 +1,292 @@
+"""What the page holds to be true: the store of web/src/state, fed with events in order, late, doubled and missing.
+
+The store knows no page and no clock, so it runs in the browser without a simulation.
+"""
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+SOURCE = Path(__file__).parents[2] / "web" / "src"
+FILE, OTHER = "/scripts/a.py", "/scripts/b.py"
+OPEN = ["opened", {"script": "mine/a.py", "file": FILE}]
+# Feeds [event, content] and [ms], which lets time pass, to a new store; returns what the page says after each event.
+FEED = """async (events) => {
+    const { Store } = await import("http://page.test/state/store.js");
+    const words = await import("http://page.test/state/words.js");
+    const { Board } = await import("http://page.test/board.js");
+    let clock = 1000;
+    const store = new Store(() => clock);
+    const board = new Board();
+    for (const part of ["status", "flight", "master"]) board.on(part, (content) => store.take(part, content));
+    const said = () => ({
+        said: words.saidWords(store.now).text, banner: words.bannerWords(store.now),
+        flying: words.flyingWords(store.now).text,
+        is: words.flyingWords(store.now).is, status: words.statusWords(store.now), marked: words.markedLines(store.now),
+        can: words.abilities(store.now), notice: store.now.notice?.text ?? "", saved: store.now.saved.text,
+        connection: store.now.connection, message: store.now.message?.kind ?? "",
+    });
+    return events.map(([event, content]) => {
+        if (typeof event === "number") {
+            for (let left = event; left > 0; left -= 500) {
+                clock += Math.min(left, 500);
+                store.take("tick");
+            }
+        } else if (event === "sleep") {
+            clock += content;
+            store.take("tick");
+        } else if (event === "panel") board.take(content);
+        else store.take(event, content);
+        return said();
+    });
+}"""
+
+
+@pytest.fixture(name="feed", scope="module")
+def _feed(browser):
+    """Return what the page says after each event."""
+    context = browser.new_context()
+    page = context.new_page()
+
+    def serve(route):
+        path = route.request.url.removeprefix("http://page.test/")
+        content = "<!doctype html>" if not path else (SOURCE / path).read_text()
+        route.fulfill(body=content, content_type="text/javascript" if path else "text/html")
+
+    page.route("http://page.test/**", serve)
+    page.goto("http://page.test/")
+    yield lambda *events: page.evaluate(FEED, list(events))
+    context.close()
+
+
+def status(is_, version=1):
+    return ["panel", {"panel": {"status": is_}, "version": version}]
+
+
+def flight(is_, version=1):
+    return ["panel", {"panel": {"flight": is_}, "version": version}]
+
+
+def reached(line, state="paused"):
+    at = {"file": FILE, "line": line, "time": 1.5} if line else {}
+    return ["variables", {"state": state, "reached": at, "time": 1.5, "scripts": []}]
+
+
+def failure(line=5, said="ZeroDivisionError", phase="actuation", file=FILE):
+    return ["failure", {"file": file, "line": line, "said": said, "phase": phase}]
+
+
+CONNECTED = [["connected"], OPEN, ["flown", "mine/a.py"]]
+
+
+def last(feed, *events):
+    return feed(*CONNECTED, *events)[-1]
+
+
+# ---- pauses
+
+
+def test_the_end_of_a_pause_is_heard_without_a_word_from_the_inspection(feed):
+    paused = last(feed, status("paused"), reached(63))
+    assert paused["said"] == "paused at line 63, t = 1.50 s" and paused["marked"]["paused"] == 63
+    gone = last(feed, status("paused"), reached(63), ["variables", None], status("flying", 2))
+    assert gone["said"] == "" and gone["marked"]["paused"] == 0
+    assert last(feed, status("paused"), reached(63), ["lost"])["marked"]["paused"] == 0
+
+
+@pytest.mark.parametrize("events", [[status("paused"), reached(3)], [reached(3), status("paused")]])
+def test_a_pause_and_its_breakpoint_come_in_either_order(feed, events):
+    assert last(feed, *events)["marked"]["paused"] == 3
+
+
+def test_a_breakpoint_that_is_told_after_its_pause_is_none_of_the_next_pause(feed):
+    late = [status("paused"), status("flying", 2), reached(3), [3000], status("paused", 3)]
+    assert last(feed, *late)["said"] == ""
+
+
+# ---- errors of scripts
+
+
+def test_a_mended_syntax_error_goes_and_the_next_one_takes_its_place(feed):
+    first = {"line": 5, "said": "SyntaxError: invalid syntax", "severity": "error"}
+    wrong = failure(5, first["said"], "not started")
+    assert last(feed, wrong)["said"] == "not started, line 5: SyntaxError: invalid syntax"
+    other = {"line": 29, "said": "SyntaxError: '(' was never closed", "severity": "error"}
+    moved = last(feed, wrong, ["checked", {"file": FILE, "found": [other]}])
+    assert moved["said"] == "not started, line 29: SyntaxError: '(' was never closed"
+    assert last(feed, wrong, ["checked", {"file": OTHER, "found": []}])["said"] != "", "the check of another file"
+    assert last(feed, wrong, ["checked", {"file": FILE, "found": []}])["said"] == ""
+
+
+@pytest.mark.parametrize("end", [["run"], ["started"], ["moved", 0]])
+def test_an_error_of_a_flight_ends_with_the_next_start_or_when_its_line_is_mended(feed, end):
+    assert last(feed, failure())["said"] == "actuation, line 5: ZeroDivisionError"
+    assert last(feed, failure(), ["moved", 7])["marked"]["failed"] == 7
+    assert last(feed, failure(), end)["said"] == ""
+
+
+def test_a_repetition_of_a_mended_error_does_not_bring_it_back_but_a_new_flight_does(feed):
+    assert last(feed, failure(), ["moved", 0], failure())["said"] == ""
+    assert last(feed, failure(), ["moved", 0], [6000], failure())["said"] != ""
+
+
+def test_a_start_that_nobody_told_ends_an_error_after_some_seconds_of_flight(feed):
+    events = [status("stopped"), failure(), [1000], status("flying", 2), [1000], [1000], [2000]]
+    said = [one["said"] for one in feed(*CONNECTED, *events)]
+    assert said[-2] != "" and said[-1] == ""
+    crashed = [status("flying"), [4000], failure(), [10_000]]
+    assert last(feed, *crashed)["said"] != "", "a script of an object fails, and the flight goes on"
+
+
+def test_an_error_belongs_to_its_file_and_goes_with_the_copy(feed):
+    assert last(feed, failure(file=OTHER))["said"] == "actuation, b.py, line 5: ZeroDivisionError"
+    copied = last(feed, failure(), ["renamed", {"script": "mine/c.py", "file": "/scripts/c.py"}])
+    assert copied["said"] == "actuation, line 5: ZeroDivisionError" and copied["marked"]["failed"] == 5
+
+
+def test_beside_run_stands_what_the_script_does(feed):
+    assert last(feed, status("flying"))["flying"] == "flies"
+    assert last(feed, status("flying"), ["flown", "mine/bad.py"])["flying"] == "mine/bad.py flies"
+    failed = last(feed, ["flown", "mine/bad.py"], status("stopped"), flight("script failed"))
+    assert (failed["flying"], failed["is"], failed["status"]) == ("mine/bad.py has failed", "failed", "Script failed")
+    assert last(feed, status("paused"))["flying"] == "is paused"
+    for nothing in (["lost"], ["refused"], status("no simulation", 2), ["pulse", {"silent": 4, "ended": True}]):
+        assert last(feed, status("flying"), nothing)["flying"] == ""
+
+
+# ---- messages: each ends
+
+
+MESSAGES = json.loads("[" + ",".join(
+    f'"{line.split(":")[0].strip()}"'
+    for line in (SOURCE / "state" / "messages.js").read_text().splitlines()
+    if "ends:" in line
+) + "]")  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", MESSAGES)
+def test_every_message_ends_with_each_of_its_events(feed, kind):
+    contents = {
+        "opened": OPEN[1],
+        "failure": failure()[1],
+        "flown": "mine/b.py",
+        "saved": "saved as mine/a.py",
+    }
+    ends = next(line for line in (SOURCE / "state" / "messages.js").read_text().splitlines() if f" {kind}:" in line)
+    names = ends.partition("ends: [")[2].partition("]")[0].replace("...LEFT", '"opened", "run"')
+    events = json.loads(f"[{names}]")
+    assert events
+    for event in events:
+        after = status("stopped") if event == "stopped" else [event, contents.get(event)]
+        said = feed(*CONNECTED, status("flying", 0), ["say", {"kind": kind, "text": "words"}], after)
+        assert said[-2]["message"] == kind and said[-1]["message"] == "", event
+
+
+def test_a_notice_goes_by_itself_and_an_error_with_the_next_good_start(feed):
+    good, bad = ["notice", {"text": "paused", "bad": False}], ["notice", {"text": "step: failed", "bad": True}]
+    assert last(feed, good, [5000])["notice"] == "paused" and last(feed, good, [7000])["notice"] == ""
+    assert last(feed, bad, [60_000])["notice"] == "step: failed"
+    assert last(feed, bad, ["run"])["notice"] == "" and last(feed, bad, ["started"])["notice"] == ""
+
+
+# ---- the connection
+
+
+def test_the_banner_says_what_does_not_answer(feed):
+    flying = [["heard"], status("flying")]
+    assert last(feed, *flying)["banner"] == ""
+    assert last(feed, *flying, [4000])["banner"].startswith("No data from the cockpit for 4 s")
+    assert last(feed, *flying, ["pulse", {"silent": 4.2, "ended": False}])["banner"].startswith(
+        "No data from the simulator for 4 s"
+    )
+    assert last(feed, *flying, ["lost"], [12_000])["banner"].startswith("No connection to the cockpit for 12 s")
+    assert "Open the address" in last(feed, *flying, ["lost"], ["refused"])["banner"]
+    ended = "The simulator has ended: start it again."
+    assert last(feed, *flying, ["pulse", {"silent": 4.2, "ended": True}])["banner"] == ended
+    assert last(feed, *flying, status("no simulation", 2))["banner"] == ended
+    assert last(feed, status("no simulation"))["banner"].startswith("There is no simulator yet")
+    assert last(feed, *flying, ["lost"], ["connected"])["banner"] == "", "the panel is on its way"
+    assert "master" in last(feed, *flying, ["panel", {"panel": {"master": False}, "version": 3}])["banner"]
+
+
+def test_a_page_that_slept_does_not_blame_the_cockpit(feed):
+    assert last(feed, status("flying"), [1000], ["sleep", 60_000])["banner"] == ""
+    assert last(feed, status("flying"), ["sleep", 60_000], [4000])["banner"].startswith("No data from the cockpit")
+
+
+def test_buttons_that_can_do_nothing_are_disabled(feed):
+    flying = status("flying")
+    assert last(feed, flying)["can"]["run"] and not last(feed, flying)["can"]["sim-start"]
+    for dead in (["lost"], [4000], ["pulse", {"silent": 4, "ended": False}], status("no simulation", 2)):
+        can = last(feed, flying, dead)["can"]
+        assert not any(can[one] for one in ("run", "sim-pause", "sim-start", "takeoff", "speed", "vehicle")), dead
+    assert last(feed, flying, ["pulse", {"silent": 4, "ended": False}])["can"]["grade"], "it needs the cockpit alone"
+    assert not last(feed, flying, ["grading", True])["can"]["grade"]
+
+
+# ---- any events
+
+
+STATES = ("flying", "paused", "stopped", "no simulation")
+EVENTS = st.one_of(
+    st.tuples(st.integers(0, 20_000)),
+    st.builds(lambda is_, version: status(is_, version), st.sampled_from(STATES), st.integers(0, 30)),
+    st.builds(
+        lambda is_, version: flight(is_, version), st.sampled_from(["flying", "script failed"]), st.integers(0, 30)
+    ),
+    st.builds(reached, st.sampled_from([0, 3, 63]), st.sampled_from(["flying", "paused"])),
+    st.builds(failure, st.sampled_from([5, 29]), phase=st.sampled_from(["actuation", "not started"])),
+    st.builds(lambda silent, ended: ["pulse", {"silent": silent, "ended": ended}], st.integers(0, 9), st.booleans()),
+    st.sampled_from([["variables", None], ["connected"], ["lost"], ["refused"], ["heard"], ["run"], ["answered"]]),
+    st.sampled_from([["started"], ["edited"], ["saving"], OPEN, ["opened", {"script": "mine/b.py", "file": OTHER}]]),
+    st.sampled_from([["flown", "mine/a.py"], ["flown", "mine/b.py"], ["moved", 0], ["moved", 9], ["saved", "saved"]]),
+    st.sampled_from([["checked", {"file": FILE, "found": []}], ["notice", {"text": "no", "bad": True}]]),
+    st.builds(lambda kind: ["say", {"kind": kind, "text": "words"}], st.sampled_from(MESSAGES)),
+).map(list)
+ANY = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@ANY
+@given(st.lists(EVENTS, max_size=40))
+def test_the_page_never_contradicts_itself(feed, events):
+    for said in feed(*events) if events else []:
+        if said["marked"]["paused"] or said["said"].startswith("paused"):
+            assert said["status"] == "Paused"
+        if said["connection"] != "connected":
+            assert said["banner"] or said["connection"] == "connecting"
+            assert not any(said["can"].values()) and not said["flying"]
+        if said["banner"]:
+            assert not said["can"]["run"] and not said["can"]["sim-pause"]
+        if said["can"]["run"]:
+            assert said["banner"] == "" and said["connection"] == "connected"
+
+
+@ANY
+@given(st.lists(EVENTS, max_size=40), st.sampled_from(STATES), st.sampled_from([0, 63]))
+def test_after_any_events_a_reconnection_shows_what_is_true(feed, events, is_, line):
+    """Whatever came before, late, doubled or missing: what the node tells a page that connects is what it shows."""
+    truth = [["lost"], ["connected"], OPEN, ["run"], status(is_, 100), flight("flying", 100), ["flown", "mine/b.py"]]
+    truth += [["pulse", {"silent": 0, "ended": False}], ["panel", {"panel": {"master": True}, "version": 100}]]
+    truth += [reached(line if is_ == "paused" else 0, is_)]
+    said, expected = feed(*events, *truth)[-1], feed(["connected"], status("flying", 0), *truth)[-1]
+    left_out = {"notice": "", "banner": ""}  # whether there was a simulator before is another matter
+    assert {**said, **left_out} == {**expected, **left_out} and bool(said["banner"]) == bool(expected["banner"])
+
+
+@ANY
+@given(st.lists(EVENTS, max_size=30), st.data())
+def test_an_event_that_comes_twice_says_the_same_as_once(feed, events, data):
+    events = [one for one in events if not isinstance(one[0], int)]
+    at = data.draw(st.integers(0, len(events)))
+    doubled = [*events[:at], *events[max(0, at - 1) : at], *events[at:]]
+    if events:
+        assert feed(*doubled)[-1] == feed(*events)[-1]
+
+
+@ANY
+@given(st.permutations([status("paused", 7), status("flying", 6), status("stopped", 5), flight("flying", 4)]))
+def test_parts_that_come_out_of_order_leave_the_newest(feed, events):
+    assert last(feed, *events)["status"] == "Paused"

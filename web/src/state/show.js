@@ -1,0 +1,78 @@
+// Shows what is true: the only code that writes the lines, badges and buttons that depend on it.
+import { at } from "../dom.js";
+import { abilities, answers, bannerWords, flyingWords, pauseOf, saidWords, statusWords } from "./words.js";
+
+// What has no use without a simulator, and is not a single button.
+const WITHOUT_USE = ["build-bar", "shelf", "tune-groups", "left", "right"];
+
+function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+// A box that is longer than it is high can be scrolled by keys.
+function makeScrollable(element) {
+  element.tabIndex = element.scrollHeight > element.clientHeight + 1 ? 0 : -1;
+}
+
+function showLine(element, { text, bad }) {
+  if (element.textContent === text && element.classList.contains("bad") === Boolean(bad)) return;
+  write(element, text);
+  element.classList.toggle("bad", Boolean(bad));
+  makeScrollable(element);
+}
+
+function showFlying(now) {
+  const { text, is } = flyingWords(now);
+  write(at("flying"), text);
+  at("flying").dataset.is = is;
+  at("flying").classList.toggle("is-shown", now.flown === now.open.script);
+  write(at("flown"), text && now.flown);
+  at("flown").dataset.is = is;
+  at("flown").title = text && `The script of the drone: ${is}`;
+}
+
+function showStatus(now) {
+  const pause = pauseOf(now);
+  write(at("status"), statusWords(now));
+  at("status").dataset.is = now.status || "no simulation";
+  at("status").title = pause ? `Paused by the breakpoint at line ${pause.line} of ${pause.file}` : "";
+  const { warnings } = now;
+  at("why").hidden = !warnings.length || !answers(now);
+  write(at("why"), warnings.length === 1 ? "1 warning" : `${warnings.length} warnings`);
+  at("why").title = `${warnings.join("\n")}\n(opens the log)`;
+  at("state").classList.toggle("wrong", !at("why").hidden);
+  at("sim-pause").setAttribute("aria-pressed", String(now.status === "paused"));
+}
+
+const withoutNumbers = (text) => text.replace(/\d+/g, "");
+
+function showBanner(now) {
+  const words = bannerWords(now);
+  // A screen reader reads it once, not with every second that it counts.
+  const isNew = withoutNumbers(words) !== withoutNumbers(at("banner").textContent);
+  at("banner").setAttribute("aria-live", isNew ? "assertive" : "off");
+  write(at("banner"), words);
+  at("banner").hidden = !words;
+  document.body.classList.toggle("outdated", Boolean(words)); // the scene is not what happens
+}
+
+function showNotice({ notice }) {
+  showLine(at("notice-text"), notice ?? { text: "", bad: false });
+  at("notice").classList.toggle("bad", Boolean(notice?.bad));
+  at("notice").classList.toggle("empty", !notice);
+}
+
+function showButtons(now) {
+  for (const [id, can] of Object.entries(abilities(now))) if (at(id).disabled === can) at(id).disabled = !can;
+  for (const id of WITHOUT_USE) at(id).inert = !answers(now);
+}
+
+export function show(now) {
+  showBanner(now);
+  showStatus(now);
+  showFlying(now);
+  showLine(at("said"), saidWords(now));
+  showLine(at("saved"), now.saved);
+  showNotice(now);
+  showButtons(now);
+}
