@@ -27,7 +27,9 @@ FEED = """async (events) => {
         flying: words.flyingWords(store.now).text,
         is: words.flyingWords(store.now).is, status: words.statusWords(store.now), marked: words.markedLines(store.now),
         can: words.abilities(store.now), notice: store.now.notice?.text ?? "", saved: store.now.saved.text,
-        connection: store.now.connection, message: store.now.message?.kind ?? "",
+        pace: words.paceWords(store.now), diagnosis: words.diagnosisWords(store.now), deaf: words.deafWords(store.now),
+        console: words.consoleWords(store.now), connection: store.now.connection,
+        message: store.now.message?.kind ?? "",
     });
     return events.map(([event, content]) => {
         if (typeof event === "number") {
@@ -118,7 +120,9 @@ def test_a_mended_syntax_error_goes_and_the_next_one_takes_its_place(feed):
     moved = last(feed, wrong, ["checked", {"file": FILE, "found": [other]}])
     assert moved["said"] == "not started, line 29: SyntaxError: '(' was never closed"
     assert last(feed, wrong, ["checked", {"file": OTHER, "found": []}])["said"] != "", "the check of another file"
-    assert last(feed, wrong, ["checked", {"file": FILE, "found": []}])["said"] == ""
+    assert moved["console"] == f"error: [load] {FILE}:29: SyntaxError: '(' was never closed"
+    mended = last(feed, wrong, ["checked", {"file": FILE, "found": []}])
+    assert mended["said"] == mended["console"] == ""
 
 
 @pytest.mark.parametrize("end", [["run"], ["started"], ["moved", 0]])
@@ -215,6 +219,16 @@ def test_the_banner_says_what_does_not_answer(feed):
 def test_a_page_that_slept_does_not_blame_the_cockpit(feed):
     assert last(feed, status("flying"), [1000], ["sleep", 60_000])["banner"] == ""
     assert last(feed, status("flying"), ["sleep", 60_000], [4000])["banner"].startswith("No data from the cockpit")
+
+
+def test_what_the_simulator_said_last_is_not_shown_as_true_when_it_is_silent(feed):
+    events = [status("flying"), ["pace", "0.98"], ["hears_commands", False]]
+    said = last(feed, *events)
+    assert said["pace"].startswith("0.98 ") and said["deaf"] and said["diagnosis"] == "Nothing is wrong."
+    for dead in (["lost"], [4000], ["pulse", {"silent": 4, "ended": False}], status("no simulation", 2)):
+        said = last(feed, *events, dead)
+        assert said["pace"] == said["deaf"] == "" and "does not answer" in said["diagnosis"]
+    assert last(feed, *events, status("stopped", 2))["deaf"] == "", "a script that is stopped hears nothing anyway"
 
 
 def test_buttons_that_can_do_nothing_are_disabled(feed):

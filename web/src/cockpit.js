@@ -57,7 +57,7 @@ function told(message) {
   panels.told(message);
   if (message.windows) windows.show(message.windows);
   if (message.pictures) windows.showPictures(message.pictures);
-  if (message.failure) scripts.fail(message.failure);
+  if (message.failure) store.take("failure", message.failure);
   if (message.log) desk.console.add(message.log);
   if (message.variables !== undefined) desk.take(message.variables);
 }
@@ -74,7 +74,7 @@ function took(data) {
 
 const run = () => {
   if (at("run").disabled) return Promise.resolve();
-  desk.console.clear();
+  desk.console.begin();
   return scripts.run(lesson.name).catch(tell);
 };
 const open = (script) => scripts.open(script).catch(tell);
@@ -129,7 +129,7 @@ const socket = new PageSocket(store, {
 });
 const windows = new Windows(at("windows"), socket, panels.notice);
 const desk = new Desk(socket, store, show);
-const scripts = new Scripts(at("text"), socket, store, { show, say: (line) => desk.say(line) }, (name) => lesson.go(name), desk.known, () => desk.look());
+const scripts = new Scripts(at("text"), socket, store, { show }, (name) => lesson.go(name), desk.known, () => desk.look());
 desk.serve(scripts);
 scripts.onRun = run;
 const teleop = new Teleop(

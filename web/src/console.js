@@ -9,6 +9,7 @@ export class Console {
   constructor(list, goTo) {
     this.list = list;
     this.goTo = goTo;
+    this.current = ""; // the line that is shown as long as it is true
   }
 
   add(line) {
@@ -25,6 +26,16 @@ export class Console {
     item.replaceChildren(...this.parts(line), ...(item.times > 1 ? [`  (${item.times} times)`] : []));
     while (this.list.children.length > MOST) this.list.firstElementChild.remove();
     if (follows) this.list.scrollTop = this.list.scrollHeight;
+  }
+
+  // Shows a line only as long as it is true; "" ends it. Returns whether there was none before.
+  showCurrent(line) {
+    const before = this.current;
+    if (line === before) return false;
+    for (const item of [...this.list.children]) if (item.same === before) item.remove();
+    this.current = line;
+    if (line) this.add(line);
+    return !before;
   }
 
   // The place of an error is a button that goes there.
@@ -48,5 +59,11 @@ export class Console {
 
   clear() {
     this.list.replaceChildren();
+  }
+
+  // Begins with nothing, for another flight.
+  begin() {
+    this.clear();
+    this.current = "";
   }
 }

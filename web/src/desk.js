@@ -4,7 +4,7 @@ import { Known } from "./completion.js";
 import { at } from "./dom.js";
 import { Files } from "./files.js";
 import { split } from "./split.js";
-import { pauseOf } from "./state/words.js";
+import { consoleWords, pauseOf } from "./state/words.js";
 import { Variables } from "./variables.js";
 
 const AGAIN = 1000; // ms between two words to the node on what is looked at
@@ -60,12 +60,6 @@ export class Desk {
     this.look();
   }
 
-  // Says something in the console, and shows that.
-  say(line) {
-    this.console.add(line);
-    this.choose(at("tab-console"));
-  }
-
   key(event) {
     if (!["ArrowLeft", "ArrowRight"].includes(event.key) || !this.tabs.includes(event.target)) return;
     const other = this.tabs.find((one) => one !== event.target);
@@ -104,8 +98,9 @@ export class Desk {
     this.store.take("variables", state);
   }
 
-  // Shows the line of a breakpoint when the flight pauses there.
+  // Shows what keeps a script from flying, and the line of a breakpoint when the flight pauses there.
   follow(now) {
+    if (this.console.showCurrent(consoleWords(now))) this.choose(at("tab-console"));
     const pause = pauseOf(now);
     const name = pause ? `${pause.file}:${pause.line}:${pause.time}` : "";
     this.variables.say(now);

@@ -2,23 +2,10 @@
 import { Console } from "./console.js";
 import { at, create } from "./dom.js";
 
-const DEAF = "This script does not listen to commands: its flight is in the script. Stage 6 of the tutorial does, and pilot.py.";
-
 export class Log {
   constructor(board) {
     this.lines = new Console(at("log-lines"));
     board.on("diagnosis", (all) => this.show(all));
-    for (const part of ["hears_commands", "status"]) board.on(part, () => this.showDeaf(board));
-  }
-
-  // A script that is stopped listens to nothing, whichever it is.
-  showDeaf(board) {
-    const isDeaf = board.get("hears_commands", true) === false && board.get("status", "") !== "stopped";
-    for (const id of ["deaf", "sheet-deaf"]) {
-      at(id).hidden = !isDeaf;
-      at(id).textContent = at(id).title = isDeaf ? DEAF : "";
-    }
-    document.body.classList.toggle("deaf", isDeaf);
   }
 
   begin(lines) {
@@ -34,6 +21,5 @@ export class Log {
     const row = ({ of, said, wrong }) =>
       create("li", { className: wrong ? "wrong" : "" }, create("b", { textContent: `${of}: ` }), said);
     at("diagnosis").replaceChildren(...all.map(row));
-    at("diagnosis-says").textContent = all.some((one) => one.wrong) ? "" : "Nothing is wrong.";
   }
 }

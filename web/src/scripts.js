@@ -16,8 +16,7 @@ const stemOf = (script) => script.split("/").pop().replace(/\.\w+$/, "");
 const size = (text) => new TextEncoder().encode(text).length;
 
 export class Scripts {
-  // `page` has show({ lists, script, of, question }) and say(line), for the console; `onOpen` hears of the text that a
-  // script has.
+  // `page` has show({ lists, script, of, question }); `onOpen` hears of the text that a script has.
   constructor(parent, socket, store, page, onOpen, known, onBreakpoints) {
     this.ask = (...question) => socket.ask(...question);
     this.socket = socket;
@@ -25,7 +24,10 @@ export class Scripts {
     this.page = page;
     this.onOpen = onOpen;
     this.drafts = new Drafts();
-    const check = async (text, lua) => (socket.open ? (await this.ask("check", { text, lua })).found : null);
+    const check = async (text, lua) => {
+      const { found, unchecked } = socket.open ? await this.ask("check", { text, lua }) : {};
+      return unchecked ? null : found; // of a text that is too large, or takes too long, nothing is known
+    };
     const checked = (found) => this.store.take("checked", { file: this.is.file, found });
     const moved = (line) => this.store.take("moved", line);
     this.editor = new Editor(parent, { change: () => this.change(), run: () => this.onRun(), check, checked, moved, breakpoints: onBreakpoints }, known);
@@ -339,7 +341,6 @@ export class Scripts {
     await this.save();
     const wrong = (await this.editor.check()).find(isSyntaxError);
     if (wrong) {
-      this.page.say(`error: [load] ${this.is.file}:${wrong.line}: ${wrong.said}`);
       this.store.take("failure", { file: this.is.file, line: wrong.line, said: wrong.said, phase: NOT_STARTED });
       return this.editor.goTo(wrong.line);
     }

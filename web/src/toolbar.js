@@ -38,10 +38,9 @@ export class Toolbar {
     at("speed").onchange = () => act("speed", { factor: Number(at("speed").value) });
     at("scene-choice").onchange = () => act("scene", { scene: at("scene-choice").value });
     at("vehicle").onchange = () => act("vehicle", { vehicle: at("vehicle").value });
-    for (const part of ["status", "flight", "master"]) board.on(part, (content) => store.take(part, content));
+    for (const part of ["status", "flight", "master", "hears_commands", "pace"]) board.on(part, (content) => store.take(part, content));
     board.on("diagnosis", (all) => store.take("warnings", all.filter((one) => one.wrong).map((one) => one.said)));
     board.on("speed", (factor) => this.showSpeed(factor));
-    board.on("pace", (pace) => (at("pace").textContent = Number(pace) ? `${Number(pace).toFixed(2)} ×` : ""));
     board.on("scenes", ({ all, now }) => this.offer(at("scene-choice"), all, now));
     board.on("vehicles", ({ all, now }) => {
       this.offer(at("vehicle"), all, now);

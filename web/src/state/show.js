@@ -1,6 +1,8 @@
 // Shows what is true: the only code that writes the lines, badges and buttons that depend on it.
 import { at } from "../dom.js";
-import { abilities, answers, bannerWords, flyingWords, pauseOf, saidWords, statusWords } from "./words.js";
+import {
+  abilities, answers, bannerWords, deafWords, diagnosisWords, flyingWords, paceWords, pauseOf, saidWords, statusWords,
+} from "./words.js";
 
 // What has no use without a simulator, and is not a single button.
 const WITHOUT_USE = ["build-bar", "shelf", "tune-groups", "left", "right"];
@@ -46,6 +48,18 @@ function showStatus(now) {
 
 const withoutNumbers = (text) => text.replace(/\d+/g, "");
 
+function showFlight(now) {
+  const deaf = deafWords(now);
+  for (const id of ["deaf", "sheet-deaf"]) {
+    at(id).hidden = !deaf;
+    write(at(id), deaf);
+    at(id).title = deaf;
+  }
+  document.body.classList.toggle("deaf", Boolean(deaf));
+  write(at("pace"), paceWords(now));
+  write(at("diagnosis-says"), diagnosisWords(now));
+}
+
 function showBanner(now) {
   const words = bannerWords(now);
   // A screen reader reads it once, not with every second that it counts.
@@ -70,6 +84,7 @@ function showButtons(now) {
 export function show(now) {
   showBanner(now);
   showStatus(now);
+  showFlight(now);
   showFlying(now);
   showLine(at("said"), saidWords(now));
   showLine(at("saved"), now.saved);

@@ -23,6 +23,8 @@ const BEGINNING = {
   statusSince: 0,
   flight: "", // what the drone does
   hadSimulation: false, // since this page was opened
+  hears_commands: true, // whether the script of the drone does
+  pace: "", // the actual speed, compared with real time
   warnings: [], // what /diagnostics finds wrong
   reached: null, // the breakpoint that paused the flight: { file, line, time (s), told (ms) }
   flown: "", // the script that the simulator has
@@ -54,6 +56,8 @@ const EVENTS = {
   pulse: (now, { silent, ended }) => ({ silent, hasEnded: ended }),
   master: (now, hasMaster) => ({ hasMaster }),
   flight: (now, flight) => ({ flight }),
+  hears_commands: (now, hears_commands) => ({ hears_commands }),
+  pace: (now, pace) => ({ pace }),
   warnings: (now, warnings) => ({ warnings }),
   status(now, status) {
     if (status === now.status) return {};

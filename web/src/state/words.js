@@ -45,6 +45,18 @@ export function statusWords(now) {
   return capital(now.status === "stopped" && isFailed(now) ? now.flight : says);
 }
 
+const DEAF = "This script does not listen to commands: its flight is in the script. Stage 6 of the tutorial does, and pilot.py.";
+
+// A script that is stopped listens to nothing, whichever it is.
+export const deafWords = (now) => (answers(now) && !now.hears_commands && now.status !== "stopped" ? DEAF : "");
+
+export const paceWords = (now) => (answers(now) && Number(now.pace) ? `${Number(now.pace).toFixed(2)} ×` : "");
+
+export function diagnosisWords(now) {
+  if (!answers(now)) return "The simulator does not answer; this is what it said last.";
+  return now.warnings.length ? "" : "Nothing is wrong.";
+}
+
 // What the script that the simulator has does, beside the button that would fly the open one.
 export function flyingWords(now) {
   if (!now.flown || now.connection !== "connected" || !isThere(now)) return { text: "", is: "" };
@@ -57,6 +69,10 @@ function failureWords({ failure, open }) {
   const place = failure.file === open.file ? `line ${failure.line}` : `${nameOf(failure.file)}, line ${failure.line}`;
   return `${failure.phase}, ${place}: ${failure.said}`;
 }
+
+// The line of the console about what keeps the script from flying; its place is a link. Other errors are in the log.
+export const consoleWords = ({ failure }) =>
+  failure?.phase === NOT_STARTED ? `error: [load] ${failure.file}:${failure.line}: ${failure.said}` : "";
 
 function pauseWords({ file, line, time }, open) {
   return `paused at line ${line}${file === open.file ? "" : ` of ${nameOf(file)}`}, t = ${time.toFixed(2)} s`;
