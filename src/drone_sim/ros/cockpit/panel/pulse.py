@@ -13,7 +13,7 @@ from drone_sim.ros.core import network
 
 _PERIOD = 1.0  # s
 _SUSPICIOUS = 3.0  # s of silence; the simulator publishes /diagnostics every second, also while it is busy
-_PATIENCE = 0.5  # s, for the answer of the master and of the node
+_TIMEOUT = 0.5  # s, for the answer of the master and of the node
 
 
 class Pulse(threading.Thread):
@@ -50,13 +50,13 @@ class Pulse(threading.Thread):
 def has_ended(node: str) -> bool:
     """Return whether the process of a node has ended; the master still lists a node that was killed."""
     try:
-        uri = network.call(rosgraph.get_master_uri(), "lookupNode", node, patience=_PATIENCE)
+        uri = network.call(rosgraph.get_master_uri(), "lookupNode", node, timeout=_TIMEOUT)
     except ValueError:  # the master does not know it
         return True
     except network.FAILURES:
         return False
     try:
-        network.call(uri, "getPid", patience=_PATIENCE)
+        network.call(uri, "getPid", timeout=_TIMEOUT)
     except ConnectionRefusedError:
         return True
     except network.FAILURES:  # the process is stopped, or the network is slow
