@@ -119,6 +119,7 @@ def test_an_error_box_shows_all_of_it_is_reached_by_keys_and_goes_with_a_good_ru
 
 
 def test_a_reload_opens_what_was_edited_last_where_it_was(cockpit, browser):
+    cockpit.start_afresh()
     with open_page(cockpit, browser) as page:
         page.select_option("#script", "tasks/hover.py")
         wait_until(page, lambda: "how far the wind" in text(page))
@@ -145,6 +146,8 @@ def test_a_reload_opens_what_was_edited_last_where_it_was(cockpit, browser):
 
 
 def test_a_grade_goes_on_over_a_reload_and_ages_with_the_script(cockpit, browser):
+    cockpit.start_afresh()
+    cockpit.scripts.mkdir(exist_ok=True)
     (cockpit.scripts / "hover_wrong.py").write_text("def sysCall_init(:\n" + "# long enough to be seen\n" * 5)
     with open_page(cockpit, browser) as page:
         wait_until(page, lambda: page.locator("#script option[value='mine/hover_wrong.py']").count())
