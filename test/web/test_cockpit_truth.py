@@ -145,28 +145,6 @@ def test_a_reload_opens_what_was_edited_last_where_it_was(cockpit, browser):
     (cockpit.scripts / "hover.py").unlink()
 
 
-def test_a_grade_goes_on_over_a_reload_and_ages_with_the_script(cockpit, browser):
-    cockpit.start_afresh()
-    cockpit.scripts.mkdir(exist_ok=True)
-    (cockpit.scripts / "hover_wrong.py").write_text("def sysCall_init(:\n" + "# long enough to be seen\n" * 5)
-    with open_page(cockpit, browser) as page:
-        wait_until(page, lambda: page.locator("#script option[value='mine/hover_wrong.py']").count())
-        page.select_option("#script", "mine/hover_wrong.py")
-        wait_until(page, lambda: page.locator("#grade").is_visible() and "long enough" in text(page))
-        page.click("#grade")
-        wait_until(page, lambda: page.inner_text("#graded") == "flying without pictures ...")
-        assert page.is_disabled("#grade")
-        page.wait_for_timeout(500)
-        page.reload()
-        ready(page)
-        wait_until(page, lambda: "SyntaxError" in page.inner_text("#graded") and page.is_enabled("#grade"))
-        page.locator("#text .cm-content").click()
-        page.keyboard.type("# more\n")
-        wait_until(page, lambda: "The script has been changed since" in page.inner_text("#graded"))
-        wait_until(page, lambda: page.inner_text("#saved").startswith("saved"))
-    (cockpit.scripts / "hover_wrong.py").unlink()
-
-
 # ---- what does not answer
 
 
@@ -260,7 +238,7 @@ def test_what_is_frozen_is_told_and_its_buttons_are_disabled(own, tab):
 
 
 def test_a_simulator_that_was_killed_is_told_and_the_next_cockpit_takes_its_tabs_back(own, tab):
-    """The tab has the cookie of the cockpit before; a key that is not the tab's lets nobody in."""
+    """The tab has the cookie of the cockpit before."""
     asked = []
     tab.on("request", lambda one: asked.append(one.url))
     own.end("simulator", signal.SIGKILL)
@@ -275,6 +253,10 @@ def test_a_simulator_that_was_killed_is_told_and_the_next_cockpit_takes_its_tabs
     tab.reload()
     wait_until(tab, lambda: is_alive(tab))
 
+
+def test_a_key_that_is_not_the_tabs_lets_nobody_in_and_the_page_asks_seldom(own, tab):
+    asked = []
+    tab.on("request", lambda one: asked.append(one.url))
     own.end("cockpit")
     own.key.unlink()
     own.begin("cockpit")
