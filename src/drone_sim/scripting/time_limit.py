@@ -182,7 +182,7 @@ class TimeLimit:
             return function()
 
     def inside(self, function: Callable[[], Any]) -> Any:
-        """Like `outside`, for a call of another script: its time counts as this script's."""
+        """Call another script, in the simulation's thread; its time counts towards this script's limit."""
         deadline = self._deadline
         try:
             return self.outside(function)

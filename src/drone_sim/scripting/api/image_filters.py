@@ -28,7 +28,7 @@ _EDGES = 27.0 * np.eye(9)[4].reshape(3, 3) - 3.0  # kernel: a pixel minus the me
 
 
 class ImageFilters(Functions):
-    """Filters of pictures."""
+    """Image filters for pictures of vision sensors."""
 
     def __init__(self, *arguments: Any):
         """Create it without images; `arguments` are those of Functions."""
@@ -167,7 +167,7 @@ class ImageFilters(Functions):
         sim.handleflag_abscoords in the world frame) and the distance (m). Then follow their colors, from buffer 1.
         """
         eye, image = self._eye(handle), self._image(handle)
-        columns, rows = (int(one) for one in numbers(xyPointCount, 2))
+        columns, rows = map(int, numbers(xyPointCount, 2))
         if not 0 < columns * rows <= _MOST_POINTS:
             raise WrongValue(f"expected 1 to {_MOST_POINTS} points, not {columns} x {rows}")
         x, y = _directions(eye, columns, rows, bool(evenlySpacedInAngularSpace))
@@ -233,11 +233,11 @@ def _copies(source: str, target: str) -> Callable[[ImageFilters, int], None]:
     return lambda self, handle: self._store(handle, self._image(handle, source), target)
 
 
-def _swaps(one: str, other: str) -> Callable[[ImageFilters, int], None]:
+def _swaps(name1: str, name2: str) -> Callable[[ImageFilters, int], None]:
     def swap(self: ImageFilters, handle: int) -> None:
-        first, second = self._image(handle, one), self._image(handle, other)
-        self._store(handle, second, one)
-        self._store(handle, first, other)
+        first, second = self._image(handle, name1), self._image(handle, name2)
+        self._store(handle, second, name1)
+        self._store(handle, first, name2)
 
     return swap
 

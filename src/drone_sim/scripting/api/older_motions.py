@@ -73,7 +73,7 @@ class OlderMotions(Functions):
         currentVel, currentAccel, maxVel, maxAccel, maxJerk (of x, y, z and the angle), targetPosition,
         targetQuaternion.
         """
-        given = {name: one for name, one in zip(_PLACES, arguments) if one is not None}
+        given = {name: value for name, value in zip(_PLACES, arguments) if value is not None}
         now = self._objects.matrix(handle, relativeTo)
         place = given.pop("position", frames.position(now))
         goal = built(place, given.pop("quaternion", frames.to_quaternion(now)))
@@ -187,9 +187,9 @@ class OlderMotions(Functions):
         if much <= 0:
             raise WrongValue("angleToLinearCoeff must be greater than 0")
         scale = [1.0 if alone or joint.motion == PRISMATIC else 1.0 / much for joint in joints]
-        most, fastest = (_each(one, scale) for one in (velocity, math.inf if accel is None else accel))
+        most, fastest = (_each(limit, scale) for limit in (velocity, math.inf if accel is None else accel))
         start = [joint.value for joint in joints]
-        goal = [_allowed(*one) for one in zip(joints, numbers(positions, len(joints)))]
+        goal = [_allowed(joint, position) for joint, position in zip(joints, numbers(positions, len(joints)))]
         limits = Limits(most, fastest, [math.inf] * len(joints))
         still = [0.0] * len(joints)
         trajectory = Trajectory(State(start, still, still), goal, still, limits, NONE if alone else PHASE)

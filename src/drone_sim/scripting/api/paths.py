@@ -174,7 +174,7 @@ class Paths(Functions):
     def getPathLengths(self, path: Numbers, dof: int, _callback: Any = None) -> tuple[list[float], float]:
         """Return the distance of each point along a path table, and its length; a point has `dof` numbers, 3 in m."""
         points = _points(path, dof)
-        pieces = (math.dist(one[:3], other[:3]) for one, other in itertools.pairwise(points))
+        pieces = (math.dist(start[:3], end[:3]) for start, end in itertools.pairwise(points))
         lengths = list(itertools.accumulate(pieces, initial=0.0))
         return lengths, lengths[-1]
 
@@ -202,7 +202,7 @@ class Paths(Functions):
         if len(ends) < 2 or len(path) % len(ends) or len(path) < 3 * len(ends):
             raise WrongValue(f"expected 3 numbers or more for each of {len(ends)} points, not {len(path)} in all")
         x, y, z = numbers(absPt, 3)
-        points = [one[:3] for one in _points(path, len(path) // len(ends))]
+        points = [point[:3] for point in _points(path, len(path) // len(ends))]
         return nearest(points, ends, (x, y, z))
 
     @sim("5")
@@ -231,19 +231,19 @@ def _orientation(bits: int) -> str:
     return X_UP if bits & _X_UP else AUTOMATIC
 
 
-def _control_point(given: Sequence[float], is_flat: bool) -> dict[str, Any]:
+def _control_point(values: Sequence[float], is_flat: bool) -> dict[str, Any]:
     """Return a control point as in a scene file, from V-REP's 11 or 16 numbers."""
-    x, y, z = given[:3]
-    turn = frames.to_quaternion(frames.from_euler((0.0, 0.0, 0.0), given[3:6]))
-    count = min(max(round(given[8]), 1), 100)
+    x, y, z = values[:3]
+    turn = frames.to_quaternion(frames.from_euler((0.0, 0.0, 0.0), values[3:6]))
+    count = min(max(round(values[8]), 1), 100)
     entry = {
         "position": [x, y, 0.0 if is_flat else z],
         "turn": list(turn),
-        "pause": min(max(given[7], 0.0), 1000.0),
+        "pause": min(max(values[7], 0.0), 1000.0),
         "count": count,
-        "factors": [min(max(one, 0.1), 0.99) for one in given[9:11]],
+        "factors": [min(max(factor, 0.1), 0.99) for factor in values[9:11]],
     }
-    data = {"flags": round(given[11]), "channels": list(given[12:])} if len(given) == _WITH_DATA else {}
+    data = {"flags": round(values[11]), "channels": list(values[12:])} if len(values) == _WITH_DATA else {}
     return {**entry, **data}
 
 

@@ -150,9 +150,9 @@ class Subscriptions:
         return restore
 
 
-def _are_same(one: Callback, other: Callback) -> bool:
+def _are_same(first: Callback, second: Callback) -> bool:
     """Return whether two callbacks have the same name, or are the same function."""
-    return one == other if isinstance(one, str) and isinstance(other, str) else one is other
+    return first == second if isinstance(first, str) and isinstance(second, str) else first is second
 
 
 def _copied(messages: deque[Any]) -> deque[Any]:

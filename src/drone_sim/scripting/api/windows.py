@@ -153,11 +153,12 @@ class Windows:
         return {
             "views": [{"handle": handle, **vars(view)} for handle, view in self.views.items() if view.sensor],
             "dialogs": [
-                {"handle": handle, "title": one.title, "text": one.text, "buttons": one.buttons, "typed": one.typed}
-                for handle, one in open_dialogs.items()
+                {"handle": handle, **{key: getattr(dialog, key) for key in ("title", "text", "buttons", "typed")}}
+                for handle, dialog in open_dialogs.items()
             ],
             "consoles": [
-                {"handle": handle, "title": one.title, "lines": list(one.lines)} for handle, one in shown.items()
+                {"handle": handle, "title": console.title, "lines": list(console.lines)}
+                for handle, console in shown.items()
             ],
         }
 

@@ -66,7 +66,7 @@ class Segment:
     __slots__ = ("changed", "handles", "known", "number", "phase", "reads")
 
     def __init__(self, phase: str, number: int, known: dict[Read, Any]):
-        """Begin segment `number` (from 0) of a phase; `known` contains the results of its expected reads."""
+        """Start segment `number` (from 0) of a phase; `known` contains the results of its expected reads."""
         self.phase, self.number, self.known = phase, number, known
         self.reads: dict[Read, None] = {}
         self.handles: dict[int, None] = {}
@@ -104,7 +104,7 @@ class ApiStubs:
     # ---- phases
 
     def begin(self, phase: str, answers: Answers) -> None:
-        """Begin a phase with the results of its expected reads."""
+        """Start a phase with the results of its expected reads."""
         self._begin(phase, 0, answers)
 
     def _begin(self, phase: str, number: int, answers: Answers) -> None:

@@ -1,4 +1,4 @@
-"""Which functions of the API only read, which kind of data they read, and which kinds other functions change.
+"""Effects of the API's functions: the kinds of data that they read or change.
 
 A read may be made in advance, and its result is valid until a call may have changed data of its kind. A call without a
 return value may be sent with the next message. Any other function is called at once, and may change everything.

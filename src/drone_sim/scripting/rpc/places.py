@@ -62,7 +62,7 @@ class Places:
     """The poses known in the current phase."""
 
     def __init__(self) -> None:
-        """Know no poses."""
+        """Create it without poses."""
         self._frames: dict[int, _Frame] = {}
         self._tree = _Tree()
         self._objects = Objects.__new__(Objects)
@@ -95,7 +95,7 @@ class Places:
         return frame is not None and frame.is_mark
 
     def forget_below(self, mark: int) -> None:
-        """Forget the poses of a mark's descendants."""
+        """Discard the poses of a mark's descendants."""
         known = self._tree.known
         for handle in [key for key, frame in known.items() if frame.root == mark and key != mark]:
             del known[handle]

@@ -160,7 +160,7 @@ class _LoadedScript:
 
     @property
     def is_threaded(self) -> bool:
-        """Whether it has an unfinished thread."""
+        """Whether the script has an unfinished thread."""
         return self._script.threaded
 
     def do(self, command: str, arguments: list[Any], answers: Any) -> Any:

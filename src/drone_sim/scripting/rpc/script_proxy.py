@@ -126,7 +126,7 @@ class ScriptProxy(Script):
     # ---- messages
 
     def _finish(self) -> None:
-        """Execute the requests of an actuation that the script has already run."""
+        """Execute the API calls of an actuation that the script has run ahead of the simulation."""
         self._is_ahead = False
         self._phase = "call actuation"
         self._exchange("actuation")
