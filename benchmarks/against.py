@@ -16,7 +16,7 @@ from benchmarks.loop_worker import FLIGHTS
 
 Row = dict[str, Any]
 ROOT = Path(__file__).parents[1]
-ROUNDS = 15
+ROUNDS = 60  # short turns: other programs disturb both sides alike
 
 
 def compare(revision: str, rounds: int = ROUNDS) -> list[Row]:

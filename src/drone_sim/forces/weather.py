@@ -86,6 +86,7 @@ class Weather:
         speed = math.hypot(x, y)
         self._along = (x / speed, y / speed) if speed else (1.0, 0.0)
         self._speed = max(speed, now.gusts.speed)
+        self._wind, self._deviation, self._length = now.wind, now.gusts.deviation, now.gusts.length
         self._gusts = self._gusts_of(now.gusts.seed) if any(now.gusts.deviation) else None
 
     def _gusts_of(self, seed: int) -> Gusts:
@@ -102,10 +103,10 @@ class Weather:
         if not self.is_felt:
             return _STILL
         if self._gusts is None:
-            return self.now.wind
-        (ex, ey), (wx, wy, wz), gusts = self._along, self.now.wind, self.now.gusts
+            return self._wind
+        (ex, ey), (wx, wy, wz) = self._along, self._wind
         way = self._way(self._clock.time) - ex * place[0] - ey * place[1]
-        along, across, up = self._gusts.at(way, gusts.deviation, gusts.length)
+        along, across, up = self._gusts.at(way, self._deviation, self._length)
         return wx + ex * along - ey * across, wy + ey * along + ex * across, wz + up
 
     def save_state(self) -> Restore:
