@@ -23,17 +23,21 @@ PHASES = {
 STEP, BARE = "step", "bare PyBullet: forces and steps"
 LEAST = "  of it PyBullet: pose, force, torque, step"
 NAMES = ["scripts: actuation", "forces", "advance", LEAST, "read back", "scripts: sensing", STEP, BARE]
-ROUNDS = 40
-STEPS = 60  # of a flight in each round
+ROUNDS = 60
+STEPS = 40  # of a flight in each round
 _Times = dict[str, list[float]]
 
 
 def measure(rounds: int = ROUNDS) -> list[Row]:
-    """Return the median times (us) of a step and its phases, a column for each flight; and `of_bare`."""
+    """Return the times (us) of a step and its phases, a column for each flight, and `of_bare`.
+
+    Each time is the median of the quietest round; `of_bare` is the median over the rounds.
+    """
     with one_core():
         alone = {BARE: loop.bare(), LEAST: loop.least()}
         flights = {name: begin() for name, begin in FLIGHTS.items()}
         times: dict[str, _Times] = {name: {row: [] for row in NAMES} for name in flights}
+        medians: dict[str, _Times] = {name: {row: [] for row in NAMES} for name in flights}
         for name, flight in flights.items():
             _time_phases(flight, times[name])
         for _ in tqdm(range(rounds), desc="  rounds", leave=False):
@@ -41,9 +45,15 @@ def measure(rounds: int = ROUNDS) -> list[Row]:
                 _time(flight.step, times[name][STEP])
                 for row, step in alone.items():
                     _time(step, times[name][row])
-    medians = {name: {row: 1e6 * statistics.median(some) for row, some in rows.items()} for name, rows in times.items()}
-    rows = [{"name": f"{row}, us", **{name: medians[name][row] for name in flights}} for row in NAMES]
-    return [*rows, {"name": "of_bare", **{name: medians[name][BARE] / medians[name][STEP] for name in flights}}]
+                for row, some in times[name].items():
+                    medians[name][row].append(1e6 * statistics.median(some))
+                    some.clear()
+    rows = [{"name": f"{row}, us", **{name: min(medians[name][row]) for name in flights}} for row in NAMES]
+    return [*rows, {"name": "of_bare", **{name: _share(medians[name]) for name in flights}}]
+
+
+def _share(medians: _Times) -> float:
+    return statistics.median(bare / step for bare, step in zip(medians[BARE], medians[STEP]))
 
 
 def _time(step: Callable[[], None], times: list[float]) -> None:
