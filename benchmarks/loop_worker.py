@@ -13,7 +13,7 @@ from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
-STEPS = 100  # timed at once
+STEPS = 20  # timed at once
 LEG = 60  # steps that the drone flies one way
 
 

@@ -43,7 +43,10 @@ class Script(ABC):
 
     def call(self, phase: str) -> None:
         """Run a phase: init, actuation, sensing or cleanup."""
-        self._attempt(self._run_phase, phase)
+        if self._is_isolated:
+            self._attempt(self._run_phase, phase)
+        else:  # the usual case, twice in every step
+            self._run_phase(phase)
 
     def take_turn(self) -> None:
         """Resume its thread until it yields."""
