@@ -50,7 +50,7 @@ def sizes(simulation):
     """Return how much of everything there is, as far as one may count it."""
     world, scene, tree = simulation.world, simulation.scene, simulation.context.objects
     counted = (tree, list(tree.names), scene.entries, scene.objects, scene.visuals()[0], simulation.context.names)
-    inside = (scene._built, scene._places, scene._carried_bases, world._inertial_frames)
+    inside = (scene._built, scene._holders, scene.records, scene._carried_bases, world._inertial_frames)
     shared = (simulation.context.carried.shapes, simulation.context.link_names)
     known = (world.joints._inertial, world.collision_filter._frozen, world.collision_filter._permeable)
     return pybullet.getNumBodies(world._client), *(len(list(one)) for one in (*counted, *inside, *shared, *known))

@@ -69,7 +69,7 @@ class _Always:
 
 def _now(simulation):
     scene = simulation.scene
-    return [scene.current_entry(index) for index in scene.entries]
+    return [record.present for record in scene.records.values()]
 
 
 def _looks(simulation, entry):

@@ -43,6 +43,18 @@ def test_nothing_leaks(tmp_path, started):
     simulation.close()
 
 
+def test_reading_a_moved_object_does_not_make_its_place_the_initial_one(tmp_path):
+    simulation = simulate(tmp_path, started=False)
+    before = picture(simulation)
+    simulation.load_scripts()
+    tree = simulation.context.objects
+    box = tree.handle("Cuboid")
+    tree.set_position(box, -1, (4.0, 4.0, 2.0))
+    simulation.operations.color(box)
+    simulation.stop()
+    assert picture(simulation) == before
+
+
 def test_stop_undoes_what_was_done_in_flight(tmp_path):
     simulation = simulate(tmp_path, started=False)
     before = picture(simulation)

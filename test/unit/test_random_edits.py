@@ -96,7 +96,7 @@ def assert_agree(editor, folder):
     simulation.context.carried.follow()
     assert {one.name for one in scene.entries.values()} == {one.name for one in scene.objects.values()}
     for index, one in scene.objects.items():
-        entry = scene.current_entry(index)
+        entry = scene.records[index].present
         assert (one.parent.name if one.parent else "") == entry.parent
         number = getattr(one, "number", None)
         if number is not None and one.link == -1:

@@ -33,7 +33,7 @@ class SceneRows:
         """Return the rows that changed since the last call, and the handles of removed objects."""
         simulation, changed = self._simulation, list[Row]()
         tree = simulation.tree
-        entries = {entry.name: (index, entry) for index, entry in simulation.scene.entries.items()}
+        records = {record.entry.name: record for record in simulation.scene.records.values()}
         owners = {handle: item for item in simulation.vehicles.values() for handle in item.handles}
         written = vehicles_in(simulation.document.settings, simulation.parameters) if owners else {}
         written = {name: {key: value for key, value in it.items() if key not in PLACE} for name, it in written.items()}
@@ -41,7 +41,8 @@ class SceneRows:
         handles = {id(tree[handle]): handle for handle in tree}
         for handle in tree:
             item = tree[handle]
-            index, entry = entries.get(item.name, (-1, None))
+            record = records.get(item.name)
+            entry = record.entry if record is not None else None
             vehicle = owners.get(handle)
             parent = -1 if item.parent is None else handles[id(item.parent)]
             script = scripts.get(item.name)
@@ -52,8 +53,8 @@ class SceneRows:
             )  # fmt: skip
             if self._known.get(handle) != state:
                 self._known[handle] = state
-                if entry is not None:
-                    content = simulation.scene.current_entry(index)
+                if record is not None:
+                    content = record.present
                 self.rows[handle] = row = _row(handle, item, parent, content, script)
                 row["vehicle"] = vehicle.name if vehicle else ""
                 row["of"] = "vehicle" if vehicle else "scene" if entry is not None else "floor"

@@ -439,7 +439,7 @@ class Simulation:
     def content(self) -> SceneContent:
         """Return the present content of the scene; vehicles and weather are those at the start."""
         scene = self.scene
-        entries = {scene.tree.handle(entry.name): scene.current_entry(index) for index, entry in scene.entries.items()}
+        entries = {self.tree.handle(record.entry.name): record.present for record in scene.records.values()}
         return SceneContent(entries, dict(scene.scripts), self.document.settings)
 
     def save_scene(self, path: Path) -> str:

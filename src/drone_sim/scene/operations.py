@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,16 +14,18 @@ from typing import Any
 from drone_sim.config.errors import changed
 from drone_sim.config.types import ParameterError
 from drone_sim.mechanics import frames
+from drone_sim.mechanics.joint import Joint
 from drone_sim.mechanics.object_names import first_free, numbered, plain, shifted, suffixes
 from drone_sim.mechanics.object_tree import PARENT, WORLD, levels
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.scene import models
 from drone_sim.scene.attached_scripts import MAX_SCRIPTS, AttachedScriptParameters, RunningScripts
 from drone_sim.scene.entry import EntryParameters, Place, placed
-from drone_sim.scene.kinds.force_sensor import ForceSensorParameters
+from drone_sim.scene.kinds.force_sensor import ForceSensor, ForceSensorParameters
 from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.kinds.kind import KindParameters
 from drone_sim.scene.object_parameters import CompoundParameters, ObjectParameters
+from drone_sim.scene.object_record import ObjectRecord
 from drone_sim.scene.scaling import scaled
 from drone_sim.scene.scene import Scene
 from drone_sim.scene.scene_parameters import (
@@ -54,9 +55,7 @@ class SceneOperations:
 
     def entry(self, handle: int) -> EntryParameters:
         """Return an object's entry with its present values. Raises ValueError if the object is not of the scene."""
-        index = self._index(handle)
-        self._scene.sync_entries((index,))
-        return self._scene.entries[index]
+        return self._record(handle).present
 
     def model(self, handle: int) -> list[int]:
         """Return an object and its descendants, parents first. Raises ValueError for an unknown handle."""
@@ -67,16 +66,16 @@ class SceneOperations:
         """Return an unused name: the wanted one, or the first free one with a number: Cuboid, Cuboid0, Cuboid1, ..."""
         return first_free((name for name in numbered(wanted) if plain(name) == name), self._scene.tree)
 
-    def _index(self, handle: int) -> int:
+    def _record(self, handle: int) -> ObjectRecord:
         item = self._scene.tree[handle]
-        index = self._index_of(item)
-        if index is not None:
-            return index
+        record = self._record_of(item)
+        if record is not None:
+            return record
         what = "the floor" if item.name == "Floor" else "a part of a vehicle"
         raise ValueError(f"'{item.name}' is {what}: only objects of the scene can be changed")
 
-    def _index_of(self, item: SceneObject) -> int | None:
-        return next((index for index, other in self._scene.objects.items() if other is item), None)
+    def _record_of(self, item: SceneObject) -> ObjectRecord | None:
+        return next((record for record in self._scene.records.values() if record.item is item), None)
 
     # ---- adding and removing
 
@@ -91,8 +90,8 @@ class SceneOperations:
         """
         scene, tree = self._scene, self._scene.tree
         entries = [item if isinstance(item, EntryParameters) else entry_from(item) for item in items]
-        if len(scene.entries) + len(entries) > MAX_OBJECTS:
-            raise ParameterError(f"a scene has at most {MAX_OBJECTS} objects, not {len(scene.entries) + len(entries)}")
+        if len(scene.records) + len(entries) > MAX_OBJECTS:
+            raise ParameterError(f"a scene has at most {MAX_OBJECTS} objects, not {len(scene.records) + len(entries)}")
         if len(scene.scripts) + len(scripts) > MAX_SCRIPTS:
             raise ParameterError(f"a scene has at most {MAX_SCRIPTS} scripts, not {len(scene.scripts) + len(scripts)}")
         names: set[str] = set()
@@ -110,7 +109,7 @@ class SceneOperations:
         with self._changing(any(isinstance(entry, _IN_DYNAMICS) for entry in entries)):
             first = scene.next_index
             scene.next_index += len(entries)
-            scene.entries.update(enumerate(entries, first))
+            scene.records.update((index, ObjectRecord(entry)) for index, entry in enumerate(entries, first))
             scene.scripts.update({script.object: script for script in scripts})
         if scripts:
             self._scripts.attach([script.object for script in scripts])
@@ -119,11 +118,11 @@ class SceneOperations:
     def remove(self, handles: Collection[int]) -> None:
         """Remove objects with their scripts; their children stay where they are. Raises ValueError."""
         scene = self._scene
-        names = [scene.entries[self._index(handle)].name for handle in handles]
+        names = [self._record(handle).entry.name for handle in handles]
         self._scripts.end([name for name in names if name in scene.scripts])
         present = {*scene.tree}  # a cleanup may have removed some
-        removed = {self._index(handle): int(handle) for handle in handles if handle in present}
-        parents = {id(scene.objects[index]) for index in removed}
+        removed = {self._record(handle): int(handle) for handle in handles if handle in present}
+        parents = {id(record.item) for record in removed}
         freed = [(it, it.matrix()) for it in map(scene.tree.__getitem__, scene.tree) if id(it.parent) in parents]
 
         def take_out() -> None:
@@ -135,12 +134,13 @@ class SceneOperations:
 
         with self._changing(change_tree=take_out):
             for item, matrix in freed:
-                index = self._index_of(item)
-                if index is not None and index not in removed:
-                    scene.entries[index] = placed(scene.entries[index], "", matrix)
+                record = self._record_of(item)
+                if record is not None and record not in removed:
+                    record.entry = placed(record.entry, "", matrix)
                     self._mark_for_rebuild(item)
-            for index in removed:
-                scene.scripts.pop(scene.entries.pop(index).name, None)
+            scene.records = {key: record for key, record in scene.records.items() if record not in removed}
+            for record in removed:
+                scene.scripts.pop(record.entry.name, None)
 
     def copy(self, handles: Sequence[int]) -> list[int]:
         """Add copies of objects, which may be children of each other, and of their scripts; return the copies' handles.
@@ -230,21 +230,21 @@ class SceneOperations:
 
     def rename(self, handle: int, name: str) -> None:
         """Rename an object; the name must be unused. Raises ValueError."""
-        scene, index = self._scene, self._index(handle)
-        before = scene.entries[index]
+        scene, record = self._scene, self._record(handle)
+        before = record.entry
         if name in scene.tree and scene.tree.handle(name) != handle:
             raise ParameterError(f"an object named '{name}' already exists")
         if not name:
             raise ParameterError("name = '': must have at least 1 character")
         renamed = changed(before, {"name": name})
         with self._changing(change_tree=lambda: scene.tree.rename(int(handle), name)):
-            scene.entries[index] = before.model_copy(update={"name": renamed.name})
-            for other, entry in scene.entries.items():
-                if entry.parent == before.name:
-                    scene.entries[other] = entry.model_copy(update={"parent": name})
+            record.entry = before.model_copy(update={"name": renamed.name})
+            for other in scene.records.values():
+                if other.entry.parent == before.name:
+                    other.entry = other.entry.model_copy(update={"parent": name})
         self._move_script(before.name, name)
         if not before.alias:
-            scene.objects[index].alias = name
+            scene.tree[handle].alias = name
 
     def _move_script(self, name: str, new_name: str) -> None:
         """Move the script of the object `name`, if it has one, to another object, or to the object's new name."""
@@ -259,12 +259,11 @@ class SceneOperations:
 
     def describe(self, handle: int, **values: Any) -> None:
         """Set `alias`, `category` or `model` (whether it is a model base) of an object. Raises ValueError."""
-        index = self._index(handle)
-        entry = self._scene.entries[index]
-        checked = changed(entry, values)
-        self._scene.entries[index] = entry.model_copy(update={key: getattr(checked, key) for key in values})
+        record = self._record(handle)
+        checked = changed(record.entry, values)
+        record.entry = record.entry.model_copy(update={key: getattr(checked, key) for key in values})
         self._scene.is_changed = True
-        described = self._scene.objects[index]
+        described = self._scene.tree[handle]
         described.alias, described.is_model = checked.shown, checked.model
 
     # ---- scripts
@@ -295,7 +294,7 @@ class SceneOperations:
 
     def put(self, handle: int, local: frames.Matrix) -> None:
         """Set an object's pose in its parent's frame, also of an object that a joint holds. Raises ValueError."""
-        scene, index = self._scene, self._index(handle)
+        scene, record = self._scene, self._record(handle)
         moved = scene.tree[handle]
         if not getattr(moved, "is_held", False) and moved.kind not in ("joint", "force_sensor"):
             scene.tree.set_matrix(handle, PARENT, local)
@@ -307,8 +306,9 @@ class SceneOperations:
                 moved.local = local
 
         with self._changing(change_tree=put):
-            scene.entries[index] = placed(self.entry(handle), scene.entries[index].parent, local)
-            scene.changed[index] += 1
+            present = record.present
+            record.entry = placed(present, present.parent, local)
+            record.version += 1
             self._mark_for_rebuild(moved)
 
     def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None:
@@ -316,11 +316,11 @@ class SceneOperations:
 
         Raises ValueError if it cannot be a child of this parent.
         """
-        scene, tree = self._scene, self._scene.tree
+        tree = self._scene.tree
         tree.check_parent(handle, parent)
         moved, new_parent = tree[handle], None if parent == WORLD else tree[parent]
-        index = self._index_of(moved)
-        if index is None:  # a vehicle's object
+        record = self._record_of(moved)
+        if record is None:  # a vehicle's object
             tree.set_parent(handle, parent, keep_in_place)
             return
         entry, keeps_pose = self.entry(handle), keep_in_place or moved.body is not None
@@ -335,14 +335,15 @@ class SceneOperations:
             tree.look_for_loose_ones()
 
         with self._changing(change_tree=hang):
-            scene.entries[index] = placed(entry, new_parent.name if new_parent is not None else "", local)
+            record.entry = placed(entry, new_parent.name if new_parent is not None else "", local)
             self._mark_for_rebuild(moved)
 
     def _mark_for_rebuild(self, moved: SceneObject) -> None:
         """Mark a re-parented joint or force sensor, and those below a re-parented object, for rebuild."""
-        for index, item in self._scene.objects.items():
-            if item.kind in ("joint", "force_sensor") and (item is moved or item.is_descendant_of(moved)):
-                self._scene.changed[index] += 1
+        for record in self._scene.records.values():
+            item = record.item
+            if isinstance(item, (Joint, ForceSensor)) and (item is moved or item.is_descendant_of(moved)):
+                record.version += 1
 
     # ---- properties
 
@@ -365,7 +366,7 @@ class SceneOperations:
 
     def paint(self, handle: int, rgba: Sequence[float | None]) -> None:
         """Set the color of a shape and all its parts; None keeps a component. Raises ValueError."""
-        entry, index = self.entry(handle), self._index(handle)
+        entry, record = self.entry(handle), self._record(handle)
         before = self.color(handle)
         painted = [old if new is None else new for old, new in zip(before, rgba)]
         assert isinstance(entry, ObjectParameters), "only a shape has a color"
@@ -373,9 +374,9 @@ class SceneOperations:
         values: dict[str, Any] = {"color": color}
         if isinstance(entry, CompoundParameters):
             values = {"parts": [part.model_copy(update={"color": color}) for part in entry.parts]}
-        self._scene.entries[index] = entry.model_copy(update=values)
+        record.entry = entry.model_copy(update=values)
         self._scene.is_changed = True
-        self._scene.paint(index, color)
+        self._scene.paint(record, color)
 
     def color(self, handle: int) -> tuple[float, ...]:
         """Return the color of a shape, or of a compound's first part. Raises ValueError if it has none."""
@@ -392,8 +393,8 @@ class SceneOperations:
 
     def forms(self, handle: int) -> list[tuple[str, tuple[float, ...]]]:
         """Return an object's shape or a compound's shapes, as (`shape`, `size`); empty if it is not a scene shape."""
-        index = self._index_of(self._scene.tree[handle])
-        entry = None if index is None else self._scene.entries[index]
+        record = self._record_of(self._scene.tree[handle])
+        entry = record.entry if record is not None else None
         if isinstance(entry, CompoundParameters):
             return [(part.shape, getattr(part, "size", ())) for part in entry.parts]
         return [(entry.shape, getattr(entry, "size", ()))] if isinstance(entry, ObjectParameters) else []
@@ -416,38 +417,40 @@ class SceneOperations:
             if not getattr(tree[handle], "is_held", False):
                 tree.set_matrix(handle, PARENT, places[handle])
         for handle in entries:
-            index = self._index(handle)
-            before = self._scene.factors.get(index, (1.0, 1.0, 1.0))
-            self._scene.factors[index] = (x * before[0], y * before[1], z * before[2])
+            record = self._record(handle)
+            a, b, c = record.factors
+            record.factors = x * a, y * b, z * c
 
     def factors(self, handle: int) -> tuple[float, float, float]:
         """Return the factors by which an object has been scaled along x, y and z."""
         item = self._scene.tree[handle]
-        index = self._index_of(item)
-        x, y, z = (1.0, 1.0, 1.0) if index is None else self._scene.factors.get(index, (1.0, 1.0, 1.0))
+        record = self._record_of(item)
+        x, y, z = record.factors if record is not None else (1.0, 1.0, 1.0)
         return x * item.size_factor, y * item.size_factor, z * item.size_factor
 
     def replace_entries(self, entries: Mapping[int, EntryParameters]) -> None:
         """Replace the entries of objects; names, parents and poses stay the same. Raises ParameterError."""
         scene = self._scene
-        indices = {handle: self._index(handle) for handle in entries}
+        records = {handle: self._record(handle) for handle in entries}
         new_entries = entries.values()
         if any(isinstance(entry, ObjectParameters) for entry in new_entries):
-            others = [entry for index, entry in scene.entries.items() if index not in indices.values()]
+            replaced = {*records.values()}
+            others = [record.entry for record in scene.records.values() if record not in replaced]
             check_files(scene.parameters.floor, [*others, *new_entries])
 
         def replace_objects() -> None:
-            for handle, index in indices.items():
-                entry, before = entries[handle], scene.objects[index]
+            for handle, record in records.items():
+                entry, before = entries[handle], scene.tree[handle]
                 if isinstance(entry, KindParameters):
                     place = Place(before.names, before.alias, before.parent, before.local)
-                    scene.replace_object(index, int(handle), entry, place)
+                    scene.replace_object(record, int(handle), entry, place)
 
         with self._changing(any(isinstance(entry, _IN_DYNAMICS) for entry in new_entries), change_tree=replace_objects):
-            for handle, index in indices.items():
-                place = {key: getattr(scene.entries[index], key) for key in ("position", "rpy", "parent")}
-                scene.entries[index] = entries[handle].model_copy(update=place)
-                scene.changed[index] += 1
+            for handle, record in records.items():
+                present = record.present
+                place = {key: getattr(present, key) for key in ("position", "rpy", "parent")}
+                record.entry = entries[handle].model_copy(update=place)
+                record.version += 1
 
     # ---- atomic changes
 
@@ -456,13 +459,16 @@ class SceneOperations:
         """Update world and tree after entries were changed inside `with`; on ValueError, restore the entries."""
         scene = self._scene
         if bodies:
-            scene.write_down_joints()
-        entries, versions, number = dict(scene.entries), Counter(scene.changed), scene.next_index
-        scripts = dict(scene.scripts)
+            scene.sync_chains()
+        before = {index: (record, record.entry, record.version) for index, record in scene.records.items()}
+        number, scripts = scene.next_index, dict(scene.scripts)
         try:
             yield
             scene.rebuild(change_tree, bodies)
         except ValueError:
-            scene.entries, scene.changed, scene.next_index, scene.scripts = entries, versions, number, scripts
+            scene.records = {index: record for index, (record, _, _) in before.items()}
+            for record, entry, version in before.values():
+                record.entry, record.version = entry, version
+            scene.next_index, scene.scripts = number, scripts
             raise
         scene.is_changed = True

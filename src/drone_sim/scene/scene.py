@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -20,12 +19,13 @@ from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.bodies import CarriedBody, ShapeInWorld, ShapeObject, bodies_above
 from drone_sim.scene.building import Built
 from drone_sim.scene.chains import Chain
-from drone_sim.scene.entry import EntryParameters, Place, place_of, stands_at
+from drone_sim.scene.entry import EntryParameters, Place
 from drone_sim.scene.kinds.force_sensor import ForceSensor, ForceSensorParameters
 from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.kinds.kind import KindParameters
 from drone_sim.scene.object_drag import ObjectDrag
 from drone_sim.scene.object_parameters import ObjectParameters
+from drone_sim.scene.object_record import ObjectRecord
 from drone_sim.scene.scene_parameters import FloorParameters, SceneParameters, check_files
 from drone_sim.shapes.visual import Visual
 from drone_sim.world.joints import JointDrive
@@ -48,23 +48,30 @@ class Scene:
         Raises ParameterError for a file that cannot be used.
         """
         self.parameters = parameters  # initial ones
-        self.entries: dict[int, EntryParameters] = dict(enumerate(parameters.objects))  # by permanent index
+        self.records = {index: ObjectRecord(entry) for index, entry in enumerate(parameters.objects)}  # permanent keys
         self.scripts: dict[str, AttachedScriptParameters] = {item.object: item for item in parameters.scripts}
         check_files(parameters.floor, parameters.objects)
         self._context, self.tree = context, context.objects
         self._world = context.world
         self._add_floor(parameters.floor)
         self.drag = ObjectDrag(context, self.things, parameters.floor.size)
-        self.next_index = len(self.entries)
+        self.next_index = len(self.records)
         self.is_changed = False  # whether any operation (operations.py) changed it
         self.rebuilt = 0  # number of bodies added or removed so far
-        self.changed: Counter[int] = Counter()  # versions of entries; incremented to rebuild the body
-        self.factors: dict[int, Vector] = {}  # total scale of entries
         self._built: dict[_Key, Built] = {}
-        self._places: dict[int, tuple[int, int]] = {}  # body and link of each shape
-        self._initial_poses: dict[int, Matrix] = {}  # of the objects, by entry; empty until known
+        self._holders: dict[int, list[Joint | ForceSensor]] = {}  # of the links of each body
         self._forget_objects()
         _warn(self.entries, self._build()[1])
+
+    @property
+    def entries(self) -> dict[int, EntryParameters]:
+        """The entries of all objects, by the keys of `records`."""
+        return {index: record.entry for index, record in self.records.items()}
+
+    @property
+    def objects(self) -> dict[int, SceneObject]:
+        """The objects in the tree, by the keys of `records`."""
+        return {index: record.item for index, record in self.records.items() if record.item is not None}
 
     def set_floor(self, floor: FloorParameters) -> None:
         """Replace the floor. Raises ParameterError for a file that cannot be used."""
@@ -87,13 +94,14 @@ class Scene:
         Return the new bodies, and for each joint that the dynamics cannot move the reason, by entry. Raises
         ParameterError for a file that cannot be read; then nothing has changed.
         """
-        result = chains.found(self.entries)
-        required = {self._key(chain): chain for chain in (*building.alone(self.entries, result.chains), *result.chains)}
+        entries = self.entries
+        result = chains.found(entries)
+        required = {self._key(chain): chain for chain in (*building.alone(entries, result.chains), *result.chains)}
         new = {key: chain for key, chain in required.items() if key not in self._built}
         matrices = {index: self._matrix(index) for chain in new.values() for index in chain.members()}
         speeds = {index: self._speed(index) for index in matrices}
         try:
-            built = building.build(self._world, self.entries, new.values(), matrices)
+            built = building.build(self._world, entries, new.values(), matrices)
         except ValueError as error:
             raise ParameterError(str(error)) from None
         obsolete = self._built.keys() - required.keys()
@@ -101,31 +109,33 @@ class Scene:
             self._remove(self._built.pop(key))
         self.rebuilt += len(obsolete) + len(new)
         self._built.update(zip(new, built))
-        self._places = {index: (item.body, link) for item in self._built.values() for index, link in item.links.items()}
-        self._add_names()
         for item in built:
+            for index, link in item.links.items():
+                self.records[index].body = item.body, link
             self._restore_velocities(item, speeds)
+        self._add_names()
         return built, result.reasons
 
     def _key(self, chain: Chain) -> _Key:
-        versions = tuple(self.changed[index] for index in chain.members())
+        versions = tuple(self.records[index].version for index in chain.members())
         return chain.root, tuple(hung[:3] for hung in chain.hung), versions
 
     def _matrix(self, index: int) -> Matrix:
         """Return world from an entry's frame, also for an entry without an object."""
-        if index in self.objects:
-            return self.objects[index].matrix()
-        entry = self.entries[index]
+        entry, item = self.records[index].entry, self.records[index].item
+        if item is not None:
+            return item.matrix()
         if entry.parent in self.tree:
             return multiply(self.tree[self.tree.handle(entry.parent)].below(), entry.local)
-        parent = next((key for key, item in self.entries.items() if entry.parent and item.name == entry.parent), None)
+        parents = (key for key, other in self.records.items() if entry.parent and other.entry.name == entry.parent)
+        parent = next(parents, None)
         if parent is None:  # the parent is a vehicle, which is added after the scene
             return entry.local
-        return multiply(multiply(self._matrix(parent), building.motion(self.entries[parent])), entry.local)
+        return multiply(multiply(self._matrix(parent), building.motion(self.records[parent].entry)), entry.local)
 
     def _speed(self, index: int) -> tuple[Vector, Vector, float]:
         """Return the velocities of an entry whose body is replaced: linear (m/s), angular (rad/s), along a joint."""
-        item = self.objects.get(index)
+        item = self.records[index].item
         if isinstance(item, Joint):
             return _AT_REST, _AT_REST, item.velocity_along
         body = item.body if item is not None else None
@@ -136,18 +146,16 @@ class Scene:
 
     def _restore_velocities(self, built: Built, speeds: Mapping[int, tuple[Vector, Vector, float]]) -> None:
         root = built.chain.root
-        if root is not None and getattr(self.entries[root], "moves", False) and any(map(any, speeds[root][:2])):
+        if root is not None and getattr(self.records[root].entry, "moves", False) and any(map(any, speeds[root][:2])):
             self._world.set_velocity(built.body, *speeds[root][:2])
         for hung in built.chain.hung:
-            joint, speed = self.entries[hung.joint], speeds[hung.joint][2]
+            joint, speed = self.records[hung.joint].entry, speeds[hung.joint][2]
             if speed and isinstance(joint, JointParameters):
                 self._world.joints.put(built.body, built.links[hung.shape], joint.value, speed)
 
     def _remove(self, built: Built) -> None:
-        for hung in built.chain.hung:
-            item = self.objects.get(hung.joint)
-            if isinstance(item, (Joint, ForceSensor)):
-                item.release()
+        for holder in self._holders.pop(built.body, ()):
+            holder.release()
         self._world.remove(built.body)
         self._context.names.pop(built.body, None)
         for link in built.links.values():
@@ -161,10 +169,11 @@ class Scene:
 
     def _add_names(self) -> None:
         names, link_names = self._context.names, self._context.link_names
-        for index, (number, link) in self._places.items():
-            name = link_names[number, link] = self.entries[index].name
-            if link == -1 or number not in names:
-                names[number] = (name, name)
+        for built in self._built.values():
+            for index, link in built.links.items():
+                name = link_names[built.body, link] = self.records[index].entry.name
+                if link == -1 or built.body not in names:
+                    names[built.body] = (name, name)
 
     # ---- the tree
 
@@ -175,9 +184,10 @@ class Scene:
         """
         self._forget_objects()
         self._add_objects(self._built.values())
-        if not self._initial_poses:
-            self._place_free_children(self.objects)
-            self._initial_poses = {index: item.matrix() for index, item in self.objects.items()}
+        if all(record.start is None for record in self.records.values()):
+            self._place_free_children(building.parents_first(self.entries))
+            for record in self.records.values():
+                record.start = record.item.matrix() if record.item is not None else None
         self._follow()
 
     def rebuild(self, change_tree: Callable[[], None] = lambda: None, bodies: bool = True) -> None:
@@ -187,63 +197,61 @@ class Scene:
         """
         new_bodies = self._build()[0] if bodies else []
         for index in (index for body in new_bodies for index in body.links):
-            item = self.objects.get(index)
-            if isinstance(item, ShapeObject):
-                item.embody(self._solid(index, self.entries[index].local))
-        for index in self.objects.keys() - self.entries.keys():
-            del self.objects[index], self.changed[index]
-            self.factors.pop(index, None)
+            record = self.records[index]
+            if isinstance(record.item, ShapeObject):
+                record.item.embody(_solid(record, record.entry.local))
         change_tree()
         for item in self.objects.values():
             if isinstance(item, ShapeObject):
                 item.pass_carriers()
-        present = set(self.objects)
-        self._add_objects(new_bodies)
-        self._place_free_children(self.objects.keys() - present)
+        self._place_free_children(self._add_objects(new_bodies))
         self._follow()
 
-    def replace_object(self, index: int, handle: int, entry: KindParameters, place: Place) -> None:
+    def replace_object(self, record: ObjectRecord, handle: int, entry: KindParameters, place: Place) -> None:
         """Replace an object by one built from `entry`."""
         made = entry.make(place, self._context)
         made.is_model, made.size_factor = entry.model, entry.size_factor
-        before, self.objects[index] = self.objects[index], made
+        before, record.item = record.item, made
         if isinstance(made, Joint) and isinstance(before, Joint):
             made.turn = before.turn
         self.tree.replace(handle, made)
 
-    def paint(self, index: int, rgba: Sequence[float]) -> None:
+    def paint(self, record: ObjectRecord, rgba: Sequence[float]) -> None:
         """Set the displayed color of a shape."""
-        body, link = self._places[index]
+        assert record.body is not None, "only shapes have a color"
+        body, link = record.body
         self._world.set_color(body, rgba, link)
 
     def _forget_objects(self) -> None:
         self.drag.let_go_of_all()
-        for item in getattr(self, "objects", {}).values():
-            if isinstance(item, ShapeObject):
-                item.release()
-        self.objects: dict[int, SceneObject] = {}  # by index of the entry
+        for record in self.records.values():
+            if isinstance(record.item, ShapeObject):
+                record.item.release()
+            record.item = None
         self._carried_bases: dict[int, CarriedBody] = {}  # static roots of chains with a parent, by body
         self._context.carried.shapes.clear()
         self._context.carried.bases.clear()
 
-    def _add_objects(self, new_bodies: Iterable[Built]) -> None:
-        """Add the missing objects to the tree, and connect the joints and force sensors of new bodies."""
-        new = {index: entry for index, entry in self.entries.items() if index not in self.objects}
-        for index in building.parents_first(new):
-            self.objects[index] = self._add(index)
+    def _add_objects(self, new_bodies: Iterable[Built]) -> list[int]:
+        """Add the missing objects to the tree, and connect joints and force sensors of new bodies; return the new."""
+        new = building.parents_first({key: record.entry for key, record in self.records.items() if record.item is None})
+        for index in new:
+            self.records[index].item = self._add(index)
         for built in new_bodies:
             self._connect_joints(built)
+        return new
 
     def _add(self, index: int) -> SceneObject:
-        entry = self.entries[index]
-        parent = self._parent(index)
+        record = self.records[index]
+        entry, parent = record.entry, self._parent(index)
         is_orphan = bool(entry.parent) and parent is None  # a removed vehicle: the object keeps its initial pose
-        place = Place((entry.name,), entry.shown, parent, self._initial_poses[index] if is_orphan else entry.local)
+        local = record.start if is_orphan and record.start is not None else entry.local
+        place = Place((entry.name,), entry.shown, parent, local)
         if isinstance(entry, KindParameters):
             added = entry.make(place, self._context)
         else:
             follow = self._context.carried.follow
-            added = ShapeObject(place, self._world, self._update_carried, follow, self._solid(index, place.local))
+            added = ShapeObject(place, self._world, self._update_carried, follow, _solid(record, local))
         added.is_model, added.size_factor = entry.model, entry.size_factor
         try:
             self.tree.insert(added)
@@ -251,23 +259,17 @@ class Scene:
             raise ParameterError(str(error), ("objects", index, "name")) from None
         return added
 
-    def _solid(self, index: int, local: Matrix) -> ShapeInWorld:
-        entry = self.entries[index]
-        assert isinstance(entry, ObjectParameters), "only shapes have bodies"
-        number, link = self._places[index]
-        return ShapeInWorld(number, link, entry.local if link != -1 else local, entry.mass, entry.static)
-
     def _parent(self, index: int) -> SceneObject | None:
-        name = self.entries[index].parent
+        record = self.records[index]
+        name = record.entry.parent
         if not name:
             return None
         if name in self.tree:
             return self.tree[self.tree.handle(name)]
-        if self._initial_poses:  # a vehicle that was removed
+        if record.start is not None:  # a vehicle that was removed
             return None
         raise ParameterError(
-            f"no object is named '{name}', the parent of '{self.entries[index].name}'; "
-            f"{near_names(name, self.tree.names)}",
+            f"no object is named '{name}', the parent of '{record.entry.name}'; {near_names(name, self.tree.names)}",
             ("objects", index, "parent"),
         )
 
@@ -281,17 +283,20 @@ class Scene:
             self._context.carried.shapes[shape.number] = shape.carried
 
     def _connect_joints(self, built: Built) -> None:
+        holders = self._holders[built.body] = []
         for hung in built.chain.hung:
-            holder, link = self.objects[hung.joint], built.links[hung.shape]
+            holder, link = self.records[hung.joint].item, built.links[hung.shape]
             if isinstance(holder, ForceSensor):
+                holders.append(holder)
                 holder.hold(self._world, built.body, link)
             elif isinstance(holder, Joint):
+                holders.append(holder)
                 holder.drive = JointDrive(self._world.joints, built.body, link)
                 holder.drive.limit(holder.limits)
                 holder.drive.command(holder.control)
         if built.chain.root is None:
-            first = self.objects[built.chain.hung[0].joint]
-            if first.parent is not None:
+            first = self.records[built.chain.hung[0].joint].item
+            if first is not None and first.parent is not None:
                 self._carried_bases[built.body] = CarriedBody(self._world, built.body, first.parent.below)
                 for carrier in bodies_above(first):
                     self._world.collision_filter.let_pass(built.body, carrier)
@@ -300,8 +305,9 @@ class Scene:
         """Move the kinematic bodies to their frames; a chain that hangs on another chain's link follows that chain."""
 
         def depth(body: int) -> int:
-            return len(bodies_above(self.objects[first[body]]))
+            return len(bodies_above(objects[first[body]]))
 
+        objects = self.objects
         first = {built.body: built.chain.hung[0].joint for built in self._built.values() if built.chain.hung}
         bases = self._carried_bases
         self._context.carried.bases = {body: bases[body] for body in sorted(bases, key=depth)}
@@ -310,57 +316,35 @@ class Scene:
     def _place_free_children(self, added: Iterable[int]) -> None:
         """Move added free children to their entries' poses relative to the parent, now that it exists."""
         for index in added:
-            item = self.objects[index]
-            if item.is_free_child and item.parent is not None:
-                item.put(multiply(item.parent.below(), self.entries[index].local))
+            item = self.records[index].item
+            if item is not None and item.is_free_child and item.parent is not None:
+                item.put(multiply(item.parent.below(), self.records[index].entry.local))
 
     # ---- present values
 
-    def now(self, index: int) -> dict[str, Any]:
-        """Return the present values of an entry's keys for pose, parent, joint and `static`."""
-        item, entry = self.objects[index], self.entries[index]
-        values = place_of(item)
-        if stands_at(entry, values):  # keep the author's numbers
-            values.update(position=list(entry.position), rpy=list(entry.rpy))
-        if isinstance(item, ShapeObject) and item.mass and not item.is_held:
-            is_other = isinstance(entry, ObjectParameters) and item.is_static != entry.static
-            values.update({"static": item.is_static} if is_other else {})
-        return values
-
-    def current_entry(self, index: int) -> EntryParameters:
-        """Return an entry with its present values; the same entry if nothing differs."""
-        entry, now = self.entries[index], self.now(index).items()
-        values = {key: tuple(value) if isinstance(value, list) else value for key, value in now}
-        values = {key: value for key, value in values.items() if getattr(entry, key) != value}
-        return entry.model_copy(update=values) if values else entry
-
-    def sync_entries(self, indices: Iterable[int]) -> None:
-        """Update entries to the present values of their objects."""
-        for index in indices:
-            self.entries[index] = self.current_entry(index)
-
-    def write_down_joints(self) -> None:
+    def sync_chains(self) -> None:
         """Update all entries to the present values if there are joints or force sensors, whose links may change."""
-        if any(isinstance(entry, (JointParameters, ForceSensorParameters)) for entry in self.entries.values()):
-            self.sync_entries(self.entries)
+        records = self.records.values()
+        if any(isinstance(record.entry, (JointParameters, ForceSensorParameters)) for record in records):
+            for record in records:
+                record.entry = record.present
 
     def put_in_order(self) -> None:
-        """Sort the entries by their objects' handles, the order in which they were first added."""
-        handles = {index: self.tree.handle(entry.name) for index, entry in self.entries.items()}
-        self.entries = dict(sorted(self.entries.items(), key=lambda pair: handles[pair[0]]))
+        """Sort the objects by their handles, the order in which they were first added."""
+        self.records = dict(sorted(self.records.items(), key=lambda pair: self.tree.handle(pair[1].entry.name)))
 
     def parameters_now(self) -> SceneParameters:
         """Return the parameters of the scene with their present values."""
-        self.sync_entries(self.entries)
-        now = {"objects": list(self.entries.values()), "scripts": list(self.scripts.values())}
+        now = {"objects": [record.present for record in self.records.values()], "scripts": list(self.scripts.values())}
         return self.parameters.model_copy(update=now)
 
     def save_state(self) -> Callable[[], None]:
         """Return a function that restores entries and moves kinematic bodies to their frames."""
-        entries = dict(self.entries)
+        entries = self.entries
 
         def restore() -> None:
-            self.entries.update({index: entry for index, entry in entries.items() if index in self.entries})
+            for index, record in self.records.items():
+                record.entry = entries.get(index, record.entry)
             shapes = [it.carried for it in self.objects.values() if isinstance(it, ShapeObject) and not it.is_held]
             for body in (*self._carried_bases.values(), *shapes):
                 body.reapply_pose()
@@ -384,11 +368,20 @@ class Scene:
 
     def visual_names(self) -> list[str]:
         """Return the object's name for each of the visuals, as in `things`."""
-        names = {place: self.entries[index].name for index, place in self._places.items()}
+        names = {record.body: record.entry.name for record in self.records.values()}
         return [names.get(place, "") for place in self._world.pictures.places(self._numbers())]
 
     def _numbers(self) -> list[int]:
-        return list(dict.fromkeys(self._places[index][0] for index in sorted(self._places)))
+        bodies = (self.records[index].body for index in sorted(self.records))
+        return list(dict.fromkeys(body[0] for body in bodies if body is not None))
+
+
+def _solid(record: ObjectRecord, local: Matrix) -> ShapeInWorld:
+    """Return a shape's body; `local` is its pose in the parent's frame, unless a joint holds it."""
+    entry = record.entry
+    assert isinstance(entry, ObjectParameters) and record.body is not None, "only shapes have bodies"
+    number, link = record.body
+    return ShapeInWorld(number, link, entry.local if link != -1 else local, entry.mass, entry.static)
 
 
 def _warn(entries: Mapping[int, object], reasons: Mapping[int, str]) -> None:
