@@ -157,7 +157,9 @@ def test_beside_run_stands_what_the_script_does(feed):
     failed = last(feed, ["flown", "mine/bad.py"], status("stopped"), flight("script failed"))
     assert (failed["flying"], failed["is"], failed["status"]) == ("mine/bad.py has failed", "failed", "Script failed")
     assert last(feed, status("paused"))["flying"] == "is paused"
-    for nothing in (["lost"], ["refused"], status("no simulation", 2), ["pulse", {"silent": 4, "ended": True}]):
+    silent, ended = ["pulse", {"silent": 4, "ended": False}], ["pulse", {"silent": 4, "ended": True}]
+    assert last(feed, status("flying"), silent)["status"] == "No answer"
+    for nothing in (["lost"], ["refused"], status("no simulation", 2), silent, ended):
         assert last(feed, status("flying"), nothing)["flying"] == ""
 
 
@@ -268,7 +270,7 @@ ANY = settings(max_examples=150, deadline=None, suppress_health_check=[HealthChe
 def test_the_page_never_contradicts_itself(feed, events):
     for said in feed(*events) if events else []:
         if said["marked"]["paused"] or said["said"].startswith("paused"):
-            assert said["status"] == "Paused"
+            assert said["status"] in ("Paused", "No answer")
         if said["connection"] != "connected":
             assert said["banner"] or said["connection"] == "connecting"
             assert not any(said["can"].values()) and not said["flying"]

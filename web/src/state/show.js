@@ -36,7 +36,7 @@ function showFlying(now) {
 function showStatus(now) {
   const pause = pauseOf(now);
   write(at("status"), statusWords(now));
-  at("status").dataset.is = now.status || "no simulation";
+  at("status").dataset.is = answers(now) ? now.status : "no simulation";
   at("status").title = pause ? `Paused by the breakpoint at line ${pause.line} of ${pause.file}` : "";
   const { warnings } = now;
   at("why").hidden = !warnings.length || !answers(now);

@@ -41,6 +41,7 @@ const isFailed = (now) => now.flight === "script failed";
 
 export function statusWords(now) {
   if (now.connection === "lost" || now.connection === "refused") return "No connection";
+  if (isThere(now) && !answers(now)) return "No answer";
   const says = now.status === "flying" && now.flight && !now.flight.startsWith("unknown") ? now.flight : now.status;
   return capital(now.status === "stopped" && isFailed(now) ? now.flight : says);
 }
@@ -59,7 +60,7 @@ export function diagnosisWords(now) {
 
 // What the script that the simulator has does, beside the button that would fly the open one.
 export function flyingWords(now) {
-  if (!now.flown || now.connection !== "connected" || !isThere(now)) return { text: "", is: "" };
+  if (!now.flown || !answers(now)) return { text: "", is: "" };
   const is = isFailed(now) ? "failed" : now.status;
   const does = { failed: "has failed", flying: "flies", paused: "is paused", stopped: "is stopped" }[is] ?? is;
   return { text: now.flown === now.open.script ? does : `${now.flown} ${does}`, is };
