@@ -30,7 +30,9 @@ from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 from drone_sim.world import World
 
-MAX_OVERLAPS = 500  # pairs of moving bodies at the start; with more, a step takes seconds
+# Pairs of moving bodies at the start: whose bounds overlap, and which are deep inside each other. With more, a step
+# takes seconds.
+MAX_OVERLAPS, MAX_DEEP_OVERLAPS = 500, 50
 
 
 class SimulationSetup:
@@ -217,11 +219,14 @@ class SimulationSetup:
     def _check(self) -> None:
         if not self._world.is_finite():
             raise ParameterError("the scene at the start: a position or a velocity is not finite")
-        overlaps = self._world.queries.overlaps()
-        if overlaps > MAX_OVERLAPS:
-            problem = (
-                f"{overlaps} pairs of moving objects touch or overlap at the start; at most {MAX_OVERLAPS} are allowed"
-            )
+        queries = self._world.queries
+        pairs = queries.overlaps()
+        count, kind, most = len(pairs), "touch or overlap", MAX_OVERLAPS
+        if MAX_DEEP_OVERLAPS < count <= MAX_OVERLAPS:
+            deep = [pair for pair in pairs if queries.is_deep_inside(*pair)]
+            count, kind, most = len(deep), "are deep inside each other", MAX_DEEP_OVERLAPS
+        if count > most:
+            problem = f"{count} pairs of moving objects {kind} at the start; at most {most} are allowed"
             raise ParameterError(f"scene/objects: {problem}")
 
 

@@ -175,20 +175,31 @@ class Queries:
         """Return the height (m) of the lowest point that can collide, of a body without joints."""
         return float(pybullet.getAABB(body, -1, self._client)[0][2])
 
-    def overlaps(self) -> int:
-        """Return the number of pairs of moving bodies whose bounds overlap."""
-        bounds = []
+    def overlaps(self) -> list[tuple[int, int]]:
+        """Return the pairs of moving bodies whose bounds overlap."""
+        bodies, bounds = [], []
         for index in range(pybullet.getNumBodies(self._client)):
             body = pybullet.getBodyUniqueId(index, self._client)
-            joints = pybullet.getNumJoints(body, self._client)
-            if joints or pybullet.getDynamicsInfo(body, -1, self._client)[0]:
-                boxes = [pybullet.getAABB(body, link, self._client) for link in range(-1, joints)]
-                bounds.append((np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)))
-        if len(bounds) < 2:  # the usual case
-            return 0
+            if pybullet.getNumJoints(body, self._client) or pybullet.getDynamicsInfo(body, -1, self._client)[0]:
+                bodies.append(body)
+                bounds.append(self._bounds(body))
+        if len(bodies) < 2:  # the usual case
+            return []
         low, high = np.array(bounds)[:, 0], np.array(bounds)[:, 1]
         meet = (low[:, None] <= high[None]).all(axis=2)
-        return int(np.triu(meet & meet.T, k=1).sum())
+        return [(bodies[first], bodies[second]) for first, second in np.argwhere(np.triu(meet & meet.T, k=1))]
+
+    def is_deep_inside(self, first: int, second: int) -> bool:
+        """Return whether two bodies are in each other by more than a quarter of the smaller one's smallest extent."""
+        extent = min(float((high - low).min()) for low, high in map(self._bounds, (first, second)))
+        rows = pybullet.getClosestPoints(first, second, 0.0, physicsClientId=self._client)
+        return min((row[8] for row in rows), default=0.0) < -0.25 * extent
+
+    def _bounds(self, body: int) -> tuple[Any, Any]:
+        """Return the lowest and the highest corner (m) of the box around a body, in the world."""
+        links = range(-1, pybullet.getNumJoints(body, self._client))
+        boxes = [pybullet.getAABB(body, link, self._client) for link in links]
+        return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
 
 
 def _normal(start: Vector, end: Vector, hit: Any) -> Vector:
