@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import cockpit, fleet, grade, loop, node, phases, remote, render, start
+from benchmarks import cockpit, fleet, grade, lockstep, loop, node, phases, remote, render, start
 from benchmarks.cores import one_core
 
 Row = dict[str, Any]
@@ -26,6 +26,7 @@ BENCHMARKS: dict[str, Callable[[], list[Row]]] = {
     "phases": phases.measure,
     "start": start.measure,
     "node": node.measure,
+    "lockstep": lockstep.measure,
     "fleet": fleet.measure,
     "remote": remote.measure,
     "grade": grade.measure,
