@@ -17,7 +17,6 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from tf2_msgs.msg import TFMessage
 
-from drone_sim.ros.core.image_messages import draw_mask
 from drone_sim.ros.node.node import Node
 from drone_sim.ros.vehicle import camera_truth
 from drone_sim.run import parameters
@@ -127,10 +126,10 @@ class Cameras(unittest.TestCase):
 
     def test_the_mask_lies_over_the_picture_of_its_stamp_while_somebody_listens(self):
         topics = ("", "/truth/categories", "/truth/overlay")
-        with mock.patch.object(camera_truth, "painted", wraps=camera_truth.painted) as painted:
+        with mock.patch.object(camera_truth, "draw_mask", wraps=camera_truth.draw_mask) as draw_mask:
             listeners = [self.listen(f"/drone/floor/image{one}", Image) for one in topics[:2]]
             self.step_until(lambda: all(len(one.messages) > 2 for one in listeners))
-            painted.assert_not_called()
+            draw_mask.assert_not_called()
             listeners.append(self.listen(f"/drone/floor/image{topics[2]}", Image))
             self.step_until(lambda: set.intersection(*map(stamps_of, listeners)))
         stamp = min(set.intersection(*map(stamps_of, listeners)))

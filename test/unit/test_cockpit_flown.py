@@ -114,7 +114,7 @@ def test_a_script_is_graded_in_a_process_of_its_own(ask):
 
 
 def test_a_grading_that_does_not_end_is_ended(monkeypatch, tmp_path):
-    monkeypatch.setattr(task_flights, "_MOST", 0.0)
+    monkeypatch.setattr(task_flights, "_TIMEOUT", 0.0)
     one = task_flights.Grader()
     number = one.start("hover", tmp_path / "x.py")
     while not (result := one.result(number)):

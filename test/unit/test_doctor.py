@@ -186,7 +186,7 @@ def test_nodes_that_never_answer_are_named_after_one_time_limit(known, monkeypat
     end = threading.Event()
     monkeypatch.setattr(master_checks, "is_alive", lambda *_: end.wait(HANGS))
     monkeypatch.setattr(master_checks, "_NODES_TIMEOUT", 0.05)
-    (line,) = run_check("nodes", master.dead, HANGS / 10)
+    (line,) = run_check("nodes", master.dead_nodes, HANGS / 10)
     end.set()
     assert line.mark == HINT
     assert "/first, /second" in line.text

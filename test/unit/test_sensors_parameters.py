@@ -82,15 +82,6 @@ def test_a_mistake_gets_one_line(sensors, words):
     assert words in refused({"sensors": sensors})
 
 
-def test_two_cameras_with_different_mounts_cannot_share_a_frame():
-    level, down = ({"position": [0.1, 0, 0], "rpy": [0, pitch, 0]} for pitch in (0.0, 1.5))
-    front = {**parameters.load().cameras["front"].model_dump(mode="json"), "frame": "eye", "mount": level}
-    pair = {name: {**front, "topic": f"{name}/image", "object": name} for name in ("upper", "lower")}
-    parameters.load({"cameras": pair})
-    words = "cameras/lower/frame = 'eye': is already the frame of cameras/upper, which has another mount"
-    assert words in refused({"cameras": {**pair, "lower": {**pair["lower"], "mount": down}}})
-
-
 def test_a_mistake_has_the_line_of_its_file(tmp_path):
     file = tmp_path / "my.yaml"
     file.write_text("sensors:\n  imu:\n    kind: imu\n    rate: 150\n")

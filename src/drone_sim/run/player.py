@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -39,7 +40,7 @@ class Player:
         self.paused = False
         self.begun = False  # whether it has started since this was last set to False
         self.failure: ScriptError | Diverged | None = None  # the error that ended the last run, if one did
-        self._order: _Order | None = None
+        self._orders: deque[_Order] = deque()  # executed one after the other
         self._simulated_time = simulated_time
         self._tell = tell
         self._last_state = ""
@@ -71,11 +72,11 @@ class Player:
     @property
     def is_step_due(self) -> bool:
         """Whether a step is to be run: it is playing, or paused with ordered steps left."""
-        return self.playing or self._order is not None
+        return self.playing or bool(self._orders)
 
     def start(self, scene_file: str | None = None) -> str:
         """Read scene and scripts from disk and begin at time 0. Raises as Simulation.start, and is then stopped."""
-        self._cancel_order()
+        self._cancel_orders()
         self.paused, self.failure = False, None
         self.attempt(lambda: self.simulation.start(scene_file))
         self.simulation.look()  # reads meshes and textures now, which would delay the first step
@@ -89,7 +90,7 @@ class Player:
         """Run the scripts' cleanup, and restore the initial scene. Raises ScriptError."""
         if not self.simulation.running:
             return "already stopped"
-        self._cancel_order()
+        self._cancel_orders()
         try:
             self.simulation.stop()
         finally:
@@ -110,7 +111,7 @@ class Player:
         """Pause or resume. Raises ValueError when stopped."""
         if not self.simulation.running:
             raise ValueError("the simulation is stopped: start it first")
-        self._cancel_order()
+        self._cancel_orders()
         self.paused = on
         self._publish_state()
         if on:
@@ -122,26 +123,25 @@ class Player:
     def order_steps(self, count: int) -> Future[str]:
         """Have `step` run `count` steps while paused; return their answer, which may be a ScriptError or Diverged.
 
-        Raises ValueError if it is not paused, or earlier ordered steps are not done.
+        Orders are executed one after the other. Raises ValueError if it is not paused.
         """
         if not self.simulation.running or not self.paused:
             raise ValueError("the simulation is not paused: call `pause` before `step`")
-        if self._order is not None:
-            raise ValueError(f"{self._order.left} steps of an earlier call are still to be run")
-        self._order = _Order(count)
-        return self._order.answer
+        order = _Order(count)
+        self._orders.append(order)
+        return order.answer
 
-    def _cancel_order(self, error: Exception | None = None) -> None:
-        order, self._order = self._order, None
-        if order is not None:
+    def _cancel_orders(self, error: Exception | None = None) -> None:
+        while self._orders:
+            order = self._orders.popleft()
             order.answer.set_exception(error or ValueError(f"interrupted: {order.left} steps have not been run"))
 
     def _count_ordered(self) -> None:
-        order = self._order
-        if order is not None:
+        if self._orders:
+            order = self._orders[0]
             order.left -= 1
             if order.left == 0 or self.simulation.breakpoints.reached is not None:
-                self._order = None
+                self._orders.popleft()
                 order.answer.set_result(f"t = {self.simulation.time:.2f} s")
 
     def step(self) -> bool:
@@ -149,7 +149,7 @@ class Player:
         try:
             self.attempt(self._step)
         except (ScriptError, Diverged) as error:
-            self._cancel_order(error)
+            self._cancel_orders(error)
             return False
         self._count_ordered()
         self._pause_at_breakpoint()

@@ -74,12 +74,13 @@ def _claim_topics(taken: dict[str, str], keys: tuple[str, str], base: str, topic
 
 def _check_frames(cameras: Mapping[str, CameraParameters], sensors: Mapping[str, SensorParameters]) -> None:
     """Raise ParameterError if a frame would have two poses; the vehicle checks the URDF's links."""
-    taken: dict[str, tuple[str, object]] = {"Track_base": ("the vehicle", None), "world": ("the scene", None)}
-    users: list[tuple[tuple[str, str], str, object]] = [
-        *((("cameras", name), it.frame, it.mount) for name, it in cameras.items() if it.mount is not None),
-        *((("sensors", name), it.frame, (it.mount, it.default_mount)) for name, it in sensors.items()),
-    ]
-    for keys, frame, mount in users:
-        owner, other = taken.setdefault(frame, (f"{'/'.join(keys)}, which has another mount", mount))
-        if other != mount:
-            raise ParameterError(f"is already the frame of {owner}", (*keys, "frame"), f"'{frame}'")
+    taken = {camera.frame: f"cameras/{name}" for name, camera in cameras.items() if camera.mount is not None}
+    taken.update({"Track_base": "the vehicle", "world": "the scene"})
+    first_users: dict[str, tuple[str, SensorParameters]] = {}
+    for name, sensor in sensors.items():
+        other, before = first_users.setdefault(sensor.frame, (name, sensor))
+        owner = taken.get(sensor.frame)
+        if (before.mount, before.default_mount) != (sensor.mount, sensor.default_mount):
+            owner = f"sensors/{other}, which has another mount"
+        if owner:
+            raise ParameterError(f"is already the frame of {owner}", ("sensors", name, "frame"), f"'{sensor.frame}'")
