@@ -304,7 +304,7 @@ def test_files_are_renamed_duplicated_deleted_and_brought_back(cockpit, desk):
     wait_until(desk, lambda: desk.input_value("#script") == "mine/second_2.py")
     wait_until(desk, lambda: text(desk).startswith("# the first"))
     desk.select_option("#script", "built-in/pilot.py")
-    wait_until(desk, lambda: "takes off" in text(desk))
+    wait_until(desk, lambda: "stops the propellers" in text(desk))
     desk.click("#more")
     assert desk.get_by_role("menuitem", name="Delete").is_disabled()
     desk.keyboard.press("Escape")

@@ -37,7 +37,7 @@ def _desk(cockpit, browser):
     before = {path.name for path in cockpit.scripts.glob("*")}
     with page_at_once(cockpit, browser) as page:
         yield page
-        open_script(page, "built-in/pilot.py", "takes off")
+        open_script(page, "built-in/pilot.py", "stops the propellers")
         page.click("#run")
         wait_until(page, lambda: said(page).startswith("started"))
     for path in cockpit.scripts.glob("*"):
@@ -137,9 +137,9 @@ def test_a_file_that_another_program_changes_is_told_and_both_texts_are_kept(coc
     wait_until(desk, lambda: text(desk).startswith("# written meanwhile"))
     other = cockpit.scripts / said(desk).rpartition("/")[2]
     assert other != file and "# not saved yet" in other.read_text() and file.read_text() == "# written meanwhile\n"
-    open_script(desk, "built-in/pilot.py", "takes off")
+    open_script(desk, "built-in/pilot.py", "stops the propellers")
     desk.locator("#text .cm-content").press("Control+z")
-    assert "takes off" in text(desk), "each script has a history of its own"
+    assert "stops the propellers" in text(desk), "each script has a history of its own"
     desk.click("#more")
     desk.get_by_role("menuitem", name="Save as").click()
     desk.keyboard.type("named")
