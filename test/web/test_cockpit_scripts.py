@@ -128,10 +128,11 @@ def test_a_file_that_another_program_changes_is_told_and_both_texts_are_kept(coc
     wait_until(desk, lambda: desk.input_value("#script").startswith("mine/1_thrust"))
     file = cockpit.scripts / desk.input_value("#script").partition("/")[2]
     file.write_text(file.read_text().replace("# mine", "# theirs"))
-    wait_until(desk, lambda: "# theirs" in text(desk) and "changed by another program" in said(desk), 5)
+    wait_until(desk, lambda: "# theirs" in text(desk) and "changed by another program" in said(desk))
     desk.locator("#text .cm-content").press("Control+z")
     wait_until(desk, lambda: "# mine" in file.read_text())
-    write_at_the_end(desk, "# not saved yet")
+    desk.locator("#text .cm-content").press("Control+End")
+    desk.keyboard.insert_text("# not saved yet")  # at once: the page saves soon after the last key
     file.write_text("# written meanwhile\n")
     desk.get_by_role("button", name="The other's").click()
     wait_until(desk, lambda: text(desk).startswith("# written meanwhile"))
