@@ -51,6 +51,14 @@ for _ in range(2):
         ends, steps = is_there or is_late, steps + 1
     print(steps, is_there, *map(repr, observation))
 """
+SENSING = """
+def sysCall_init():
+    global publisher
+    publisher = simROS.advertise("seen", "std_msgs/Float64")
+
+def sysCall_sensing():
+    simROS.publish(publisher, {"data": simROS.getTime()})
+"""
 FIRST = 5 * 10**7  # ns, the first stamp
 SECONDS = 4.0  # s of simulated time
 FREE = "_real_time_factor:=0"
@@ -266,6 +274,15 @@ class Lockstep(unittest.TestCase):
                 self.assertEqual(simulator.process.wait(HANGS), 1)
                 self.assertNotIn("Traceback", "".join(simulator.lines))
             self.setUp()
+
+    def test_a_script_that_publishes_in_sensing_does_not_stop_a_flight(self):
+        script = Path(self.folder.name) / "sensing.py"
+        script.write_text(SENSING)
+        flights = [
+            self.flown(COMMANDS, f"_script:={script}", nodes=[(NODES / node,)])
+            for node in ("reacting.py", "sleeping.py")
+        ]
+        self.assertEqual(flights[0], flights[1])
 
     def test_a_graded_flight_with_a_timeline_has_the_same_digest_every_time(self):
         file = Path(self.folder.name) / "plan.yaml"

@@ -1,4 +1,4 @@
-"""Connections of this node's topics in rospy: the nodes at the other end, and messages that are not written yet."""
+"""Connections of this node's topics in rospy: the nodes at the other end, and messages in rospy's queues."""
 
 from __future__ import annotations
 
@@ -37,16 +37,22 @@ def all_connections() -> set[tuple[str, str]]:
     return {(topic, node) for _, node, _, _, topic, is_open, *_ in get_topic_manager().get_pub_sub_info() if is_open}
 
 
-def has_unwritten(connection: Any) -> bool:
-    """Return whether there are messages that rospy's thread has not yet written to a subscriber's socket."""
+def has_queued(connection: Any) -> bool:
+    """Return whether messages wait in rospy's queue for a subscriber.
+
+    rospy's thread takes all of them out of the queue before it writes them to the socket.
+    """
     return bool(getattr(connection, "_queue", ()))
 
 
-def wait_until_written(timeout: float) -> bool:
-    """Wait until all messages are written; return False after `timeout` (s), as for a subscriber that does not read."""
+def wait_until_taken(timeout: float) -> bool:
+    """Wait until rospy's threads have taken all messages out of their queues.
+
+    Return False after `timeout` (s), as for a subscriber that does not read.
+    """
     deadline = time.monotonic() + timeout
     topics = [topic for topic, _ in get_topic_manager().get_publications()]
-    while any(has_unwritten(connection) for topic in topics for connection in subscribers_of(topic)):
+    while any(has_queued(connection) for topic in topics for connection in subscribers_of(topic)):
         if time.monotonic() > deadline:
             return False
         time.sleep(_POLL_PERIOD)

@@ -97,7 +97,8 @@ class Node:
         self._gate = self._lockstep.gate if self._lockstep else open_gate
         self._topics = FleetTopics(self.simulation, self._inbox, self._time.stamp, self._gate)
         self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
-        self._services = Services(self.player, self._inbox, self._topics.follow)
+        restored = self._lockstep.reset if self._lockstep else lambda: None
+        self._services = Services(self.player, self._inbox, self._topics.follow, restored)
         self._editing = SceneEditing(self.player, self._inbox, self._services)
         self._windows = WindowTopics(self.simulation, self._inbox)
         self._signals = SignalTopic(self.simulation)
@@ -193,7 +194,9 @@ class Node:
         return self.player.is_step_due and not self._outside.holds
 
     def _reset_pacing(self) -> None:
-        """Do not count a step as late if it came late because the simulation stood still."""
+        """Do not count a step, or an answer, as late if it came late because the simulation stood still."""
+        if self._lockstep is not None:
+            self._lockstep.skip_pause()
         if self.player.playing and not self.player.begun:
             self._pacer.excuse()
         else:
@@ -215,11 +218,14 @@ class Node:
     def _step_and_show(self) -> None:
         self._time.begin()
         self._services.timeline.apply(self.simulation.steps, self.simulation.vehicles)
+        if self._lockstep is not None:
+            self._time.stamp()  # publishes the present time after a restore, which is no trigger of the step
+            self._lockstep.begin_waits()
         self.simulation.step()
         if self._lockstep is not None:
-            is_shown = self._lockstep.open()
+            self._lockstep.begin_late_waits()
             self._time.end(at_once=True)
-            if not is_shown:
+            if self.simulation.steps == 1:  # only starts the clock
                 return
         self._show(is_step=True)
         self._time.end(at_once=self.player.paused)  # who asks for single steps is told of each

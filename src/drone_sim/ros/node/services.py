@@ -15,7 +15,7 @@ from drone_sim.grading.permissions import CHANGE
 from drone_sim.message_text import shown
 from drone_sim.offline import timeline as timelines
 from drone_sim.offline.timeline import Timeline, TimelineError
-from drone_sim.ros.core.connections import wait_until_written
+from drone_sim.ros.core.connections import wait_until_taken
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.core.launch_parameters import from_shell, script_from_shell
 from drone_sim.ros.core.startup import MASTER_FAILURES
@@ -27,7 +27,8 @@ from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import script_path
 
 _VEHICLES = "~vehicles"
-_LOOK, _SENT = 0.2, 1.0  # s, between two looks for the end; for the messages of a step to be written
+_POLL_PERIOD = 0.2  # s, between two looks for the end of the steps
+_SEND_TIMEOUT = 1.0  # s, for the messages of a step to be sent
 
 
 class Services:
@@ -38,11 +39,14 @@ class Services:
     and `step` takes `step_count` steps.
     """
 
-    def __init__(self, player: Player, inbox: Inbox, follow: Callable[[], None]):
+    def __init__(
+        self, player: Player, inbox: Inbox, follow: Callable[[], None], restored: Callable[[], None] = lambda: None
+    ):
         """Advertise what is done with `player` by the thread that empties `inbox`.
 
-        `follow` lets the topics follow vehicles that have come or gone.
+        `follow` lets the topics follow vehicles that have come or gone; `restored` is called after a restore.
         """
+        self._restored = restored
         self._player = player
         self._inbox = inbox
         self._follow = follow
@@ -84,12 +88,12 @@ class Services:
         try:
             count = _step_count()
             steps = self._inbox.ask(lambda: self._player.order_steps(count), done)
-            while not rospy.is_shutdown() and not wait([steps], _LOOK).done:
+            while not rospy.is_shutdown() and not wait([steps], _POLL_PERIOD).done:
                 pass  # in lockstep, a step may wait for a node for any time
             if not steps.done():
                 return False, "the node ends"
             answer = steps.result()
-            wait_until_written(_SENT)
+            wait_until_taken(_SEND_TIMEOUT)
             return True, answer
         except (ScriptError, ValueError, OSError, RuntimeError) as error:
             return False, " ".join(str(error).split())
@@ -165,6 +169,7 @@ class Services:
         if self._snapshot is None:
             raise ValueError("no snapshot has been taken")
         self._player.simulation.restore(self._snapshot)
+        self._restored()
         return f"restored t = {self._player.simulation.time:.2f} s"
 
 
