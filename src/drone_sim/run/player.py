@@ -15,6 +15,7 @@ from drone_sim.scripting.errors import ScriptError
 
 _LOG = logging.getLogger(__name__)
 _LOG.setLevel(logging.INFO)
+_MAX_ORDERS = 1000  # calls of `step` that wait at the same time
 
 
 @dataclass
@@ -76,7 +77,7 @@ class Player:
 
     def start(self, scene_file: str | None = None) -> str:
         """Read scene and scripts from disk and begin at time 0. Raises as Simulation.start, and is then stopped."""
-        self._cancel_orders()
+        self.interrupt_steps("interrupted")
         self.paused, self.failure = False, None
         self.attempt(lambda: self.simulation.start(scene_file))
         self.simulation.look()  # reads meshes and textures now, which would delay the first step
@@ -90,7 +91,7 @@ class Player:
         """Run the scripts' cleanup, and restore the initial scene. Raises ScriptError."""
         if not self.simulation.running:
             return "already stopped"
-        self._cancel_orders()
+        self.interrupt_steps("interrupted")
         try:
             self.simulation.stop()
         finally:
@@ -111,7 +112,7 @@ class Player:
         """Pause or resume. Raises ValueError when stopped."""
         if not self.simulation.running:
             raise ValueError("the simulation is stopped: start it first")
-        self._cancel_orders()
+        self.interrupt_steps("interrupted")
         self.paused = on
         self._publish_state()
         if on:
@@ -123,35 +124,45 @@ class Player:
     def order_steps(self, count: int) -> Future[str]:
         """Have `step` run `count` steps while paused; return their answer, which may be a ScriptError or Diverged.
 
-        Orders are executed one after the other. Raises ValueError if it is not paused.
+        Orders are executed one after the other; a breakpoint ends all of them. Raises ValueError if it is not paused.
         """
         if not self.simulation.running or not self.paused:
             raise ValueError("the simulation is not paused: call `pause` before `step`")
+        if len(self._orders) >= _MAX_ORDERS:
+            raise ValueError(f"{_MAX_ORDERS} calls of `step` are waiting already")
         order = _Order(count)
         self._orders.append(order)
         return order.answer
 
-    def _cancel_orders(self, error: Exception | None = None) -> None:
+    def interrupt_steps(self, reason: str) -> None:
+        """Cancel all ordered steps; their answer is a ValueError with `reason`."""
         while self._orders:
             order = self._orders.popleft()
-            order.answer.set_exception(error or ValueError(f"interrupted: {order.left} steps have not been run"))
+            order.answer.set_exception(ValueError(f"{reason}: {order.left} steps have not been run"))
 
-    def _count_ordered(self) -> None:
-        if self._orders:
-            order = self._orders[0]
-            order.left -= 1
-            if order.left == 0 or self.simulation.breakpoints.reached is not None:
-                self._orders.popleft()
-                order.answer.set_result(f"t = {self.simulation.time:.2f} s")
+    def _fail_steps(self, error: ScriptError | Diverged) -> None:
+        while self._orders:
+            self._orders.popleft().answer.set_exception(error)
+
+    def _count_ordered_step(self) -> None:
+        if not self._orders:
+            return
+        order, reached = self._orders[0], self.simulation.breakpoints.reached
+        order.left -= 1
+        if order.left == 0:
+            self._orders.popleft()
+            order.answer.set_result(f"t = {self.simulation.time:.2f} s")
+        if reached is not None:
+            self.interrupt_steps(f"breakpoint at {reached.file}:{reached.line}, t = {reached.time:.2f} s")
 
     def step(self) -> bool:
         """Run one step. If a script fails or the dynamics diverges, log it once, stop, and return False."""
         try:
             self.attempt(self._step)
         except (ScriptError, Diverged) as error:
-            self._cancel_orders(error)
+            self._fail_steps(error)
             return False
-        self._count_ordered()
+        self._count_ordered_step()
         self._pause_at_breakpoint()
         request = self.simulation.context.control.take()
         return not request or self._execute_request(request)
