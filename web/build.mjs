@@ -4,10 +4,11 @@ import { createHash } from "node:crypto";
 import { copyFileSync, readFileSync, readdirSync } from "node:fs";
 import { build } from "esbuild";
 
-const PAGE = process.env.PAGE ?? "../src/drone_sim/ros/cockpit/page";
+const PAGE = "../src/drone_sim/ros/cockpit/page";
 
 function digest() {
-  const scripts = readdirSync("src", { recursive: true }).filter((name) => name.endsWith(".js")).sort();
+  const names = readdirSync("src", { recursive: true }).map((name) => name.replaceAll("\\", "/"));
+  const scripts = names.filter((name) => name.endsWith(".js")).sort();
   const hash = createHash("sha256");
   for (const file of [...scripts.map((name) => `src/${name}`), "package-lock.json"]) hash.update(`${file}\n`).update(readFileSync(file));
   return hash.digest("hex");

@@ -181,10 +181,7 @@ def test_what_is_no_browser_is_hung_up_on(served, caplog, junk):
 
 def test_the_page_that_is_served_is_the_one_in_the_source():
     source = Path(__file__).parents[2] / "web" / "src"
-    for name in (
-        "index.html",
-        *(file.name for file in source.glob("*.css")),
-    ):  # the script is built of it: web/package.json
+    for name in ("index.html", *(file.name for file in source.glob("*.css"))):  # `npm run build` copies these
         assert page_files().get(f"/{name}")[1] == (source / name).read_bytes(), "cd web && npm ci && npm run build"
 
 
@@ -192,8 +189,9 @@ def test_the_script_that_is_served_was_built_from_the_source():
     """`web/build.mjs` writes a digest of all sources into the first line of the script."""
     web = Path(__file__).parents[2] / "web"
     digest = hashlib.sha256()
-    for file in [*sorted((web / "src").rglob("*.js")), web / "package-lock.json"]:
-        digest.update(f"{file.relative_to(web)}\n".encode() + file.read_bytes())
+    sources = sorted((web / "src").rglob("*.js"), key=lambda file: file.relative_to(web).as_posix())
+    for file in [*sources, web / "package-lock.json"]:
+        digest.update(f"{file.relative_to(web).as_posix()}\n".encode() + file.read_bytes())
     first_line = page_files()["/cockpit.js"][1].partition(b"\n")[0].decode()
     assert first_line.endswith(digest.hexdigest()), "cd web && npm ci && npm run build"
 

@@ -45,7 +45,6 @@ export class PageSocket {
   opened() {
     this.attempts = 0;
     this.store.take("connected");
-    this.ask("pass").then(({ pass }) => (this.key = pass), () => {});
     this.on.open();
   }
 
@@ -53,6 +52,7 @@ export class PageSocket {
     this.store.take("heard");
     if (typeof data !== "string") return this.on.picture(data);
     const message = JSON.parse(data);
+    if (message.pass) this.key = message.pass;
     const waiting = this.waiting.get(message.id);
     if (!waiting) return this.on.tell(message);
     this.waiting.delete(message.id);

@@ -65,7 +65,6 @@ class Cockpit:
         self._windows = ScriptWindows(self._simulator.node, self._cameras, self._socket)
         self._pulse = Pulse(self._simulator.node, self._socket.tell)
         answers.update({**self._panel.answers, **self._windows.answers})
-        answers["pass"] = lambda _: {"pass": server.return_pass.key}  # by which the page returns after a new start
         server.begin(self._socket.serve, self._find)
         for hold in (lambda: held.run(lambda: not rospy.is_shutdown()), self._hold):
             threading.Thread(target=hold, daemon=True).start()

@@ -20,7 +20,7 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
-from drone_sim.ros.cockpit.server.return_pass import ReturnPass
+from drone_sim.ros.cockpit.server.return_pass import ReturnPass, is_local
 
 SUBPROTOCOL = "drone_sim"  # of our own socket
 _LARGEST = 8 << 20  # bytes of a message from a browser: a script, with all that JSON makes longer
@@ -52,15 +52,10 @@ _BROKEN = (CloseCode.PROTOCOL_ERROR, CloseCode.INVALID_DATA, CloseCode.MESSAGE_T
 class AccessControl:
     """The check in front of the page and its socket: only requests with the token get in."""
 
-    def __init__(
-        self, token: str, page: Callable[[str], Content], socket: Handler, return_pass: ReturnPass | None = None
-    ):
-        """Let in whoever has `token`, and tabs that return; `page` finds a page by its path, `socket` serves sockets.
-
-        `return_pass` checks tabs of an earlier cockpit; None lets none of them in.
-        """
+    def __init__(self, token: str, page: Callable[[str], Content], socket: Handler):
+        """Let in clients that have `token`; `page` finds a page by its path, `socket` serves sockets."""
         self._token = token
-        self._return_pass = return_pass
+        self.return_pass: ReturnPass | None = None  # checks the tabs of an earlier cockpit; None lets none of them in
         self._page = page
         self._socket = socket
 
@@ -80,20 +75,20 @@ class AccessControl:
             logger=log,
         )
 
-    def _answer(self, _connection: ServerConnection, request: Request) -> Response | None:
+    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the answer to a request; None lets a socket be opened."""
         try:
-            return self._answered(request)
+            return self._answered(request, is_local(connection))
         except ValueError as error:
             return _response(http.HTTPStatus.BAD_REQUEST, str(error))
 
-    def _answered(self, request: Request) -> Response | None:
+    def _answered(self, request: Request, may_return: bool) -> Response | None:
         host = _checked_host(request.headers)
         path, _, query = request.path.partition("?")
         if self._is_token(parse_qs(query).get("token", [""])[0]) and not _is_socket(request):
             return self._let_in(request)
-        if path == RETURN and self._return_pass is not None and not _is_socket(request):
-            return self._let_return(self._return_pass, parse_qs(query), request)
+        if path == RETURN and may_return and self.return_pass is not None and not _is_socket(request):
+            return self._let_return(self.return_pass, parse_qs(query), request)
         if not self._is_token(_cookie(request, self._name_of_cookie(request))):
             return _response(http.HTTPStatus.FORBIDDEN, _REFUSED)
         if _is_socket(request):

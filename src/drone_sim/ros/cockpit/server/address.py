@@ -6,8 +6,8 @@ import contextlib
 import errno
 import os
 import socket
-import stat
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,6 @@ _HIGHEST = 65535
 _TRIES = 100  # ports, from the one that was asked for
 _EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # listening at all addresses: the one for this machine itself
 _FAR = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # kept for examples: nobody's
-_MODE = stat.S_IRUSR | stat.S_IWUSR
 
 
 class AddressError(ValueError):
@@ -116,10 +115,14 @@ def address_file(address: str, port: int) -> Iterator[str]:
 def write_for_user_only(file: Path, content: str) -> None:
     """Write a file that only the user can read, in place of an older one. Raises OSError."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.unlink(missing_ok=True)  # of one that was killed; whoever may read that must not read this
-    descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, _MODE)
-    with os.fdopen(descriptor, "w", encoding="utf-8") as opened:
-        opened.write(content)
+    descriptor, temporary = tempfile.mkstemp(prefix=f".{file.name}.", dir=file.parent)  # its mode is 0600
+    try:
+        with os.fdopen(descriptor, "w", encoding="utf-8") as opened:
+            opened.write(content)
+        os.rename(temporary, file)
+    except OSError:
+        os.unlink(temporary)
+        raise
 
 
 def print_to_terminal(line: str) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import json
 import secrets
 import threading
 from collections.abc import Callable
@@ -10,11 +12,12 @@ from concurrent import futures
 from pathlib import Path
 from typing import Any
 
-from websockets.asyncio.server import ServerConnection
+from websockets.asyncio.server import Server, ServerConnection
+from websockets.exceptions import ConnectionClosed
 
 from drone_sim.ros.cockpit.server.access_control import AccessControl, Content, Handler
 from drone_sim.ros.cockpit.server.address import free_place, urls
-from drone_sim.ros.cockpit.server.return_pass import ReturnPass, key_of_port
+from drone_sim.ros.cockpit.server.return_pass import is_local, new_pass
 
 _KINDS = {
     ".html": "text/html; charset=utf-8",
@@ -42,9 +45,8 @@ class PageServer:
         host, wanted = free_place(address, port)
         self._loop = asyncio.new_event_loop()
         threading.Thread(target=self._loop.run_forever, name="page server", daemon=True).start()
-        self.return_pass = ReturnPass(key_of_port(wanted))
-        listening = AccessControl(token, self._find, self._talk, self.return_pass).serve(host, wanted)
-        self._server = asyncio.run_coroutine_threadsafe(listening, self._loop).result()
+        self._access = AccessControl(token, self._find, self._talk)
+        self._server = asyncio.run_coroutine_threadsafe(self._listen(host, wanted), self._loop).result()
         self.port = int(next(iter(self._server.sockets)).getsockname()[1])
         self.address, self.address_elsewhere = urls(host, self.port, token)
 
@@ -68,9 +70,20 @@ class PageServer:
             closing.cancel()
         self._loop.call_soon_threadsafe(self._loop.stop)
 
+    async def _listen(self, host: str, port: int) -> Server:
+        """Bind the port, then replace its key: a cockpit that cannot bind it must not revoke the key of another one."""
+        server = await self._access.serve(host, port)
+        if port:  # a number that the system has chosen is another one at the next start
+            self._access.return_pass = new_pass(port)
+        return server
+
     def _find(self, path: str) -> Content:
         return self._files.get(path) or (self._begun.result()[1](path) if self._begun.done() else None)
 
     async def _talk(self, connection: ServerConnection) -> None:
+        return_pass = self._access.return_pass
+        if return_pass is not None and is_local(connection):
+            with contextlib.suppress(ConnectionClosed):
+                await connection.send(json.dumps({"pass": return_pass.key}))
         socket, _ = await asyncio.shield(asyncio.wrap_future(self._begun))  # others wait for it, too
         await socket(connection)

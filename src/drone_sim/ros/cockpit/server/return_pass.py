@@ -1,8 +1,8 @@
 """Pass by which the tabs of an earlier cockpit come back after a new start on the same port.
 
-A tab has the key in its memory only, and never sends it: it signs a challenge. So a program of somebody else that
-listens on the port in the meantime learns nothing that would let it in later; a cookie that stays valid would be sent
-to that program.
+A tab has the key in its memory only, and never sends it: it signs a challenge. So another user's program that listens
+on the port in the meantime learns nothing that it could use later; a program that answers at that very moment could
+pass the challenge on. Each key is good for the next start only, so that a second start revokes it.
 """
 
 from __future__ import annotations
@@ -10,62 +10,91 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import hmac
+import ipaddress
 import os
 import secrets
 import stat
-from collections import deque
+import time
 from pathlib import Path
 
 import rospkg
+from websockets.asyncio.server import ServerConnection
 
 from drone_sim.ros.cockpit.server.address import write_for_user_only
 
 _BYTES = 32  # of a key
-_MOST = 100  # challenges that are waiting for their answer; more visitors than that do not return at once
+_VALID = 30  # s, for a challenge
 
 
 class ReturnPass:
-    """Challenges for tabs that come back, and the check of their answers. Any thread may call it."""
+    """Challenges for tabs that come back, and the check of their answers. Only the server's event loop calls it.
 
-    def __init__(self, key: bytes):
-        """`key` is known to the tabs that were let in, and to the user's next cockpit on this port."""
-        self._key = key
-        self._challenges: deque[str] = deque(maxlen=_MOST)
+    A challenge is `time.nonce.mac` with a MAC of this process. None is stored before it is signed, so visitors
+    without the key cannot invalidate the challenges of others.
+    """
+
+    def __init__(self, accept: bytes | None, give: bytes):
+        """`accept` is the key of tabs that the port's last cockpit let in, if any; `give` is for tabs let in now."""
+        self._accept, self._give = accept, give
+        self._secret = secrets.token_bytes(_BYTES)
+        self._spent: dict[str, float] = {}  # correctly signed challenges, with the time (s) at which each expires
 
     @property
     def key(self) -> str:
         """The key in hexadecimal digits, for a page that has been let in."""
-        return self._key.hex()
+        return self._give.hex()
 
     def challenge(self) -> str:
         """Return a new challenge."""
-        self._challenges.append(secrets.token_hex(16))
-        return self._challenges[-1]
+        content = f"{time.monotonic():.3f}.{secrets.token_hex(16)}"
+        return f"{content}.{_mac(self._secret, content)}"
 
     def is_signed(self, challenge: str, signature: str) -> bool:
-        """Return whether a tab has signed one of our challenges with the key. Each challenge is good for one try."""
-        try:
-            self._challenges.remove(challenge)
-        except ValueError:
+        """Return whether a tab has signed one of our valid challenges; each is accepted only once."""
+        if self._accept is None or not _is_equal(_mac(self._accept, challenge), signature):
             return False
-        expected = hmac.new(self._key, challenge.encode(), hashlib.sha256).hexdigest()
-        return hmac.compare_digest(expected.encode(), signature.encode(errors="backslashreplace"))
+        content, _, mac = challenge.rpartition(".")
+        if not _is_equal(_mac(self._secret, content), mac):
+            return False
+        now, expires = time.monotonic(), float(content.partition(".")[0]) + _VALID
+        self._spent = {spent: end for spent, end in self._spent.items() if end >= now}
+        if expires < now or challenge in self._spent:
+            return False
+        self._spent[challenge] = expires
+        return True
 
 
-def key_of_port(port: int) -> bytes:
-    """Return the key in `$ROS_HOME/drone_sim/cockpit_PORT.key`, which only the user can read; a new one is written.
+def _mac(key: bytes, text: str) -> str:
+    return hmac.new(key, text.encode(errors="backslashreplace"), hashlib.sha256).hexdigest()
 
-    If the file cannot be written, or any port is taken (0), no tab returns after the next start.
+
+def _is_equal(one: str, other: str) -> bool:
+    return hmac.compare_digest(one.encode(errors="backslashreplace"), other.encode(errors="backslashreplace"))
+
+
+def is_local(connection: ServerConnection) -> bool:
+    """Return whether a client is on this machine (or comes through SSH); others would get the key unencrypted."""
+    if connection.remote_address is None:  # it has disconnected
+        return False
+    address = ipaddress.ip_address(connection.remote_address[0])
+    return bool((getattr(address, "ipv4_mapped", None) or address).is_loopback)
+
+
+def new_pass(port: int) -> ReturnPass | None:
+    """Return the pass of a cockpit that has just bound `port`, and replace the key in `$ROS_HOME/drone_sim`.
+
+    The file `cockpit_PORT.key`, which only the user can read, holds the key for the next start. Return None if it
+    cannot be replaced: then no tab comes back, because the old key would stay valid.
     """
-    if not port:
-        return secrets.token_bytes(_BYTES)
     file = Path(rospkg.get_ros_home()) / "drone_sim" / f"cockpit_{port}.key"
+    accept, give = None, secrets.token_bytes(_BYTES)
     with contextlib.suppress(OSError, ValueError):
-        return _read(file)
-    key = secrets.token_bytes(_BYTES)
-    with contextlib.suppress(OSError):
-        write_for_user_only(file, key.hex())
-    return key
+        accept = _read(file)
+    try:
+        write_for_user_only(file, give.hex())
+    except OSError:
+        return None
+    return ReturnPass(accept, give)
 
 
 def _read(file: Path) -> bytes:
