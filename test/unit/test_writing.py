@@ -149,7 +149,7 @@ KNOWN = {
     "grading/submissions/archive.py": 1,  # a temporary folder, which is named by a hash
     "importing/cache.py": 1,  # a temporary folder, which is named by a hash
     "ros/cockpit/editor/script_store.py": 3,  # checked by `_checked` and `_place`
-    "ros/cockpit/server/address.py": 2,  # named by the port
+    "ros/cockpit/server/address.py": 3,  # named by the port, and a temporary file
     "world/assemblies.py": 1,  # temporary files of BulletFiles
     "world/bodies.py": 1,
 }
