@@ -1,4 +1,4 @@
-"""The simulation in a browser, from a node that only knows its topics and services."""
+"""Cockpit node: it shows a simulator in browsers, and uses only the simulator's topics and services."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ from drone_sim.ros.cockpit.topics import FoundTopics, find_topics
 from drone_sim.ros.core.master_watch import MasterWatch
 from drone_sim.ros.core.simulator import FAILURES, Simulator
 
-_PERIOD = 0.05  # s between two looks: 20 a second
-_TOGETHER = 0.008  # s, within which the markers of a step come after its frames
-_HOLDING = 0.1  # s between two looks at what is dragged
-_ASKING = 2.0  # s between two questions to the master
+_PERIOD = 0.05  # s between two updates of the scene
+_TOGETHER = 0.008  # s, within which the markers of a step arrive after its frames
+_HOLDING = 0.1  # s between two updates of dragged objects
+_ASKING = 2.0  # s between two requests to the master
 
 
 class Cockpit:
-    """One page for one simulation. While no browser is open, it listens to nothing."""
+    """Connects browsers to one simulator. While no browser is connected, it does not subscribe to the simulator."""
 
     def __init__(self, server: PageServer, simulator: str, scripts: Path):
-        """Serve the simulation of the node `simulator` through `server`; `scripts` is the user's folder of scripts."""
+        """Serve the simulator node `simulator` through `server`; `scripts` is the user's folder of scripts."""
         self._simulator = Simulator(simulator)
         self._topics = FoundTopics()
         self._view: SceneView | None = None
@@ -71,7 +71,7 @@ class Cockpit:
         self._pulse.start()
 
     def run(self) -> None:
-        """Show what is new, again and again."""
+        """Update the browsers until the node ends."""
         logging.getLogger("rosout").addFilter(_is_not_repeated)
         MasterWatch(meanwhile="the page waits for it").start()
         while not rospy.is_shutdown():
@@ -81,7 +81,7 @@ class Cockpit:
         self._server.stop()
 
     def _hold(self) -> None:
-        """Keep what browsers drag held, however long the master takes to answer meanwhile."""
+        """Keep holding dragged objects; in a thread of its own, because `run` waits for the master's replies."""
         while not rospy.is_shutdown():
             time.sleep(_HOLDING)
             view = self._view
@@ -89,7 +89,7 @@ class Cockpit:
                 view.keep(self._socket.browsers)
 
     def _wait(self, began: float) -> None:
-        """Wait for the next step of the simulation, and until its markers have come, too."""
+        """Wait for the next step of the simulation, and for its markers."""
         rest = max(0.0, 0.8 * _PERIOD - (time.monotonic() - began))
         time.sleep(rest)
         if self._view is not None:
@@ -145,11 +145,11 @@ class Cockpit:
 
     def _ask_master(self) -> None:
         try:
-            below = rospy.get_namespace()  # another simulator may fly in another one
+            below = rospy.get_namespace()  # there may be other simulators in other namespaces
             self._topics = find_topics([one for one in rospy.get_published_topics() if one[0].startswith(below)])
             scene = str(self._simulator.parameter("scene_file", ""))
             self._panel.board.show("master", True)
-        except FAILURES:  # another master may come
+        except FAILURES:  # the master may be started again
             self._topics, scene = FoundTopics(), ""
             self._panel.board.show("master", False)
         if not self._topics.namespace:
@@ -159,5 +159,5 @@ class Cockpit:
 
 
 def _is_not_repeated(record: logging.LogRecord) -> bool:
-    """Leave out what rospy says of each single topic when there is no master: `MasterWatch` says it once."""
+    """Filter out rospy's message per topic about an unreachable master, which `MasterWatch` reports once."""
     return "registrations are now out of sync" not in str(record.msg)

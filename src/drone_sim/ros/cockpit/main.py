@@ -1,4 +1,4 @@
-"""`rosrun drone_sim cockpit`: its parameters are checked, the page is served, the rest is imported meanwhile."""
+"""`rosrun drone_sim cockpit`: checks the parameters, serves the page, and then imports the rest."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NODE = re.compile(r"[/A-Za-z][\w/]*", re.ASCII)
 
 
 class CockpitParameters(NamedTuple):
-    """Address and port as given, which `PageServer` checks; folder of scripts; the simulation's node."""
+    """Parameters of the node. `PageServer` checks the address and the port; `simulator` is the simulator's node."""
 
     address: Any = "127.0.0.1"
     port: Any = 8080
@@ -32,7 +32,7 @@ class CockpitParameters(NamedTuple):
 
 
 def read_parameters(given: Any) -> CockpitParameters:
-    """Return what is set in a node's private parameters. Raises ValueError; FileNotFoundError for an unknown home."""
+    """Return the node's parameters with defaults. Raises ValueError, or FileNotFoundError for an unknown home."""
     if not isinstance(given, Mapping):
         raise ValueError(f"the node's parameters: must be a mapping, not {shown(given)}")
     for name in given.keys() - set(CockpitParameters._fields):
@@ -48,8 +48,8 @@ def read_parameters(given: Any) -> CockpitParameters:
 
 
 def main() -> int:
-    """Serve until the node ends; return the exit status."""
-    # There may be several. Its time is the person's, who looks on while /clock stands still.
+    """Serve until the node ends, and return the exit status."""
+    # Anonymous, since there may be several cockpits. Real time, because /clock stands still during a pause.
     if not init_node(_NAME, anonymous=True, disable_rostime=True, disable_signals=True):
         return 1
     end_on_signals()
@@ -63,7 +63,7 @@ def _serve() -> None:
         rospy.loginfo(f"the cockpit listens at {server.address.partition('?')[0]}; {where}")
         print_to_terminal(f"the cockpit is at {server.addresses}")
 
-        from drone_sim.ros.cockpit.cockpit import Cockpit  # which takes a second and more
+        from drone_sim.ros.cockpit.cockpit import Cockpit  # takes more than a second
 
         Cockpit(server, parameters.simulator, parameters.scripts).run()
 

@@ -1,4 +1,4 @@
-"""What the page's buttons and lists do, and what the simulation says to them. The page draws all of it."""
+"""Replies to the page's buttons and lists, and the simulator's state, which is sent to the page."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ _CALLS: dict[str, tuple[Any, ...]] = {
 
 
 class Panel:
-    """Answers what a browser asks for, and shows what there is on the board."""
+    """Replies to requests of the page's toolbar and panels, and puts the simulator's state on the board."""
 
     def __init__(
         self, simulator: Simulator, commands: CommandPublisher, scenes: SceneList, tell: Callable[[Any], None]
     ):
-        """Call `simulator`, send `commands`, offer `scenes`; `tell` sends a message to all browsers."""
+        """`simulator` is called, `commands` sends commands, `scenes` lists scenes; `tell` sends to all browsers."""
         self._simulator, self._commands, self._scenes = simulator, commands, scenes
         self.board = Board(tell)
         self.plots = Plots(self.board)
@@ -47,7 +47,7 @@ class Panel:
 
     @property
     def answers(self) -> dict[str, Answer]:
-        """What answers each question."""
+        """The handler of each request, by its name."""
         return {
             "panel": self.board.whole,
             "call": self._call,
@@ -60,12 +60,12 @@ class Panel:
         }
 
     def _call(self, message: Mapping[str, Any]) -> dict[str, Any]:
-        """Call a service of the simulation, and tell what it says."""
+        """Call a service of the simulator, and return its reply."""
         done, said = self._simulator.call(*_CALLS[one_of(message, "call", list(_CALLS))])
         return {"done": done, "said": said}
 
     def _load(self, message: Mapping[str, Any]) -> dict[str, Any]:
-        """Start anew in another scene. Raises ValueError."""
+        """Load another scene, which restarts the simulation. Raises ValueError."""
         name = one_of(message, "scene", self.board.get("scenes", {}).get("all", []))
         try:
             self._simulator.set_parameter("scene_file", self._scenes.file(name))
@@ -76,7 +76,7 @@ class Panel:
         return {"done": done, "said": said}
 
     def _choose(self, message: Mapping[str, Any]) -> dict[str, Any]:
-        """Let the keys fly another vehicle. Raises ValueError."""
+        """Send the keys' commands to another vehicle. Raises ValueError."""
         vehicles = self.board.get("vehicles", {}).get("all", [])
         self._commands.choose(one_of(message, "vehicle", vehicles))
         self._show_vehicles(vehicles)
@@ -85,11 +85,11 @@ class Panel:
     # ---- what is shown
 
     def show_status(self, status: str) -> None:
-        """Show what the simulation does."""
+        """Show the simulator's state."""
         self.board.show("status", status)
 
     def offer(self, found: FoundTopics, scene: str) -> None:
-        """Offer vehicles and scenes that there are; `scene` is what the node's parameter says."""
+        """Show the available vehicles and scenes; `scene` is the value of the simulator's parameter."""
         if self._commands.vehicle not in found.vehicles:
             self._commands.choose(found.vehicles[0] if found.vehicles else "")
         self._show_vehicles(list(found.vehicles))
@@ -104,7 +104,7 @@ class Panel:
         self.board.show("scenes", {"all": list(scenes), "now": now})
 
     def follow(self, vehicle: str) -> None:
-        """Show what a vehicle does, '' for none."""
+        """Show the state of a vehicle, '' for none."""
         self.plots.follow(vehicle)
         self.tuning.follow(vehicle)
         if vehicle == self._followed:
@@ -113,7 +113,7 @@ class Panel:
         for one in self._flight:
             one.unregister()
         self.board.show("flight", "")
-        self._show_hears(Bool(True))  # until its node says otherwise
+        self._show_hears(Bool(True))  # until the simulator publishes otherwise
         self._flight = []
         if vehicle:
             self._flight = [
@@ -127,10 +127,10 @@ class Panel:
 
 
 class SimulatorListener:
-    """Listens to one node, and shows what it says."""
+    """Subscriptions to one simulator, whose state they show on the panel."""
 
     def __init__(self, node: str, panel: Panel, socket: PageSocket, hear: Callable[[], None]):
-        """Listen to `node`; show it on `panel`, and send a script's failure through `socket`.
+        """Subscribe to `node`, show its state on `panel`, and send failures of scripts through `socket`.
 
         `hear` is called with every message that shows that the node is alive.
         """
@@ -146,7 +146,7 @@ class SimulatorListener:
         self._listening = [rospy.Subscriber(*one, queue_size=20) for one in heard]
 
     def close(self) -> None:
-        """Listen no more."""
+        """End the subscriptions."""
         for one in self._listening:
             one.unregister()
 

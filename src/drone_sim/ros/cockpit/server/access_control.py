@@ -1,4 +1,4 @@
-"""Access to the cockpit: only with the token in the printed address, and not from pages of another origin."""
+"""Check of HTTP requests and WebSockets: they need the token of the printed address, and the cockpit's own origin."""
 
 from __future__ import annotations
 
@@ -22,45 +22,46 @@ from websockets.http11 import Request, Response
 
 from drone_sim.ros.cockpit.server.return_pass import ReturnPass, is_local
 
-SUBPROTOCOL = "drone_sim"  # of our own socket
-_LARGEST = 8 << 20  # bytes of a message from a browser: a script, with all that JSON makes longer
+SUBPROTOCOL = "drone_sim"  # of the page's WebSocket
+_LARGEST = 8 << 20  # bytes of a message from a browser: a script of at most 1 MiB, escaped as JSON
 _REFUSED = "To open the cockpit, use the whole address that the simulation printed. It ends in ?token=..."
 _SAFE = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "SAMEORIGIN",
     "Cache-Control": "no-store",
-    "Connection": "close",  # after every answer; a browser would send the next request into it
+    "Connection": "close",  # the server closes the connection after every response, so no browser may reuse it
 }
-# What our page may load and do: what comes from here, and nothing else. Textures of meshes are blobs.
+# The page may load only what this server sends. Textures of meshes are blobs.
 _POLICY = (
     "default-src 'none'; script-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
     "connect-src 'self' blob: {sockets}; "
     "frame-ancestors 'self'; base-uri 'none'; form-action {forms}"
 )
-RETURN = "/return"  # where a tab of an earlier cockpit asks for a challenge, and answers it
-MANUAL = "/manual/"  # whose search is a form
-_ONCE = ("Host", "Cookie", "Origin", "Upgrade", "Accept-Encoding")  # of what is read here
+RETURN = "/return"  # the path at which a tab of an earlier cockpit gets a challenge, and sends its signature
+MANUAL = "/manual/"  # the path of the manual, whose search is an HTML form
+_ONCE = ("Host", "Cookie", "Origin", "Upgrade", "Accept-Encoding")  # headers that are read here, and must be unique
 _HOST = re.compile(r"[\w.:\[\]-]+", re.ASCII)
 
 Handler = Callable[[ServerConnection], Awaitable[None]]
-Content = tuple[str, bytes] | None  # its type, and itself; None for what is not there
-_PACKED = ("text/", "model/")  # what is worth being compressed
+Content = tuple[str, bytes] | None  # content type and body of a page; None if there is no such page
+_PACKED = ("text/", "model/")  # content types that are compressed
+# The codes with which the server closes the WebSocket of a browser that violates the protocol.
 _BROKEN = (CloseCode.PROTOCOL_ERROR, CloseCode.INVALID_DATA, CloseCode.MESSAGE_TOO_BIG)
 
 
 class AccessControl:
-    """The check in front of the page and its socket: only requests with the token get in."""
+    """Server of the page and its WebSocket that accepts only requests with the token."""
 
     def __init__(self, token: str, page: Callable[[str], Content], socket: Handler):
-        """Let in clients that have `token`; `page` finds a page by its path, `socket` serves sockets."""
+        """Accept clients that have `token`; `page` returns a page by its path, `socket` serves a WebSocket."""
         self._token = token
-        self.return_pass: ReturnPass | None = None  # checks the tabs of an earlier cockpit; None lets none of them in
+        self.return_pass: ReturnPass | None = None  # for the tabs of an earlier cockpit; None accepts none
         self._page = page
         self._socket = socket
 
     async def serve(self, host: str, port: int) -> Server:
-        """Listen at a numeric address, in the event loop that runs; port 0 is any. Raises OSError."""
+        """Listen at a numeric address, in the running event loop; port 0 is any free port. Raises OSError."""
         log = logging.Logger("cockpit", logging.ERROR)
         log.addHandler(_OneLineHandler())
         return await serve(
@@ -69,14 +70,14 @@ class AccessControl:
             port,
             process_request=self._answer,
             subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
-            compression=None,  # what is sent is for this machine, or goes through ssh
+            compression=None,  # messages stay on this machine, or SSH can compress them
             max_size=_LARGEST,
             create_connection=_CheckedConnection,
             logger=log,
         )
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Return the answer to a request; None lets a socket be opened."""
+        """Return the response to a request; None accepts a WebSocket."""
         try:
             return self._answered(request, is_local(connection))
         except ValueError as error:
@@ -99,14 +100,14 @@ class AccessControl:
         return _page(*found, host, _takes_gzip(request), "'self'" if path.startswith(MANUAL) else "'none'")
 
     def _let_in(self, request: Request) -> Response:
-        """Remember the token in a cookie, and take it out of the address, which people send to each other."""
+        """Set the token as a cookie, and redirect to an address without it, which people can safely share."""
         response = _response(http.HTTPStatus.SEE_OTHER, "")
         response.headers["Location"] = "/"
         self._remember(request, response)
         return response
 
     def _let_return(self, return_pass: ReturnPass, query: Mapping[str, list[str]], request: Request) -> Response:
-        """Give a challenge to a tab of an earlier cockpit; if it has signed one, remember the token in a cookie."""
+        """Return a challenge to a tab of an earlier cockpit; if the tab has signed one, set the token as a cookie."""
         if "signature" not in query:
             return _response(http.HTTPStatus.OK, return_pass.challenge())
         if not return_pass.is_signed(query.get("challenge", [""])[0], query["signature"][0]):
@@ -124,12 +125,12 @@ class AccessControl:
 
     @staticmethod
     def _name_of_cookie(request: Request) -> str:
-        """Return a name of its own for every port: browsers keep cookies by host alone."""
+        """Return the cookie's name, with the port: browsers send a host's cookies to all of its ports."""
         return f"drone_sim_{request.headers.get('Host', '').rpartition(':')[2]}"
 
 
 def _checked_host(headers: Headers) -> str:
-    """Return the host that a browser asks for. Raises ValueError if that is wrong, or a header is repeated."""
+    """Return the Host header, '' without one. Raises ValueError if it is invalid, or a header is repeated."""
     for name in _ONCE:
         if len(headers.get_all(name)) > 1:
             raise ValueError(f"{name}: must not be given twice")
@@ -144,7 +145,7 @@ def _is_socket(request: Request) -> bool:
 
 
 def _is_of_our_page(request: Request) -> bool:
-    """Tell whether a socket is opened by our own page, or by a program other than a browser, which sends no origin."""
+    """Return whether a WebSocket is opened by the cockpit's page, or by a program that sends no origin (no browser)."""
     origin, host = request.headers.get("Origin"), request.headers.get("Host", "")
     return origin is None or origin in (f"http://{host}", f"https://{host}")
 
@@ -181,16 +182,16 @@ def _response(
     host: str = "",
     forms: str = "'none'",
 ) -> Response:
-    """Return an answer with headers that keep a browser from using it in any other way."""
+    """Return a response whose headers keep a browser from using it in another page or for another purpose."""
     body = content if isinstance(content, bytes) else content.encode()
-    # Older browsers take 'self' for our pages alone, not for our sockets.
+    # In older browsers, 'self' does not include WebSockets.
     policy = _POLICY.format(sockets=f"ws://{host} wss://{host}" if host else "", forms=forms)
     headers = {"Content-Type": kind, "Content-Length": str(len(body)), **_SAFE, "Content-Security-Policy": policy}
     return Response(status.value, status.phrase, Headers(headers), body)
 
 
 class _CheckedConnection(ServerConnection):
-    """A browser's socket. A browser that breaks its rules is disconnected, and the user gets one line about it."""
+    """WebSocket of a browser. If the browser violates the protocol, it is disconnected, with one warning."""
 
     async def recv(self, decode: bool | None = None) -> Any:
         """Return the next message, as `ServerConnection` does."""
@@ -206,11 +207,11 @@ class _CheckedConnection(ServerConnection):
 
 
 class _OneLineHandler(logging.Handler):
-    """Tells in one line, without a traceback, what goes wrong with a socket that is open."""
+    """Logs errors of an open WebSocket in one line, without a traceback."""
 
     def emit(self, record: logging.LogRecord) -> None:
         error = record.exc_info[1] if record.exc_info else None
-        if record.getMessage() != "opening handshake failed":  # by whoever is no browser; there is nobody to tell
+        if record.getMessage() != "opening handshake failed":  # a client that is no browser, such as a port scanner
             rospy.logwarn(f"a browser's socket: {_one_line(error) if error else record.getMessage()}")
 
 

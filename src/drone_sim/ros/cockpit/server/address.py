@@ -1,4 +1,4 @@
-"""The address at which the cockpit listens, checked before the server uses it; its URLs, and how the user gets them."""
+"""Check of the cockpit's address and port, the cockpit's URLs, and the file and terminal in which users find them."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from typing import Any
 import rospkg
 
 _HIGHEST = 65535
-_TRIES = 100  # ports, from the one that was asked for
-_EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # listening at all addresses: the one for this machine itself
-_FAR = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # kept for examples: nobody's
+_TRIES = 100  # ports, from the requested one on
+_EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # addresses that mean all interfaces, with their loopback address
+_FAR = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # addresses reserved for documentation
 
 
 class AddressError(ValueError):
-    """Nothing can listen where the user asked for; one line."""
+    """The cockpit cannot listen at the requested address and port; the message has one line."""
 
 
 def free_place(address: Any, port: Any) -> tuple[str, int]:
-    """Return a numeric address of this machine, and the first free port from the given one on; 0 is any port.
+    """Return the numeric form of `address`, and the first free port from `port` on; port 0 means any free port.
 
     Raises AddressError.
     """
@@ -40,10 +40,10 @@ def free_place(address: Any, port: Any) -> tuple[str, int]:
 
 
 def _resolved(address: Any) -> tuple[socket.AddressFamily, str]:
-    """Return the family and the numeric form of an address, of IPv4 where it has one. Raises AddressError."""
+    """Return the family and the numeric form of an address, IPv4 if it has both. Raises AddressError."""
     wrong = AddressError(
-        f"address = {str(address)[:80]!r}: is none of this machine's; 127.0.0.1 is for this machine alone, "
-        "0.0.0.0 lets others in"
+        f"address = {str(address)[:80]!r}: is not an address of this machine; use 127.0.0.1 for this machine only, "
+        "or 0.0.0.0 to let other machines in"
     )
     if not isinstance(address, str) or not address:
         raise wrong
@@ -60,9 +60,9 @@ def _resolved(address: Any) -> tuple[socket.AddressFamily, str]:
 
 
 def _is_free(family: socket.AddressFamily, host: str, port: int) -> bool:
-    """Tell whether a server can listen there. Raises AddressError for a port that is not for this user, OSError."""
+    """Return whether the port is free. Raises AddressError if the user may not use it, OSError for other reasons."""
     with socket.socket(family, socket.SOCK_STREAM) as one:
-        one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as servers do: one that has just ended is gone
+        one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as the server does: it can reuse a closed port
         try:
             one.bind((host, port))
             one.listen()
@@ -76,7 +76,7 @@ def _is_free(family: socket.AddressFamily, host: str, port: int) -> bool:
 
 
 def urls(host: str, port: int, token: str) -> tuple[str, str]:
-    """Return the URL of the cockpit for this machine, and that for other machines, '' where they cannot reach it."""
+    """Return the cockpit's URL on this machine, and on other machines ('' if they cannot reach it)."""
     here = _EVERYWHERE.get(host, host)
     there = _outside(host) if host in _EVERYWHERE else ""
     url, far = (f"http://{f'[{one}]' if ':' in one else one}:{port}/?token={token}" for one in (here, there))
@@ -84,11 +84,11 @@ def urls(host: str, port: int, token: str) -> tuple[str, str]:
 
 
 def _outside(host: str) -> str:
-    """Return the address by which others reach this machine; its name, where there is no way to any other."""
+    """Return the address at which other machines reach this one; its host name if it has no route to others."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as one:
-            one.connect((_FAR[family], 9))  # which sends nothing: it only chooses the way
+            one.connect((_FAR[family], 9))  # sends nothing, but chooses the local address of the route
             return str(one.getsockname()[0])
     except OSError:
         return socket.gethostname()
@@ -96,7 +96,7 @@ def _outside(host: str) -> str:
 
 @contextlib.contextmanager
 def address_file(address: str, port: int) -> Iterator[str]:
-    """Keep the address in `$ROS_HOME/drone_sim/cockpit_PORT.txt` meanwhile; give one line on where it is."""
+    """Keep the address in `$ROS_HOME/drone_sim/cockpit_PORT.txt`, and yield a line that names the file."""
     file = Path(rospkg.get_ros_home()) / "drone_sim" / f"cockpit_{port}.txt"
     content = f"{address}\n"
     try:
@@ -108,12 +108,12 @@ def address_file(address: str, port: int) -> Iterator[str]:
         yield f"the address with the token that opens it is in {file}"
     finally:
         with contextlib.suppress(OSError, ValueError):
-            if file.read_text(encoding="utf-8") == content:  # or another one is at that port by now
+            if file.read_text(encoding="utf-8") == content:  # otherwise another cockpit has replaced it
                 file.unlink()
 
 
 def write_for_user_only(file: Path, content: str) -> None:
-    """Write a file that only the user can read, in place of an older one. Raises OSError."""
+    """Write a file that only the user can read, and replace an older file at once. Raises OSError."""
     file.parent.mkdir(parents=True, exist_ok=True)
     descriptor, temporary = tempfile.mkstemp(prefix=f".{file.name}.", dir=file.parent)  # its mode is 0600
     try:
@@ -126,13 +126,13 @@ def write_for_user_only(file: Path, content: str) -> None:
 
 
 def print_to_terminal(line: str) -> None:
-    """Print a line for the user, but not into the log that roslaunch makes of nodes without output="screen"."""
+    """Print a line, unless roslaunch writes the output to a log file, as for nodes without output="screen"."""
     if sys.stdout is None:
         return
     target = ""
-    with contextlib.suppress(OSError, ValueError):  # no file at all, as in a test
+    with contextlib.suppress(OSError, ValueError):  # stdout is not a file, as in a test
         target = os.readlink(f"/proc/self/fd/{sys.stdout.fileno()}")
     if target.startswith(os.path.realpath(rospkg.get_log_dir()) + os.sep):
         return
-    with contextlib.suppress(OSError):  # nobody reads it
+    with contextlib.suppress(OSError):  # the reader has closed the pipe
         print(line, flush=True)

@@ -1,4 +1,4 @@
-"""The server: the page at once, and its socket once there is something to show."""
+"""Web server of the cockpit: it serves the page at once, and WebSockets after `begin`."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ _KINDS = {
     ".css": "text/css; charset=utf-8",
     ".svg": "image/svg+xml",
 }
-_PATIENCE = 5.0  # s, in which the server ends
+_PATIENCE = 5.0  # s, for the server to close its connections
 
 
 def page_files() -> dict[str, tuple[str, bytes]]:
-    """Return content type and content of the page, as `web/` builds it, by the path that is asked."""
+    """Return content type and content of the files that `web/` builds, by their URL path."""
     files = [file for file in (Path(__file__).parents[1] / "page").iterdir() if file.suffix in _KINDS]
     found = {f"/{file.name}": (_KINDS[file.suffix], file.read_bytes()) for file in files}
     return {**found, "/": found["/index.html"]}
 
 
 class PageServer:
-    """The server with page and socket, in a thread of its own. The socket waits until `begin`."""
+    """Web server in a thread of its own. WebSockets wait until `begin` is called."""
 
     def __init__(self, address: Any, port: Any):
-        """Listen at `address`, at `port` or the next one that is free. Raises AddressError where nothing can."""
+        """Listen at `address`, at `port` or the next free one. Raises AddressError if that is impossible."""
         self._begun: futures.Future[tuple[Handler, Callable[[str], Content]]] = futures.Future()
         self._files, token = page_files(), secrets.token_urlsafe(16)
         host, wanted = free_place(address, port)
@@ -52,16 +52,16 @@ class PageServer:
 
     @property
     def addresses(self) -> str:
-        """Where it is, for the user, with the token."""
+        """The cockpit's URLs with the token, in words."""
         elsewhere = self.address_elsewhere
         return self.address + (f" and, on other machines, at {elsewhere}" if elsewhere else "")
 
     def begin(self, socket: Handler, beside: Callable[[str], Content]) -> None:
-        """Let `socket` serve the browsers that are there, and those that come; `beside` finds what the page shows."""
+        """Serve waiting and new WebSockets with `socket`; `beside` returns other files by their path."""
         self._begun.set_result((socket, beside))
 
     def stop(self) -> None:
-        """Close all sockets, and listen no more."""
+        """Close all connections, and stop listening."""
         self._server.close()
         closing = asyncio.run_coroutine_threadsafe(self._server.wait_closed(), self._loop)
         try:
@@ -73,7 +73,7 @@ class PageServer:
     async def _listen(self, host: str, port: int) -> Server:
         """Bind the port, then replace its key: a cockpit that cannot bind it must not revoke the key of another one."""
         server = await self._access.serve(host, port)
-        if port:  # a number that the system has chosen is another one at the next start
+        if port:  # with port 0, the next start has another port, so no tab could return
             self._access.return_pass = new_pass(port)
         return server
 
@@ -85,5 +85,5 @@ class PageServer:
         if return_pass is not None and is_local(connection):
             with contextlib.suppress(ConnectionClosed):
                 await connection.send(json.dumps({"pass": return_pass.key}))
-        socket, _ = await asyncio.shield(asyncio.wrap_future(self._begun))  # others wait for it, too
+        socket, _ = await asyncio.shield(asyncio.wrap_future(self._begun))  # other connections await it, too
         await socket(connection)
