@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# The Python packages of dev.sh, which reads this file: .venv from lists of requirements, and PyBullet's wheel.
-# shellcheck disable=SC2154,SC2086 # dev.sh has set the variables; venv_options are words
+# Functions of dev.sh, which sources this file: they fill .venv from requirements files, and provide PyBullet's wheel.
+# shellcheck disable=SC2154 # dev.sh assigns the variables
 
-# .venv holds absolute paths, and whoever interrupts pip leaves half a package. So what .venv was made from is written
-# last, and taken away before anything changes; where it does not stand, .venv is made anew.
+# .venv holds absolute paths, and an interrupted pip leaves half a package. So the file .made-from is written last, and
+# removed before any change. Without that file, .venv is created again.
 make_venv() { # make_venv REQUIREMENTS...
   if ! made_from "$@"; then locked "$(dirname "$venv")" fill_venv "$@"; fi
 }
@@ -25,6 +25,7 @@ fill_venv() { # fill_venv REQUIREMENTS...
   else
     say "making $venv"
     rm -rf "$venv/.made-from" "$venv"
+    # shellcheck disable=SC2086 # venv_options may be several words, or none
     "$python" -m venv $venv_options "$venv"
     stamp >"$before"
   fi
@@ -55,7 +56,7 @@ fill_both() {
     renice -n 10 "$BASHPID" >/dev/null 2>&1 || true
     make_venv requirements.txt
   } &
-  # shellcheck disable=SC2046 # one word each
+  # shellcheck disable=SC2046 # each word is the name of a package
   install_packages $(packages)
   wait $!
 }

@@ -1,10 +1,10 @@
-// Builds the page into the folder from which the node serves it. `npm ci && npm run build` in web/.
-// The script begins with a digest of its sources, by which a test sees that it was built from them.
+// Builds the page. Run `npm ci && npm run build` in web/. The script's first line has a digest of the sources, so that a
+// test can check that the script was built from them.
 import { createHash } from "node:crypto";
 import { copyFileSync, readFileSync, readdirSync } from "node:fs";
 import { build } from "esbuild";
 
-const PAGE = "../src/drone_sim/ros/cockpit/page";
+const PAGE = "../src/drone_sim/ros/cockpit/page"; // the folder that the cockpit serves
 
 function digest() {
   const names = readdirSync("src", { recursive: true }).map((name) => name.replaceAll("\\", "/"));
