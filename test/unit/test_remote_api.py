@@ -104,6 +104,7 @@ def _stage(theatre):
         client.vanish()
     theatre.clients.clear()
     assert theatre.settled(lambda: not theatre.server._clients)
+    theatre.player.start()  # so that the stop also resets what was moved while it was stopped
     theatre.player.stop()
 
 

@@ -3,6 +3,7 @@
 After it the simulation is in hand: the attack got one line at most, and the next start works.
 """
 
+import re
 import subprocess
 import sys
 
@@ -87,7 +88,7 @@ IN_LUA = [
     ("x = {} for i = 1, 10 do x[i] = string.rep(tostring(i), 4e7) end", "uses more than 256 MiB"),
     ("error(('x\\n'):rep(1e7))", "x x x"),
 ]
-# What crosses from Lua to Python and back, which the interpreter's version does not change.
+# Values and calls that cross from Lua to Python and back.
 CROSSING = [
     # memory
     ("x = string.rep('x', 1e9)", "not enough memory"),
@@ -151,6 +152,14 @@ def test_lua_stays_in_hand(attack, tmp_path, dialect, source, words):
 @pytest.mark.parametrize("source, words", CROSSING, ids=[source[:90] for source, _ in CROSSING])
 def test_what_crosses_from_lua_stays_in_hand(attack, tmp_path, source, words):
     attack(tmp_path / "script.lua", PROLOGUE["newest"] + source, words)
+
+
+OF_INTERPRETER = [case for case in CROSSING if re.search("coroutine|pcall|nested", " ".join(case))]  # depends on it
+
+
+@pytest.mark.parametrize("source, words", OF_INTERPRETER, ids=[source[:90] for source, _ in OF_INTERPRETER])
+def test_what_crosses_from_lua_5_1_stays_in_hand(attack, tmp_path, source, words):
+    attack(tmp_path / "script.lua", PROLOGUE["5.1"] + source, words)
 
 
 MASKED = "import signal\nsignal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())\n"

@@ -254,6 +254,19 @@ def test_drawing_a_picture_is_not_the_scripts_time(monkeypatch):
     limit.run(look)
 
 
+def test_a_limit_that_passes_during_a_call_of_the_simulator_holds_after_it():
+    def look():
+        with limit.paused():
+            while time.monotonic() < end:
+                pass
+        while True:
+            pass
+
+    limit, end = TimeLimit(0.2), time.monotonic() + 0.5
+    with pytest.raises(ScriptStopped):
+        limit.run(look)
+
+
 def test_a_limit_that_passes_while_it_is_looked_at_holds():
     class Slow(TimeLimit):
         looks = 0

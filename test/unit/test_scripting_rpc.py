@@ -38,7 +38,7 @@ SCRIPTS = sorted(
     ]
 )
 TASKS = [one.name for one in sorted(tasks.folder().iterdir()) if (one / "solution.py").exists()]
-# What a script may do beside the tutorial's; each flies as it does without a door.
+# What a script may do beside the tutorial's; each flies as it does in this process.
 PYTHON = """
 import math, random
 import tutorial
@@ -78,6 +78,8 @@ DOES = {
     "calls itself": "say(sim.callScriptFunction('twice', sim.handle_self, 3, [1, 'b', b'\\xff', None, {2: 3}]))",
     "calls by attributes": "say(sim.getScriptFunctions(sim.getScriptHandle()).twice(4))",
     "names its arguments": "say(sim.getObjectPosition(self.d, relativeTo=self.mark))",
+    "reads more poses than it may announce": "say(sum(tried(lambda: sim.getObjectPosition(1000 + number, -1))"
+    " != [] for number in range(300)))",
     "reads sensors": "say(sim.readSensor(sim.getObjectHandle('imu')))",
     "packs": "say(sim.unpackTable(sim.packTable({'a': [1, 2.5, 'c', True]})))",
 }
@@ -142,7 +144,7 @@ def quick(folder):
 
 
 def same(plan, script, seed=0):
-    """Return the result, which is the same with and without a door."""
+    """Return the result, which is the same in this process and in one of its own."""
     elsewhere, why_closed = remote_script.flown(plan, str(script), seed)
     assert elsewhere == flight.grade(plan, str(script), seed) and not why_closed
     return elsewhere
@@ -266,7 +268,9 @@ def test_all_that_is_said_of_functions_is_of_functions_that_there_are():
     known = {f"{name}.{key}" for name, functions, _ in api_stubs.declared() for key in functions}
     named = {*effects.READS, *effects.CHANGES, *(f"sim.{one}" for one in (*effects.PLACED, *effects.PUT))}
     assert named <= known and set(effects.OWN_THREADS) <= {one.partition(".")[2] for one in known}
-    assert api_stubs.ApiStubs(None, None, Turns()).modules.keys() == {name for name, _, _ in api_stubs.declared()}
+    modules = api_stubs.ApiStubs(None, None, Turns()).modules
+    assert modules.keys() == {name for name, _, _ in api_stubs.declared()}
+    assert modules["sim"].packInt32Table([1]) == b"\x01\0\0\0"  # in this process: there is no link to call through
 
 
 # ---- what comes from a process that has been taken over
@@ -288,6 +292,8 @@ SAID = {
     "a question not waited for": (json.dumps([["set", "sim.stopSimulation"]]).encode(), "needs a reply"),
     "reads that are calls": (json.dumps([["reads", "x", 0, [["sim.stopSimulation"]], []]]).encode(), "a read"),
     "too many reads": (json.dumps([["reads", "x", 0, [["sim.getSimulationTime"]] * 201, []]]).encode(), "too many"),
+    "a result of load that is none": (json.dumps([["end", False, [1, 2]]]).encode(), "malformed result of load"),
+    "no result of load": (json.dumps([["end", False, None]]).encode(), "malformed result of load"),
     "an end with more": (json.dumps([["end", 1, 2, 3, 4]]).encode(), "malformed end of a call"),
     "a failure of numbers": (json.dumps([["failed", 1, 2, 3, 4, 5]]).encode(), "malformed failure"),
     "a mark that is none": (json.dumps([["end", True, {"x": 1}]]).encode(), "unknown mark"),

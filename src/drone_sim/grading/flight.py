@@ -183,7 +183,7 @@ def _error_of(action: Callable[[], None]) -> str | None:
     try:
         action()
     except EXPECTED as error:
-        return format_error(error)
+        return format_error(error) or type(error).__name__
     return None
 
 

@@ -54,7 +54,7 @@ MOVE, PUSH, CHANGE = "move", "push", "change"  # actions that a plan's `allowed`
 CALL, READ = "call", "read"  # actions that a plan's `calls` and `reads` allow
 WRITE, LOAD, OPEN, RUN = "write", "load", "open", "run"  # actions that no plan allows
 _BY_PLAN = (MOVE, PUSH, CHANGE)
-MOST_TRIED = 20  # forbidden calls listed in a result
+MAX_TRIED = 20  # forbidden calls listed in a result
 _FREE_CLASSES: tuple[type, ...] = (
     custom_data.CustomDataFunctions,
     distances.DistanceFunctions,
@@ -185,7 +185,10 @@ class Actions:
         return None
 
     def _is_frame(self, scene_object: SceneObject) -> bool:
-        """Return whether an object is a dummy or a path without a body, and carries nothing with scene_object."""
+        """Return whether an object is a dummy or path without a body, and all its descendants are frames as well.
+
+        Frames are the kinds in _FRAME_CHILDREN.
+        """
         if scene_object.kind not in ("dummy", "path") or scene_object.body is not None:
             return False
         others = (other for other in map(self._objects.get, self._objects) if other is not None)
@@ -299,7 +302,7 @@ class Permissions(Actions):
             self._refuse("sim.callScriptFunction", CALL, subject, ": its own file does not define such a function")
 
     def _refuse(self, function: str, action: str, subject: str, reason: str) -> None:
-        if (action, subject) not in self._refused and len(self.tried) < MOST_TRIED:
+        if (action, subject) not in self._refused and len(self.tried) < MAX_TRIED:
             self._refused.add((action, subject))
             self.tried.append(f"tried to {action} {subject} at {self._simulation.time:.2f} s ({function})")
         raise Forbidden(f"the plan does not allow a script to {action} {subject}{reason}")

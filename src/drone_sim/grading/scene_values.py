@@ -21,9 +21,8 @@ from drone_sim.scripting.api.signals import SignalFunctions, TubeFunctions
 _APP, _ALL = CONSTANTS["handle_app"], CONSTANTS["handle_all"]
 _CUSTOM_PREFIX, _PATH_PROPERTIES = "customData.", ("customData.PATH", "customData.PATHCTRLPTS")
 OnResult = Callable[[Any], None]
-Verdict = tuple[
-    str, OnResult | None
-]  # the scene's value that a call would set ('' for none), a callback for the result
+# The scene's value that a call would set ('' for none), and a callback for the result.
+Verdict = tuple[str, OnResult | None]
 Check = Callable[[list[Any]], Verdict]
 
 

@@ -49,7 +49,10 @@ class MovedObjects:
         self._initial: Arrangements = {}
 
     def watch(self) -> None:
-        """Save the arrangement at the first change after a start or stop; to be called before any change."""
+        """Save the arrangement at the first change after a start, a stop or a change of the vehicles.
+
+        To be called before any change.
+        """
         if self._topology_version != self._simulation.topology_version:
             self._topology_version = self._simulation.topology_version
             self._initial = {} if self._simulation.running else self._all()

@@ -22,7 +22,7 @@ class ClientHost:
     """Host of remote clients. Names without a suffix mean the first vehicle's objects, as in its script."""
 
     def __init__(self, simulation: Simulation):
-        """Use the simulation's current context; to be created again after the next start or stop."""
+        """Use the simulation's current context; to be created again with every topology version."""
         self.context = replace(simulation.context, scripts=_ScriptsForClients(simulation.context.scripts))
         self._operations = simulation.operations
         self._vehicles = list(simulation.vehicles.values())

@@ -29,7 +29,7 @@ _ELSEWHERE = frozenset(_PREFIX + name for name in _OTHER_KINDS.split())
 
 
 def misspelt(functions: Collection[str]) -> Iterator[tuple[str, str]]:
-    """Yield each function that is probably a misspelt phase function, and the name of that one, which is missing."""
+    """Yield each function that is probably a misspelt phase function, with the name of the phase function."""
     for name in functions:
         meant = _intended_phase(name)
         if meant is not None and meant not in functions:

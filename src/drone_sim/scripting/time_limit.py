@@ -167,6 +167,9 @@ class TimeLimit:
         finally:
             self._deadline += monotonic() - start
             self.armed = armed
+            # A timer that expired meanwhile was switched off.
+            if armed and get_ident() == _MAIN and _timer.limit is self and _timer.next == math.inf:
+                _timer.set(max(0.0, self.left()) + _LATER)
             if is_seen:
                 self.show()
 
@@ -213,9 +216,8 @@ class TimeLimit:
                 self.armed = True
                 return function(*arguments)
             finally:
-                if (
-                    self.traces
-                ):  # restored now, without calling a Python function, because the script's trace function may hang
+                # Restored without calling a Python function, because the script's trace function may hang.
+                if self.traces:
                     _set_trace(self.traces[0])
                     _set_profile(self.traces[1])
                     self.traces = None

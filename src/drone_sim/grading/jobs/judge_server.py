@@ -40,21 +40,21 @@ def main() -> None:
     requests = Requests()
     plan_cache: FileCache[Plan] = FileCache(_read_plan, _MAX_PLANS)
     with contextlib.suppress(*DISCONNECTED):
-        for request, door in requests:
-            requests.reply(*_answer(request, door, requests, plan_cache))
+        for request, link in requests:
+            requests.reply(*_answer(request, link, requests, plan_cache))
 
 
 def _answer(
-    request: dict[str, Any], door: socket.socket, requests: Requests, plan_cache: FileCache[Plan]
+    request: dict[str, Any], link: socket.socket, requests: Requests, plan_cache: FileCache[Plan]
 ) -> tuple[bytes, bytes]:
     """Return the result, or the reason why there is none, as JSON, and the table, b'' if there is none."""
     try:
         plan = plan_cache.get(request["plan"])
     except (OSError, PlanError) as error:
         return json.dumps({"lost": format_error(error)}).encode(), b""
-    judge = functools.partial(_judge, plan, request, door)
-    process = LimitedProcess(request["limits"], judge, _OUTPUT_LIMITS, [door.fileno()])
-    door.close()
+    judge = functools.partial(_judge, plan, request, link)
+    process = LimitedProcess(request["limits"], judge, _OUTPUT_LIMITS, [link.fileno()])
+    link.close()
     with process:
         if not process.watch(requests.fileno()):
             sys.exit(0)  # the client has ended
@@ -64,10 +64,10 @@ def _answer(
     return json.dumps({"lost": process.end}).encode(), b""
 
 
-def _judge(plan: Plan, request: dict[str, Any], door: socket.socket, outputs: Mapping[str, int]) -> None:
+def _judge(plan: Plan, request: dict[str, Any], link: socket.socket, outputs: Mapping[str, int]) -> None:
     """Fly once, in the forked process, and write result and table to the outputs."""
     script, seed, changes = request["script"], request["seed"], request["changes"]
-    connection = ScriptConnection(door, processor=stay_on_one_processor())
+    connection = ScriptConnection(link, processor=stay_on_one_processor())
     rows, is_gone = None, False
     try:
         flight = Flight(plan, script, seed, changes, connection)

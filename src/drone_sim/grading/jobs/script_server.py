@@ -1,6 +1,6 @@
 """A program that forks a process for each script; it runs in the sandbox if there is one.
 
-It has neither plan nor seed: the only connection of a script's process is a door to the judge's process of the flight.
+It has neither plan nor seed: a script's process has one connection, to the judge's process of the flight.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from drone_sim.grading.jobs.server import DISCONNECTED, HANDED_IN, HUNG_UP, Requ
 from drone_sim.scripting.rpc import script_process
 from drone_sim.scripting.rpc.script_process import ScriptWorker
 
-_DOOR = 3  # the only open descriptor of a script's process besides the standard streams
+_LINK = 3  # the only open descriptor of a script's process besides the standard streams
 
 
 def main() -> None:
     """Answer each request, which names a script and its files, with a message about how the script's process ended.
 
-    The next message of the client ends the process; HUNG_UP means that the process has closed its door, and may be
+    The next message of the client ends the process; HUNG_UP means that the process has closed its socket, and may be
     ending already.
     """
     is_alone = sys.argv[1:] == ["alone"]  # in a sandbox, which shows only the sandbox's own processes
@@ -44,14 +44,14 @@ def main() -> None:
     requests = Requests()
     folders = [os.environ["TMPDIR"], *([HANDED_IN] if is_alone else [])]
     with contextlib.suppress(*DISCONNECTED):
-        for request, door in requests:
+        for request, link in requests:
             for path in request["handed_in"]:
                 file = Path(f"{HANDED_IN}{path}")
                 file.parent.mkdir(parents=True, exist_ok=True)
                 file.write_bytes(requests.receive())
-            run = functools.partial(_run, worker, request, door)
-            process = LimitedProcess(request["limits"], run, {}, [door.fileno()], folders if is_alone else ())
-            door.close()
+            run = functools.partial(_run, worker, request, link)
+            process = LimitedProcess(request["limits"], run, {}, [link.fileno()], folders if is_alone else ())
+            link.close()
             end = _watch(process, requests)
             is_last = not all([_clear(folder) for folder in folders])  # the client removes what is left
             requests.reply(json.dumps({"end": end, "is_last": is_last}).encode())
@@ -69,16 +69,16 @@ def _watch(process: LimitedProcess, requests: Requests) -> str:
     return process.end if has_ended else ""
 
 
-def _run(worker: ScriptWorker, request: dict[str, Any], door: socket.socket, _outputs: Mapping[str, int]) -> None:
-    """Serve the script's end of the door, in the forked process."""
-    descriptor = door.detach()
-    if descriptor != _DOOR:
-        os.dup2(descriptor, _DOOR, inheritable=False)
+def _run(worker: ScriptWorker, request: dict[str, Any], link: socket.socket, _outputs: Mapping[str, int]) -> None:
+    """Serve the script's end of the link, in the forked process."""
+    descriptor = link.detach()
+    if descriptor != _LINK:
+        os.dup2(descriptor, _LINK, inheritable=False)
         os.close(descriptor)
     drop_capabilities()
     random.seed(request["random"])
     np.random.seed(request["random"] % 2**32)
-    script_process.serve(worker, socket.socket(fileno=_DOOR), request["script"])
+    script_process.serve(worker, socket.socket(fileno=_LINK), request["script"])
 
 
 def _clear(folder: str) -> bool:

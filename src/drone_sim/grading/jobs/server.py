@@ -51,8 +51,8 @@ class Requests:
             self._connection.send_bytes(READY)
             while self._connection.poll(_IDLE):
                 request = json.loads(self._connection.recv_bytes())
-                with socket.socket(fileno=recv_handle(self._connection)) as door:
-                    yield request, door
+                with socket.socket(fileno=recv_handle(self._connection)) as link:
+                    yield request, link
 
     def fileno(self) -> int:
         """Return a descriptor that is readable if there is a message, or if the connection has ended."""

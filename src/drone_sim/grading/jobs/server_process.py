@@ -70,12 +70,12 @@ class ServerProcess:
         if self.receive(_START_TIMEOUT) != READY:
             raise ServerDied
 
-    def send(self, request: Mapping[str, Any], door: int, *contents: bytes) -> None:
-        """Send a request, the descriptor `door`, and contents of files. Raises ServerDied."""
+    def send(self, request: Mapping[str, Any], link: int, *contents: bytes) -> None:
+        """Send a request, the descriptor `link`, and contents of files. Raises ServerDied."""
         with _connection_errors():
             connection = self._open()
             connection.send_bytes(json.dumps(request).encode())
-            send_handle(connection, door, None)
+            send_handle(connection, link, None)
             for content in contents:
                 connection.send_bytes(content)
 

@@ -13,7 +13,7 @@ from drone_sim.remote.client import Client
 from drone_sim.remote.control import MovedObjects
 from drone_sim.remote.conversation import RemoteApi, Stepping, Task, Until, Watched, unwatched
 from drone_sim.remote.legacy.connection import Connection
-from drone_sim.remote.legacy.doors import Doors
+from drone_sim.remote.legacy.listeners import Listeners
 from drone_sim.remote.legacy.session import Session
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
@@ -71,10 +71,10 @@ class LegacyServer(RemoteApi):
         self._selected: list[int] = []
         self._cleanup, self._log_limit, self._suppressed = Throttle(_INTERVAL, clock), Throttle(_INTERVAL, clock), 0
         self._epoll = select.epoll()
-        self._doors = Doors("" if address == "*" else address, self._epoll)
+        self._listeners = Listeners("" if address == "*" else address, self._epoll)
         self._guests: dict[int, _Guest] = {}
         self._pending: dict[int, None] = {}  # descriptors of clients that may have sent unread messages, in turn
-        self.port = self._doors.open(port)
+        self.port = self._listeners.open(port)
         self.address = f"{address}:{self.port}"
 
     def fileno(self) -> int:
@@ -104,7 +104,7 @@ class LegacyServer(RemoteApi):
         for guest in [guest for guest in self._guests.values() if guest.until and guest.until.over()]:
             self._resume(guest)
         for number, event in self._epoll.poll(0):
-            if number in self._doors:
+            if number in self._listeners:
                 self._accept(number)
             else:
                 self._handle_event(number, event)
@@ -116,7 +116,7 @@ class LegacyServer(RemoteApi):
         """Disconnect all clients, and close the ports."""
         for guest in list(self._guests.values()):
             self._disconnect(guest)
-        self._doors.close()
+        self._listeners.close()
         self._epoll.close()
 
     # ---- connections
@@ -125,16 +125,16 @@ class LegacyServer(RemoteApi):
         """Listen on the ports that scripts request, while the simulation runs."""
         ports = self._player.simulation.context.remote_ports
         wanted = ports.wanted if self._player.simulation.running else {}
-        closed = self._doors.follow(wanted)
+        closed = self._listeners.follow(wanted)
         for guest in [guest for guest in self._guests.values() if guest.port in closed and guest.port != self.port]:
             self._disconnect(guest)
         if wanted:
             ports.connected = {guest.port for guest in self._guests.values()}
 
-    def _accept(self, door: int) -> None:
+    def _accept(self, listener: int) -> None:
         for _ in range(_MAX_ACCEPTED):
             try:
-                accepted = self._doors.accept(door)
+                accepted = self._listeners.accept(listener)
             except OSError as error:  # the client is gone already, or too many files are open
                 self._log(f"cannot accept a client: {error.strerror}")
                 return

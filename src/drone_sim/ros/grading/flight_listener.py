@@ -17,7 +17,7 @@ from std_msgs.msg import Float32MultiArray, String
 from visualization_msgs.msg import MarkerArray
 
 from drone_sim.grading.flight_record import ContactEvent, FlightRecord, ValueChange
-from drone_sim.grading.permissions import CALL, MOST_TRIED
+from drone_sim.grading.permissions import CALL, MAX_TRIED
 from drone_sim.grading.plan import Plan
 from drone_sim.message_text import printable
 from drone_sim.ros.core.message_conversion import odometry_row, xyz
@@ -88,7 +88,7 @@ class FlightListener:
                 callback(message)
                 return
             with self._lock:
-                if len(self._forged) < MOST_TRIED:
+                if len(self._forged) < MAX_TRIED:
                     line = f"tried to forge {topic} at {self.time:.2f} s (by {printable(node)})"
                     self._forged.setdefault((topic, node), line)
 
@@ -222,5 +222,5 @@ class LiveRules:
         action, subject, *_ = [*line.split(" ", 2), ""]
         is_own = line.endswith(f", by {rospy.get_name()})")
         is_allowed = subject in self._calls if action == CALL else action in self._allowed
-        if not is_own and not is_allowed and len(self.tried) < MOST_TRIED:
+        if not is_own and not is_allowed and len(self.tried) < MAX_TRIED:
             self.tried.append(f"tried to {line}")

@@ -12,7 +12,7 @@ from typing import Any
 import rospy
 from std_msgs.msg import String
 
-from drone_sim.grading.permissions import CHANGE, MOST_TRIED, Actions, free_functions
+from drone_sim.grading.permissions import CHANGE, MAX_TRIED, Actions, free_functions
 from drone_sim.message_text import MAX_NAME, printable
 from drone_sim.ros.core.inbox import Intervention
 from drone_sim.run.simulation import Simulation
@@ -47,7 +47,7 @@ class Interventions:
         """Say what is done now."""
         self.update()
         kind = one.action, one.by
-        if one not in self._told and self._count[kind] < MOST_TRIED:
+        if one not in self._told and self._count[kind] < MAX_TRIED:
             self._told.add(one)
             self._count[kind] += 1
             self._say(one.action, one.what, f"{one.way}, by {one.by}")

@@ -160,7 +160,7 @@ class Turns:
     def set_automatic(self, allowed: bool | int) -> int:
         """Raise (False), lower (True) or set the level that forbids automatic switching (0: allowed).
 
-        Return the old one.
+        Return the level before.
         """
         before = self._forbidden
         if not isinstance(allowed, (bool, int, float)) or not 0 <= allowed < 1e9:

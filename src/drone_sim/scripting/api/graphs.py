@@ -55,7 +55,7 @@ class Graphs:
         }
 
     def values(self) -> dict[str, float]:
-        """Return the latest values of streams by the streams' names."""
+        """Return the latest value of each stream that has one, by the stream's name."""
         return {name: value for _, name, value in self._streams.values() if value is not None}
 
     def save_state(self) -> Callable[[], None]:

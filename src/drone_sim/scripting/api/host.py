@@ -183,7 +183,7 @@ class SceneServices:
 
 
 class Functions:
-    """Base class for functions of `sim`; docs/api.md has a section for each class."""
+    """Base class for API functions that need the host; docs/api.md has a section for each class."""
 
     def __init__(self, host: Host, services: SceneServices, ignored: Ignored):
         """`host` is the drone or object that the script belongs to; `services` give access to the rest of the scene.

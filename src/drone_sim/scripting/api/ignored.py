@@ -18,7 +18,7 @@ from drone_sim.scripting.script_log import LOG
 _IMPORTANT = ("setLinkDummy",)  # logged as a warning, because without it, connected bodies separate
 HANDLE = object()  # means that the function returns a new handle
 
-# Functions by module and by the reason for the log. Each line starts with the generations that have the functions (-:
+# Functions by module and by the reason for the log. A number gives the generations of the functions that follow it (-:
 # none); a function may have a result.
 _TABLE = {
     "sim": {

@@ -25,7 +25,7 @@ _PAGES = {"simROS": "rosInterf", "simUI": "simUI", "simVision": "simVision"}  # 
 
 
 def apis() -> dict[str, Api]:
-    """Return the modules of the script API, without a simulation; their functions must not be called."""
+    """Return the modules of the script API, without a simulation; only functions that need none may be called."""
     scripts = Scripts()
     scripts.add("Drone", {})
     clock, objects = Clock(0.05), ObjectTree()
@@ -106,19 +106,16 @@ def _sentence(function: Any) -> str:
     return first_paragraph(inspect.getdoc(function) or "")
 
 
+_STARS: dict[Any, str] = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}
+
+
 def arguments_of(function: Any) -> str:
     """Return a function's parameters without types: 'objectHandle, relativeTo=-1'."""
     if is_ignored(function):
         return "..."
     shown = []
     for parameter in inspect.signature(function).parameters.values():
-        star = (
-            "*"
-            if parameter.kind is parameter.VAR_POSITIONAL
-            else "**"
-            if parameter.kind is parameter.VAR_KEYWORD
-            else ""
-        )
+        star = _STARS.get(parameter.kind, "")
         default = "" if parameter.default is parameter.empty else f"={parameter.default!r}"
         shown.append(f"{star}{parameter.name.lstrip('_')}{default}")
     return ", ".join(shown)

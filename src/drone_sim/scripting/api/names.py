@@ -170,7 +170,7 @@ def _is_of_the_scene(objects: ObjectTree, name: str, own: str) -> bool:
 
 
 def _only_copy(objects: ObjectTree, name: str, own: str) -> str:
-    """Return the first copy that an import has made of a name, if no copy of `own` has its suffix; otherwise the name.
+    """Return the first copy that an import has made of a name, if its suffix belongs to no copy of `own`, or the name.
 
     An import adds a suffix to all names of a tree if one of them exists already (importing/scene_folder.py).
     """

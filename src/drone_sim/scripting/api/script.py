@@ -16,7 +16,8 @@ from drone_sim.scripting.script_log import log_failure
 class Script(ABC):
     """A loaded child script. Its methods raise ScriptError.
 
-    After `isolate`, they log the script's first error instead, and the script is not called any more.
+    After `isolate`, the first error of a call by the simulation is logged instead, and the script is not called any
+    more. Calls by other scripts always raise.
     """
 
     language: str  # lua or python

@@ -128,9 +128,8 @@ class LuaState:
             unpack_returned_tuples=True,
             max_memory=_CAP,
         )
-        self.used: Callable[[], int] = (
-            self.runtime.get_memory_used
-        )  # bytes; Lua's own count excludes 5.5's long strings
+        # Bytes; Lua's own count excludes 5.5's long strings.
+        self.used: Callable[[], int] = self.runtime.get_memory_used
         self.waits = 0  # unfinished waits of API functions in coroutines
         self.known: set[str] = set()  # names in the API
         self.warned: set[str] = set()  # functions that were called with too many values

@@ -100,9 +100,8 @@ class PythonScript(Script):
 
     def _new_thread(self, turns: Turns) -> PythonThread:
         try:
-            from drone_sim.scripting.python.thread import (
-                PythonThread,
-            )  # imported here because only threads need greenlet
+            # Imported here because only threads need greenlet.
+            from drone_sim.scripting.python.thread import PythonThread
         except ImportError as error:
             message = f"threads of Python scripts need greenlet (pip install greenlet): {error}"
             raise ScriptError("load", self._path, 0, message) from None
@@ -223,9 +222,8 @@ class PythonScript(Script):
 
     def _save_variables(self) -> Callable[[], None]:
         modules = self._helpers.modules()
-        builtins = (
-            self._helpers.builtins
-        )  # contain the `self` of the helper modules, and of a script that has deleted its own
+        # They contain the `self` of the helper modules, and of a script that has deleted its own.
+        builtins = self._helpers.builtins
         namespaces = (self._globals, *map(vars, modules.values()))
         own, *kept = _copied({"self": builtins["self"]}, *namespaces)
         uncopied = [{name: variables[name] for name in _NOT_COPIED if name in variables} for variables in namespaces]
@@ -326,9 +324,8 @@ def _copied(*namespaces: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _copy(value: Any, memo: dict[int, Any]) -> Any:
-    if isinstance(
-        value, Variables
-    ):  # attribute by attribute, so that one that cannot be copied does not matter for the rest
+    # Attribute by attribute, so that one that cannot be copied does not matter for the rest.
+    if isinstance(value, Variables):
         if id(value) in memo:  # it is one of its own attributes
             return memo[id(value)]
         variables = memo[id(value)] = Variables()

@@ -24,13 +24,11 @@ from drone_sim.scripting.api.scripts import ScriptFunctions
 from drone_sim.scripting.api.threads import Threads
 from drone_sim.scripting.rpc import effects
 from drone_sim.scripting.rpc.places import Place, Places
+from drone_sim.scripting.rpc.values import ALL_PLAIN, PLAIN
 
-MOST_EXPECTED = 200  # reads of a segment
 _MAX_SEGMENTS = 50  # of a phase; more are not remembered
 _MAX_FORMS = 10_000  # remembered forms of successful calls
 _UNKNOWN = object()
-_PLAIN = frozenset((int, float, str, bool, type(None)))
-_ALL_PLAIN = _PLAIN.issuperset
 _ALL_NUMBERS = frozenset((float, int)).issuperset
 Read = tuple[str, tuple[Any, ...]]  # a function's name and its arguments
 Answers = tuple[list[Any], list[Place]]  # results of expected reads (Ellipsis: none), and poses of objects
@@ -121,7 +119,7 @@ class ApiStubs:
         expected = self._expected.get(key, _NOTHING)
         if expected.reads == (*segment.reads,) and expected.handles == (*segment.handles,):
             return
-        if segment.number < _MAX_SEGMENTS:
+        if segment.number < _MAX_SEGMENTS and (key in self._expected or len(self._expected) < effects.MAX_READS):
             self._expected[key] = Expected(tuple(segment.reads), tuple(segment.handles))
             reads = [[name, *self._link.marked(list(arguments))] for name, arguments in segment.reads]
             self._link.queue(["reads", segment.phase, segment.number, reads, list(segment.handles)])
@@ -134,9 +132,8 @@ class ApiStubs:
         if kind is Threads and name in effects.OWN_THREADS:
             own: Function = getattr(self._threads, name)
             return own
-        return (
-            function if kind in effects.OWN_CLASSES or (kind is ScriptFunctions and name in effects.OWN_LOG) else None
-        )
+        is_local = kind in effects.OWN_CLASSES or (kind is ScriptFunctions and name in effects.OWN_LOG)
+        return function if is_local else None
 
     def _stub(self, module: str, function: Function) -> Function:
         name = f"{module}.{function.__name__}"
@@ -174,7 +171,7 @@ class ApiStubs:
                 result = segment.known.get(key, _UNKNOWN)
             except TypeError:  # unhashable arguments, such as a list
                 return self._request(name, arguments, named)
-            if len(segment.reads) < MOST_EXPECTED:
+            if len(segment.reads) < effects.MAX_READS:
                 segment.reads[key] = None
             if result is _UNKNOWN:
                 result = segment.known[key] = self._send(name, arguments, named, -1)[0]
@@ -192,9 +189,9 @@ class ApiStubs:
             handle, frame = arguments if len(arguments) == 2 else (*arguments, WORLD)
             if type(handle) is not int or type(frame) is not int:
                 return self._request(name, arguments, named)
-            segment.handles[handle] = None
+            _announce(segment, handle)
             if frame != WORLD:
-                segment.handles[frame] = None
+                _announce(segment, frame)
             if places.knows(handle, frame):
                 return function(handle, frame)
             return self._send(name, arguments, named, -1)[0]
@@ -210,7 +207,7 @@ class ApiStubs:
             if named or effects.PLACES in segment.changed or not arguments or type(arguments[0]) is not int:
                 return change(*arguments, **named)
             handle = arguments[0]
-            segment.handles[handle] = None
+            _announce(segment, handle)
             if not places.is_mark(handle) or _form(name, arguments) not in succeeded:
                 return change(*arguments, **named)
             try:
@@ -298,7 +295,7 @@ class _RemoteWait(Wait):
 def _form(name: str, arguments: tuple[Any, ...]) -> Any:
     """Return a key shared by calls that differ only in finite numbers of their last argument; None if there is none."""
     others = arguments[:-1]
-    if not arguments or not _ALL_PLAIN(map(type, others)):
+    if not arguments or not ALL_PLAIN(map(type, others)):
         return None
     last = arguments[-1]
     kind = type(last)
@@ -307,7 +304,7 @@ def _form(name: str, arguments: tuple[Any, ...]) -> Any:
     if kind is list:
         is_suitable = last and _ALL_NUMBERS(map(type, last)) and isfinite(sum(last))
         return (name, others, list, len(last)) if is_suitable else None
-    return (name, arguments) if kind in _PLAIN else None
+    return (name, arguments) if kind in PLAIN else None
 
 
 def _copied(value: Any) -> Any:
@@ -324,8 +321,13 @@ def _copied(value: Any) -> Any:
 
 @functools.cache
 def declared() -> list[tuple[str, dict[str, Function], dict[str, Any]]]:
-    """Return each module's name, functions (without a simulation: not to be called) and constants."""
+    """Return each module's name, functions and constants; only functions that need no simulation may be called."""
     return [contents(api) for api in listing.apis().values()]
+
+
+def _announce(segment: Any, handle: int) -> None:
+    if len(segment.handles) < effects.MAX_READS:
+        segment.handles[handle] = None
 
 
 @functools.cache

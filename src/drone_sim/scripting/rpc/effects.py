@@ -25,6 +25,8 @@ OWN_THREADS = [
     "setThreadResumeLocation",
     "delegateChildScriptExecution",
 ]
+MAX_FUNCTIONS = 100_000  # that a script may pass to the simulation
+MAX_READS = 200  # reads of a segment, handles of a segment, and segments, that a script may announce
 OWN_LOG = ("addLog", "addStatusbarMessage")
 
 # Reads of known poses, and changes of marks' poses, which the script's process may do by itself (`places`).

@@ -13,7 +13,6 @@ from drone_sim.scripting.rpc.places import Place, place_of
 from drone_sim.scripting.rpc.values import InvalidMessage
 
 _LOG = logging.getLogger(__name__)
-_MAX_READS = 200  # in a list, and lists
 _MAX_PHASE_LENGTH = 1000  # characters of a phase
 _POSE_FUNCTION = f"sim.{effects.PLACED[-1]}"  # reads the complete pose of an object
 _NOTHING: tuple[list[Any], list[int]] = ([], [])
@@ -31,7 +30,7 @@ class ExpectedReads:
         """Store the reads that the script announces for a segment of a phase. Raises InvalidMessage."""
         if [type(field) for field in item[1:]] != [str, int, list, list]:
             raise InvalidMessage("malformed list of reads")
-        if max(len(item[3]), len(item[4]), len(self._expected)) > _MAX_READS:
+        if max(len(item[3]), len(item[4]), len(self._expected)) > effects.MAX_READS:
             raise InvalidMessage("too many reads")
         if not all(type(handle) is int for handle in item[4]):
             raise InvalidMessage("handles must be integers")

@@ -14,14 +14,13 @@ from drone_sim.scripting import load
 from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.api.scripts import FunctionsOfScript
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.scripting.rpc import values
+from drone_sim.scripting.rpc import effects, values
 from drone_sim.scripting.rpc.api_stubs import NO_ANSWERS, Answers, ApiStubs
 from drone_sim.scripting.rpc.channel import Channel, Disconnected
 from drone_sim.scripting.time_limit import TimeLimit
 
 _MAX_QUEUED = 1000  # items in a message
 _WARM_UP_SCRIPT = "pilot"  # loaded once, before the process forks
-_MAX_FUNCTIONS = 100_000  # passed to the simulation
 
 
 def serve(worker: ScriptWorker, end: socket.socket, path: str) -> None:
@@ -105,8 +104,8 @@ class ScriptWorker:
 
     def _number(self, function: Any) -> int:
         if id(function) not in self._numbers:
-            if len(self._functions) >= _MAX_FUNCTIONS:
-                raise ValueError(f"a script can pass at most {_MAX_FUNCTIONS} functions")
+            if len(self._functions) >= effects.MAX_FUNCTIONS:
+                raise ValueError(f"a script can pass at most {effects.MAX_FUNCTIONS} functions")
             self._numbers[id(function)] = len(self._functions)
             self._functions.append(function)  # this reference keeps its id() from being reused
         return self._numbers[id(function)]
@@ -195,7 +194,7 @@ def _sent(value: Any) -> Any:
 
 
 def prepared() -> ScriptWorker:
-    """Return an end for the forks of this process, with the imports of both script languages loaded."""
+    """Return a worker for the forks of this process, with the imports of both script languages loaded."""
     for name in ("drone_sim.scripting.lua.script", "drone_sim.scripting.python.thread"):
         importlib.import_module(name)
     simulation_socket, script_socket = socket.socketpair()

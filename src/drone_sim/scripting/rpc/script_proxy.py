@@ -23,14 +23,11 @@ from drone_sim.scripting.rpc.channel import Disconnected
 from drone_sim.scripting.rpc.connection import ScriptConnection
 from drone_sim.scripting.rpc.expected_reads import ExpectedReads
 from drone_sim.scripting.rpc.places import Place
-from drone_sim.scripting.rpc.values import InvalidMessage, ScriptFunction, kind_of
+from drone_sim.scripting.rpc.values import ALL_PLAIN, PLAIN, InvalidMessage, ScriptFunction, kind_of
 from drone_sim.scripting.time_limit import TimeLimit
 
 GRACE = 5.0  # s beyond the time limit, which the script's process should enforce itself
-_MAX_FUNCTIONS = 100_000
 _MAX_WAITS = 1000
-_PLAIN = frozenset((float, int, bool, str, type(None)))
-_ALL_PLAIN = _PLAIN.issuperset
 _MAX_TEXT = 1000  # characters of an error text
 
 
@@ -60,7 +57,9 @@ class ScriptProxy(Script):
         self.language = "python" if path.endswith(".py") else "lua"
         self._thread_is_alive = False
         result = self._do("load", [self._limit.seconds, self._connection.processor])
-        self.idle, self.is_empty = str(result[0])[:_MAX_TEXT], bool(result[1])
+        if type(result) is not list or [type(field) for field in result] != [str, bool]:
+            self._end("load", "its process sent an invalid message: malformed result of load")
+        self.idle, self.is_empty = result[0][:_MAX_TEXT], result[1]
 
     # ---- interface of a script
 
@@ -220,8 +219,8 @@ class ScriptProxy(Script):
             raise InvalidMessage("function that needs a reply")
         if self._failure is not None:
             return
-        if not _ALL_PLAIN(map(type, arguments)):
-            arguments = [value if type(value) in _PLAIN else self._value(value) for value in arguments]
+        if not ALL_PLAIN(map(type, arguments)):
+            arguments = [value if type(value) in PLAIN else self._value(value) for value in arguments]
         try:
             on_result = self._connection.permit(name, arguments)
             function(*arguments)
@@ -252,7 +251,7 @@ class ScriptProxy(Script):
 
     def _called(self, name: Any, arguments: list[Any], named: Mapping[str, Any]) -> Any:
         function = self._functions.get(name) if type(name) is str else None
-        in_order = arguments if _ALL_PLAIN(map(type, arguments)) else [self._value(value) for value in arguments]
+        in_order = arguments if ALL_PLAIN(map(type, arguments)) else [self._value(value) for value in arguments]
         by_name = {key: self._value(value) for key, value in named.items()} if named else named
         if name == "wait":
             return self._waits.step(*in_order)
@@ -269,7 +268,7 @@ class ScriptProxy(Script):
 
     def _function_there(self, number: int) -> ScriptFunction:
         if number not in self._handed:
-            if len(self._handed) >= _MAX_FUNCTIONS:
+            if len(self._handed) >= effects.MAX_FUNCTIONS:
                 raise InvalidMessage("too many functions")
             self._handed[number] = ScriptFunction(number)
         return self._handed[number]

@@ -25,10 +25,10 @@ from drone_sim.scripting.api.scripts import FunctionsOfScript, handle_of
 from drone_sim.scripting.api.types import DEEPEST, WrongValue
 from drone_sim.scripting.lua.values import fields
 
-_PLAIN = frozenset((float, int, bool, str, type(None)))
-_ALL_PLAIN = _PLAIN.issuperset
+PLAIN = frozenset((float, int, bool, str, type(None)))
+ALL_PLAIN = PLAIN.issuperset
 _MARKS = {"b": str, "f": int, "t": list, "d": list, "o": list}
-_MARSHALLED = frozenset((*_PLAIN, bytes))
+_MARSHALLED = frozenset((*PLAIN, bytes))
 _ALL_MARSHALLED = _MARSHALLED.issuperset
 _encode = json.JSONEncoder(check_circular=False, separators=(",", ":")).encode
 _decode = json.JSONDecoder().raw_decode
@@ -144,10 +144,10 @@ def marked(value: Any, number: Callable[[Any], int]) -> Any:
     `number` returns the number of a function.
     """
     kind = type(value)
-    if kind in _PLAIN:
+    if kind in PLAIN:
         return value
     if kind is list:
-        return value if _ALL_PLAIN(map(type, value)) else [marked(item, number) for item in value]
+        return value if ALL_PLAIN(map(type, value)) else [marked(item, number) for item in value]
     if kind is tuple:
         return {"t": [marked(item, number) for item in value]}
     if isinstance(value, Mapping):
@@ -206,12 +206,12 @@ def unmarked(value: Any, function: Callable[[int], Any], depth: int = 0) -> Any:
     Raises InvalidMessage.
     """
     kind = type(value)
-    if kind in _PLAIN:
+    if kind in PLAIN:
         return value
     if depth > DEEPEST:
         raise InvalidMessage("values nested too deeply")
     if kind is list:
-        return value if _ALL_PLAIN(map(type, value)) else [unmarked(item, function, depth + 1) for item in value]
+        return value if ALL_PLAIN(map(type, value)) else [unmarked(item, function, depth + 1) for item in value]
     mark, inner = _mark(value)
     if mark == "b":
         return _bytes(inner)

@@ -11,35 +11,35 @@ _LOG = logging.getLogger(__name__)
 _BACKLOG = 256
 
 
-class Doors:
+class Listeners:
     """Listening sockets by file descriptor, as `epoll` reports them."""
 
     def __init__(self, host: str, epoll: select.epoll):
         """`host` is the address to listen on, '' for all; `epoll` reports new connections."""
         self._host, self._epoll = host, epoll
-        self._doors: dict[int, socket.socket] = {}
+        self._listeners: dict[int, socket.socket] = {}
         self._ports: dict[int, int] = {}  # of scripts: file descriptor by port, -1 if not opened
 
     def __contains__(self, number: int) -> bool:
         """Return whether a file descriptor is that of a listening socket."""
-        return number in self._doors
+        return number in self._listeners
 
     def open(self, port: int) -> int:
         """Listen on a port (0: a free one); return it. Raises OSError, in one line."""
         try:
-            door = socket.create_server((self._host, port), backlog=_BACKLOG)
+            listener = socket.create_server((self._host, port), backlog=_BACKLOG)
         except (OSError, OverflowError) as error:
             why = getattr(error, "strerror", None) or error
             raise OSError(f"remote_api: cannot listen on {self._host or '*'}:{port}: {why}") from None
-        door.setblocking(False)
-        self._doors[door.fileno()] = door
-        self._epoll.register(door.fileno(), select.EPOLLIN)
-        return int(door.getsockname()[1])
+        listener.setblocking(False)
+        self._listeners[listener.fileno()] = listener
+        self._epoll.register(listener.fileno(), select.EPOLLIN)
+        return int(listener.getsockname()[1])
 
     def accept(self, number: int) -> tuple[socket.socket, str] | None:
         """Return a pending connection and its name; None if there is none. Raises OSError."""
         try:
-            peer, (host, port) = self._doors[number].accept()
+            peer, (host, port) = self._listeners[number].accept()
         except BlockingIOError:
             return None
         return peer, f"{host}:{port}"
@@ -56,22 +56,22 @@ class Doors:
 
     def close(self) -> None:
         """Close all listening sockets."""
-        for number in list(self._doors):
+        for number in list(self._listeners):
             self._close(number)
 
     def _open_for_script(self, port: int) -> int:
         """Open a port; return its file descriptor, -1 if it is open already or cannot be opened (logged once)."""
-        if any(door.getsockname()[1] == port for door in self._doors.values()):
+        if any(listener.getsockname()[1] == port for listener in self._listeners.values()):
             return -1
         try:
             self.open(port)
         except OSError as error:
             _LOG.error("%s, which a script requests", error)
             return -1
-        return next(reversed(self._doors))
+        return next(reversed(self._listeners))
 
     def _close(self, number: int) -> None:
-        door = self._doors.pop(number, None)
-        if door is not None:
+        listener = self._listeners.pop(number, None)
+        if listener is not None:
             self._epoll.unregister(number)
-            door.close()
+            listener.close()
