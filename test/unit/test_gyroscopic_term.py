@@ -44,10 +44,10 @@ def add_box_on_a_hinge(world):
     """Add a small ball's mass with the box as its second link, about the same centre."""
     parts = [Part(BOX, IDENTITY, WHITE)]
     small = [Part(Box((0.01, 0.01, 0.01)), IDENTITY, WHITE)]
-    hinge = LinkJoint(0, IDENTITY, "fixed", None, 0.0)
+    joint = LinkJoint(0, IDENTITY, "fixed", None, 0.0)
     links = [
         Link(small, mass=0.01, inertia=inertia_of(small, 0.01)),
-        Link(parts, mass=MASS, inertia=inertia_of(parts, MASS), hinge=hinge),
+        Link(parts, mass=MASS, inertia=inertia_of(parts, MASS), joint=joint),
     ]
     return world.add_assembly(links, Pose((0.0, 0.0, 1.0)), ["", ""])[0]
 

@@ -747,7 +747,7 @@ def test_a_port_that_is_taken_is_one_line(stage):
 def test_nobody_beyond_this_machine_is_let_in_unless_told(stage):
     assert parameters.load().remote_api.address == "127.0.0.1"
     stage.server.serve()
-    (door,) = stage.server._doors._doors.values()
+    (door,) = stage.server._listeners._listeners.values()
     assert door.getsockname()[0] == "127.0.0.1"
 
 

@@ -5,6 +5,7 @@ import pytest
 import trimesh
 from drawing import CAMERA, looking, seen
 
+from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
@@ -352,10 +353,65 @@ def test_a_mesh_written_anew_is_seen_anew(tmp_path):
 def test_a_heap_that_would_take_seconds_a_step_is_refused():
     box = {"shape": "box", "size": [1, 1, 1], "position": [0, 0, 5], "mass": 1}
     assert len(Simulation(parameters.load({"scene": {"objects": [box] * 10}})).world.queries.overlaps()) == 45
-    wall = [{**box, "position": [x, 0, z + 0.5]} for x in range(10) for z in range(5)]  # 185 pairs that touch
+    wall = [{**box, "position": [x, 0, z + 0.5]} for x in range(10) for z in range(5)]  # which touch
     Simulation(parameters.load({"scene": {"objects": wall}})).close()
+    ghosts = [{**box, "respondable": False}] * 31  # they collide with nothing
+    Simulation(parameters.load({"scene": {"objects": ghosts}})).close()
     Simulation(parameters.load({"scene": {"objects": [{**box, "mass": 0}] * 100}})).close()  # what stands may
     with pytest.raises(ParameterError, match="4950 pairs of moving objects"):
         Simulation(parameters.load({"scene": {"objects": [box] * 100}}))
-    with pytest.raises(ParameterError, match="465 pairs of moving objects are deep inside each other"):
+    with pytest.raises(ParameterError, match="465 pairs of moving objects or vehicles are deep inside each other"):
         Simulation(parameters.load({"scene": {"objects": [box] * 31}}))
+
+
+def test_copies_are_grouped_under_the_name_of_the_first():
+    cuboid = {"name": "Cuboid", "shape": "box", "size": [1, 1, 1], "position": [2, 0, 1]}
+    simulation = Simulation(parameters.load({"scene": {"objects": [cuboid]}}))
+    operations, tree = simulation.operations, simulation.tree
+    copies = [operations.copy([tree.handle("Cuboid")])[0] for _ in range(2)]
+    assert tree[operations.group(copies)].name == "Cuboid#0"
+    simulation.close()
+
+
+CHAIN = [
+    {"name": "Mark", "kind": "dummy", "position": [1, 1, 1]},
+    {"name": "Hinge", "kind": "joint", "type": "revolute", "position": [3, 0, 1]},
+    {"name": "Rod", "shape": "box", "size": [1, 0.1, 0.1], "mass": 1, "parent": "Hinge", "position": [0.5, 0, 0]},
+]
+
+
+def position_of(simulation, name):
+    return list(simulation.tree.matrix(simulation.tree.handle(name))[3::4])
+
+
+def test_an_operation_that_fails_in_flight_does_not_move_where_objects_start(monkeypatch):
+    simulation = Simulation(parameters.load({"scene": {"objects": CHAIN}}))
+    simulation.start()
+    mark = simulation.tree.handle("Mark")
+    simulation.tree.set_position(mark, WORLD, (5.0, 5.0, 5.0))
+
+    def fail(*_):
+        raise ValueError("no")
+
+    with monkeypatch.context() as patch, pytest.raises(ValueError, match="no"):
+        patch.setattr(simulation.scene, "rebuild", fail)
+        simulation.operations.remove([simulation.tree.handle("Rod")])
+    simulation.stop()
+    assert position_of(simulation, "Mark") == [1, 1, 1]
+    simulation.close()
+
+
+def test_edits_made_while_stopped_stay_if_the_scene_cannot_be_rebuilt(monkeypatch):
+    simulation = Simulation(parameters.load({"scene": {"objects": CHAIN[:1]}}))
+    simulation.start()
+    simulation.stop()
+    simulation.tree.set_position(simulation.tree.handle("Mark"), WORLD, (5.0, 5.0, 5.0))
+    simulation.scene.is_changed = True
+
+    def fail(*_):
+        raise ValueError("no")
+
+    monkeypatch.setattr(simulation, "_rebuild", fail)
+    simulation.stop()
+    assert position_of(simulation, "Mark") == [5, 5, 5]
+    simulation.close()

@@ -73,12 +73,12 @@ def _combined(first: Mapping[_Key, _Pair[_Value]], second: Mapping[_Key, _Pair[_
     return {key: pair for key, pair in pairs.items() if pair[0] != pair[1]}
 
 
-def apply_change(simulation: Simulation, change: SceneChange, arrange: Callable[[Settings], None]) -> None:
-    """Apply a change to a scene that is in the state before it; `arrange` applies changed settings.
+def apply_change(simulation: Simulation, change: SceneChange, apply_settings: Callable[[Settings], None]) -> None:
+    """Apply a change to a scene that is in the state before it; `apply_settings` applies changed settings.
 
     Raises ValueError; a part of the change may then be applied already.
     """
-    _ChangeApplier(simulation, change).apply_change(arrange)
+    _ChangeApplier(simulation, change).apply_change(apply_settings)
 
 
 class _ChangeApplier:
@@ -90,11 +90,11 @@ class _ChangeApplier:
         self._added = {handle: after for handle, (before, after) in pairs if before is None and after is not None}
         self._changed = {handle: (old, new) for handle, (old, new) in pairs if old is not None and new is not None}
 
-    def apply_change(self, arrange: Callable[[Settings], None]) -> None:
+    def apply_change(self, apply_settings: Callable[[Settings], None]) -> None:
         self._remove()
         before, after = self._change.settings
         if before != after:
-            arrange(after)
+            apply_settings(after)
         self._rename({handle: new.name for handle, (old, new) in self._changed.items() if old.name != new.name})
         if self._added:
             self._simulation.context.objects.reserve({new.name: handle for handle, new in self._added.items()})

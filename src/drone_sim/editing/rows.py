@@ -49,7 +49,7 @@ class SceneRows:
             content = self._other_content(item, vehicle, written) if entry is None else entry
             state = (
                 item.name, item.alias, item.is_model, parent, item.matrix(), content, script,
-                vehicle.name if vehicle else "", getattr(item, "value", 0.0),
+                vehicle.name if vehicle else "", getattr(item, "value", 0.0), getattr(item, "is_static", None),
             )  # fmt: skip
             if self._known.get(handle) != state:
                 self._known[handle] = state

@@ -114,7 +114,7 @@ class ObjectTree:
         for handle in handles:
             for name in self._objects.pop(handle).names:
                 del self._handles[name]
-        self.look_for_loose_ones()
+        self.refresh_free_children()
 
     def rename(self, handle: int, name: str) -> None:
         """Replace all names of an object by one. Raises ValueError for a name that is taken."""
@@ -134,13 +134,13 @@ class ObjectTree:
         for child in self._objects.values():
             if child.parent is before:
                 child.parent = other
-        self.look_for_loose_ones()
+        self.refresh_free_children()
 
     def handles(self) -> Handles:
         """Return the handles of all objects, for another tree of the same objects."""
         return Handles(dict(self._handles), self._next)
 
-    def look_for_loose_ones(self) -> None:
+    def refresh_free_children(self) -> None:
         """Update the list of bodies that follow their parent only when a script moves that."""
         self._free_children = [body for body in self._objects.values() if body.is_free_child]
 
@@ -228,7 +228,7 @@ class ObjectTree:
             for item, parent, restore_item in states:
                 if item in existing and parent in existing:
                     restore_item()
-            self.look_for_loose_ones()
+            self.refresh_free_children()
 
         return restore
 
@@ -309,7 +309,7 @@ class ObjectTree:
         matrix = moved.matrix()
         moved.parent = new
         if moved.body is not None:
-            self.look_for_loose_ones()
+            self.refresh_free_children()
         elif keep_in_place:
             moved.put(matrix)
 

@@ -318,6 +318,7 @@ class Simulation:
             self.parameters = self._initial.parameters
             self._initial.restore_document()
         elif self.scene.is_changed:
+            self.scene.sync()  # should the rebuild fail, the changes stay
             before, scene = self.parameters, self.scene.parameters_now()
             self.parameters = before.varied(before.weather, scene, before.fleet)
             self._initial = self._initial._replace(handles=self.tree.handles(), is_edited=True)

@@ -226,8 +226,8 @@ class SimulationSetup:
             deep = [pair for pair in pairs if queries.is_deep_inside(*pair)]
             count, kind, most = len(deep), "are deep inside each other", MAX_DEEP_OVERLAPS
         if count > most:
-            problem = f"{count} pairs of moving objects {kind} at the start; at most {most} are allowed"
-            raise ParameterError(f"scene/objects: {problem}")
+            problem = f"{count} pairs of moving objects or vehicles {kind}; at most {most} are allowed"
+            raise ParameterError(f"the scene at the start: {problem}")
 
 
 def script_of(vehicle: VehicleParameters, parameters: Parameters, script: str) -> str:

@@ -112,11 +112,11 @@ class Stepper:
 
     def _sum_forces(self) -> dict[int, Wrench]:
         """Return the sum of each vehicle's forces, by body."""
-        self._velocities.begin_step()
         return {number: vehicle.wrench() for number, vehicle in zip(self._bodies, self.flying)}
 
     def _advance(self, wrenches: dict[int, Wrench], watch: Callable[[int], None] | None) -> None:
         """Take the sub-steps, with the vehicles' forces and instruments that follow each of them."""
+        self._velocities.begin_step()
         carried = self._context.carried
         if carried.shapes or carried.bases:
             carried.follow()

@@ -90,7 +90,7 @@ def _articulated(
     for hung in chain.hung:
         shape = entries[hung.shape]
         assert isinstance(shape, ObjectParameters), "a chain consists of joints and shapes"
-        links.append(_link(shape, shape.local)._replace(hinge=_hinge(entries, hung)))
+        links.append(_link(shape, shape.local)._replace(joint=_link_joint(entries, hung)))
         textures.append(shape.texture)
     return world.add_assembly(links, _pose(_frame(entries, chain, matrices)), textures)
 
@@ -103,7 +103,7 @@ def _frame(entries: Mapping[int, EntryParameters], chain: Chain, matrices: Mappi
     return multiply(matrices[joint], frames.invert(entries[joint].local))
 
 
-def _hinge(entries: Mapping[int, EntryParameters], hung: Hung) -> LinkJoint:
+def _link_joint(entries: Mapping[int, EntryParameters], hung: Hung) -> LinkJoint:
     joint = entries[hung.joint]
     if isinstance(joint, ForceSensorParameters):
         return LinkJoint(hung.above, hung.local, "fixed", None, 0.0)

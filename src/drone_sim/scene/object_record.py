@@ -13,7 +13,7 @@ from drone_sim.scene.object_parameters import ObjectParameters
 
 @dataclass(eq=False)
 class ObjectRecord:
-    """An object of the scene. Its body, and then its object in the tree, are made from the entry."""
+    """An object of the scene. Its object in the tree, and a shape's body, are made from the entry."""
 
     entry: EntryParameters
     version: int = 0  # incremented to rebuild the body
@@ -24,7 +24,7 @@ class ObjectRecord:
 
     @property
     def present(self) -> EntryParameters:
-        """The entry with the object's present pose, parent, joint state and `static`; the same if nothing differs."""
+        """The entry with the present pose, parent, joint state and `static`; `entry` itself if nothing differs."""
         entry, item = self.entry, self.item
         if item is None:
             return entry

@@ -64,7 +64,7 @@ class SceneOperations:
 
     def free_name(self, wanted: str) -> str:
         """Return an unused name: the wanted one, or the first free one with a number: Cuboid, Cuboid0, Cuboid1, ..."""
-        return first_free((name for name in numbered(wanted) if plain(name) == name), self._scene.tree)
+        return first_free(numbered(plain(wanted)), self._scene.tree)
 
     def _record(self, handle: int) -> ObjectRecord:
         item = self._scene.tree[handle]
@@ -238,7 +238,7 @@ class SceneOperations:
             raise ParameterError("name = '': must have at least 1 character")
         renamed = changed(before, {"name": name})
         with self._changing(change_tree=lambda: scene.tree.rename(int(handle), name)):
-            record.entry = before.model_copy(update={"name": renamed.name})
+            record.entry = record.entry.model_copy(update={"name": renamed.name})
             for other in scene.records.values():
                 if other.entry.parent == before.name:
                     other.entry = other.entry.model_copy(update={"parent": name})
@@ -332,7 +332,7 @@ class SceneOperations:
             if moved.body is None:
                 moved.local = local
                 moved.put(moved.matrix())
-            tree.look_for_loose_ones()
+            tree.refresh_free_children()
 
         with self._changing(change_tree=hang):
             record.entry = placed(entry, new_parent.name if new_parent is not None else "", local)
@@ -458,10 +458,10 @@ class SceneOperations:
     def _changing(self, bodies: bool = True, change_tree: Callable[[], None] = lambda: None) -> Iterator[None]:
         """Update world and tree after entries were changed inside `with`; on ValueError, restore the entries."""
         scene = self._scene
-        if bodies:
-            scene.sync_chains()
         before = {index: (record, record.entry, record.version) for index, record in scene.records.items()}
         number, scripts = scene.next_index, dict(scene.scripts)
+        if bodies:
+            scene.sync_chains()
         try:
             yield
             scene.rebuild(change_tree, bodies)

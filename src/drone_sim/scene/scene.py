@@ -276,7 +276,7 @@ class Scene:
     def _update_carried(self, shape: ShapeObject) -> None:
         """Update the kinematic bodies after a shape's parent or its being static has changed."""
         if shape.name in self.tree:
-            self.tree.look_for_loose_ones()
+            self.tree.refresh_free_children()
         if shape.parent is None or not shape.is_static:
             self._context.carried.shapes.pop(shape.number, None)
         else:
@@ -322,12 +322,16 @@ class Scene:
 
     # ---- present values
 
+    def sync(self) -> None:
+        """Update all entries to the present values."""
+        for record in self.records.values():
+            record.entry = record.present
+
     def sync_chains(self) -> None:
         """Update all entries to the present values if there are joints or force sensors, whose links may change."""
         records = self.records.values()
         if any(isinstance(record.entry, (JointParameters, ForceSensorParameters)) for record in records):
-            for record in records:
-                record.entry = record.present
+            self.sync()
 
     def put_in_order(self) -> None:
         """Sort the objects by their handles, the order in which they were first added."""

@@ -21,7 +21,7 @@ from drone_sim.sensors.truth import PictureTruth
 from drone_sim.sensors.vision import Vision
 
 
-class CameraFitting(NamedTuple):
+class CameraMounting(NamedTuple):
     """The connection of a camera to its vehicle."""
 
     name: str  # unique, such as drone/front; seeds the noise
@@ -33,7 +33,7 @@ class CameraFitting(NamedTuple):
 class Camera(Sensor):
     """A vision sensor. Its period counts simulation steps; it renders only if a viewer wants the image."""
 
-    def __init__(self, parameters: CameraParameters, mounting: CameraFitting, vision: Vision):
+    def __init__(self, parameters: CameraParameters, mounting: CameraMounting, vision: Vision):
         """`vision` renders its images."""
         super().__init__(parameters.every)
         self.kind = parameters.kind

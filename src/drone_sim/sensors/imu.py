@@ -132,9 +132,9 @@ class Imu(Instrument):
     def save_state(self) -> Restore:
         """Return a function that restores the sensor and its integrals."""
         integrals = saved(self, "_velocity", "_axes", "_delta_velocity", "_delta_angle", "_duration")
-        return in_turn(super().save_state(), integrals, self._update_jumps)
+        return in_turn(super().save_state(), integrals, self._update_teleports)
 
-    def _update_jumps(self) -> None:
+    def _update_teleports(self) -> None:
         self._teleports = self.carrier.teleports
 
     # ---- messages

@@ -38,7 +38,8 @@ class VehicleType:
     def entry(self) -> dict[str, Any]:
         """Return the keys that a new vehicle's entry needs besides its place."""
         values = read_yaml(package_path() / "config" / self.config) if self.config else {}
-        return {**values.pop("drone", {}), **values}
+        drone = values.pop("drone", {})
+        return {**drone, **values}
 
 
 QUADRICOPTER = VehicleType(  # as in V-REP

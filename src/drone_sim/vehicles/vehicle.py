@@ -17,7 +17,7 @@ from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.sensors.camera import Camera, CameraFitting
+from drone_sim.sensors.camera import Camera, CameraMounting
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.vehicles.body import Body
 from drone_sim.vehicles.commands import LANDED, RESET, Commands, FlightState, request
@@ -59,7 +59,7 @@ class Vehicle:
         self.handles: list[int] = []  # of its objects
         self._cleared = -1  # the tree's count of clearings when the objects were added
         self.cameras = {
-            name: Camera(item, self._fitting(name, item), context.vision) for name, item in parameters.cameras.items()
+            name: Camera(item, self._mounting(name, item), context.vision) for name, item in parameters.cameras.items()
         }
         context.blades.append(self.propulsion.blades)
         context.names[self.body.number] = (parameters.name, self.object_name)
@@ -145,9 +145,9 @@ class Vehicle:
         sensor = objects.matrix(objects.handle(camera.object + self.suffix))
         return frames.multiply(sensor, OPTICAL_FROM_SENSOR)
 
-    def _fitting(self, name: str, camera: CameraParameters) -> CameraFitting:
+    def _mounting(self, name: str, camera: CameraParameters) -> CameraMounting:
         pose, velocity = partial(self.optical, camera), partial(self._velocity, camera)
-        return CameraFitting(f"{self.name}/{name}", pose, velocity, self.context.clock)
+        return CameraMounting(f"{self.name}/{name}", pose, velocity, self.context.clock)
 
     def _velocity(self, camera: CameraParameters) -> tuple[Vector, Vector]:
         """Linear and angular velocity of a camera: present ones, or over the last step if scripts move it."""

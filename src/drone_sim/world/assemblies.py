@@ -49,7 +49,7 @@ class Link(NamedTuple):
     local: Matrix = IDENTITY
     mass: float = 0.0
     inertia: PrincipalInertia = _NO_INERTIA
-    hinge: LinkJoint | None = None
+    joint: LinkJoint | None = None
 
 
 def create(client: int, files: BulletFiles, links: Sequence[Link], pose: Pose) -> tuple[int, list[int]]:
@@ -74,21 +74,21 @@ def create(client: int, files: BulletFiles, links: Sequence[Link], pose: Pose) -
     names = [pybullet.getJointInfo(body, number, client)[12] for number in range(len(links) - 1)]
     numbers = [-1, *(names.index(f"l{index}".encode()) for index in range(1, len(links)))]
     for link, number in zip(links, numbers):
-        if link.hinge is not None:
-            _set_joint(client, body, number, link.hinge)
+        if link.joint is not None:
+            _set_joint(client, body, number, link.joint)
         if link.mass:
             moments = list(link.inertia.moments)
             pybullet.changeDynamics(body, number, localInertiaDiagonal=moments, physicsClientId=client)
     return body, numbers
 
 
-def _set_joint(client: int, body: int, number: int, hinge: LinkJoint) -> None:
+def _set_joint(client: int, body: int, number: int, joint: LinkJoint) -> None:
     """Give a link V-REP's material, and let its joint move freely."""
     pybullet.changeDynamics(body, number, lateralFriction=1, restitution=0, physicsClientId=client)
     pybullet.changeDynamics(body, number, jointDamping=0, maxJointVelocity=_MAX_VELOCITY, physicsClientId=client)
-    if hinge.motion != "fixed":
+    if joint.motion != "fixed":
         pybullet.setJointMotorControl2(body, number, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
-        pybullet.resetJointState(body, number, hinge.value, 0, client)
+        pybullet.resetJointState(body, number, joint.value, 0, client)
 
 
 # ---- as a URDF
@@ -99,8 +99,8 @@ def _urdf(files: BulletFiles, links: Sequence[Link]) -> bytes:
     for index, link in enumerate(links):
         _add_link(files, robot, index, link)
     for index, link in enumerate(links):
-        if link.hinge is not None:
-            _add_joint(robot, index, link.hinge)
+        if link.joint is not None:
+            _add_joint(robot, index, link.joint)
     Xml.indent(robot)  # PyBullet truncates long lines
     return Xml.tostring(robot)
 
@@ -125,16 +125,16 @@ def _add_link(files: BulletFiles, robot: Xml.Element, index: int, link: Link) ->
             collision.set("concave", "yes")
 
 
-def _add_joint(robot: Xml.Element, index: int, hinge: LinkJoint) -> None:
-    kind = "continuous" if hinge.motion == "revolute" and hinge.limits is None else hinge.motion
-    joint = Xml.SubElement(robot, "joint", name=f"j{index}", type=kind)
-    Xml.SubElement(joint, "parent", link=f"l{hinge.parent}")
-    Xml.SubElement(joint, "child", link=f"l{index}")
-    _add_origin(joint, hinge.local)
-    Xml.SubElement(joint, "axis", xyz="0 0 1")
-    if hinge.limits is not None or hinge.motion == "prismatic":
-        low, high = map(repr, hinge.limits or (-_NO_LIMIT, _NO_LIMIT))
-        Xml.SubElement(joint, "limit", lower=low, upper=high, effort=repr(_NO_LIMIT), velocity=repr(_NO_LIMIT))
+def _add_joint(robot: Xml.Element, index: int, joint: LinkJoint) -> None:
+    kind = "continuous" if joint.motion == "revolute" and joint.limits is None else joint.motion
+    element = Xml.SubElement(robot, "joint", name=f"j{index}", type=kind)
+    Xml.SubElement(element, "parent", link=f"l{joint.parent}")
+    Xml.SubElement(element, "child", link=f"l{index}")
+    _add_origin(element, joint.local)
+    Xml.SubElement(element, "axis", xyz="0 0 1")
+    if joint.limits is not None or joint.motion == "prismatic":
+        low, high = map(repr, joint.limits or (-_NO_LIMIT, _NO_LIMIT))
+        Xml.SubElement(element, "limit", lower=low, upper=high, effort=repr(_NO_LIMIT), velocity=repr(_NO_LIMIT))
 
 
 def _add_shape(element: Xml.Element, kind: str, pose: Matrix, geometry: Geometry) -> Xml.Element:

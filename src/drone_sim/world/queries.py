@@ -176,11 +176,13 @@ class Queries:
         return float(pybullet.getAABB(body, -1, self._client)[0][2])
 
     def overlaps(self) -> list[tuple[int, int]]:
-        """Return the pairs of moving bodies whose bounds overlap."""
+        """Return the pairs of moving bodies whose bounds overlap; permeable bodies do not count."""
         bodies, bounds = [], []
         for index in range(pybullet.getNumBodies(self._client)):
             body = pybullet.getBodyUniqueId(index, self._client)
-            if pybullet.getNumJoints(body, self._client) or pybullet.getDynamicsInfo(body, -1, self._client)[0]:
+            joints = pybullet.getNumJoints(body, self._client)
+            is_moving = joints or pybullet.getDynamicsInfo(body, -1, self._client)[0]
+            if is_moving and not all(self._filter.is_permeable(body, link) for link in range(-1, joints)):
                 bodies.append(body)
                 bounds.append(self._bounds(body))
         if len(bodies) < 2:  # the usual case
@@ -190,10 +192,12 @@ class Queries:
         return [(bodies[first], bodies[second]) for first, second in np.argwhere(np.triu(meet & meet.T, k=1))]
 
     def is_deep_inside(self, first: int, second: int) -> bool:
-        """Return whether two bodies are in each other by more than a quarter of the smaller one's smallest extent."""
+        """Return whether two bodies are in each other by more than a quarter of the shortest side of their bounds."""
         extent = min(float((high - low).min()) for low, high in map(self._bounds, (first, second)))
         rows = pybullet.getClosestPoints(first, second, 0.0, physicsClientId=self._client)
-        return min((row[8] for row in rows), default=0.0) < -0.25 * extent
+        is_permeable = self._filter.is_permeable
+        depths = [-row[8] for row in rows if not (is_permeable(first, row[3]) or is_permeable(second, row[4]))]
+        return max(depths, default=0.0) > 0.25 * extent
 
     def _bounds(self, body: int) -> tuple[Any, Any]:
         """Return the lowest and the highest corner (m) of the box around a body, in the world."""
