@@ -28,7 +28,10 @@ class FlyTo(gymnasium.Env):
         super().reset(seed=seed)
         self.goal = self.np_random.uniform([0.5, -1, 1], [2, 1, 2])
         self.restart.wait_for_service()
-        self.restart()
+        self.heard.queue.clear()  # what is left of the last flight has the same stamps
+        answer = self.restart()
+        if not answer.success:
+            raise RuntimeError(answer.message)
         return self._observation(lambda stamp: stamp == rospy.Time(0, 100_000_000)), {}
 
     def step(self, action):

@@ -9,9 +9,9 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 import unittest
 from pathlib import Path
+from unittest import mock
 
 import rospy
 import rostest
@@ -23,6 +23,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from drone_sim.files.resources import package_path
 from drone_sim.grading import plan as plans
+from drone_sim.ros.grading import seeds
 from drone_sim.ros.grading.grade_live import grade
 from drone_sim.ros.grading.simulator import Mismatch
 
@@ -76,12 +77,14 @@ class Flight:
     """The odometry of one vehicle, as it comes."""
 
     def __init__(self, drone="drone"):
-        self.rows, self._came = [], threading.Condition()
+        self.rows, self._is_stopped, self._came = [], False, threading.Condition()
         self._subscriber = rospy.Subscriber(f"/{drone}/odom", Odometry, self._take)
 
     def _take(self, message):
         with self._came:
-            if message.header.stamp.to_nsec() > FIRST:  # while it is stopped, the state has the stamp 0
+            stamp = message.header.stamp.to_nsec()
+            self._is_stopped = stamp == 0
+            if stamp > FIRST:
                 self.rows.append(state(message))
             self._came.notify_all()
 
@@ -91,6 +94,12 @@ class Flight:
             last = round(seconds * 1e9)
             assert self._came.wait_for(lambda: self.rows and self.rows[-1][0] >= last, timeout), self.rows[-1:]
             return [row for row in self.rows if row[0] <= last]
+
+    def forget(self):
+        """Wait until the flight has been stopped, and forget it."""
+        with self._came:
+            assert self._came.wait_for(lambda: self._is_stopped, HANGS), self.rows[-1:]
+            self.rows.clear()
 
     def close(self):
         self._subscriber.unregister()
@@ -185,8 +194,7 @@ class Lockstep(unittest.TestCase):
             with self.subTest(node), self.flying(*arguments, nodes=[(NODES / node, "0.1")]) as (_, flight, _):
                 flights[node] = flight.until(SECONDS)
                 self.assertTrue(rospy.ServiceProxy("/drone_sim/stop", Trigger)().success)
-                time.sleep(0.5)
-                flight.rows.clear()
+                flight.forget()
                 self.assertTrue(rospy.ServiceProxy("/drone_sim/start", Trigger)().success)
                 self.assertEqual(flight.until(SECONDS), flights[node])
             self.setUp()
@@ -275,6 +283,17 @@ class Lockstep(unittest.TestCase):
                 self.assertNotIn("Traceback", "".join(simulator.lines))
             self.setUp()
 
+    def test_a_config_turns_simulated_time_on_until_the_end(self):
+        rospy.delete_param("/use_sim_time")
+        try:
+            with self.flying(COMMANDS) as (simulator, _, _):
+                simulator.wait_for("/use_sim_time is now true")
+                simulator.wait_for("time stands at 0.05 s until there is")
+                self.assertIs(rospy.get_param("/use_sim_time"), True)
+            self.assertFalse(rospy.has_param("/use_sim_time"))
+        finally:
+            rospy.set_param("/use_sim_time", True)
+
     def test_a_script_that_publishes_in_sensing_does_not_stop_a_flight(self):
         script = Path(self.folder.name) / "sensing.py"
         script.write_text(SENSING)
@@ -287,12 +306,16 @@ class Lockstep(unittest.TestCase):
     def test_a_graded_flight_with_a_timeline_has_the_same_digest_every_time(self):
         file = Path(self.folder.name) / "plan.yaml"
         file.write_text(PLAN + f"scene: {SCENE}\nconfig: {{{SMALL.strip()}}}\n")
-        plan = plans.read(file)
+        plan, other = plans.read(file), Path(self.folder.name) / "other.yaml"
+        other.write_text("- {at: 1, land: {}}\n")
         results = []
         for _ in range(2):
             with self.flying(COMMANDS, nodes=[(NODES / "reacting.py",)]) as (simulator, _, _):
                 simulator.wait_for("in step with")
                 results.append(grade(plan, 1, "reacting", "drone_sim", HANGS)[0])
+                with mock.patch.object(seeds, "timeline_file", lambda _plan: str(other)):
+                    replaced, _ = grade(plan, 1, "reacting", "drone_sim", HANGS)
+            self.assertIn("/drone_sim executes another timeline than the plan's", replaced.error)
             self.setUp()
         self.assertIsNone(results[0].error)
         self.assertEqual(results[0].digest, results[1].digest)

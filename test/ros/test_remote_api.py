@@ -69,6 +69,23 @@ class RemoteApi(unittest.TestCase):
         self.services["stop"]()  # answered although the client holds the simulation
         self.assertEqual(sim.getSimulationState(), sim.simulation_stopped)
 
+    def test_a_steps_are_not_waited_for_while_a_client_holds_the_simulation(self):
+        sim = RemoteAPIClient(port=self.port).require("sim")
+        sim.startSimulation()
+        sim.pauseSimulation()
+        step = rospy.ServiceProxy("~step", Trigger)
+        self.assertTrue(step().success)
+        sim.setStepping(True)
+        answer = step()
+        self.assertFalse(answer.success)
+        self.assertEqual(
+            answer.message,
+            "interrupted: a client of the remote API holds the simulation: 1 of 1 steps have not been run",
+        )
+        sim.setStepping(False)
+        self.assertTrue(step().success)
+        sim.stopSimulation()
+
     def test_b_topics_reach_functions_of_the_client(self):
         client = RemoteAPIClient(port=self.port)
         sim, ros = client.require("sim"), client.require("simROS")

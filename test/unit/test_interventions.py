@@ -4,6 +4,7 @@ from contextlib import closing, suppress
 from types import SimpleNamespace
 from unittest import mock
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
@@ -23,6 +24,7 @@ from drone_sim.remote.legacy.server import LegacyServer
 from drone_sim.remote.server import RemoteApiServer
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.grading.flight_listener import FlightListener, LiveRules
+from drone_sim.ros.grading.grade_live import missed_steps
 from drone_sim.ros.node import interventions, services
 from drone_sim.ros.vehicle import inputs, tuning_server
 from drone_sim.run import parameters
@@ -196,7 +198,7 @@ def test_tuning_is_told_and_what_stays_of_it_at_every_start(stage):
 
 
 def test_services_are_told_but_a_snapshot(stage):
-    services.Services(stage.player, stage.inbox, lambda: None)
+    services.Services(stage.player, SimpleNamespace(summary=""), stage.inbox, lambda: None)
     for name in ("snapshot", "restore", "pause"):
         stage.hear(f"~{name}", SimpleNamespace(data=True))
     said = [(one.split(" (")[0], one.rpartition("/")[0].rpartition("/")[2]) for one in stage.lines()]
@@ -210,6 +212,12 @@ def test_a_plan_lists_the_functions_that_a_client_may_call(stage):
         hear(String(line))
     hear(String("call sysCall_init of the script of Lamp at 1 s (x)"))
     assert [one.split()[2:4] for one in rules.tried] == [["run", "a"], ["call", "sysCall_init"]]
+
+
+@pytest.mark.parametrize("lost, missed", [([], 0), ([3], 1), ([0, 1, 5, 6], 2)])
+def test_steps_that_were_not_heard_are_counted(lost, missed):
+    times = np.delete(np.arange(2, 12) * 0.05, lost)
+    assert missed_steps(times, 0.05) == missed
 
 
 def test_odometry_of_another_node_is_no_flight(stage, tmp_path):

@@ -62,7 +62,7 @@ def test_what_ends_the_pause_interrupts_all_orders(begin, interrupt):
     orders = [player.order_steps(3), player.order_steps(4)]
     player.step()
     interrupt(player)
-    for order, left in zip(orders, (2, 4)):
+    for order, left in zip(orders, ("2 of 3", "4 of 4")):
         assert str(order.exception(0)) == f"interrupted: {left} steps have not been run"
 
 
@@ -72,7 +72,7 @@ def test_a_breakpoint_ends_all_orders(begin):
     orders = [player.order_steps(count) for count in (1, 20, 1)]
     player.step()
     assert orders[0].result(0) == "t = 0.05 s", "all of its steps have been run"
-    for order, left in zip(orders[1:], (20, 1)):
+    for order, left in zip(orders[1:], ("20 of 20", "1 of 1")):
         assert str(order.exception(0)) == f"breakpoint at {path}:4, t = 0.05 s: {left} steps have not been run"
     assert not player.is_step_due
 

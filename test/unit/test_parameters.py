@@ -153,6 +153,11 @@ def test_no_limits_can_be_written_as_a_word(word):
     assert parameters.load({"control": {"thrust_limits": word}}).control.thrust_limits is None
 
 
+@pytest.mark.parametrize("topics, wanted", [("none", []), ("", []), ("goto, cmd_vel", ["goto", "cmd_vel"])])
+def test_topics_of_lockstep_can_be_a_text(topics, wanted):
+    assert [each.topic for each in parameters.load({"lockstep": {"wait_for": topics}}).lockstep.wait_for] == wanted
+
+
 def test_parameters_are_frozen():
     with pytest.raises(ValueError, match="frozen"):
         parameters.load().control.Kzref = 1.0

@@ -348,7 +348,7 @@ def test_a_script_that_fails_is_an_exception_where_the_client_steps(stage):
 
 
 def test_a_scene_that_cannot_be_started_is_an_exception(stage, monkeypatch):
-    def fail(_scene=None):
+    def fail(*_):
         raise ParameterError("scene/objects: it is not there")
 
     monkeypatch.setattr(stage.simulation, "start", fail)

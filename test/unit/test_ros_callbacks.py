@@ -1,5 +1,6 @@
 """Callbacks run in rospy's threads: they read nothing of the simulation, check, and leave a job for its thread."""
 
+import math
 import threading
 from queue import Queue
 from unittest import mock
@@ -118,6 +119,15 @@ def test_a_command_is_checked_against_what_has_been_tuned(simulation, callbacks)
     assert not inputs.log.is_refusing("cmd_vel")
 
 
+@pytest.mark.parametrize("topic, message", [("cmd_vel", Twist()), ("cmd_vel_stamped", TwistStamped())])
+def test_a_refusal_names_the_topic_of_the_command(simulation, callbacks, caplog, topic, message):
+    inputs = VehicleInputs(simulation, simulation.drone.parameters, Inbox())
+    (message.twist if topic == "cmd_vel_stamped" else message).linear.x = math.nan
+    callbacks[f"drone/{topic}"](message)
+    assert inputs.log.is_refusing("cmd_vel") and inputs.log.last_refusal().topic == topic
+    assert f"{topic} refused, the last valid one is kept: " in caplog.text
+
+
 @pytest.mark.parametrize("made", [vehicle_handles.VehicleHandles, object_handles.ObjectHandles])
 def test_a_handle_is_dragged_without_the_simulation(simulation, callbacks, made):
     inbox = Inbox()
@@ -214,7 +224,7 @@ def test_to_resume_what_is_not_paused_says_how_to_pause(simulation, monkeypatch)
     monkeypatch.setattr(rospy, "Service", mock.Mock())
     monkeypatch.setattr(rospy, "logwarn", warnings.append)
     monkeypatch.setattr(services, "scene_parameter", str)
-    offered = services.Services(player, Inbox(), lambda: None)
+    offered = services.Services(player, mock.Mock(), Inbox(), lambda: None)
     assert "pause true` pauses" in offered.pause(False) and len(warnings) == 1
     assert offered.pause(True) == "paused"
     player.playing = False

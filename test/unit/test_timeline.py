@@ -1,13 +1,16 @@
 """Timelines: which step an entry takes effect in, and what a mistake in the file says."""
 
 import random
+from contextlib import closing
 
 import pytest
 
+from drone_sim.files import yaml_files
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline import timeline
 from drone_sim.offline.timeline import Entry, Push, Timeline, TimelineError, first_step
 from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 PARAMETERS = parameters.load()
 
@@ -47,6 +50,39 @@ def test_entry_at_a_steps_own_time_belongs_to_that_step(time_step):
 @pytest.mark.parametrize("time, step", [(0.0, 0), (0.001, 1), (0.049, 1), (0.051, 2), (0.0999, 2), (3599.96, 72000)])
 def test_entry_between_steps_waits_for_the_next_one(time, step):
     assert first_step(time, 0.05) == step
+
+
+@pytest.mark.parametrize(
+    "text, why",
+    [
+        ("- {at: 0.1, object: {name: Bal, position: [1, 0, 2]}}", "entry at 0.1 s: no object named 'Bal'"),
+        ("- {at: 0.1, vehicle: drone, land: {}}", "entry at 0.1 s: there is no vehicle drone"),
+        ("- {at: 0.1, land: {}}", "entry at 0.1 s: there is no vehicle"),
+    ],
+)
+def test_an_entry_that_cannot_be_executed_says_why(tmp_path, text, why):
+    commands = read(tmp_path, text)
+    with closing(Simulation(PARAMETERS, started=False)) as simulation:
+        commands.apply(0, simulation.vehicles)
+        vehicles = simulation.vehicles if "object" in text else {}
+        with pytest.raises(TimelineError, match=why):
+            commands.apply(2, vehicles)
+
+
+def test_a_digest_tells_timelines_apart(tmp_path):
+    rows = [
+        "- {at: 1, push: {force: [0, 0, 1], duration: 0.2}}",
+        "- {at: 1, weather: {wind: [0, 1, 0], gusts: {deviation: [0.1, 0, 0]}}}",
+        "- {at: 1, land: {}}",
+        "- {at: 1, twist: {linear: [1, 0, 0]}}",
+        "- {at: 1, twist: {linear: [1, 0, 0]}}\n- {at: 2, goto: {position: [1, 2, 3]}}",
+        "- {at: 1, object: {name: Ball, position: [1, 2, 3]}}",
+        "- {at: 1, faults: {propellers: [1, 1, 0, 1]}}",
+    ]
+    digests = [read(tmp_path, text).digest for text in rows]
+    assert len(set(digests)) == len(rows)
+    assert digests == [timeline.of_rows(yaml_files.parse(text), PARAMETERS, "plan.yaml").digest for text in rows]
+    assert Timeline((), 0.05).digest == ""
 
 
 def test_each_kind_reaches_the_drone_once_in_its_step(tmp_path):

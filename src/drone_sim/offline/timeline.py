@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -48,6 +49,7 @@ from drone_sim.vehicles.vehicle import Vehicle
 
 MAX_TIME = 1e6  # s, the longest flight
 _ZERO = (0.0, 0.0, 0.0)
+_DIGEST_LENGTH = 16
 _TOLERANCE = 1e-6  # in steps: decimal times are not exact multiples of a binary step
 
 
@@ -123,8 +125,16 @@ class Entry(NamedTuple):
         return self.at + (self.action.duration if isinstance(self.action, Push) else 0.0)
 
     def apply(self, vehicles: Mapping[str, Vehicle]) -> None:
-        """Apply the action to the entry's vehicle."""
-        vehicle = vehicles[self.vehicle] if self.vehicle else next(iter(vehicles.values()))
+        """Apply the action to the entry's vehicle. Raises TimelineError, as the scene may have changed in flight."""
+        vehicle = vehicles.get(self.vehicle) if self.vehicle else next(iter(vehicles.values()), None)
+        if vehicle is None:
+            raise TimelineError(f"entry at {self.at:g} s: there is no vehicle {self.vehicle}".rstrip())
+        try:
+            self._apply_to(vehicle)
+        except ValueError as error:
+            raise TimelineError(f"entry at {self.at:g} s: {error}") from None
+
+    def _apply_to(self, vehicle: Vehicle) -> None:
         if isinstance(self.action, Twist):
             vehicle.commands.receive(self.action)
         elif isinstance(self.action, Pose):
@@ -155,6 +165,11 @@ class Timeline:
         """The time (s) of the last command or the end of the last push; 0 without entries."""
         return max((entry.end for entry in self.entries), default=0.0)
 
+    @property
+    def digest(self) -> str:
+        """A text that differs between timelines with different entries; '' without entries."""
+        return hashlib.sha256(repr(self.entries).encode()).hexdigest()[:_DIGEST_LENGTH] if self.entries else ""
+
     def of(self, vehicle: str) -> Timeline:
         """Return the entries of a vehicle, including those without a vehicle's name."""
         return Timeline([entry for entry in self.entries if entry.vehicle in ("", vehicle)], self._time_step)
@@ -164,7 +179,7 @@ class Timeline:
         return step in self._due
 
     def apply(self, step: int, vehicles: Mapping[str, Vehicle]) -> None:
-        """Apply the entries of a step (counted from 0), just before it runs."""
+        """Apply the entries of a step (counted from 0), just before it runs. Raises TimelineError."""
         for entry in self._due.get(step, ()):
             entry.apply(vehicles)
 

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from drone_sim.config.types import Checked, Finite, Within
 
 STEP = "step"
+_NONE = "none"  # as the launch argument, for no topics: an empty one is hard to write
 _MAX_TOPICS = 64
 _LONGEST = 200  # characters of a topic
 _TOPIC = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
@@ -69,7 +70,7 @@ class LockstepParameters(Checked):
             return values
         entries = values.get("wait_for")
         if isinstance(entries, str):
-            entries = [name.strip() for name in entries.split(",")] if entries.strip() else []
+            entries = [] if entries.strip() in ("", _NONE) else [name.strip() for name in entries.split(",")]
         if not isinstance(entries, (list, tuple)):
             return values
         common = {key: values[key] for key in ("trigger", "every") if key in values}

@@ -268,7 +268,7 @@ def _read_config(name: str, below: Mapping[str, Any]) -> dict[str, Any]:
     if "config" in values:
         raise ParameterError(f"{name}: a config file must not have the key `config`")
     scene_parameters.find_files_beside(path.parent, values)
-    for key in ("script", "scene_file"):
+    for key in ("script", "scene_file", "timeline_file"):
         if isinstance(values.get(key), str) and Path(values[key]).suffix:  # `tutorial` and `target` are no files
             values[key] = named_in(path.parent, values[key])
     return values

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 
+from drone_sim.run.parameters import Parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.run.stepping import Diverged
 from drone_sim.scripting.api.control import STOP
@@ -22,6 +23,7 @@ _MAX_ORDERS = 1000  # calls of `step` that wait at the same time
 class _Order:
     """Steps that are to be run while the simulation is paused."""
 
+    count: int
     left: int
     answer: Future[str] = field(default_factory=Future)  # the simulated time after the last step, in words
 
@@ -33,10 +35,19 @@ class Player:
     """
 
     def __init__(
-        self, simulation: Simulation, step: Callable[[], None], tell: Callable[[str], None], simulated_time: bool
+        self,
+        simulation: Simulation,
+        step: Callable[[], None],
+        tell: Callable[[str], None],
+        simulated_time: bool,
+        prepare: Callable[[Parameters], None] = lambda _parameters: None,
     ):
-        """`step` runs and publishes one step. With `simulated_time`, other nodes wait while the clock stands still."""
+        """`step` runs and publishes one step. With `simulated_time`, other nodes wait while the clock stands still.
+
+        `prepare` is called at each start as `Simulation.start` says.
+        """
         self.simulation = simulation
+        self._prepare = prepare
         self._step = step
         self.paused = False
         self.begun = False  # whether it has started since this was last set to False
@@ -79,7 +90,7 @@ class Player:
         """Read scene and scripts from disk and begin at time 0. Raises as Simulation.start, and is then stopped."""
         self.interrupt_steps("interrupted")
         self.paused, self.failure = False, None
-        self.attempt(lambda: self.simulation.start(scene_file))
+        self.attempt(lambda: self.simulation.start(scene_file, self._prepare))
         self.simulation.look()  # reads meshes and textures now, which would delay the first step
         self.begun = True
         self._pause_at_breakpoint()
@@ -130,7 +141,7 @@ class Player:
             raise ValueError("the simulation is not paused: call `pause` before `step`")
         if len(self._orders) >= _MAX_ORDERS:
             raise ValueError(f"{_MAX_ORDERS} calls of `step` are waiting already")
-        order = _Order(count)
+        order = _Order(count, count)
         self._orders.append(order)
         return order.answer
 
@@ -138,7 +149,7 @@ class Player:
         """Cancel all ordered steps; their answer is a ValueError with `reason`."""
         while self._orders:
             order = self._orders.popleft()
-            order.answer.set_exception(ValueError(f"{reason}: {order.left} steps have not been run"))
+            order.answer.set_exception(ValueError(f"{reason}: {order.left} of {order.count} steps have not been run"))
 
     def _fail_steps(self, error: ScriptError | Diverged) -> None:
         while self._orders:

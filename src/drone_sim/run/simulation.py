@@ -215,17 +215,21 @@ class Simulation:
 
     # ---- start and stop
 
-    def start(self, scene_file: str | None = None) -> None:
+    def start(
+        self, scene_file: str | None = None, prepare: Callable[[Parameters], None] = lambda _parameters: None
+    ) -> None:
         """Read scene and scripts from disk, and run the scripts' init; `scene_file` replaces the present scene file.
 
-        A scene that was edited while stopped is not read again. If scene or vehicles cannot be read, the present ones
+        A scene that was edited while stopped is not read again. `prepare` is called with the parameters of the run
+        before the scene is built. If it raises an exception, or scene or vehicles cannot be read, the present ones
         stay, stopped. Raises ParameterError, UrdfError, ScriptError.
         """
         self.stop()
         if scene_file is None and self._initial.is_edited:
+            prepare(self.parameters)
             self._rebuild(self.parameters, self._initial.handles)
         else:
-            self._load_scene(self.parameters.scene_file if scene_file is None else scene_file)
+            self._load_scene(self.parameters.scene_file if scene_file is None else scene_file, prepare)
         give_back_memory()
         self.load_scripts()
 
@@ -234,8 +238,10 @@ class Simulation:
         self.stop()
         self._load_scene(scene_file)
 
-    def _load_scene(self, scene_file: str) -> None:
-        self._rebuild(self.parameters.in_scene(scene_file), NO_HANDLES)
+    def _load_scene(self, scene_file: str, prepare: Callable[[Parameters], None] = lambda _parameters: None) -> None:
+        parameters = self.parameters.in_scene(scene_file)
+        prepare(parameters)
+        self._rebuild(parameters, NO_HANDLES)
         self._warn_of_unsupported()
         self.document = SceneDocument(self.parameters, self.object_handles)
         self._initial = self._initial._replace(is_edited=False)

@@ -62,8 +62,14 @@ class Simulator:
         return rospy.get_param(f"{self.node}/{name}", default)
 
     def set_parameter(self, name: str, value: Any) -> None:
-        """Set a private parameter, which the node reads when a service tells it to. Raises one of `FAILURES`."""
-        rospy.set_param(f"{self.node}/{name}", value)
+        """Set a private parameter, which the node reads when a service tells it to; None deletes it.
+
+        Raises one of `FAILURES`.
+        """
+        if value is not None:
+            rospy.set_param(f"{self.node}/{name}", value)
+        elif rospy.has_param(f"{self.node}/{name}"):
+            rospy.delete_param(f"{self.node}/{name}")
 
 
 def script_failure(line: str) -> ScriptFailure | None:

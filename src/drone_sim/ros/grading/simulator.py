@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -27,6 +28,7 @@ _IGNORED = (
     *("lockstep", "step_count", "timeline_file"),
 )
 _SCRIPT_ERROR = "script error: "
+_TIMELINE = re.compile(r"; timeline (\w+)$")  # at the end of the answer of a start
 
 
 class Mismatch(ValueError):
@@ -91,30 +93,35 @@ class GradedSimulator(Simulator):
             raise Mismatch(f"no simulator {self.node} publishes its real_time_factor") from None
         return float(decode_config(message)["real_time_factor"])
 
-    def start(self, scene: str, timeline: str = "") -> None:
+    def start(self, scene: str, timeline: str = "", digest: str = "") -> None:
         """Restart the simulation in a scene file, '' for the scene of the parameters. Raises Mismatch.
 
-        The simulator itself executes the entries of the file `timeline`.
+        The simulator itself executes the entries of the file `timeline`, whose Timeline.digest must be `digest`.
         """
         self.error = ""
         files = {"scene_file": scene, "timeline_file": timeline}
-        old_files = {name: self.parameter(name, "") for name in files}
+        old_files = {name: self.parameter(name) for name in files}
         for name, file in files.items():
             self.set_parameter(name, file)
         try:
-            self._call("load_scene")
+            answer = self._call("load_scene")
         finally:
-            for name, file in old_files.items():
-                self.set_parameter(name, file)
+            for name, old_file in old_files.items():
+                self.set_parameter(name, old_file)
+        found = _TIMELINE.search(answer)
+        if (found[1] if found else "") != digest:
+            raise Mismatch(f"{self.node} executes another timeline than the plan's: somebody has replaced it")
 
     def stop(self) -> None:
         """Stop the simulation, which runs the script's cleanup. Raises Mismatch."""
         self._call("stop")
 
-    def _call(self, service: str) -> None:
+    def _call(self, service: str) -> str:
+        """Return the answer of a service. Raises Mismatch if it did not succeed."""
         success, message = self.call(service)
         if not success:
             raise Mismatch(f"{self.node}/{service}: {message}")
+        return message
 
     def _on_state(self, message: String) -> None:
         self.state = message.data

@@ -12,7 +12,7 @@ import contextlib
 import gc
 import logging
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 import rospy
 from std_msgs.msg import String
@@ -24,12 +24,13 @@ from drone_sim.ros.core.launch_parameters import parameters_of, use_sim_time
 from drone_sim.ros.core.master_watch import MasterWatch
 from drone_sim.ros.core.publishing import StepTime
 from drone_sim.ros.core.shutdown import Shutdown
-from drone_sim.ros.core.startup import init_node, release_name, status_of_node
+from drone_sim.ros.core.startup import MASTER_FAILURES, init_node, release_name, status_of_node
 from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.inspection import InspectionTopics
 from drone_sim.ros.node.interventions import Interventions
 from drone_sim.ros.node.lockstep import Lockstep
 from drone_sim.ros.node.object_poses import ObjectPoses
+from drone_sim.ros.node.run_timeline import RunTimeline
 from drone_sim.ros.node.scene_editing import SceneEditing
 from drone_sim.ros.node.services import Services
 from drone_sim.ros.node.signals import SignalTopic
@@ -49,6 +50,7 @@ from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.ros.vehicle.vehicle_topics import FleetTopics
 from drone_sim.run.diagnosis.diagnosis import Diagnosis
 from drone_sim.run.diagnosis.finding import Finding
+from drone_sim.run.lockstep_parameters import LockstepParameters
 from drone_sim.run.pacing import Beat, Pace, Pacer, period
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.player import Player
@@ -61,6 +63,7 @@ from drone_sim.vehicles.situation import hears_commands
 from drone_sim.vehicles.vehicle import Vehicle
 
 _NAME = "drone_sim"
+_USE_SIM_TIME = "/use_sim_time"
 _SOON, _SELDOM = 0.05, 0.2  # s between two messages while the simulation stands: after a change, and without one
 
 
@@ -85,7 +88,10 @@ class Node:
         )
         self._time = StepTime(self.simulation, use_sim_time())
         self._state = rospy.Publisher("~state", String, queue_size=10, latch=True)
-        self.player = Player(self.simulation, self._step_and_show, self._state.publish, self._time.simulated)
+        self._timeline = RunTimeline(parameters)
+        self.player = Player(
+            self.simulation, self._step_and_show, self._state.publish, self._time.simulated, self._timeline.read
+        )
         self._interventions = Interventions(self.simulation)
         self._outside = start_server(parameters.remote_api, self.player, backend, self._interventions.watched)
         self._pacer = Pacer(period(parameters), sleep=self._outside.wait)
@@ -98,7 +104,7 @@ class Node:
         self._topics = FleetTopics(self.simulation, self._inbox, self._time.stamp, self._gate)
         self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
         restored = self._lockstep.reset if self._lockstep else lambda: None
-        self._services = Services(self.player, self._inbox, self._topics.follow, restored)
+        self._services = Services(self.player, self._timeline, self._inbox, self._topics.follow, restored)
         self._editing = SceneEditing(self.player, self._inbox, self._services)
         self._windows = WindowTopics(self.simulation, self._inbox)
         self._signals = SignalTopic(self.simulation)
@@ -145,7 +151,6 @@ class Node:
             rospy.loginfo(f"drone_sim: the remote API listens on {self._outside.address}")
         else:
             with contextlib.suppress(ScriptError):  # said already; the node waits for `start`
-                self._services.read_timeline()
                 self.player.start()
             self._topics.follow()  # so that cameras see the first step
         gc.collect()
@@ -217,7 +222,7 @@ class Node:
 
     def _step_and_show(self) -> None:
         self._time.begin()
-        self._services.timeline.apply(self.simulation.steps, self.simulation.vehicles)
+        self._timeline.apply(self.simulation)
         if self._lockstep is not None:
             self._time.stamp()  # publishes the present time after a restore, which is no trigger of the step
             self._lockstep.begin_waits()
@@ -232,6 +237,8 @@ class Node:
 
     def _idle(self) -> None:
         """Paused, stopped or held from outside: wait for something to do, and show what it changed."""
+        if self._outside.holds:  # nobody knows for how long
+            self.player.interrupt_steps("interrupted: a client of the remote API holds the simulation")
         self._inbox.wait(self._until_shown())
         self._time.begin()
         self._inbox.run_jobs()
@@ -327,6 +334,25 @@ class _ToRosout(logging.Handler):
         logging.getLogger("rosout").log(record.levelno, self.format(record))
 
 
+@contextlib.contextmanager
+def _simulated_time(lockstep: LockstepParameters) -> Iterator[None]:
+    """Set /use_sim_time if lockstep needs it, and restore it at the end."""
+    if not lockstep.wait_for or use_sim_time():
+        yield
+        return
+    before = rospy.get_param(_USE_SIM_TIME, None)
+    rospy.set_param(_USE_SIM_TIME, True)
+    rospy.logwarn(f"lockstep needs simulated time: {_USE_SIM_TIME} is now true, for nodes that start from now on")
+    try:
+        yield
+    finally:
+        with contextlib.suppress(*MASTER_FAILURES, OSError):
+            if before is None:
+                rospy.delete_param(_USE_SIM_TIME)
+            else:
+                rospy.set_param(_USE_SIM_TIME, before)
+
+
 def main(watchdog: Watchdog) -> int:
     """Run the node; return its exit status: 1, after one line, for a wrong parameter, file or script."""
     # The time of messages is the simulation's; hearing its own /clock would cost the node half of its speed.
@@ -339,14 +365,12 @@ def main(watchdog: Watchdog) -> int:
         check_launch_arguments()
         parameters = parameters_of(rospy.get_name())
         script_path(parameters.script)  # none there ends the node; an error in one that is there stops the flight
-        if parameters.lockstep.wait_for and not use_sim_time():
-            rospy.set_param("/use_sim_time", True)
-            rospy.logwarn("lockstep needs simulated time: /use_sim_time is now true, for nodes that start from now on")
-        check_others([one.name for one in parameters.fleet], use_sim_time())
-        nodes.append(Node(parameters))
-        MasterWatch(nodes[0].descriptions).start()
-        release_name()
-        nodes[0].run(shutdown.is_requested)
+        with _simulated_time(parameters.lockstep):
+            check_others([one.name for one in parameters.fleet], use_sim_time())
+            nodes.append(Node(parameters))
+            MasterWatch(nodes[0].descriptions).start()
+            release_name()
+            nodes[0].run(shutdown.is_requested)
 
     status = status_of_node(_NAME, run)
     for node in nodes:

@@ -13,13 +13,12 @@ from std_srvs.srv import SetBool, Trigger
 
 from drone_sim.grading.permissions import CHANGE
 from drone_sim.message_text import shown
-from drone_sim.offline import timeline as timelines
-from drone_sim.offline.timeline import Timeline, TimelineError
 from drone_sim.ros.core.connections import wait_until_taken
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.core.launch_parameters import from_shell, script_from_shell
 from drone_sim.ros.core.startup import MASTER_FAILURES
 from drone_sim.ros.core.validation import intervention
+from drone_sim.ros.node.run_timeline import RunTimeline
 from drone_sim.run.parameters import MAX_STEP_COUNT, ParameterError, Parameters
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Snapshot
@@ -35,18 +34,24 @@ class Services:
     """~start, ~stop, ~restart, ~step, ~pause; ~load_scene; ~set_vehicles; ~snapshot, ~restore.
 
     Each answers when it is done, with one line. The scene's file is the private parameter `scene_file`, the script
-    that of `script`, the vehicles are those of the private parameter `vehicles`, what happens is in `timeline_file`,
-    and `step` takes `step_count` steps.
+    that of `script`, the vehicles are those of the private parameter `vehicles`, and `step` takes `step_count` steps.
     """
 
     def __init__(
-        self, player: Player, inbox: Inbox, follow: Callable[[], None], restored: Callable[[], None] = lambda: None
+        self,
+        player: Player,
+        timeline: RunTimeline,
+        inbox: Inbox,
+        follow: Callable[[], None],
+        restored: Callable[[], None] = lambda: None,
     ):
         """Advertise what is done with `player` by the thread that empties `inbox`.
 
-        `follow` lets the topics follow vehicles that have come or gone; `restored` is called after a restore.
+        `player` reads `timeline` at each start. `follow` lets the topics follow vehicles that have come or gone;
+        `restored` is called after a restore.
         """
         self._restored = restored
+        self._timeline = timeline
         self._player = player
         self._inbox = inbox
         self._follow = follow
@@ -55,7 +60,6 @@ class Services:
         self._snapshot: Snapshot | None = None
         # The scene of the config, if the parameter scene_file did not replace it.
         self._config_scene = "" if scene_parameter() else player.simulation.parameters.scene_file
-        self.timeline = Timeline((), player.simulation.parameters.time_step)  # executed by each run
         jobs = ("start", "stop", "restart", "load_scene", "set_vehicles", "snapshot", "restore")
         for name in jobs:
             rospy.Service(f"~{name}", Trigger, partial(self._answer, name, getattr(self, name)))
@@ -86,7 +90,7 @@ class Services:
         """Answer when as many steps as the parameter `step_count` says have been run, and their messages sent."""
         done = intervention(CHANGE, "the scene", "~step", request)
         try:
-            count = _step_count()
+            count = _step_count(self._player.simulation.parameters.step_count)
             steps = self._inbox.ask(lambda: self._player.order_steps(count), done)
             while not rospy.is_shutdown() and not wait([steps], _POLL_PERIOD).done:
                 pass  # in lockstep, a step may wait for a node for any time
@@ -103,7 +107,7 @@ class Services:
     def start(self) -> str:
         """Read scene and the script of `script` from disk, and begin at time 0."""
         self._take_script()
-        return self._begun(self._player.start())
+        return self._report_start(self._player.start())
 
     def stop(self) -> str:
         """Run cleanup, and restore the initial scene."""
@@ -112,7 +116,7 @@ class Services:
     def restart(self) -> str:
         """Stop, and start."""
         self._take_script()
-        return self._begun(self._player.restart())
+        return self._report_start(self._player.restart())
 
     def pause(self, on: bool) -> str:
         """Pause, or resume, if not `on`. `rosservice call ... pause "{}"` means False, so a flight is not paused."""
@@ -126,22 +130,12 @@ class Services:
         """Start anew in the scene of `scene_file`."""
         file = scene_parameter(self._config_scene)
         self._take_script()
-        return f"{self._begun(self._player.start(file))} in {file or 'the scene of the parameters'}"
+        started = self._player.start(file)
+        return self._report_start(f"{started} in {file or 'the scene of the parameters'}")
 
-    def _begun(self, said: str) -> str:
-        self._vehicles.tell(self._player.simulation.parameters)  # the scene, read anew, may have other ones
-        try:
-            self.read_timeline()
-        except TimelineError:
-            self._player.stop()
-            raise
-        return said
-
-    def read_timeline(self) -> None:
-        """Read the file of the parameter `timeline_file`, whose entries each run executes. Raises TimelineError."""
-        parameters, file = self._player.simulation.parameters, from_shell(str(rospy.get_param("~timeline_file", "")))
-        entries = timelines.read(file, parameters).entries if file else ()
-        self.timeline = Timeline(entries, parameters.time_step)
+    def _report_start(self, started: str) -> str:
+        self._vehicles.tell(self._player.simulation.parameters)  # the scene was read again, and may have other vehicles
+        return f"{started}{self._timeline.summary}"
 
     def _take_script(self) -> None:
         """Let the script fly that the parameter `script` names now. Raises ScriptError where it is not there."""
@@ -179,9 +173,12 @@ def scene_parameter(otherwise: str = "") -> str:
     return otherwise if given == "none" else from_shell(given)
 
 
-def _step_count() -> int:
-    """Return how many steps `step` takes. Raises ParameterError."""
-    count = rospy.get_param("~step_count", 1)
+def _step_count(otherwise: int) -> int:
+    """Return how many steps `step` takes: `otherwise` if the parameter is not set. Raises ValueError."""
+    try:
+        count = rospy.get_param("~step_count", otherwise)
+    except (*MASTER_FAILURES, OSError) as error:
+        raise ValueError(f"step_count cannot be read, because the ROS master does not answer: {error}") from None
     if not (isinstance(count, int) and not isinstance(count, bool) and 1 <= count <= MAX_STEP_COUNT):
         raise ParameterError(f"must be a whole number from 1 to {MAX_STEP_COUNT}", ("step_count",), shown(count))
     return count

@@ -78,7 +78,7 @@ class VehicleInputs:
 
     def _subscriber(self, topic: str, kind: type, read: Callable[[Any], _Job]) -> rospy.Subscriber:
         name, queue = f"{self._name}/{topic}", _QUEUES.get(topic, 1 if self._gate is open_gate else _GATED_QUEUE)
-        take = self._gate(name, self._taking(_COMMAND if topic == _STAMPED_COMMAND else topic, read))
+        take = self._gate(name, self._taking(topic, read))
         return rospy.Subscriber(name, kind, take, queue_size=queue, tcp_nodelay=True)
 
     def _commanders(self) -> list[str]:
@@ -97,7 +97,9 @@ class VehicleInputs:
 
     def _taking(self, topic: str, read: Callable[[Any], _Job]) -> Callable[[Any], None]:
         """Return a callback that leaves what a message asks for to the simulation's thread, or says why not."""
-        kept = ", the last valid one is kept" if topic == _COMMAND else ""
+        is_command = topic in (_COMMAND, _STAMPED_COMMAND)
+        kept = ", the last valid one is kept" if is_command else ""
+        logged = _COMMAND if is_command else topic
         throttle, action = Throttle(_QUIET), _INTERVENTIONS.get(topic)
 
         def take(message: Any) -> None:
@@ -106,7 +108,7 @@ class VehicleInputs:
             except (checks.Refused, ParameterError) as error:
                 refuse(message, error)
                 return
-            self.log.take(topic, sender(message))
+            self.log.take(logged, sender(message))
             done = intervention(action, self._name, f"{self._name}/{topic}", message) if action else None
             self._inbox.put(lambda: execute(job, message), done)
 
@@ -120,7 +122,7 @@ class VehicleInputs:
 
         def refuse(message: Any, error: ValueError) -> None:
             why = error.text if isinstance(error, ParameterError) else str(error)
-            self.log.refuse(topic, sender(message), why)
+            self.log.refuse(logged, sender(message), why, topic)
             if throttle.passes():
                 rospy.logwarn(f"{topic} refused{kept}: {why}")
 

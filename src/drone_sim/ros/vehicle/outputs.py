@@ -21,23 +21,25 @@ from drone_sim.vehicles.vehicle import Vehicle
 
 _EYES = 1 / 30  # s of real time, between two messages that are for eyes
 _LOOK = 0.2  # s of real time, between two looks at what the body touches
+# Messages for a subscriber that reads too slowly. In lockstep, a recorder that loses one records another flight.
+_QUEUE_SIZE, _LOCKSTEP_QUEUE_SIZE = 10, 1000
 _READINGS_QUEUE = 100  # messages: half a second at 200 Hz, which come ten at a time
 
 
 class VehicleOutputs:
     """Odometry, command, propellers, joint states and flight state of one vehicle."""
 
-    def __init__(self, parameters: VehicleParameters, new_subscribers: NewSubscribers):
+    def __init__(self, parameters: VehicleParameters, new_subscribers: NewSubscribers, is_in_lockstep: bool = False):
         """Advertise in the namespace of the vehicle with these parameters.
 
         `new_subscribers` notes who begins to listen to odometry.
         """
-        name = parameters.name
+        name, size = parameters.name, _LOCKSTEP_QUEUE_SIZE if is_in_lockstep else _QUEUE_SIZE
         self._base_link, self._track_base = frame(parameters, BASE_LINK), frame(parameters, TRACK_BASE)
-        self._odometry = rospy.Publisher(f"{name}/odom", Odometry, subscriber_listener=new_subscribers, queue_size=10)
-        self._command = rospy.Publisher(f"{name}/command", TwistStamped, queue_size=10)
-        self._propellers = rospy.Publisher(f"{name}/propellers", Float32MultiArray, queue_size=10)
-        self._joints = rospy.Publisher(f"{name}/joint_states", JointState, queue_size=10)
+        self._odometry = rospy.Publisher(f"{name}/odom", Odometry, subscriber_listener=new_subscribers, queue_size=size)
+        self._command = rospy.Publisher(f"{name}/command", TwistStamped, queue_size=size)
+        self._propellers = rospy.Publisher(f"{name}/propellers", Float32MultiArray, queue_size=size)
+        self._joints = rospy.Publisher(f"{name}/joint_states", JointState, queue_size=size)
         self._flight_state = rospy.Publisher(f"{name}/state", String, queue_size=10, latch=True)
         self._hears = rospy.Publisher(f"{name}/hears_commands", Bool, queue_size=10, latch=True)
         self._said = ""  # the script's own state

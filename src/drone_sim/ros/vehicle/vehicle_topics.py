@@ -37,7 +37,7 @@ class VehicleTopics:
         self.vehicle, parameters = vehicle, vehicle.parameters
         self.inputs = VehicleInputs(simulation, parameters, inbox, gate)
         self.new_subscribers = NewSubscribers()  # to pictures or state
-        self.outputs = VehicleOutputs(parameters, self.new_subscribers)
+        self.outputs = VehicleOutputs(parameters, self.new_subscribers, is_in_lockstep=gate is not open_gate)
         self.cameras = {
             name: CameraOutput(parameters, camera, parameters.cameras[name], self.new_subscribers)
             for name, camera in vehicle.cameras.items()

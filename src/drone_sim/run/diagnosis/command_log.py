@@ -54,11 +54,16 @@ class CommandLog:
             return []
         return sorted({change.sender for change in changes})
 
-    def refuse(self, topic: str, sender: str, why: str) -> None:
-        """Log a refused message and the reason `why`."""
+    def refuse(self, topic: str, sender: str, why: str, received_on: str = "") -> None:
+        """Log a refused message and the reason `why`.
+
+        `received_on` is the topic to name if it is not `topic`: messages on cmd_vel_stamped count as cmd_vel.
+        """
         with self._lock:
             before = self.refused.get(topic)
-            self.refused[topic] = Refusal(topic, sender, self.clock(), why, before.times + 1 if before else 1)
+            self.refused[topic] = Refusal(
+                received_on or topic, sender, self.clock(), why, before.times + 1 if before else 1
+            )
 
     def last_refusal(self) -> Refusal | None:
         """Return the latest refusal on any topic."""
