@@ -293,6 +293,16 @@ def test_a_topic_without_a_listener_is_an_error_at_startup_and_lets_time_stand_l
     assert "nothing listens to /drone/cmd_vel" in one.lockstep.finding().message
 
 
+def test_a_step_that_failed_before_it_was_published_leaves_nothing_to_ignore(stage):
+    one = stage(timeout=1000.0).connect()
+    one.lockstep.begin_waits()  # then a script fails
+    one.simulation.run, one.simulation.steps = 2, 0
+    one.step()
+    assert not one.is_ready()
+    one.now += SETTLED
+    assert one.is_ready()
+
+
 @pytest.mark.parametrize("is_restored", [False, True])
 def test_an_answer_from_before_a_start_or_a_restore_is_ignored(stage, is_restored):
     one = stage(every=2).connect()

@@ -75,10 +75,14 @@ class _PendingAnswer:
             return "" if message.header.stamp == self.stamp else "of another stamp"
         return "" if self._could_be_seen_by(sender(message)) else "early"
 
+    def is_triggered(self) -> bool:
+        """Return whether the trigger has been published: not if the step has failed."""
+        return connections.sent_count(self.awaited.trigger) > self.sent_before
+
     def _could_be_seen_by(self, node: str) -> bool:
         """Return whether the trigger has been published, and been given to the node's socket if it is connected."""
         trigger = self.awaited.trigger
-        if connections.sent_count(trigger) <= self.sent_before:
+        if not self.is_triggered():
             return False
         if trigger == _CLOCK:  # the node may answer any message of the step, and these are written in any order
             return True
@@ -237,7 +241,7 @@ class Lockstep:
             self._first_topology = self._topology_version
         with self._lock:
             for name, answer in self._pending.items():
-                if not (answer.has_arrived or name.endswith(_BY_STAMP)):
+                if answer.is_triggered() and not (answer.has_arrived or name.endswith(_BY_STAMP)):
                     self._stale_answers[name] = answer
             self._pending = {}
         for awaited in self._awaited.values():
