@@ -27,6 +27,7 @@ class Topic:
 
     def unregister(self):
         del Topic.there[self.name]
+        self.callback = None  # as rospy does
 
     def get_num_connections(self):
         return 1

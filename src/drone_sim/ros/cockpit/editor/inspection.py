@@ -110,9 +110,10 @@ class ScriptInspector:
             **({f"{self._node}/names": self._on_names} if names else {}),
         }
         for subscriber in [subscriber for subscriber in self._subscribers if subscriber.name not in wanted]:
+            has_variables = subscriber.callback == self._on_variables  # `unregister` clears it
             subscriber.unregister()
             self._subscribers.remove(subscriber)
-            if subscriber.callback == self._on_variables:
+            if has_variables:
                 self._broadcast({"variables": None})
         subscribed = {subscriber.name for subscriber in self._subscribers}
         for topic, callback in wanted.items():
