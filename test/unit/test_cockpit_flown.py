@@ -104,7 +104,7 @@ def test_a_script_is_graded_in_a_process_of_its_own(ask):
         ask("grade", script="tasks/hover.py", lesson="tasks/hover")
     while not (result := ask("graded", number=begun["number"])):
         time.sleep(0.02)
-    assert (result["error"], result["points"], result["of"]) == ("", 3.0, 6.0)
+    assert (result["problem"], result["points"], result["of"]) == ("", 3.0, 6.0)
     assert [(one["name"], one["passed"]) for one in result["rows"]][:2] == [("place", False), ("height", True)]
     for message, words in (({"lesson": "stage-3-yaw"}, "needs a task"), ({"lesson": None}, "needs a task")):
         with pytest.raises(ScriptStoreError, match=words):
@@ -119,7 +119,7 @@ def test_a_grading_that_does_not_end_is_ended(monkeypatch, tmp_path):
     number = one.start("hover", tmp_path / "x.py")
     while not (result := one.result(number)):
         time.sleep(0.01)
-    assert result == {"error": "it took more than 0 s"}
+    assert result == {"problem": "it took more than 0 s"}
 
 
 def test_a_master_that_has_gone_is_one_line(ask, monkeypatch):

@@ -216,17 +216,17 @@ def test_the_silence_of_the_simulator_is_told_while_there_is_one(monkeypatch):
     beat = Pulse("/gone", lambda _: None)
     now[0] += 100.0
     beat.hear()
-    assert beat.state() == {"silent": 0.0, "ended": False}, "nothing is expected yet"
+    assert beat.state() == {"silent": 0.0, "frozen": False, "ended": False}, "nothing is expected yet"
     beat.expect(True)
+    now[0] += 4.0
+    assert beat.state() == {"silent": 4.0, "frozen": False, "ended": False}, "it may be busy"
     now[0] += 2.0
-    assert beat.state() == {"silent": 2.0, "ended": False}
-    now[0] += 2.0
-    assert beat.state() == {"silent": 4.0, "ended": True}
+    assert beat.state() == {"silent": 6.0, "frozen": True, "ended": True}
     beat.hear()
-    assert beat.state() == {"silent": 0.0, "ended": False}
+    assert beat.state() == {"silent": 0.0, "frozen": False, "ended": False}
     now[0] += 50.0
     beat.expect(False)
-    assert beat.state() == {"silent": 0.0, "ended": False}
+    assert beat.state() == {"silent": 0.0, "frozen": False, "ended": False}
 
 
 @pytest.fixture(name="master")

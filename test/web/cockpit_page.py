@@ -147,3 +147,26 @@ def switch_camera(page, name="front"):
     """Switch a camera on, or off."""
     Panel(page).show("Cameras")
     page.locator("#camera-list").get_by_label(name, exact=True).click()
+
+
+# Keeps the page's requests with this name back until goOn() is called.
+HOLD = """name => {
+    const send = WebSocket.prototype.send, held = [];
+    WebSocket.prototype.send = function (text) {
+        if (!String(text).includes(`"ask":"${name}"`)) return send.call(this, text);
+        held.push(() => send.call(this, text));
+    };
+    window.goOn = () => {
+        WebSocket.prototype.send = send;
+        for (const sendNow of held) sendNow();
+    };
+    window.isHeld = () => held.length > 0;
+}"""
+
+
+@contextlib.contextmanager
+def requests_held(page, name):
+    """Keep the page's requests with a name back until the end of the block, as a slow network does."""
+    page.evaluate(HOLD, name)
+    yield lambda: wait_for(page, "isHeld()")
+    page.evaluate("goOn()")

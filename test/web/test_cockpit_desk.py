@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import let_pass, open_page, wait_until
+from cockpit_page import let_pass, open_page, requests_held, wait_until
 
 COUNTS = """\
 import helper
@@ -309,6 +309,20 @@ def test_files_are_renamed_duplicated_deleted_and_brought_back(cockpit, desk):
     assert desk.get_by_role("menuitem", name="Delete").is_disabled()
     desk.keyboard.press("Escape")
     assert not desk.is_visible("#menu")
+
+
+@pytest.mark.parametrize("name", ["typed.py", "typed.lua"])
+def test_a_text_that_is_typed_while_its_file_is_renamed_is_saved_under_the_new_name(cockpit, desk, name):
+    open_file(cockpit, desk, "renamed.py", "# renamed\n")
+    choose(desk, "Rename")
+    desk.keyboard.type(name)
+    with requests_held(desk, "rename") as wait_for_request:
+        desk.keyboard.press("Enter")
+        wait_for_request()
+        write_at_the_end(desk, "# typed")
+    wait_until(desk, lambda: desk.input_value("#script") == f"mine/{name}")
+    wait_until(desk, lambda: (cockpit.scripts / name).read_text() == "# renamed\n# typed")
+    assert not (cockpit.scripts / "renamed.py").exists() and text(desk).endswith("# typed")
 
 
 def test_files_are_downloaded_and_dropped_on_the_text(cockpit, desk):

@@ -119,3 +119,15 @@ def test_a_task_is_solved_and_graded(student):
     student.click("#grade")
     wait_until(student, lambda: student.locator("#graded tr").count() > 1, 120)
     assert re.search(r"\d+(\.\d)? of \d+ points", student.inner_text("#graded"))
+
+
+def test_a_script_that_fails_its_task_is_graded_with_the_reason(student):
+    door(student, "Tasks")
+    wait_until(student, lambda: student.input_value("#script").startswith("tasks/"))
+    student.locator("#text .cm-content").click()
+    student.keyboard.press("Control+a")
+    student.keyboard.insert_text("raise ValueError('of the script')\n")
+    student.click("#grade")
+    wait_until(student, lambda: "of the script" in student.inner_text("#graded"), 120)
+    student.reload()
+    wait_until(student, lambda: "of the script" in student.inner_text("#graded"))

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import STARTED, wait_until
+from cockpit_page import STARTED, requests_held, wait_until
 
 from drone_sim.files.resources import package_path
 
@@ -132,8 +132,9 @@ def test_a_file_that_another_program_changes_is_told_and_both_texts_are_kept(coc
     desk.locator("#text .cm-content").press("Control+z")
     wait_until(desk, lambda: "# mine" in file.read_text())
     desk.locator("#text .cm-content").press("Control+End")
-    desk.keyboard.insert_text("# not saved yet")  # at once: the page saves soon after the last key
-    file.write_text("# written meanwhile\n")
+    with requests_held(desk, "save"):
+        desk.keyboard.insert_text("# not saved yet")
+        file.write_text("# written meanwhile\n")
     desk.get_by_role("button", name="The other's").click()
     wait_until(desk, lambda: text(desk).startswith("# written meanwhile"))
     other = cockpit.scripts / said(desk).rpartition("/")[2]

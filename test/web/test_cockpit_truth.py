@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-from cockpit_page import STARTED, WAIT, open_page, ready, wait_until
+from cockpit_page import STARTED, WAIT, let_pass, open_page, ready, wait_for, wait_until
 from launched import free_port
 
 STEPS = "def sysCall_actuation():\n    height = 1\n    again = 2\n"
@@ -60,14 +60,16 @@ def line_number(page, line):
 
 def test_a_pause_ends_though_its_breakpoint_is_gone(cockpit, desk):
     open_file(cockpit, desk, "steps.py", STEPS)
-    line_number(desk, 2).click()
+    line_number(desk, 3).click()
     desk.click("#run")
-    wait_until(desk, lambda: said(desk).startswith("paused at line 2"))
+    wait_until(desk, lambda: said(desk).startswith("paused at line 3"))
     assert desk.locator("#text .cm-paused").count() == 1 and desk.inner_text("#flying") == "is paused"
-    line_number(desk, 2).click()
-    desk.get_by_role("tab", name="Console").click()  # nobody looks at variables any more
-    desk.wait_for_timeout(6000)  # s after which the cockpit listens to them no longer
-    assert said(desk).startswith("paused at line 2"), "it still is"
+    line_number(desk, 3).click()
+    rows = desk.locator("#variables-body tr")
+    wait_until(desk, lambda: rows.count())
+    desk.get_by_role("tab", name="Console").click()  # no page shows the variables now
+    wait_until(desk, lambda: not rows.count())
+    assert said(desk).startswith("paused at line 3"), "it still is"
     desk.locator("#toolbar").get_by_role("button", name="Start", exact=True).click()
     wait_until(desk, lambda: not desk.locator("#text .cm-paused").count())
     wait_until(desk, lambda: "paused" not in said(desk) and desk.inner_text("#flying") == "flies")
@@ -128,7 +130,7 @@ def test_a_reload_opens_what_was_edited_last_where_it_was(cockpit, browser):
         page.keyboard.type("# mine")
         wait_until(page, lambda: page.input_value("#script") == "mine/hover.py")
         wait_until(page, lambda: page.inner_text("#saved") == "saved as mine/hover.py")
-        page.wait_for_timeout(500)
+        wait_for(page, "JSON.parse(localStorage['drone_sim/places'])['mine/hover.py']")
         for _ in range(2):
             page.reload()
             ready(page)
@@ -262,5 +264,5 @@ def test_a_key_that_is_not_the_tabs_lets_nobody_in_and_the_page_asks_seldom(own,
     own.begin("cockpit")
     wait_until(tab, lambda: "Open the address" in banner(tab))
     asked.clear()
-    tab.wait_for_timeout(8000)
+    let_pass(tab, 5000)
     assert len(asked) <= 1, "a page that is refused asks seldom"

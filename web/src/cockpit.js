@@ -12,6 +12,7 @@ import { Windows } from "./windows.js";
 import { PageSocket } from "./socket.js";
 import { show as showFacts } from "./state/show.js";
 import { Store } from "./state/store.js";
+import { abilities } from "./state/words.js";
 
 const LINE_FEED = 10;
 
@@ -19,10 +20,7 @@ const store = new Store();
 
 function show({ lists, script, of, question }) {
   if (lists) offer(lists);
-  if (script) {
-    at("script").value = script;
-    panels.opened(script);
-  }
+  if (script) at("script").value = script;
   if (of !== undefined) lesson.has(script, of);
   if (question !== undefined) ask(question);
 }
@@ -73,7 +71,7 @@ function took(data) {
 }
 
 const run = () => {
-  if (at("run").disabled) return Promise.resolve();
+  if (!abilities(store.now).run) return Promise.resolve();
   desk.console.begin();
   return scripts.run(lesson.name).catch(tell);
 };

@@ -6,7 +6,7 @@ import { forget, keep, kept } from "./storage.js";
 const ASK_AGAIN = 500; // ms, for what is being graded
 const GRADE = "grade"; // the key of the last grade: { task, script, number, isOld }; a reload goes on with it
 
-function showGrade(element, { script, isOld }, { error, points, of, rows = [] }) {
+function showGrade(element, { script, isOld }, { problem, points, of, rows = [] }) {
   const table = document.createElement("table");
   for (const one of rows) {
     const row = table.insertRow();
@@ -15,7 +15,7 @@ function showGrade(element, { script, isOld }, { error, points, of, rows = [] })
   }
   const sum = rows.length ? `${script}: ${points} of ${of} points` : "";
   const old = isOld ? "The script has been changed since" : "";
-  element.replaceChildren([sum, error, old].filter(Boolean).join(". "), table);
+  element.replaceChildren([sum, problem, old].filter(Boolean).join(". "), table);
 }
 
 export class Lesson {
@@ -130,9 +130,9 @@ export class Lesson {
     this.showGraded();
     try {
       let result = {};
-      while (!("error" in result)) {
+      while (!("problem" in result)) {
         result = await this.ask("graded", { number });
-        if (!("error" in result)) await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN));
+        if (!("problem" in result)) await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN));
       }
       this.result = result;
       this.showGraded();

@@ -3,7 +3,6 @@ import { Board } from "./board.js";
 import { Build } from "./edit/build.js";
 import { Cameras } from "./cameras.js";
 import { at, icon } from "./dom.js";
-import { keep, kept } from "./storage.js";
 import { Log } from "./log.js";
 import { Notice } from "./notice.js";
 import { Plots } from "./plots.js";
@@ -120,12 +119,5 @@ export class Panels {
     this.version = undefined; // another node counts anew
     this.board.begin();
     this.build.edit.lost();
-  }
-
-  // The first one is opened by the page itself: that is not what somebody goes on with.
-  opened(script) {
-    const isOther = this.shown !== undefined && script !== this.shown;
-    if (isOther || !kept("script", "")) keep("script", script);
-    this.shown = script;
   }
 }

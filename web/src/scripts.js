@@ -11,8 +11,9 @@ const RETRY = 4000; // ms after which what could not be saved is tried again
 const LARGEST = 1 << 20; // bytes
 
 const DEFAULT = "built-in/pilot.py"; // flies if the launch names no script
+const SCRIPT = "script"; // the storage key of the open script
+const COPIES = "copies"; // the storage key of the user's latest copy of each script of the package
 
-const stemOf = (script) => script.split("/").pop().replace(/\.\w+$/, "");
 const size = (text) => new TextEncoder().encode(text).length;
 
 export class Scripts {
@@ -60,7 +61,7 @@ export class Scripts {
   // After the connection is there, again: what was not saved comes first.
   async connected() {
     const isFirst = !this.is.script;
-    const last = isFirst ? this.lastOpen() : "";
+    const last = isFirst ? this.lastOpen() : [];
     const { flown, groups, folder } = await this.list();
     await this.save().catch(() => {});
     const left = this.drafts.scripts.filter((script) => script !== this.is.script);
@@ -69,18 +70,17 @@ export class Scripts {
     const all = groups.flatMap(({ scripts }) => scripts);
     const isNews = flown !== DEFAULT && flown !== kept("flown", flown); // another launch flies another script
     keep("flown", flown);
-    const found = (isNews ? [flown, last] : [last, flown]).find((one) => all.includes(one));
+    const found = (isNews ? [flown, ...last] : [...last, flown]).find((one) => all.includes(one));
     if (found && found !== this.is.script) await this.open(found);
     if (found) return;
     await this.open(DEFAULT);
     this.store.say("elsewhere", `${flown} flies, from another folder than ${folder}: Upload (⋯) makes a copy that you can edit`);
   }
 
-  // What the user had open last; a script of the package gives way to the copy that the user has made of it.
+  // Returns the user's copy of the last open script, if the user has changed a script of the package, and that script.
   lastOpen() {
-    const [open, edited] = [kept("script", ""), kept("edited", "")];
-    const isCopied = open && !open.startsWith("mine/") && `${stemOf(edited)}_`.startsWith(`${stemOf(open)}_`);
-    return isCopied ? edited : open;
+    const open = kept(SCRIPT, "");
+    return [kept(COPIES, {})[open], open];
   }
 
   // Hears which script the simulator has.
@@ -107,7 +107,7 @@ export class Scripts {
     this.editor.show(script, answer.text);
     this.marked = {}; // those of the text that was shown before
     this.store.take("opened", { script, file: answer.file });
-    keep("script", script);
+    keep(SCRIPT, script);
     if (draft && draft.text !== answer.text) this.resume(draft, failure);
     else this.drafts.drop(script);
     this.onOpen(answer.lesson);
@@ -156,6 +156,7 @@ export class Scripts {
       if (size(text) > LARGEST) throw new Error(`has more than ${LARGEST} bytes`);
       const answer = await this.ask("save", { script, text, version });
       if (answer.changed) return await this.compare();
+      if (answer.script !== script) keep(COPIES, { ...kept(COPIES, {}), [script]: answer.script });
       this.written(answer, text);
     } catch (error) {
       this.failed = Date.now();
@@ -175,8 +176,7 @@ export class Scripts {
     this.page.show({ script, of: answer.lesson });
     if (before !== script) this.store.take("renamed", { script, file });
     this.store.take("saved", `saved as ${script}`);
-    keep("script", script);
-    keep("edited", script);
+    keep(SCRIPT, script);
     if (before !== this.is.script) return this.list();
   }
 
@@ -204,9 +204,13 @@ export class Scripts {
     if (name === this.is.script.split("/").pop()) return;
     await this.save();
     await this.inTurn(async () => {
-      const answer = await this.ask("rename", { script: this.is.script, name });
-      if (isLua(answer.script) === isLua(this.is.script)) return this.written(answer, this.editor.text);
-      this.editor.forget(this.is.script); // it is written in another language now
+      const { script, text } = this.is;
+      const answer = await this.ask("rename", { script, name });
+      if (isLua(answer.script) === isLua(script)) return this.written(answer, text);
+      // The editor opens the file again in the other language; what was typed since the save goes with it.
+      if (this.dirty) this.drafts.put(answer.script, { text: this.editor.text, version: answer.version });
+      this.drafts.drop(script);
+      this.editor.forget(script);
       await this.list();
       await this.take(answer.script);
     });

@@ -1,5 +1,5 @@
 // Our socket: questions with answers, and what the node tells by itself. It connects again when the node is back.
-import { SILENCE } from "./state/words.js";
+import { SILENCE } from "./state/facts.js";
 
 const AGAIN = [1000, 1000, 2000, 4000, 8000]; // ms before each further attempt; the last one counts from then on
 const REFUSED = 30_000; // ms, while the cockpit does not know this page: nothing changes without the user

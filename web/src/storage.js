@@ -1,11 +1,10 @@
-// What the browser remembers of the page. A browser that stores nothing remembers it until the page is closed.
+// The values that the browser stores for the page. A value that it cannot store is kept until the page is closed.
 const PREFIX = "drone_sim/";
-const inPage = new Map(); // values by key, as text
+const unstored = new Map(); // values that the browser could not store, by key, as text
 
 function read(key) {
-  if (inPage.has(key)) return inPage.get(key);
   try {
-    return localStorage.getItem(PREFIX + key);
+    return unstored.get(key) ?? localStorage.getItem(PREFIX + key);
   } catch {
     return null; // this browser has no storage
   }
@@ -22,16 +21,16 @@ export function kept(key, otherwise) {
 
 export function keep(key, value) {
   const text = JSON.stringify(value);
-  inPage.set(key, text);
   try {
     localStorage.setItem(PREFIX + key, text);
+    unstored.delete(key); // another tab may change the value from now on
   } catch {
-    // The storage is full, or there is none.
+    unstored.set(key, text); // the storage is full, or there is none
   }
 }
 
 export function forget(key) {
-  inPage.delete(key);
+  unstored.delete(key);
   try {
     localStorage.removeItem(PREFIX + key);
   } catch {
@@ -47,7 +46,7 @@ export function keysBelow(prefix) {
   } catch {
     // This browser has no storage.
   }
-  const all = new Set([...stored, ...inPage.keys()]);
+  const all = new Set([...stored, ...unstored.keys()]);
   return [...all].filter((key) => key.startsWith(prefix)).map((key) => key.slice(prefix.length));
 }
 

@@ -1,17 +1,18 @@
-// Shows what is true: the only code that writes the lines, badges and buttons that depend on it.
+// Writes the store's facts into the page: no other code writes the lines, badges and buttons that depend on them.
 import { at } from "../dom.js";
+import { answers } from "./facts.js";
 import {
-  abilities, answers, bannerWords, deafWords, diagnosisWords, flyingWords, paceWords, pauseOf, saidWords, statusWords,
+  abilities, bannerWords, deafWords, diagnosisWords, flyingWords, paceWords, pauseOf, saidWords, statusWords,
 } from "./words.js";
 
-// What has no use without a simulator, and is not a single button.
-const WITHOUT_USE = ["build-bar", "shelf", "tune-groups", "left", "right"];
+// Parts of the page, other than single buttons, that are disabled while no simulator answers.
+const PARTS_OF_SIMULATOR = ["build-bar", "shelf", "tune-groups", "left", "right"];
 
 function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-// A box that is longer than it is high can be scrolled by keys.
+// Lets keys scroll a box whose text is higher than the box.
 function makeScrollable(element) {
   element.tabIndex = element.scrollHeight > element.clientHeight + 1 ? 0 : -1;
 }
@@ -39,10 +40,11 @@ function showStatus(now) {
   at("status").dataset.is = answers(now) ? now.status : "no simulation";
   at("status").title = pause ? `Paused by the breakpoint at line ${pause.line} of ${pause.file}` : "";
   const { warnings } = now;
-  at("why").hidden = !warnings.length || !answers(now);
+  const hasWarnings = warnings.length > 0 && answers(now);
+  at("why").hidden = !hasWarnings;
   write(at("why"), warnings.length === 1 ? "1 warning" : `${warnings.length} warnings`);
   at("why").title = `${warnings.join("\n")}\n(opens the log)`;
-  at("state").classList.toggle("wrong", !at("why").hidden);
+  at("state").classList.toggle("wrong", hasWarnings);
   at("sim-pause").setAttribute("aria-pressed", String(now.status === "paused"));
 }
 
@@ -62,12 +64,12 @@ function showFlight(now) {
 
 function showBanner(now) {
   const words = bannerWords(now);
-  // A screen reader reads it once, not with every second that it counts.
+  // A screen reader reads the banner once, not each time its count of seconds changes.
   const isNew = withoutNumbers(words) !== withoutNumbers(at("banner").textContent);
   at("banner").setAttribute("aria-live", isNew ? "assertive" : "off");
   write(at("banner"), words);
   at("banner").hidden = !words;
-  document.body.classList.toggle("outdated", Boolean(words)); // the scene is not what happens
+  document.body.classList.toggle("outdated", Boolean(words)); // the scene may differ from the simulation
 }
 
 function showNotice({ notice }) {
@@ -78,7 +80,7 @@ function showNotice({ notice }) {
 
 function showButtons(now) {
   for (const [id, can] of Object.entries(abilities(now))) if (at(id).disabled === can) at(id).disabled = !can;
-  for (const id of WITHOUT_USE) at(id).inert = !answers(now);
+  for (const id of PARTS_OF_SIMULATOR) at(id).inert = !answers(now);
 }
 
 export function show(now) {

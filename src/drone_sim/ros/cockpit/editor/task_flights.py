@@ -147,11 +147,14 @@ class Grader:
 
 
 def _read_result(file: Path, errors: str) -> dict[str, Any]:
-    """Return the result for the page: points, their maximum, an error, and a row for each criterion."""
+    """Return the result for the page: points, their maximum, a row for each criterion, and a problem ('' for none).
+
+    The problem's key is not `error`, because a reply with that key means that the request itself has failed.
+    """
     try:
         result = json.loads(file.read_text(encoding="utf-8"))["results"][0]
     except (OSError, ValueError, LookupError):
-        return {"error": " ".join(errors.split())[:_MAX_ERROR] or "nothing was graded"}
+        return {"problem": " ".join(errors.split())[:_MAX_ERROR] or "nothing was graded"}
     keys = ("name", "passed", "points", "of", "said")
     rows = [{key: outcome[key] for key in keys} for outcome in result["outcomes"]]
-    return {"error": result["error"] or "", "points": result["points"], "of": result["of"], "rows": rows}
+    return {"problem": result["error"] or "", "points": result["points"], "of": result["of"], "rows": rows}

@@ -1,4 +1,4 @@
-"""Heartbeat of the cockpit: tells every browser once a second for how long the simulator has been silent."""
+"""Heartbeat of the cockpit: once a second, every browser is sent for how long the simulator has been silent."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import rosgraph
 from drone_sim.ros.core import network
 
 _PERIOD = 1.0  # s
-_SUSPICIOUS = 3.0  # s of silence; the simulator publishes /diagnostics every second, also while it is busy
-_TIMEOUT = 0.5  # s, for the answer of the master and of the node
+_SILENCE_LIMIT = 5.0  # s; while the simulator is busy, it publishes /diagnostics every 3 s only
+_TIMEOUT = 0.5  # s, for the reply of the master and of the node
 
 
 class Pulse(threading.Thread):
-    """Sends {"pulse": {"silent", "ended"}}; a daemon thread, so that a slow master does not delay it."""
+    """Sends {"pulse": {"silent", "frozen", "ended"}}; a daemon thread, so that a slow master does not delay it."""
 
     def __init__(self, node: str, tell: Callable[[Mapping[str, Any]], None]):
         """Watch the simulator `node`; `tell` sends a message to all browsers."""
@@ -41,10 +41,11 @@ class Pulse(threading.Thread):
             self._tell({"pulse": self.state()})
 
     def state(self) -> dict[str, Any]:
-        """Return for how long the simulator has been silent (s), and whether its process has ended."""
+        """Return for how long the simulator has been silent (s), whether that is too long, and whether it has ended."""
         heard = self._heard
         silent = 0.0 if heard is None else time.monotonic() - heard
-        return {"silent": round(silent, 1), "ended": silent > _SUSPICIOUS and has_ended(self._node)}
+        is_frozen = silent > _SILENCE_LIMIT
+        return {"silent": round(silent, 1), "frozen": is_frozen, "ended": is_frozen and has_ended(self._node)}
 
 
 def has_ended(node: str) -> bool:

@@ -1,0 +1,13 @@
+// What follows from the store's facts: whether the cockpit can be reached, and whether the simulator answers.
+export const NO_SIMULATION = "no simulation";
+export const UNKNOWN = ""; // the status before the cockpit has sent it
+export const SILENCE = 3; // s without a message after which the cockpit is not reachable; its heartbeat comes every second
+
+export const secondsOfSilence = (now) => (now.connection === "connected" ? (now.at - now.heard) / 1000 : 0);
+
+export const isReachable = (now) => now.connection === "connected" && secondsOfSilence(now) <= SILENCE;
+
+export const hasSimulator = ({ status, hasEnded }) => status !== UNKNOWN && status !== NO_SIMULATION && !hasEnded;
+
+// Whether the simulator answers, so that its buttons can do something.
+export const answers = (now) => isReachable(now) && now.hasMaster && hasSimulator(now) && !now.isFrozen;
