@@ -195,8 +195,10 @@ class States(unittest.TestCase):
         again, changes_again = path([one.messages[count:] for one, count in zip(heard, before)])
         self.assertEqual(len(changes_again), len(changes))
         late = max(abs(one - other) for one, other in zip(changes, changes_again))
+        commanded = {step for step in flown if step <= changes[-1]}
         common = flown.keys() & again.keys()
-        self.assertGreater(len(common), 0.9 * len(flown), "a busy machine may lose a few messages")
+        self.assertGreater(len(commanded), 100)
+        self.assertGreater(len(common & commanded), 0.9 * len(commanded), "a busy machine loses few messages")
         for step in common:
             # Each command holds a little longer or shorter. What a busy machine has not heard looks one step later.
             self.assertLess(math.dist(flown[step], again[step]), SPEED * STEP * (late + 1) * len(changes))
