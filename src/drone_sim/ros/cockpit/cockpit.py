@@ -34,9 +34,9 @@ from drone_sim.ros.core.master_watch import MasterWatch
 from drone_sim.ros.core.simulator import FAILURES, Simulator
 
 _PERIOD = 0.05  # s between two updates of the scene
-_TOGETHER = 0.008  # s, within which the markers of a step arrive after its frames
-_HOLDING = 0.1  # s between two updates of dragged objects
-_ASKING = 2.0  # s between two requests to the master
+_MARKER_DELAY = 0.008  # s, within which the markers of a step arrive after its frames
+_DRAG_PERIOD = 0.1  # s between two updates of dragged objects
+_MASTER_PERIOD = 2.0  # s between two requests to the master
 
 
 class Cockpit:
@@ -48,7 +48,7 @@ class Cockpit:
         self._topics = FoundTopics()
         self._view: SceneView | None = None
         self._listener: SimulatorListener | None = None
-        self._asked = 0.0
+        self._asked_master_at = 0.0
         self._commands = CommandPublisher()
         self._state, self._meshes, self._manual = SceneState(), MeshStore(), Manual()
         held = HeldCommands(self._commands.send)
@@ -66,7 +66,7 @@ class Cockpit:
         self._pulse = Pulse(self._simulator.node, self._socket.tell)
         answers.update({**self._panel.answers, **self._windows.answers})
         server.begin(self._socket.serve, self._find)
-        for hold in (lambda: held.run(lambda: not rospy.is_shutdown()), self._hold):
+        for hold in (lambda: held.run(lambda: not rospy.is_shutdown()), self._hold_dragged):
             threading.Thread(target=hold, daemon=True).start()
         self._pulse.start()
 
@@ -76,30 +76,30 @@ class Cockpit:
         MasterWatch(meanwhile="the page waits for it").start()
         while not rospy.is_shutdown():
             began = time.monotonic()
-            self._look(began)
-            self._wait(began)
+            self._update(began)
+            self._wait_for_step(began)
         self._server.stop()
 
-    def _hold(self) -> None:
+    def _hold_dragged(self) -> None:
         """Keep holding dragged objects; in a thread of its own, because `run` waits for the master's replies."""
         while not rospy.is_shutdown():
-            time.sleep(_HOLDING)
+            time.sleep(_DRAG_PERIOD)
             view = self._view
             if view is not None:
                 view.keep(self._socket.browsers)
 
-    def _wait(self, began: float) -> None:
+    def _wait_for_step(self, began: float) -> None:
         """Wait for the next step of the simulation, and for its markers."""
         rest = max(0.0, 0.8 * _PERIOD - (time.monotonic() - began))
         time.sleep(rest)
         if self._view is not None:
             self._view.wait(_PERIOD)
-            time.sleep(_TOGETHER)
+            time.sleep(_MARKER_DELAY)
 
-    def _look(self, now: float) -> None:
+    def _update(self, now: float) -> None:
         browsers = self._socket.browsers
-        if now - self._asked > _ASKING:
-            self._asked = now
+        if now - self._asked_master_at > _MASTER_PERIOD:
+            self._asked_master_at = now
             self._ask_master()
         self._inspector.update(bool(self._topics.namespace))
         wanted = self._topics.namespace if browsers else ""

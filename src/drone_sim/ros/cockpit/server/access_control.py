@@ -23,9 +23,9 @@ from websockets.http11 import Request, Response
 from drone_sim.ros.cockpit.server.return_pass import ReturnPass, is_local
 
 SUBPROTOCOL = "drone_sim"  # of the page's WebSocket
-_LARGEST = 8 << 20  # bytes of a message from a browser: a script of at most 1 MiB, escaped as JSON
+_MAX_MESSAGE = 8 << 20  # bytes of a message from a browser: a script of at most 1 MiB, escaped as JSON
 _REFUSED = "To open the cockpit, use the whole address that the simulation printed. It ends in ?token=..."
-_SAFE = {
+_SECURITY_HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "SAMEORIGIN",
@@ -40,14 +40,14 @@ _POLICY = (
 )
 RETURN = "/return"  # the path at which a tab of an earlier cockpit gets a challenge, and sends its signature
 MANUAL = "/manual/"  # the path of the manual, whose search is an HTML form
-_ONCE = ("Host", "Cookie", "Origin", "Upgrade", "Accept-Encoding")  # headers that are read here, and must be unique
+_UNIQUE_HEADERS = ("Host", "Cookie", "Origin", "Upgrade", "Accept-Encoding")  # all headers that are read here
 _HOST = re.compile(r"[\w.:\[\]-]+", re.ASCII)
 
 Handler = Callable[[ServerConnection], Awaitable[None]]
 Content = tuple[str, bytes] | None  # content type and body of a page; None if there is no such page
-_PACKED = ("text/", "model/")  # content types that are compressed
+_COMPRESSED_TYPES = ("text/", "model/")
 # The codes with which the server closes the WebSocket of a browser that violates the protocol.
-_BROKEN = (CloseCode.PROTOCOL_ERROR, CloseCode.INVALID_DATA, CloseCode.MESSAGE_TOO_BIG)
+_VIOLATIONS = (CloseCode.PROTOCOL_ERROR, CloseCode.INVALID_DATA, CloseCode.MESSAGE_TOO_BIG)
 
 
 class AccessControl:
@@ -71,7 +71,7 @@ class AccessControl:
             process_request=self._answer,
             subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
             compression=None,  # messages stay on this machine, or SSH can compress them
-            max_size=_LARGEST,
+            max_size=_MAX_MESSAGE,
             create_connection=_CheckedConnection,
             logger=log,
         )
@@ -79,17 +79,17 @@ class AccessControl:
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the response to a request; None accepts a WebSocket."""
         try:
-            return self._answered(request, is_local(connection))
+            return self._response_to(request, is_local(connection))
         except ValueError as error:
             return _response(http.HTTPStatus.BAD_REQUEST, str(error))
 
-    def _answered(self, request: Request, may_return: bool) -> Response | None:
+    def _response_to(self, request: Request, may_return: bool) -> Response | None:
         host = _checked_host(request.headers)
         path, _, query = request.path.partition("?")
         if self._is_token(parse_qs(query).get("token", [""])[0]) and not _is_socket(request):
-            return self._let_in(request)
+            return self._accept_token(request)
         if path == RETURN and may_return and self.return_pass is not None and not _is_socket(request):
-            return self._let_return(self.return_pass, parse_qs(query), request)
+            return self._accept_return(self.return_pass, parse_qs(query), request)
         if not self._is_token(_cookie(request, self._name_of_cookie(request))):
             return _response(http.HTTPStatus.FORBIDDEN, _REFUSED)
         if _is_socket(request):
@@ -99,24 +99,24 @@ class AccessControl:
             return _response(http.HTTPStatus.NOT_FOUND, "There is no such page.")
         return _page(*found, host, _takes_gzip(request), "'self'" if path.startswith(MANUAL) else "'none'")
 
-    def _let_in(self, request: Request) -> Response:
+    def _accept_token(self, request: Request) -> Response:
         """Set the token as a cookie, and redirect to an address without it, which people can safely share."""
         response = _response(http.HTTPStatus.SEE_OTHER, "")
         response.headers["Location"] = "/"
-        self._remember(request, response)
+        self._set_cookie(request, response)
         return response
 
-    def _let_return(self, return_pass: ReturnPass, query: Mapping[str, list[str]], request: Request) -> Response:
+    def _accept_return(self, return_pass: ReturnPass, query: Mapping[str, list[str]], request: Request) -> Response:
         """Return a challenge to a tab of an earlier cockpit; if the tab has signed one, set the token as a cookie."""
         if "signature" not in query:
             return _response(http.HTTPStatus.OK, return_pass.challenge())
         if not return_pass.is_signed(query.get("challenge", [""])[0], query["signature"][0]):
             return _response(http.HTTPStatus.FORBIDDEN, _REFUSED)
         response = _response(http.HTTPStatus.OK, "")
-        self._remember(request, response)
+        self._set_cookie(request, response)
         return response
 
-    def _remember(self, request: Request, response: Response) -> None:
+    def _set_cookie(self, request: Request, response: Response) -> None:
         cookie = f"{self._name_of_cookie(request)}={self._token}; Path=/; HttpOnly; SameSite=Strict"
         response.headers["Set-Cookie"] = cookie
 
@@ -131,7 +131,7 @@ class AccessControl:
 
 def _checked_host(headers: Headers) -> str:
     """Return the Host header, '' without one. Raises ValueError if it is invalid, or a header is repeated."""
-    for name in _ONCE:
+    for name in _UNIQUE_HEADERS:
         if len(headers.get_all(name)) > 1:
             raise ValueError(f"{name}: must not be given twice")
     host = headers.get("Host", "")
@@ -163,15 +163,15 @@ def _takes_gzip(request: Request) -> bool:
 
 
 def _page(kind: str, content: bytes, host: str, takes_gzip: bool, forms: str) -> Response:
-    is_packed = takes_gzip and kind.startswith(_PACKED)
-    response = _response(http.HTTPStatus.OK, _packed(content) if is_packed else content, kind, host, forms)
-    if is_packed:
+    is_compressed = takes_gzip and kind.startswith(_COMPRESSED_TYPES)
+    response = _response(http.HTTPStatus.OK, _compress(content) if is_compressed else content, kind, host, forms)
+    if is_compressed:
         response.headers["Content-Encoding"] = "gzip"
     return response
 
 
 @lru_cache(maxsize=64)
-def _packed(content: bytes) -> bytes:
+def _compress(content: bytes) -> bytes:
     return gzip.compress(content, 6, mtime=0)
 
 
@@ -186,7 +186,12 @@ def _response(
     body = content if isinstance(content, bytes) else content.encode()
     # In older browsers, 'self' does not include WebSockets.
     policy = _POLICY.format(sockets=f"ws://{host} wss://{host}" if host else "", forms=forms)
-    headers = {"Content-Type": kind, "Content-Length": str(len(body)), **_SAFE, "Content-Security-Policy": policy}
+    headers = {
+        "Content-Type": kind,
+        "Content-Length": str(len(body)),
+        **_SECURITY_HEADERS,
+        "Content-Security-Policy": policy,
+    }
     return Response(status.value, status.phrase, Headers(headers), body)
 
 
@@ -198,7 +203,7 @@ class _CheckedConnection(ServerConnection):
         try:
             return await super().recv(decode)
         except ConnectionClosedError as error:
-            if error.sent is not None and error.sent.code in _BROKEN and not error.rcvd_then_sent:
+            if error.sent is not None and error.sent.code in _VIOLATIONS and not error.rcvd_then_sent:
                 self._say(error.sent.reason)
             raise
 

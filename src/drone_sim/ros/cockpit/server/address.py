@@ -14,10 +14,10 @@ from typing import Any
 
 import rospkg
 
-_HIGHEST = 65535
-_TRIES = 100  # ports, from the requested one on
-_EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # addresses that mean all interfaces, with their loopback address
-_FAR = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # addresses reserved for documentation
+_MAX_PORT = 65535
+_MAX_TRIES = 100  # ports, from the requested one on
+_LOOPBACK_OF_ALL = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # by addresses that mean all interfaces
+_REMOTE_EXAMPLES = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # addresses reserved for documentation
 
 
 class AddressError(ValueError):
@@ -29,17 +29,17 @@ def free_place(address: Any, port: Any) -> tuple[str, int]:
 
     Raises AddressError.
     """
-    if not isinstance(port, int) or isinstance(port, bool) or not 0 <= port <= _HIGHEST:
-        raise AddressError(f"port = {str(port)[:80]}: must be a whole number from 0 to {_HIGHEST}, such as 8080")
-    family, host = _resolved(address)
-    last = min(port + _TRIES - 1, _HIGHEST)
+    if not isinstance(port, int) or isinstance(port, bool) or not 0 <= port <= _MAX_PORT:
+        raise AddressError(f"port = {str(port)[:80]}: must be a whole number from 0 to {_MAX_PORT}, such as 8080")
+    family, host = _resolve(address)
+    last = min(port + _MAX_TRIES - 1, _MAX_PORT)
     for one in range(port, last + 1):
         if _is_free(family, host, one):
             return host, one
     raise AddressError(f"port = {port}: all ports from {port} to {last} are in use at {host}")
 
 
-def _resolved(address: Any) -> tuple[socket.AddressFamily, str]:
+def _resolve(address: Any) -> tuple[socket.AddressFamily, str]:
     """Return the family and the numeric form of an address, IPv4 if it has both. Raises AddressError."""
     wrong = AddressError(
         f"address = {str(address)[:80]!r}: is not an address of this machine; use 127.0.0.1 for this machine only, "
@@ -77,18 +77,18 @@ def _is_free(family: socket.AddressFamily, host: str, port: int) -> bool:
 
 def urls(host: str, port: int, token: str) -> tuple[str, str]:
     """Return the cockpit's URL on this machine, and on other machines ('' if they cannot reach it)."""
-    here = _EVERYWHERE.get(host, host)
-    there = _outside(host) if host in _EVERYWHERE else ""
+    here = _LOOPBACK_OF_ALL.get(host, host)
+    there = _external_address(host) if host in _LOOPBACK_OF_ALL else ""
     url, far = (f"http://{f'[{one}]' if ':' in one else one}:{port}/?token={token}" for one in (here, there))
     return url, far if there else ""
 
 
-def _outside(host: str) -> str:
+def _external_address(host: str) -> str:
     """Return the address at which other machines reach this one; its host name if it has no route to others."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as one:
-            one.connect((_FAR[family], 9))  # sends nothing, but chooses the local address of the route
+            one.connect((_REMOTE_EXAMPLES[family], 9))  # sends nothing, but chooses the local address of the route
             return str(one.getsockname()[0])
     except OSError:
         return socket.gethostname()

@@ -25,7 +25,7 @@ _KINDS = {
     ".css": "text/css; charset=utf-8",
     ".svg": "image/svg+xml",
 }
-_PATIENCE = 5.0  # s, for the server to close its connections
+_CLOSE_TIMEOUT = 5.0  # s, for the server to close its connections
 
 
 def page_files() -> dict[str, tuple[str, bytes]]:
@@ -40,12 +40,13 @@ class PageServer:
 
     def __init__(self, address: Any, port: Any):
         """Listen at `address`, at `port` or the next free one. Raises AddressError if that is impossible."""
-        self._begun: futures.Future[tuple[Handler, Callable[[str], Content]]] = futures.Future()
+        # What `begin` was called with.
+        self._handlers: futures.Future[tuple[Handler, Callable[[str], Content]]] = futures.Future()
         self._files, token = page_files(), secrets.token_urlsafe(16)
         host, wanted = free_place(address, port)
         self._loop = asyncio.new_event_loop()
         threading.Thread(target=self._loop.run_forever, name="page server", daemon=True).start()
-        self._access = AccessControl(token, self._find, self._talk)
+        self._access = AccessControl(token, self._find, self._serve_socket)
         self._server = asyncio.run_coroutine_threadsafe(self._listen(host, wanted), self._loop).result()
         self.port = int(next(iter(self._server.sockets)).getsockname()[1])
         self.address, self.address_elsewhere = urls(host, self.port, token)
@@ -56,16 +57,16 @@ class PageServer:
         elsewhere = self.address_elsewhere
         return self.address + (f" and, on other machines, at {elsewhere}" if elsewhere else "")
 
-    def begin(self, socket: Handler, beside: Callable[[str], Content]) -> None:
-        """Serve waiting and new WebSockets with `socket`; `beside` returns other files by their path."""
-        self._begun.set_result((socket, beside))
+    def begin(self, socket: Handler, find: Callable[[str], Content]) -> None:
+        """Serve waiting and new WebSockets with `socket`; `find` returns other files by their path."""
+        self._handlers.set_result((socket, find))
 
     def stop(self) -> None:
         """Close all connections, and stop listening."""
         self._server.close()
         closing = asyncio.run_coroutine_threadsafe(self._server.wait_closed(), self._loop)
         try:
-            closing.result(_PATIENCE)
+            closing.result(_CLOSE_TIMEOUT)
         except futures.TimeoutError:
             closing.cancel()
         self._loop.call_soon_threadsafe(self._loop.stop)
@@ -78,12 +79,12 @@ class PageServer:
         return server
 
     def _find(self, path: str) -> Content:
-        return self._files.get(path) or (self._begun.result()[1](path) if self._begun.done() else None)
+        return self._files.get(path) or (self._handlers.result()[1](path) if self._handlers.done() else None)
 
-    async def _talk(self, connection: ServerConnection) -> None:
+    async def _serve_socket(self, connection: ServerConnection) -> None:
         return_pass = self._access.return_pass
         if return_pass is not None and is_local(connection):
             with contextlib.suppress(ConnectionClosed):
                 await connection.send(json.dumps({"pass": return_pass.key}))
-        socket, _ = await asyncio.shield(asyncio.wrap_future(self._begun))  # other connections await it, too
+        socket, _ = await asyncio.shield(asyncio.wrap_future(self._handlers))  # other connections await it, too
         await socket(connection)

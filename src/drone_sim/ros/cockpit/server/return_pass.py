@@ -29,8 +29,8 @@ _VALID = 30  # s, for a challenge
 class ReturnPass:
     """Challenges for tabs that come back, and the check of their answers. Only the server's event loop calls it.
 
-    A challenge is `time.nonce.mac` with a MAC of this process. None is stored before it is signed, so visitors
-    without the key cannot invalidate the challenges of others.
+    A challenge is `time.nonce.mac`, with the time in s and a MAC of this process. It is stored only after it was signed
+    correctly, so visitors without the key cannot invalidate the challenges of others.
     """
 
     def __init__(self, accept: bytes | None, give: bytes):
@@ -46,7 +46,7 @@ class ReturnPass:
 
     def challenge(self) -> str:
         """Return a new challenge."""
-        content = f"{time.monotonic():.3f}.{secrets.token_hex(16)}"
+        content = f"{int(time.monotonic())}.{secrets.token_hex(16)}"
         return f"{content}.{_mac(self._secret, content)}"
 
     def is_signed(self, challenge: str, signature: str) -> bool:
@@ -56,7 +56,7 @@ class ReturnPass:
         content, _, mac = challenge.rpartition(".")
         if not _is_equal(_mac(self._secret, content), mac):
             return False
-        now, expires = time.monotonic(), float(content.partition(".")[0]) + _VALID
+        now, expires = time.monotonic(), int(content.partition(".")[0]) + _VALID
         self._spent = {spent: end for spent, end in self._spent.items() if end >= now}
         if expires < now or challenge in self._spent:
             return False
