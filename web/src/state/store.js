@@ -24,7 +24,7 @@ const BEGINNING = {
   statusSince: 0,
   flight: "", // what the drone does
   hadSimulation: false, // whether there was a simulator since this page was opened
-  hears_commands: true, // whether the drone's script does
+  hearsCommands: true, // whether the drone's script does
   pace: "", // the actual speed, compared with real time
   warnings: [], // the texts of what is wrong in /diagnostics
   reached: null, // the breakpoint that paused the flight: { file, line, time (s), told (ms) }
@@ -57,7 +57,7 @@ const EVENTS = {
   pulse: (now, { silent, frozen, ended }) => ({ silent, isFrozen: frozen, hasEnded: ended }),
   master: (now, hasMaster) => ({ hasMaster }),
   flight: (now, flight) => ({ flight }),
-  hears_commands: (now, hears_commands) => ({ hears_commands }),
+  hears_commands: (now, hearsCommands) => ({ hearsCommands }),
   pace: (now, pace) => ({ pace }),
   warnings: (now, warnings) => ({ warnings }),
   status(now, status) {

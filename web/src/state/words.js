@@ -38,7 +38,7 @@ export function statusWords(now) {
 const DEAF = "This script does not listen to commands: its flight is in the script. Stage 6 of the tutorial does, and pilot.py.";
 
 // Nothing is said of a stopped script, because none listens to commands while it is stopped.
-export const deafWords = (now) => (answers(now) && !now.hears_commands && now.status !== "stopped" ? DEAF : "");
+export const deafWords = (now) => (answers(now) && !now.hearsCommands && now.status !== "stopped" ? DEAF : "");
 
 export const paceWords = (now) => (answers(now) && Number(now.pace) ? `${Number(now.pace).toFixed(2)} ×` : "");
 
