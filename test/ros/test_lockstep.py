@@ -25,7 +25,7 @@ from drone_sim.files.resources import package_path
 from drone_sim.grading import plan as plans
 from drone_sim.ros.grading import seeds
 from drone_sim.ros.grading.grade_live import grade
-from drone_sim.ros.grading.simulator import Mismatch
+from drone_sim.ros.grading.simulator import GradedSimulator, Mismatch
 
 NODES = package_path() / "docs/lockstep"
 OTHER = Path(__file__).with_name("lockstep_node.py")
@@ -134,6 +134,12 @@ class Simulator:
             self.process.wait(HANGS)
         finally:
             self.process.stdout.close()
+
+
+def start_twice(simulator, *arguments, start=GradedSimulator.start):
+    """Start as GradedSimulator does; then another client restarts, before the first step is answered."""
+    start(simulator, *arguments)
+    assert simulator.call("restart")[0]
 
 
 def started(*command):
@@ -315,7 +321,10 @@ class Lockstep(unittest.TestCase):
                 results.append(grade(plan, 1, "reacting", "drone_sim", HANGS)[0])
                 with mock.patch.object(seeds, "timeline_file", lambda _plan: str(other)):
                     replaced, _ = grade(plan, 1, "reacting", "drone_sim", HANGS)
+                with mock.patch.object(GradedSimulator, "start", start_twice):
+                    restarted, _ = grade(plan, 1, "reacting", "drone_sim", HANGS)
             self.assertIn("/drone_sim executes another timeline than the plan's", replaced.error)
+            self.assertEqual("another client has restarted the simulation", restarted.error)
             self.setUp()
         self.assertIsNone(results[0].error)
         self.assertEqual(results[0].digest, results[1].digest)

@@ -48,6 +48,7 @@ _STOPPED_TIMEOUT, _STALLED_TIMEOUT = 1.0, 10.0  # s of real time without a step 
 _LOCKSTEP_TIMEOUT = 90.0  # s: usually more than lockstep/start_timeout and lockstep/timeout
 _POLL_INTERVAL = 0.05  # s of real time
 _LAST_MESSAGES = 0.3  # s of real time until the last messages have arrived
+_RESTARTED = "another client has restarted the simulation"
 _PATIENCE = 30.0  # s of real time
 _EARLY, _LATE = 1e-6, 2.0  # s of simulated time by which a move of the timeline may differ, on a busy machine
 
@@ -175,6 +176,10 @@ class _LiveFlight:
             if now >= self._duration - 1e-6:
                 self._over.set()
 
+    @property
+    def _is_restarted(self) -> bool:
+        return self.listener.went_back or self._simulator.starts > 1
+
     def fly(self) -> str:
         """Fly, and return an error in one line, or ''."""
         try:
@@ -189,6 +194,7 @@ class _LiveFlight:
             if rospy.is_shutdown():
                 return error
             time.sleep(_LAST_MESSAGES)
+            error = error or (_RESTARTED if self._is_restarted else "")
             self._simulator.stop()
         except Mismatch as mismatch:
             return str(mismatch)
@@ -205,8 +211,8 @@ class _LiveFlight:
             waited = time.monotonic() - since
             if rospy.is_shutdown():
                 return f"grade_live was ended at {now:.2f} s"
-            if self.listener.went_back:
-                return "another client has restarted the simulation"
+            if self._is_restarted:
+                return _RESTARTED
             if self._simulator.state == "stopped" and waited > _STOPPED_TIMEOUT:  # the topic `state` may be late
                 return self._simulator.error or f"the simulation was stopped at {now:.2f} s"
             if self._simulator.state == "paused" and CHANGE not in self._plan.allowed:

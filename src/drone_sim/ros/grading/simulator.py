@@ -27,6 +27,7 @@ _IGNORED = (
     *("config", "gui", "script", "script_time_limit", "real_time_factor", "remote_api", "scene_file", "samples"),
     *("lockstep", "step_count", "timeline_file"),
 )
+_STOPPED = "stopped"
 _SCRIPT_ERROR = "script error: "
 _TIMELINE = re.compile(r"; timeline (\w+)$")  # at the end of the answer of a start
 
@@ -45,6 +46,7 @@ class GradedSimulator(Simulator):
         service = f"{self.node}/pause"
         self.wait(lambda: lookup("lookupService", service), f"no simulator {self.node}: start drone.launch")
         self.state = ""
+        self.starts = 0  # since the last call of `start`, by anybody
         self.error = ""
         self._subscribers = [
             rospy.Subscriber(f"{self.node}/state", String, self._on_state),
@@ -98,7 +100,7 @@ class GradedSimulator(Simulator):
 
         The simulator itself executes the entries of the file `timeline`, whose Timeline.digest must be `digest`.
         """
-        self.error = ""
+        self.error, self.starts = "", 0
         files = {"scene_file": scene, "timeline_file": timeline}
         old_files = {name: self.parameter(name) for name in files}
         for name, file in files.items():
@@ -124,6 +126,7 @@ class GradedSimulator(Simulator):
         return message
 
     def _on_state(self, message: String) -> None:
+        self.starts += self.state == _STOPPED and message.data != _STOPPED
         self.state = message.data
 
     def _on_log(self, message: Log) -> None:

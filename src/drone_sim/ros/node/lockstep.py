@@ -23,7 +23,7 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.vehicle import Vehicle
 
 _CLOCK = "/clock"
-_BY_STAMP = "/cmd_vel_stamped"  # the end of the topic whose messages name the stamp that they answer
+_STAMPED_TOPIC = "/cmd_vel_stamped"  # the end of the topic whose messages name the stamp that they answer
 # s of real time without a new connection; the second one if another node than the sender is triggered
 _SETTLE_TIME, _INDIRECT_SETTLE_TIME = 0.5, 1.5
 _MIN_CLOCK_TIME = 0.1  # s of real time in which nodes that sleep see the first time of a run
@@ -71,7 +71,7 @@ class _PendingAnswer:
         """Return why a message is not the answer; '' if it is."""
         if self.has_arrived:
             return "doubled"
-        if self.awaited.topic.endswith(_BY_STAMP):
+        if self.awaited.topic.endswith(_STAMPED_TOPIC):
             return "" if message.header.stamp == self.stamp else "of another stamp"
         return "" if self._could_be_seen_by(sender(message)) else "early"
 
@@ -86,8 +86,8 @@ class _PendingAnswer:
             return False
         if trigger == _CLOCK:  # the node may answer any message of the step, and these are written in any order
             return True
-        own = [each for each in connections.subscribers_of(trigger) if each.endpoint_id == node]
-        return not any(map(connections.has_queued, own))
+        links = [each for each in connections.subscribers_of(trigger) if each.endpoint_id == node]
+        return not any(map(connections.has_queued, links))
 
 
 class Lockstep:
@@ -241,7 +241,7 @@ class Lockstep:
             self._first_topology = self._topology_version
         with self._lock:
             for name, answer in self._pending.items():
-                if answer.is_triggered() and not (answer.has_arrived or name.endswith(_BY_STAMP)):
+                if answer.is_triggered() and not (answer.has_arrived or name.endswith(_STAMPED_TOPIC)):
                     self._stale_answers[name] = answer
             self._pending = {}
         for awaited in self._awaited.values():
