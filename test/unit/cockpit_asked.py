@@ -41,13 +41,23 @@ class TimelinePlayer:
         self.prepared = None
 
 
+class Scene:
+    """A scene that may name a script for its drone."""
+
+    own_script, has_no_vehicle = "", False
+
+    def set_script(self, script):
+        self.own_script = script
+
+
 class Asked:
     """What a browser asks."""
 
     def __init__(self, store):
         self.node = Node()
         self.player = TimelinePlayer()
-        self.answers = EditorBackend(store, LESSONS, self.node, self.player).answers
+        self.scene = Scene()
+        self.answers = EditorBackend(store, LESSONS, self.node, self.player, self.scene).answers
 
     def __call__(self, ask, **message):
         return self.answers[ask](message)

@@ -60,6 +60,17 @@ def test_what_a_task_begins_with_flies(name, tmp_path):
     simulation.close()
 
 
+def test_run_writes_the_script_into_a_scene_that_names_one_and_stops_first(ask):
+    assert ask("scripts")["flown"] == "built-in/pilot.py"
+    ask.scene.own_script = "target"
+    assert ask("scripts")["flown"] == "built-in/target.py"
+    assert ask("run", script="tutorial/2_elevation.py")["done"]
+    assert ask.node.asked == ["stop", "restart"]
+    assert ask("scripts")["flown"] == "tutorial/2_elevation.py"
+    ask.scene.own_script, ask.scene.has_no_vehicle = "", True
+    assert ask("scripts")["flown"] == "", "nothing flies"
+
+
 def test_a_task_brings_its_scene_and_leaving_it_brings_back_the_users(ask, tmp_path):
     node = ask.node
     node.parameters["scene_file"] = "mine.yaml"

@@ -10,8 +10,10 @@ pytest.importorskip("rospy", reason="needs ROS")
 from std_msgs.msg import String
 from test_cockpit_inspection import Topic
 
+from drone_sim.files.resources import package_path
 from drone_sim.ros.cockpit.editor import scene_editing
 from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
+from drone_sim.scripting.python.helpers import BUILT_IN
 
 ROW = {"handle": 3, "name": "Gate"}
 
@@ -50,8 +52,8 @@ def _editing(asked, told, tmp_path):
     return made
 
 
-def say(version, since, objects=(), gone=()):
-    said = {"version": version, "since": since, "revision": version, "objects": [*objects], "gone": [*gone]}
+def say(version, since, objects=(), gone=(), **more):
+    said = {"version": version, "since": since, "revision": version, "objects": [*objects], "gone": [*gone], **more}
     Topic.there["/sim/scene_objects"].callback(String(json.dumps(said)))
 
 
@@ -97,6 +99,33 @@ def test_a_scene_is_not_saved_over_another_one_unasked(editing, asked, tmp_path)
     editing.answers["save_scene"]({"file": "mine", "over": True})
     assert asked == [{"save": str(tmp_path / "mine.yaml")}]
     assert editing.answers["scene_files"]({})["recent"] == [str(tmp_path / "mine.yaml")]
+
+
+DRONE = {"handle": 5, "name": "Drone", "root": True, "vehicle": "drone", "own_script": ""}
+
+
+def test_run_writes_the_script_into_a_scene_that_names_one(editing, asked):
+    assert not editing.has_no_vehicle and editing.own_script == ""
+    say(1, None, [ROW])
+    assert editing.has_no_vehicle
+    say(2, 1, [{**DRONE, "own_script": "pilot"}])
+    assert not editing.has_no_vehicle and editing.own_script == "pilot"
+    editing.set_script(str(BUILT_IN / "pilot.py"))
+    assert asked == [], "the scene names it already"
+    editing.set_script(str(package_path() / "docs/tutorial/2_elevation.py"))
+    values = {"script": "package://drone_sim/docs/tutorial/2_elevation.py"}
+    assert asked == [{"edit": [{"do": "set", "object": 5, "values": values}], "name": "Fly 2_elevation.py"}]
+
+
+def test_a_saved_scene_keeps_the_script_that_was_run(editing, asked, monkeypatch, tmp_path):
+    monkeypatch.setattr(scene_editing.rospy, "get_param", lambda name, default: str(tmp_path / "mine.py"))
+    say(1, None, [DRONE], state="stopped")
+    editing.answers["save_scene"]({"file": "scene"})
+    assert [next(iter(one)) for one in asked] == ["edit", "save"]
+    assert asked[0]["edit"][0]["values"] == {"script": str(tmp_path / "mine.py")}
+    say(2, 1, [], state="flying")
+    editing.answers["save_scene"]({"file": "scene", "over": True})
+    assert [next(iter(one)) for one in asked] == ["edit", "save", "save"], "stop would undo the edit"
 
 
 def test_models_have_pictures_and_own_ones_are_uploaded(editing, tmp_path):

@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 from drone_sim.files.resources import package_path
-from drone_sim.ros.cockpit.editor.scene_files import SceneList
+from drone_sim.ros.cockpit.editor.scene_files import NEW_SCENE, SceneList
 
 GATES = "package://drone_sim/config/scenes/gates.yaml"
 
@@ -22,6 +22,11 @@ def test_a_shipped_scene_has_its_short_name_however_it_was_named(tmp_path, flown
 def test_no_scene_is_offered_first(tmp_path, flown):
     names, name = SceneList(tmp_path).names(flown)
     assert names[0] == name == SceneList(tmp_path).file(name) == "none"
+
+
+def test_a_scene_without_a_file_has_a_name_of_its_own(tmp_path):
+    names, name = SceneList(tmp_path).names(NEW_SCENE)
+    assert names[-1] == name == NEW_SCENE and names[0] == "none"
 
 
 def test_scenes_of_the_folder_are_offered_as_ones_own_and_nothing_else_of_it(tmp_path):

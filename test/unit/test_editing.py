@@ -168,7 +168,7 @@ def test_vehicles_and_floor(editor):
     edit(editor, {"do": "rename", "object": "Drone", "name": "first"})
     said = yaml_files.parse(text_of(editor))
     assert said["floor"] == {"size": 10}
-    assert said["vehicles"]["second"] == {"position": [2, 2, 1], "yaw": 1}
+    assert said["vehicles"]["second"] == {"position": [2, 2, 1], "yaw": 1, "script": "pilot"}
     assert said["vehicles"]["first"]["cameras"] == {"track": None}
     assert set(editor.simulation.vehicles) == {"first", "second"}
     assert "Goal" in editor.simulation.context.objects
@@ -180,6 +180,44 @@ def test_vehicles_and_floor(editor):
     while editor.history.undo_name:
         editor.answer({"undo": True})
     assert picture(editor.simulation) == before
+
+
+def test_a_new_drone_flies_what_the_scene_says(editor, tmp_path):
+    editor.answer({"new": True})
+    assert editor.described()["new"]
+    (drone,) = edit(editor, {"do": "add_vehicle", "position": [0, 0, 0]})["handles"]
+    editor.simulation.script = "target"  # what a client has run
+    assert yaml_files.parse(text_of(editor))["vehicles"]["quadricopter"]["script"] == "pilot"
+    (tmp_path / "mine.py").write_text("def sysCall_actuation():\n    pass\n")
+    edit(editor, {"do": "set", "object": drone, "values": {"script": str(tmp_path / "mine.py")}})
+    editor.answer({"save": str(tmp_path / "scene.yaml")})
+    assert not editor.described()["new"]
+    editor.answer({"open": str(tmp_path / "scene.yaml")})
+    editor.simulation.start()
+    assert editor.simulation.child_scripts["quadricopter"].path == str(tmp_path / "mine.py")
+
+
+WRONG_MODELS = {
+    "": "there is no object|no object named",
+    "Floor": "is the floor",
+    "Drone": "part of a vehicle",
+    "Quadricopter_base": "part of a vehicle",
+    "TrackCam": "part of a vehicle",
+}
+
+
+@pytest.mark.parametrize("name", WRONG_MODELS)
+def test_what_is_no_model_is_refused_in_one_line(shared, name, tmp_path):
+    edit(shared, {"do": "add", "objects": [{"name": "Lamp", "kind": "dummy", "parent": "Quadricopter_base"}]})
+    with pytest.raises(ValueError, match=WRONG_MODELS[name]):
+        shared.answer({"save_model": name, "file": str(tmp_path / "model.yaml")})
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("file", ["", "gate", "gate.txt", "gate\0.yaml", "gate\n.yaml", "x" * 300 + ".yaml"])
+def test_a_model_needs_the_name_of_a_yaml_file(shared, file):
+    with pytest.raises(ValueError, match=r"file = .*: the name of a scene or model must end in \.yaml"):
+        shared.answer({"save_model": "Gate", "file": file})
 
 
 def vehicle_state(editor, name="drone"):

@@ -10,7 +10,7 @@ import yaml
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import STARTED, Panel, open_page, ready, wait_for, wait_until
+from cockpit_page import PROJECT, STARTED, Panel, open_page, ready, wait_for, wait_until
 from diagnostic_msgs.srv import AddDiagnostics
 from launched import launched
 from scene_builder import Builder
@@ -239,7 +239,7 @@ def test_saved_in_flight_it_is_a_copy_and_the_page_says_so(cockpit, browser):
         before = page.inner_text("#scene-file")
         builder.ask_to_save_as("flown.yaml")
         Panel(page).wait_for("This is a copy")
-        assert page.inner_text("#scene-file") == before == "new scene"
+        assert page.inner_text("#scene-file") == before == "as launched"
     assert (cockpit.scripts / "flown.yaml").is_file()
 
 
@@ -270,3 +270,35 @@ def test_a_drag_is_one_step_of_undo_and_the_text_is_the_same_scene(cockpit, brow
         ready(page)
         builder.row("Ball").wait_for()
     cockpit.load("")
+
+
+def test_a_new_scene_flies_the_script_that_it_names_and_run_writes_it(cockpit, browser):
+    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        page.locator("#script").select_option("tutorial/1_thrust.lua")
+        wait_for(page, "document.querySelector('.cm-content').textContent.includes('thrust_gravity')")
+        page.click("#run")
+        wait_until(page, lambda: page.inner_text("#flown") == "tutorial/1_thrust.lua")
+        builder, panel = Builder(page), Panel(page)
+        builder.menu("Scene file", "New")
+        wait_until(page, lambda: page.inner_text("#flown") == "")
+        wait_until(page, lambda: page.locator("#scene-choice option:checked").inner_text() == "new scene")
+        assert page.evaluate(PROJECT, [2.5, 2.5, 0])[0] > 0, "the whole floor is in view"
+        builder.drop("Quadricopter", [0, 0, 0])
+        wait_until(page, lambda: page.inner_text("#flown") == "built-in/pilot.py")
+        panel.press("Start", "started")
+        wait_until(page, lambda: page.inner_text("#flying") == "built-in/pilot.py flies")
+        page.click("#run")
+        builder.wait("Drone", lambda one: one["own_script"] == "package://drone_sim/docs/tutorial/1_thrust.lua")
+        wait_until(page, lambda: page.inner_text("#flying") == "flies")
+    cockpit.load("")
+
+
+def test_what_is_no_model_cannot_be_saved_as_one_and_the_menu_says_why(cockpit, browser):
+    with open_page(cockpit, browser) as page:
+        builder = Builder(page)
+        item = page.locator("#scene-menu [data-edit=model]")
+        for name, why in (("Floor", "The floor"), ("Drone", "a vehicle")):
+            builder.select(name)
+            assert why in item.get_attribute("title") and item.is_disabled()
+        page.evaluate("scene.editing.select([])")
+        assert "Nothing is selected" in item.get_attribute("title") and item.is_disabled()

@@ -74,7 +74,7 @@ export class Scripts {
     if (found && found !== this.is.script) await this.open(found);
     if (found) return;
     await this.open(DEFAULT);
-    this.store.say("elsewhere", `${flown} flies, from another folder than ${folder}: Upload (⋯) makes a copy that you can edit`);
+    if (flown) this.store.say("elsewhere", `${flown} flies, from another folder than ${folder}: Upload (⋯) makes a copy that you can edit`);
   }
 
   // Returns the user's copy of the last open script, if the user has changed a script of the package, and that script.

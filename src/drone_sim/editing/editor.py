@@ -42,6 +42,7 @@ class SceneEditor:
         self._run = -1  # number of the run, -1 while stopped
         self._operations = EditOperations(self.simulation)
         self._scenes_read, self._is_opening = -1, False
+        self._is_new = False  # begun here, and without a file yet
         self.follow()
 
     @property
@@ -60,6 +61,7 @@ class SceneEditor:
         return {
             "revision": self.revision,
             "file": self.scene_file,
+            "new": self._is_new and not self.scene_file,
             "modified": self.is_modified,
             "read_only": self.files.is_read_only,
             "state": self._player.state,
@@ -72,7 +74,7 @@ class SceneEditor:
         """Update the state after a start, a stop, or the loading of another scene."""
         simulation = self.simulation
         if simulation.scenes_read != self._scenes_read:
-            self._scenes_read = simulation.scenes_read
+            self._scenes_read, self._is_new = simulation.scenes_read, False
             if self.is_modified and not self._is_opening:  # loaded over unsaved changes, not by the editor
                 self._drafts.offer()
             self._reset()
@@ -210,6 +212,7 @@ class SceneEditor:
             if file is None:
                 self._reset()
             self.follow()
+            self._is_new = file is None
         finally:
             self._is_opening = False
         return self._answer("new scene" if file is None else f"opened {file}", file=self.scene_file)

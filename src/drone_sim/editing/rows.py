@@ -12,6 +12,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.run.scene_settings import PLACE, vehicles_in
 from drone_sim.run.simulation import Simulation
+from drone_sim.run.simulation_setup import own_script
 from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters, place_of
 from drone_sim.vehicles.vehicle import Vehicle
@@ -59,7 +60,8 @@ class SceneRows:
                 row["vehicle"] = vehicle.name if vehicle else ""
                 row["of"] = "vehicle" if vehicle else "scene" if entry is not None else "floor"
                 if vehicle is not None and item is vehicle.object:
-                    row.update(root=True, type="vehicle", script=vehicle.parameters.script)
+                    own = own_script(vehicle.parameters, simulation.parameters)
+                    row.update(root=True, type="vehicle", script=vehicle.parameters.script, own_script=own)
                 changed.append(row)
         removed = [handle for handle in self._known if tree.get(handle) is None]
         for handle in removed:

@@ -8,10 +8,12 @@ from drone_sim.config.types import ParameterError
 from drone_sim.files import writing, yaml_files
 from drone_sim.files.resources import locate, package_path
 from drone_sim.files.yaml_text import YamlText
+from drone_sim.message_text import shown
 from drone_sim.run.scene_document import SceneContent, home
 from drone_sim.run.scene_settings import settings_of
 from drone_sim.run.simulation import Simulation
 
+_LONGEST_NAME = 100  # characters, without the folder
 _NEW = "# Metres, radians, kilograms.\nfloor: {size: 5}\nvehicles: {}\nobjects: []\n"
 
 
@@ -85,9 +87,9 @@ class SceneFiles:
         """Write an object and its descendants as a model. Raises ValueError and OSError."""
         operations, tree = self._simulation.operations, self._simulation.tree
         path = self._path(name)
-        members = [member for member in operations.model(handle) if self._simulation.vehicle_of(member) is None]
-        if not members:
+        if self._simulation.vehicle_of(handle) is not None:
             raise ValueError(f"'{tree[handle].name}' is part of a vehicle, which cannot be saved as a model")
+        members = [member for member in operations.model(handle) if self._simulation.vehicle_of(member) is None]
         path.parent.mkdir(parents=True, exist_ok=True)
         operations.write_model(members, path)
         return path
@@ -95,8 +97,9 @@ class SceneFiles:
     def _path(self, name: str | None) -> Path:
         if name is not None:
             path = locate(name)
-            if path.suffix not in (".yaml", ".yml"):
-                raise ParameterError(f"{name[:80]}: the name of a scene must end in .yaml")
+            if not name.isprintable() or len(path.name) > _LONGEST_NAME or path.suffix not in (".yaml", ".yml"):
+                required = f"must end in .yaml, and have at most {_LONGEST_NAME} printable characters"
+                raise ParameterError(f"file = {shown(name)}: the name of a scene or model {required}")
             if not path.is_absolute():
                 path = self._simulation.document.folder / path
             if _is_read_only(path):

@@ -18,6 +18,7 @@ from drone_sim.run.flight_changes import put
 from drone_sim.run.scene_settings import Settings, keep_names, say_place, vehicles_in, with_floor, with_vehicles
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.entry import pose_keys, rounded
+from drone_sim.scripting.load import DEFAULT
 from drone_sim.vehicles.quadricopter_objects import REMOVABLE
 from drone_sim.vehicles.types import TYPES
 from drone_sim.vehicles.vehicle import Vehicle
@@ -42,14 +43,14 @@ class VehicleEdits:
         return vehicles_in(self._simulation.document.settings, self._simulation.parameters)
 
     def add(self, op: records.AddVehicle) -> list[int]:
-        """Add a vehicle under an unused name."""
+        """Add a vehicle under an unused name; the scene names its script, by default the pilot."""
         if op.type not in TYPES:
             raise ParameterError(f"type = '{op.type}': must be one of {', '.join(TYPES)}")
         entries = self._entries()
         name = _unused_name(op.name or op.type, entries)
         x, y, z = op.position
         place = {"position": rounded([x, y, z + op.height]), **({"yaw": op.yaw} if op.yaw else {})}
-        self._apply({**entries, name: merged({**TYPES[op.type].entry(), **place}, op.values)})
+        self._apply({**entries, name: merged({"script": DEFAULT, **TYPES[op.type].entry(), **place}, op.values)})
         return [self.root(self._simulation.vehicles[name])]
 
     def copy(self, handle: int, places: Sequence[Vector]) -> list[int]:

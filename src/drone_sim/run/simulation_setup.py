@@ -232,9 +232,12 @@ class SimulationSetup:
 
 def script_of(vehicle: VehicleParameters, parameters: Parameters, script: str) -> str:
     """Return the script that flies a vehicle: its own if it names one, else `script`, else the parameters' script."""
-    if vehicle.script not in (parameters.script, NO_SCRIPT):
-        return vehicle.script
-    return script or parameters.script or vehicle.script
+    return own_script(vehicle, parameters) or script or parameters.script or vehicle.script
+
+
+def own_script(vehicle: VehicleParameters, parameters: Parameters) -> str:
+    """Return the script that the scene names for a vehicle; '' if it is flown by the script for all vehicles."""
+    return "" if vehicle.script in (parameters.script, NO_SCRIPT) else vehicle.script
 
 
 def give_back_memory() -> None:

@@ -174,6 +174,10 @@ export class Build {
       button.disabled = !what;
       button.title = `${name === "undo" ? "Undo" : "Redo"}${what ? `: ${what}` : ""} (Ctrl+${name === "undo" ? "Z" : "Y"})`;
     }
+    const whyNoModel = this.files.whyNoModel();
+    const saveModel = document.querySelector("#scene-menu [data-edit=model]");
+    saveModel.disabled = Boolean(whyNoModel);
+    saveModel.title = whyNoModel || "The selected object with all its children becomes a model on the shelf";
     at("until-stop").hidden = !state || state === "stopped";
     const count = edit.selected.length;
     at("selected").textContent = !one ? "Nothing is selected" : count > 1 ? `${count} objects; the last: ${one.name}` : one.name;

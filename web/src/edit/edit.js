@@ -162,6 +162,13 @@ export class Edit {
     this.handles.put(isShown ? this.frameOf(one.handle, frame) : null, isShown && new THREE.Vector3().setFromMatrixPosition(one.matrix));
   }
 
+  frameFloor() {
+    const { size } = this.objects.named("Floor").values;
+    this.scene.view.lookAt(new THREE.Vector3(), size / 2);
+    this.scene.view.stepBack();
+    this.scene.change();
+  }
+
   // ---- frames and places
 
   mayMove(handle) {

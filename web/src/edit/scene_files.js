@@ -10,12 +10,13 @@ export class SceneFiles {
   constructor(edit) {
     this.edit = edit;
     edit.on("objects", () => this.show());
+    edit.on("tree", () => this.frame());
   }
 
   // The name of the file, and whether it lacks something.
   show() {
-    const { file, modified, draft } = this.edit.is;
-    at("scene-file").textContent = file ? nameOf(file) : "new scene";
+    const { file, modified, draft, new: isNew } = this.edit.is;
+    at("scene-file").textContent = file ? nameOf(file) : isNew ? "new scene" : "as launched";
     at("scene-file").title = file;
     at("scene-modified").hidden = !modified;
     const question = at("draft");
@@ -45,8 +46,17 @@ export class SceneFiles {
     askFor(`${file ? nameOf(file) : "The new scene"} has changes that are not saved`, [], "Throw them away", act);
   }
 
+  // The floor is framed when it is told.
   begin() {
-    return this.ifSaved(() => this.act("new_scene"));
+    return this.ifSaved(async () => {
+      this.isBegun = true;
+      if (!(await this.act("new_scene"))) this.isBegun = false;
+    });
+  }
+
+  frame() {
+    if (this.isBegun && this.edit.is.new) this.edit.frameFloor();
+    this.isBegun = false;
   }
 
   save() {
@@ -59,9 +69,20 @@ export class SceneFiles {
     this.askForFile("Save the scene as", kept, "save_scene", {});
   }
 
+  // Why what is selected cannot be saved as a model; "" if it can.
+  whyNoModel() {
+    const one = this.edit.objects.get(this.edit.last);
+    if (!one) return "Nothing is selected: a model is an object with all its children";
+    if (this.edit.selected.length > 1) return "Several objects are selected: group them to a model first";
+    if (one.of === "floor") return "The floor cannot be saved as a model";
+    if (one.of === "vehicle") return `${one.name} is a vehicle or a part of one, which cannot be saved as a model`;
+    if (one.type === "script") return "A script is saved with its object: select that one";
+    return "";
+  }
+
   saveModel() {
     const one = this.edit.objects.get(this.edit.last);
-    if (!one) return this.edit.wrong("Nothing is selected: a model is an object with all its children.");
+    if (this.whyNoModel()) return this.edit.wrong(this.whyNoModel());
     this.askForFile(`Save ${one.name} as a model`, { label: "Name", value: `${one.name}.yaml` }, "save_model", { object: one.handle });
   }
 

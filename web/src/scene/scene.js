@@ -15,6 +15,7 @@ import { BEHIND, FOV, FREE, View } from "./view.js";
 const BODIES = "view/bodies";
 const OBJECTS = "objects"; // the server of handles, and `scene`, the layer, of what stands in the scene
 const TARGETS = "markers"; // the server of the handles of vehicles and of their green spheres
+const FLOOR = "Floor";
 const BASE = "base_link", TRACK = "Track_base", EYE = "_optical";
 const STEP = 0.05; // s, of the simulation
 const HOVERED = 0xffffff;
@@ -146,12 +147,20 @@ export class Scene {
     this.onLook?.(view);
   }
 
-  // Looks at something by its name, or at the vehicle, from near.
+  // Looks at something by its name, or at the vehicle, from near; at all there is if there is no vehicle.
   frame(name = this.selected || this.vehicle) {
+    const isThere = this.bodies?.has(this.vehicle);
     if (this.editing?.last !== undefined) this.lookAt(this.editing.seen.meshesOf(this.editing.selected));
-    else if (name === this.vehicle && this.view.name === BEHIND) this.view.reset();
-    else this.lookAt(this.meshesOf(name));
+    else if (name === this.vehicle && isThere && this.view.name === BEHIND) this.view.reset();
+    else this.lookAt(isThere || this.selected ? this.meshesOf(name) : this.meshes());
     this.change();
+  }
+
+  // Of all that stands in the scene; of the floor where nothing does.
+  meshes() {
+    const names = new Set(this.things().map(({ userData }) => userData.said.ns));
+    if (names.size > 1) names.delete(FLOOR);
+    return [...names].flatMap((name) => this.meshesOf(name));
   }
 
   lookAt(meshes) {

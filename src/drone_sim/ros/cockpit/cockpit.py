@@ -15,7 +15,7 @@ from drone_sim.ros.cockpit.editor.backend import EditorBackend
 from drone_sim.ros.cockpit.editor.inspection import ScriptInspector
 from drone_sim.ros.cockpit.editor.lessons import Lessons
 from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
-from drone_sim.ros.cockpit.editor.scene_files import SceneList
+from drone_sim.ros.cockpit.editor.scene_files import NEW_SCENE, SceneList
 from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
 from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows
@@ -53,10 +53,16 @@ class Cockpit:
         self._state, self._meshes, self._manual = SceneState(), MeshStore(), Manual()
         held = HeldCommands(self._commands.send)
         store, self._lessons = ScriptStore(scripts), Lessons()
-        editor = EditorBackend(store, self._lessons, self._simulator, TimelinePlayer(self._simulator.node))
         self._server = server
         self._inspector = ScriptInspector(self._simulator.node, store, lambda message: self._socket.tell(message))
-        self._editing = SceneEditing(self._simulator.node, scripts, lambda message: self._socket.tell(message))
+        self._editing = SceneEditing(
+            self._simulator.node,
+            scripts,
+            lambda message: self._socket.tell(message),
+            lambda: self._commands.vehicle,
+        )
+        player = TimelinePlayer(self._simulator.node)
+        editor = EditorBackend(store, self._lessons, self._simulator, player, self._editing)
         answers = {**editor.answers, **self._inspector.answers, **self._editing.answers}
         takes = {"drag": self._drag, "push": self._push}
         self._socket = PageSocket(held, answers, takes, scene=self._state.since)
@@ -147,7 +153,7 @@ class Cockpit:
         try:
             below = rospy.get_namespace()  # there may be other simulators in other namespaces
             self._topics = find_topics([one for one in rospy.get_published_topics() if one[0].startswith(below)])
-            scene = str(self._simulator.parameter("scene_file", ""))
+            scene = NEW_SCENE if self._editing.is_new else str(self._simulator.parameter("scene_file", ""))
             self._panel.board.show("master", True)
         except FAILURES:  # the master may be started again
             self._topics, scene = FoundTopics(), ""

@@ -87,6 +87,8 @@ class SceneEditing:
         answer = self.editor.answer(said)
         if self.editor.scene_file != before:
             rospy.set_param("~scene_file", self.editor.scene_file)
+        if "new" in said or "open" in said or said.get("draft") == "take":
+            self._services.forget_script()
         self._services.tell_vehicles()
         return json.dumps(answer)
 

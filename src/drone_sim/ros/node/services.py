@@ -58,6 +58,7 @@ class Services:
         self._vehicles = VehiclesParameter()
         self._vehicles.tell(player.simulation.parameters)
         self._snapshot: Snapshot | None = None
+        self._launch_script = rospy.get_param("~script", "")
         # The scene of the config, if the parameter scene_file did not replace it.
         self._config_scene = "" if scene_parameter() else player.simulation.parameters.scene_file
         jobs = ("start", "stop", "restart", "load_scene", "set_vehicles", "snapshot", "restore")
@@ -142,6 +143,11 @@ class Services:
         script = script_from_shell(str(rospy.get_param("~script", "")))
         script_path(script)
         self._player.simulation.script = script
+
+    def forget_script(self) -> None:
+        """Replace the script that was run in the scene before by the script of the launch."""
+        rospy.set_param("~script", self._launch_script)
+        self._player.simulation.script = script_from_shell(str(self._launch_script))
 
     def set_vehicles(self) -> str:
         """Fly the vehicles in the parameter `vehicles`; those that fly already simply fly on."""

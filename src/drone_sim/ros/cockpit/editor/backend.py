@@ -9,6 +9,7 @@ from typing import Any
 
 from drone_sim.ros.cockpit.editor.checks import TextChecker
 from drone_sim.ros.cockpit.editor.lessons import Lesson, Lessons
+from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
 from drone_sim.ros.cockpit.editor.scene_files import SceneSwitcher, plan_of
 from drone_sim.ros.cockpit.editor.script_store import OWN, ScriptFile, ScriptStore, ScriptStoreError
 from drone_sim.ros.cockpit.editor.task_flights import Grader, TimelinePlayer
@@ -25,8 +26,16 @@ _Message = Mapping[str, Any]
 class EditorBackend:
     """Handlers of the editor's requests."""
 
-    def __init__(self, store: ScriptStore, lessons: Lessons, simulator: Simulator, player: TimelinePlayer):
-        """`simulator` flies a script; `player` sends the timeline of its task meanwhile."""
+    def __init__(
+        self,
+        store: ScriptStore,
+        lessons: Lessons,
+        simulator: Simulator,
+        player: TimelinePlayer,
+        scene: SceneEditing,
+    ):
+        """`simulator` flies a script in `scene`; `player` sends the timeline of its task meanwhile."""
+        self._scene = scene
         self._store = store
         self._lessons = lessons
         self._simulator = simulator
@@ -81,7 +90,10 @@ class EditorBackend:
         }
 
     def _flying_script(self) -> str:
-        path = script_from_shell(str(self._simulator.parameter("script", ""))) or "pilot"
+        """Return the script of the vehicle: the one that the scene names, else the simulator's; '' if none flies."""
+        if self._scene.has_no_vehicle:
+            return ""
+        path = self._scene.own_script or script_from_shell(str(self._simulator.parameter("script", ""))) or "pilot"
         with contextlib.suppress(ScriptError):  # a missing script is shown by its file name
             path = script_path(path)
         script = self._store.of_file(path)
@@ -185,6 +197,9 @@ class EditorBackend:
         lesson = self._find_lesson(message)
         self._player.prepare(plan_of(lesson) if lesson and lesson.task else None)
         self._simulator.set_parameter("script", path)
+        if self._scene.own_script and self._switcher.keeps_scene(lesson):
+            self._simulator.call("stop")  # it would undo the edit
+            self._scene.set_script(path)
         done, message_text = self._switcher.fly(lesson)
         self._player.begin() if done else self._player.end()
         if message_text.endswith("unavailable"):  # rospy's message for a service that does not exist

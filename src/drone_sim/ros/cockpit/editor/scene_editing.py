@@ -17,11 +17,15 @@ from std_msgs.msg import String
 
 from drone_sim.editing.properties import properties
 from drone_sim.files import writing
+from drone_sim.files.resources import package_path
 from drone_sim.ros.cockpit.editor.model_list import ModelList
 from drone_sim.ros.cockpit.editor.recent_scenes import RecentScenes
 from drone_sim.ros.cockpit.server.access_control import Content
 from drone_sim.ros.cockpit.server.page_socket import Answer
+from drone_sim.ros.core.launch_parameters import script_from_shell
 from drone_sim.ros.core.simulator import FAILURES
+from drone_sim.scripting.load import DEFAULT
+from drone_sim.scripting.python.helpers import BUILT_IN
 
 _Message = Mapping[str, Any]
 _LINE = re.compile(r"\bline (\d+)\b")
@@ -33,8 +37,14 @@ _MAX_SIZE = 6 << 20  # bytes of an uploaded model: in base64 it must fit into a 
 class SceneEditing:
     """Forwards edits to the simulator, and keeps the object tree for browsers that connect later."""
 
-    def __init__(self, node: str, folder: Path, broadcast: Callable[[_Message], None]):
-        """`node` is the simulator's name, `folder` that of the user's scenes; `broadcast` sends to all browsers."""
+    def __init__(
+        self, node: str, folder: Path, broadcast: Callable[[_Message], None], vehicle: Callable[[], str] = lambda: ""
+    ):
+        """`node` is the simulator's name, `folder` that of the user's scenes; `broadcast` sends to all browsers.
+
+        `vehicle` returns the name of the vehicle that the page flies.
+        """
+        self._vehicle = vehicle
         self._node, self._folder, self._broadcast = node, folder, broadcast
         self._subscriber: rospy.Subscriber | None = None
         self._has_gap = False  # a change was lost, so that later changes cannot be applied
@@ -70,6 +80,46 @@ class SceneEditing:
             self._rows.update((row["handle"], row) for row in change["objects"])
             self._header = {key: value for key, value in change.items() if key not in ("objects", "gone")}
         self._broadcast({"tree": change})
+
+    @property
+    def is_new(self) -> bool:
+        """Whether the scene was begun in the editor and has no file yet."""
+        return bool(self._state("new")["new"])
+
+    # ---- the script of the vehicle that the page flies
+
+    @property
+    def has_no_vehicle(self) -> bool:
+        """Whether the scene is known to have no vehicle."""
+        with self._lock:
+            return bool(self._rows) and not any(row.get("root") for row in self._rows.values())
+
+    @property
+    def own_script(self) -> str:
+        """The script that the scene names for the vehicle; '' if it names none."""
+        row = self._vehicle_row()
+        return str(row["own_script"]) if row else ""
+
+    def set_script(self, script: str) -> None:
+        """Write the script of the vehicle into the scene. Raises ValueError."""
+        row, script = self._vehicle_row(), _name_in_scene(script)
+        if row is not None and row["own_script"] != script:
+            operation = {"do": "set", "object": row["handle"], "values": {"script": script}}
+            self._call({"edit": [operation], "name": f"Fly {Path(script).name}"})
+
+    def _keep_flown_script(self) -> None:
+        """Write the script that was last run into a scene that names none, so that the saved scene flies the same."""
+        if self._vehicle_row() is None or self.own_script or self._state("state")["state"] != "stopped":
+            return
+        script = script_from_shell(str(rospy.get_param(f"{self._node}/script", "")))
+        if Path(script).is_absolute() and Path(script).stem != DEFAULT:
+            self.set_script(script)
+
+    def _vehicle_row(self) -> _Message | None:
+        with self._lock:
+            roots = [row for row in self._rows.values() if row.get("root")]
+        wanted = self._vehicle()
+        return next((row for row in roots if row["vehicle"] == wanted), roots[0] if roots else None)
 
     def picture(self, path: str) -> Content:
         """Return a model's picture by its path; None if the path is none of them."""
@@ -128,6 +178,7 @@ class SceneEditing:
             is_own = message.get("over") is True or path == self._state("file")["file"]
             if Path(path).exists() and not is_own:
                 raise ValueError(f"{message['file']} is there already")
+        self._keep_flown_script()
         reply = self._call({"save": path})
         self._recent.add(reply["file"])
         return reply
@@ -169,6 +220,15 @@ class SceneEditing:
         except OSError as error:
             raise ValueError(str(error)) from None
         return {"model": self._models.operation(self._models.folder / name)}
+
+
+def _name_in_scene(script: str) -> str:
+    """Return the name of a script file that a scene on any machine may have: a built-in script's, or package://."""
+    path = Path(script)
+    if path.parent == BUILT_IN:
+        return path.stem
+    package = package_path()
+    return f"package://drone_sim/{path.relative_to(package)}" if path.is_relative_to(package) else script
 
 
 def _pick(message: _Message, *keys: str) -> dict[str, Any]:

@@ -27,6 +27,7 @@ _DRONE = "drone"
 _SCENE_KEYS = ("scene", *BESIDE, *EquipmentParameters.model_fields)  # of a config, that a scene file can hold
 _KEY = "scene_file"
 _NONE = "none"  # as in the launch file
+NEW_SCENE = "new scene"  # the name of one that has no file
 _MINE = "mine/"
 _SHIPPED = "config/scenes"
 _MAX_OWN = 200  # scenes of the user's
@@ -113,6 +114,11 @@ class SceneSwitcher:
         if lesson.scene:
             return f"in {lesson.scene.rpartition('/')[2]}, as the tutorial's command says"
         return self._back() if self._is_of_lesson(self._scene_file()) else ""
+
+    def keeps_scene(self, lesson: Lesson | None) -> bool:
+        """Return whether a lesson is flown in the present scene."""
+        has_scene = lesson is not None and bool(lesson.task or lesson.scene)
+        return not has_scene and not self._is_of_lesson(self._scene_file())
 
     def fly(self, lesson: Lesson | None) -> tuple[bool, str]:
         """Restart the simulation in the lesson's scene; return whether it started, and one line.
