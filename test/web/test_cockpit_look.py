@@ -81,6 +81,33 @@ def test_the_scene_has_room_and_nothing_is_cut_off(cockpit, browser, width, heig
         wait_until(page, lambda: scene.bounding_box()["width"] == width)
 
 
+def visible_lines(page):
+    """Return how many lines of code the editor shows."""
+    return page.evaluate(
+        "document.querySelector('#text').clientHeight / document.querySelector('#text .cm-line').offsetHeight"
+    )
+
+
+@pytest.mark.parametrize(
+    "width, height, beside_text, alone", [(1440, 900, 15, 30), (820, 1180, 11, 22), (720, 450, 0, 4), (390, 844, 0, 10)]
+)
+def test_code_has_room_beside_a_text_or_the_text_covers_it(cockpit, browser, width, height, beside_text, alone):
+    with open_page(cockpit, browser, viewport={"width": width, "height": height}) as page:
+        if not page.locator("#editor").is_visible():  # on a small screen
+            page.click("#toggle")
+        page.select_option("#lesson", "stage-2-elevation")
+        page.locator("#lesson-text").get_by_text("In sensing").wait_for()
+        assert page.locator("#text").is_visible() == (beside_text > 0)
+        if beside_text:
+            assert visible_lines(page) >= beside_text
+        page.get_by_role("button", name="Code only").click()
+        assert visible_lines(page) >= alone
+        page.get_by_role("button", name="Text", exact=True).click()
+        assert page.locator("#lesson-body").bounding_box()["height"] > 70
+        page.click("#tab-variables")
+        assert page.evaluate("document.querySelector('#below').offsetHeight / editor.offsetHeight") >= 0.4 - 0.01
+
+
 def test_panel_and_editor_are_as_they_were_left(cockpit, browser):
     with open_page(cockpit, browser) as page:
         Panel(page).show("Tune")

@@ -65,7 +65,7 @@ export class Editor {
       basicSetup,
       keymap.of([indentWithTab]),
       indentUnit.of("    "),
-      EditorView.contentAttributes.of({ "aria-label": "Text of the child script; Escape and then Tab leaves it" }),
+      EditorView.contentAttributes.of({ tabindex: "0", "aria-label": "Text of the child script; Escape and then Tab leaves it" }),
       changed,
     ];
     this.view = new EditorView({ parent, state: this.begin("", "") });

@@ -188,6 +188,7 @@ export class Lesson {
 
   folded(is) {
     this.parts.body.hidden = is || !this.name;
+    this.parts.fold.textContent = this.parts.body.hidden ? "Text" : "Code only";
     this.parts.fold.setAttribute("aria-expanded", String(!this.parts.body.hidden));
     this.parts.fold.disabled = !this.name;
   }

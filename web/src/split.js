@@ -15,7 +15,13 @@ export function split(bar, property, along, low, high, measure) {
     return size;
   };
   const move = (value) => keep(key, set(value));
+  const present = () => {
+    const box = bar.getBoundingClientRect();
+    return measure({ clientX: box.x + box.width / 2, clientY: box.y + box.height / 2 });
+  };
+  bar.setAttribute("aria-valuenow", String(low));
   if (Number(kept(key, 0))) set(Number(kept(key, 0)));
+  bar.addEventListener("focus", () => bar.setAttribute("aria-valuenow", String(Math.round(present()))));
   bar.addEventListener("pointerdown", (event) => bar.setPointerCapture(event.pointerId));
   bar.addEventListener("pointermove", (event) => bar.hasPointerCapture(event.pointerId) && move(measure(event)));
   const [less, more] = along === "x" ? ["ArrowRight", "ArrowLeft"] : ["ArrowUp", "ArrowDown"];
@@ -24,7 +30,6 @@ export function split(bar, property, along, low, high, measure) {
     if (!way) return;
     event.preventDefault();
     event.stopPropagation();
-    const box = bar.getBoundingClientRect();
-    move(measure({ clientX: box.x + box.width / 2, clientY: box.y + box.height / 2 }) + way * STEP);
+    move(present() + way * STEP);
   });
 }

@@ -33,7 +33,7 @@ export class SceneText {
   begin() {
     const changed = EditorView.updateListener.of((update) => update.docChanged && !this.filling && this.change());
     const left = EditorView.domEventHandlers({ blur: () => void this.write() }); // before what one goes on with, as a start
-    const label = EditorView.contentAttributes.of({ "aria-label": "Text of the scene; Escape and then Tab leaves it" });
+    const label = EditorView.contentAttributes.of({ tabindex: "0", "aria-label": "Text of the scene; Escape and then Tab leaves it" });
     const extensions = [basicSetup, EditorView.lineWrapping, StreamLanguage.define(yaml), syntaxHighlighting(colors), keymap.of([indentWithTab]), indentUnit.of("  "), label, left, changed];
     return new EditorView({ parent: this.parts.text, state: EditorState.create({ extensions }) });
   }

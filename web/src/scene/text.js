@@ -9,7 +9,7 @@ export class Words extends THREE.Sprite {
   static unit = 0.001; // m, how large a CSS pixel is at 1 m
   // `size`: m of a line, or with `fixed` CSS pixels, near and far.
   constructor(text, { color = "#1a1f29", plate = "rgba(255,255,255,0.78)", size = 0.05, fixed = false } = {}) {
-    super(new THREE.SpriteMaterial({ sizeAttenuation: !fixed, transparent: true, depthWrite: false }));
+    super(new THREE.SpriteMaterial({ sizeAttenuation: !fixed, transparent: true, depthWrite: false, depthTest: !fixed }));
     Object.assign(this, { color, plate, size, fixed });
     this.center.set(0.5, 0);
     this.renderOrder = 5;

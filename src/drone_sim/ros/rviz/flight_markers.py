@@ -30,6 +30,7 @@ _TICK = 0.5  # m
 _MAX_TICKS = 40
 _LINE_WIDTH = 0.006  # m
 _INK = (0.10, 0.12, 0.16, 1.0)
+_PALE_INK = (0.10, 0.12, 0.16, 0.4)
 _SECONDS = 1.0  # an arrow is as long as the distance that is commanded for this time
 _BLUE = (0.0, 0.30, 0.95, 1.0)
 _DISTANCE = 0.3  # m, of arrows from the drone's center, so that they do not hide it
@@ -131,7 +132,7 @@ def _plumb_line(height: float) -> Marker:
     for number in range(1, min(_MAX_TICKS, math.ceil(height / _TICK))):
         half, z = (0.05 if number % 2 else 0.1), number * _TICK - height
         points += [(-half, 0.0, z), (half, 0.0, z), (0.0, -half, z), (0.0, half, z)]
-    return new_marker(Marker.LINE_LIST, _INK, (_LINE_WIDTH, 0, 0), points, ns="plumb line")
+    return new_marker(Marker.LINE_LIST, _PALE_INK, (_LINE_WIDTH, 0, 0), points, ns="plumb line")
 
 
 def _velocity_arrow(command: Twist, base: frames.Matrix) -> Marker | None:
