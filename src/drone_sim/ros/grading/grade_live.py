@@ -45,7 +45,6 @@ from drone_sim.scene.scene_parameters import find_files_beside
 _NAME = "grade_live"
 _ROSTEST_OUTPUT = "--gtest_output=xml:"  # prefix of rostest's argument for the file of the result
 _STOPPED_TIMEOUT, _STALLED_TIMEOUT = 1.0, 10.0  # s of real time without a step after which a flight has ended
-_LOCKSTEP_TIMEOUT = 90.0  # s: usually more than lockstep/start_timeout and lockstep/timeout
 _POLL_INTERVAL = 0.05  # s of real time
 _LAST_MESSAGES = 0.3  # s of real time until the last messages have arrived
 _RESTARTED = "another client has restarted the simulation"
@@ -151,6 +150,9 @@ class _LiveFlight:
         self._simulator, self._plan = simulator, plan
         self._duration, self._scene = plan.duration, seeds.scene_file(plan, seed)
         self._over = threading.Event()
+        lockstep = parameters.lockstep
+        wait = max(lockstep.timeout, lockstep.start_timeout) if plan.lockstep else 0.0
+        self._stalled_timeout = _STALLED_TIMEOUT + wait  # s of real time
         self._started = False
         wanted = plan.parameters(seed)
         simulator.check_seed(wanted, self._scene)
@@ -217,7 +219,7 @@ class _LiveFlight:
                 return self._simulator.error or f"the simulation was stopped at {now:.2f} s"
             if self._simulator.state == "paused" and CHANGE not in self._plan.allowed:
                 return f"somebody has paused the simulation at {now:.2f} s; the plan does not allow that"
-            if waited > (_LOCKSTEP_TIMEOUT if self._plan.lockstep else _STALLED_TIMEOUT):
+            if waited > self._stalled_timeout:
                 return f"the simulation stands still at {now:.2f} s, {self._simulator.state}"
         return ""
 
