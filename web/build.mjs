@@ -23,4 +23,5 @@ await build({
   banner: { js: `// built from web/src, sha256 ${digest()}` },
 });
 for (const name of readdirSync("src").filter((one) => /\.(html|css)$/.test(one))) copyFileSync(`src/${name}`, `${PAGE}/${name}`);
+copyFileSync("../src/drone_sim/grading/outputs/html/files/card.css", `${PAGE}/card.css`); // the report's
 copyFileSync("node_modules/uplot/dist/uPlot.min.css", `${PAGE}/uPlot.min.css`);

@@ -57,7 +57,8 @@ class Asked:
         self.node = Node()
         self.player = TimelinePlayer()
         self.scene = Scene()
-        self.answers = EditorBackend(store, LESSONS, self.node, self.player, self.scene).answers
+        backend = EditorBackend(store, LESSONS, self.node, self.player, self.scene)
+        self.answers, self.grader = backend.answers, backend.grader
 
     def __call__(self, ask, **message):
         return self.answers[ask](message)

@@ -113,10 +113,15 @@ def test_a_script_is_graded_in_a_process_of_its_own(ask):
     begun = ask("grade", script="tasks/hover.py", lesson="tasks/hover")
     with pytest.raises(ScriptStoreError, match="another script is being graded"):
         ask("grade", script="tasks/hover.py", lesson="tasks/hover")
-    while not (result := ask("graded", number=begun["number"])):
+    while "problem" not in (result := ask("graded", number=begun["number"])):
+        assert result["seeds"] == 3 and 0 <= result["flights"] <= 3
         time.sleep(0.02)
     assert (result["problem"], result["points"], result["of"]) == ("", 3.0, 6.0)
-    assert [(one["name"], one["passed"]) for one in result["rows"]][:2] == [("place", False), ("height", True)]
+    assert [(one["seed"], one["passed"]) for one in result["flights"]] == [(0, False), (1, False), (2, False)]
+    assert all("Not passed" in card and "at most 0.6 m" in card and "<circle" in card for card in result["cards"])
+    kind, page = ask.grader.report_file(f"/{result['page']}")
+    assert kind.startswith("text/html") and b"replay.js" in page
+    assert ask.grader.report_file("/graded/../result.json") is None and ask.grader.report_file("/elsewhere") is None
     for message, words in (({"lesson": "stage-3-yaw"}, "needs a task"), ({"lesson": None}, "needs a task")):
         with pytest.raises(ScriptStoreError, match=words):
             ask("grade", script="tasks/hover.py", **message)
@@ -128,7 +133,7 @@ def test_a_grading_that_does_not_end_is_ended(monkeypatch, tmp_path):
     monkeypatch.setattr(task_flights, "_TIMEOUT", 0.0)
     one = task_flights.Grader()
     number = one.start("hover", tmp_path / "x.py")
-    while not (result := one.result(number)):
+    while "problem" not in (result := one.result(number)):
         time.sleep(0.01)
     assert result == {"problem": "it took more than 0 s"}
 

@@ -51,7 +51,7 @@ def test_every_link_leads_somewhere_in_the_folder(report):
 
 
 def test_names_and_errors_are_text(report):
-    pages = {report / "index.html": 1, **dict.fromkeys(report.glob("scripts/*/*.html"), 6)}
+    pages = {report / "index.html": 1, **dict.fromkeys(report.glob("scripts/*/*.html"), 5)}
     for page, scripts in pages.items():
         tags = Page(page).tags
         assert (tags.count("script"), tags.count("img")) == (scripts, 0)
@@ -149,6 +149,6 @@ def test_a_table_that_shows_nothing_is_told_of(tmp_path, text, said):
 def test_a_long_flight_is_thinned(tmp_path):
     table = write_table(tmp_path / "t.csv", 301)
     report.write(read_plan(tmp_path), [result()], lambda _: table, tmp_path / "out")
-    (page,), (figures,) = tmp_path.glob("out/scripts/*/index.html"), tmp_path.glob("out/scripts/*/flights/*")
+    (page,), (figures,) = tmp_path.glob("out/scripts/*/index.html"), tmp_path.glob("out/scripts/*/flights/*.js")
     assert "one row in 2 is shown" in page.read_text()
     assert json.loads(figures.read_text().partition(" = ")[2].rstrip(";\n"))["t"][:3] == [0, 0.1, 0.2]

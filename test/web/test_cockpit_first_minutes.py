@@ -118,7 +118,14 @@ def test_a_task_is_solved_and_graded(student):
     wait_until(student, lambda: student.input_value("#script").startswith("tasks/"))
     student.click("#grade")
     wait_until(student, lambda: student.locator("#graded tr").count() > 1, 120)
-    assert re.search(r"\d+(\.\d)? of \d+ points", student.inner_text("#graded"))
+    graded = student.inner_text("#graded")
+    assert re.search(r"\d+(\.\d)? of \d+ points", graded) and "seed 2" in graded and "Try this" in graded
+    with student.context.expect_page() as opened:
+        student.locator("#graded a.when").first.click()
+    replay = opened.value
+    wait_until(replay, lambda: replay.locator("#stage[data-shown]").count())
+    assert float(replay.inner_text("#time").split()[0]) > 0
+    replay.close()
 
 
 def test_a_script_that_fails_its_task_is_graded_with_the_reason(student):

@@ -1,22 +1,11 @@
 // The text beside the script: a section of the tutorial, or a task. What it says of a scene, Run flies in.
+import { keepBest, showGrade, showProgress } from "./graded.js";
 import { render } from "./markdown.js";
 import { hasFunctions } from "./snippets.js";
 import { forget, keep, kept } from "./storage.js";
 
 const ASK_AGAIN = 500; // ms, for what is being graded
 const GRADE = "grade"; // the key of the last grade: { task, script, number, isOld }; a reload goes on with it
-
-function showGrade(element, { script, isOld }, { problem, points, of, rows = [] }) {
-  const table = document.createElement("table");
-  for (const one of rows) {
-    const row = table.insertRow();
-    row.className = one.passed ? "passed" : "failed";
-    for (const cell of [one.passed ? "ok" : "no", one.name, `${one.points}/${one.of}`, one.said]) row.insertCell().textContent = cell;
-  }
-  const sum = rows.length ? `${script}: ${points} of ${of} points` : "";
-  const old = isOld ? "The script has been changed since" : "";
-  element.replaceChildren([sum, problem, old].filter(Boolean).join(". "), table);
-}
 
 export class Lesson {
   // `parts` are elements: choice, before, after, fold, body, start, flies, grade, graded, text. Of `script`, `open` opens one,
@@ -102,7 +91,7 @@ export class Lesson {
   async grade() {
     const task = this.name;
     this.store.take("grading", true);
-    this.parts.graded.textContent = "flying without pictures ...";
+    showProgress(this.parts.graded, {});
     try {
       await this.save();
       const { script } = this.opened;
@@ -132,9 +121,11 @@ export class Lesson {
       let result = {};
       while (!("problem" in result)) {
         result = await this.ask("graded", { number });
+        if (!("problem" in result) && this.graded?.task === this.name) showProgress(this.parts.graded, result);
         if (!("problem" in result)) await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN));
       }
       this.result = result;
+      keepBest(this.graded.task, result);
       this.showGraded();
     } catch (error) {
       this.forgetGrade(isOfBefore ? "" : error.message);
@@ -155,7 +146,7 @@ export class Lesson {
     const { graded } = this.parts;
     if (this.graded?.task !== this.name) graded.replaceChildren();
     else if (this.result) showGrade(graded, this.graded, this.result);
-    else graded.textContent = "flying without pictures ...";
+    else showProgress(graded, {});
   }
 
   // Says it when the graded script is changed.

@@ -15,6 +15,7 @@ from drone_sim.grading.criteria.criterion import (
     Criterion,
     Figure,
     FlightPart,
+    Hint,
     format_figure,
 )
 from drone_sim.grading.flight_record import UNITS
@@ -25,6 +26,7 @@ class Stays(Criterion):
     """A column stays between `at_least` and `at_most`, in the column's unit; one of them may be left out."""
 
     kind: Literal["stays"]
+    hint: Hint = "Look at the curve: if it swings, lower the gain or add damping; if it creeps, raise the gain."
     of: Column
     at_least: Figure | None = None
     at_most: Figure | None = None
@@ -64,6 +66,7 @@ class SteadyError(Criterion):
     """
 
     kind: Literal["steady_error"]
+    hint: Hint = "What stays must be integrated away, or needs a higher gain."
     of: Column
     to: Figure
     at_most: Bound
@@ -89,6 +92,7 @@ class Attitude(AtMostCriterion):
     """The largest angle (rad) between the vehicle's vertical axis and the world's, in any direction."""
 
     kind: Literal["attitude"]
+    hint: Hint = "Limit the speed that you command, or change it more slowly."
     at_most: Annotated[Finite, Within(0, 3.2)]
 
     unit = "rad"

@@ -14,6 +14,7 @@ from drone_sim.grading.criteria.criterion import (
     Criterion,
     CriterionFailed,
     FlightPart,
+    Hint,
     format_figure,
     label_or,
 )
@@ -29,6 +30,7 @@ class NoContact(Criterion):
     """The vehicle touches nothing but `allow`, names as the sensor `contacts` gives them; every sub-step counts."""
 
     kind: Literal["no_contact"]
+    hint: Hint = "Keep a larger distance from what you touched, and slow down before it."
     allow: Annotated[list[Label], Field(max_length=100)] = Field(default_factory=list)
 
     needs_contacts = True
@@ -67,6 +69,7 @@ class Landed(Criterion):
     """
 
     kind: Literal["landed"]
+    hint: Hint = "Descend slowly, and only while you are above the place."
     at: _LandingPlace = None
     within: Bound = 0.3
     softly: Bound | None = None

@@ -7,7 +7,7 @@ from abc import abstractmethod
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, PlainValidator, TypeAdapter, ValidationError
+from pydantic import AfterValidator, Field, PlainValidator, TypeAdapter, ValidationError
 
 from drone_sim.config.types import Checked, Finite, Label, ParameterError, Within
 from drone_sim.grading.flight_record import UNITS, FlightRecord
@@ -18,6 +18,7 @@ from drone_sim.offline.timeline import MAX_TIME
 Seconds = Annotated[Finite, Within(0, MAX_TIME)]
 Figure = Annotated[Finite, Within(-1e9, 1e9)]
 Bound = Annotated[Finite, Within(0, 1e9)]
+Hint = Annotated[str, Field(max_length=300)]  # a sentence
 ROUNDING = 1e-9  # s, tolerance when times of rows are compared with times of the plan
 
 
@@ -102,6 +103,7 @@ class Criterion(Checked):
     points: Annotated[Finite, Within(0, 1e6)] = 1.0
     after: Seconds = 0.0
     until: Seconds | None = None
+    hint: Hint = ""  # what to try if it fails; every kind has a default
 
     is_lasting: ClassVar[bool] = True  # whether it must hold until the end of its part
     needs_contacts: ClassVar[bool] = False  # whether it reads FlightRecord.contacts

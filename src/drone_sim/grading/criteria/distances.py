@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from drone_sim.config.types import Fraction, Label, Point
-from drone_sim.grading.criteria.criterion import AtMostCriterion, CriterionFailed, FlightPart, format_figure
+from drone_sim.grading.criteria.criterion import AtMostCriterion, CriterionFailed, FlightPart, Hint, format_figure
 from drone_sim.grading.result import Outcome
 
 MAX_CORNERS = 1000
@@ -45,6 +45,7 @@ class Drift(DistanceCriterion):
     """The distance from the position `from` ([x, y, z] in m, world), by default the vehicle's position at `after`."""
 
     kind: Literal["drift"]
+    hint: Hint = "Command a speed towards the place that grows with the distance to it."
     place: Point | None = Field(default=None, alias="from")
 
     def _judge_part(self, part: FlightPart) -> Outcome:
@@ -62,6 +63,7 @@ class Formation(DistanceCriterion):
     """
 
     kind: Literal["formation"]
+    hint: Hint = "Aim at the place where the other one will be: add its velocity to yours."
     to: Label
     offset: Point = (0.0, 0.0, 0.0)
     turns: bool = False
@@ -92,6 +94,7 @@ class PathFollowing(DistanceCriterion):
     """
 
     kind: Literal["path"]
+    hint: Hint = "Fly more slowly in the corners, or correct the distance to the path more strongly."
     along: Annotated[list[Point], Field(min_length=2, max_length=MAX_CORNERS)] | Label
     closed: bool = False
     covers: Fraction = 0.0

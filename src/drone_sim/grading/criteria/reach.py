@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from drone_sim.config.types import Point, Switch
-from drone_sim.grading.criteria.criterion import Bound, Criterion, FlightPart, format_figure, label_or
+from drone_sim.grading.criteria.criterion import Bound, Criterion, FlightPart, Hint, format_figure, label_or
 from drone_sim.grading.result import Outcome
 
 MAX_PLACES = 200
@@ -31,6 +31,7 @@ class Reach(Criterion):
     """
 
     kind: Literal["reach"]
+    hint: Hint = "Print the distance to the next place, and go on only when you are near enough."
     places: Annotated[list[_Place], Field(min_length=1, max_length=MAX_PLACES)]
     within: Bound
     partial: Switch = False

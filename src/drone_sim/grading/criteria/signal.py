@@ -14,6 +14,7 @@ from drone_sim.grading.criteria.criterion import (
     Criterion,
     CriterionFailed,
     FlightPart,
+    Hint,
     format_figure,
 )
 from drone_sim.grading.result import Outcome
@@ -35,6 +36,7 @@ class Signal(Criterion):
     """
 
     kind: Literal["signal"]
+    hint: Hint = "Print the value with its time: when does it become wrong?"
     signal: _SourceName = ""
     topic: _SourceName = ""
     field: Annotated[Label, AfterValidator(_check_field)] = "data"

@@ -17,6 +17,7 @@ from drone_sim.grading.criteria.criterion import (
     CriterionFailed,
     Figure,
     FlightPart,
+    Hint,
     format_figure,
 )
 from drone_sim.grading.flight_record import UNITS
@@ -77,6 +78,7 @@ class RiseTime(StepCriterion):
     """
 
     kind: Literal["rise_time"]
+    hint: Hint = "Raise the gain of this loop: it answers too slowly."
 
     is_lasting = False
 
@@ -96,6 +98,7 @@ class Overshoot(StepCriterion):
     """
 
     kind: Literal["overshoot"]
+    hint: Hint = "Add damping to this loop, or lower its gain."
 
     unit = "%"
 
@@ -117,6 +120,7 @@ class SettlingTime(StepCriterion):
     """
 
     kind: Literal["settling_time"]
+    hint: Hint = "Add damping to this loop, so that it swings less."
     band: Annotated[Finite, Within(1e-6, 1)] = 0.02
 
     def _judge_part(self, part: FlightPart) -> Outcome:

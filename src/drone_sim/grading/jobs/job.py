@@ -184,6 +184,11 @@ class ResultStore:
             remove(path, within=self._tables)
 
 
+def count_results(folder: Path) -> int:
+    """Return the number of results that are stored in a folder."""
+    return sum(bool(line.strip()) for file in folder.glob("*.jsonl") for line in file.read_bytes().splitlines())
+
+
 def remove_old_results(folder: Path, days: float) -> None:
     """Remove results, tables and unpacked submissions that are older than some days, as far as permissions allow."""
     oldest = time.time() - days * _DAY

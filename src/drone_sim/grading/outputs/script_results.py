@@ -149,10 +149,13 @@ def format_points(value: float) -> str:
 
 
 def format_figure(outcome: Outcome) -> str:
-    """Return the figure of an outcome with three significant digits and its unit, '' if there is none."""
+    """Return the figure of an outcome with three digits (below 0.1: two) and its unit, '' if there is none."""
     if outcome.value is None:
         return ""
-    number = f"{outcome.value:.0f}" if abs(outcome.value) >= 100 else f"{outcome.value:.3g}"
+    size = abs(outcome.value)
+    number = (
+        f"{outcome.value:.0f}" if size >= 100 else f"{outcome.value:.3g}" if size >= 0.1 else f"{outcome.value:.2g}"
+    )
     return f"{number} {outcome.unit}".rstrip()
 
 

@@ -63,6 +63,7 @@ class Cockpit:
         )
         player = TimelinePlayer(self._simulator.node)
         editor = EditorBackend(store, self._lessons, self._simulator, player, self._editing)
+        self._report_file = editor.grader.report_file
         answers = {**editor.answers, **self._inspector.answers, **self._editing.answers}
         takes = {"drag": self._drag, "push": self._push}
         self._socket = PageSocket(held, answers, takes, scene=self._state.since)
@@ -139,7 +140,7 @@ class Cockpit:
 
     def _find(self, path: str) -> Content:
         content = self._meshes.find(path) or self._lessons.picture(path) or self._manual.find(path)
-        return content or self._editing.picture(path)
+        return content or self._editing.picture(path) or self._report_file(path)
 
     def _drag(self, browser: int, message: Mapping[str, Any]) -> None:
         if self._view is not None:

@@ -2,6 +2,7 @@
 
     index.html  files/report.css, replay.js, ...  similar/1.html ...
     scripts/01-alice/index.html  scripts/01-alice/flights/0.js ...  scripts/01-alice/files/report.css, ..., scene.js
+    scripts/01-alice/flights/0.html ...   the result card of a flight without a page around it, which the cockpit shows
 
 A script's folder is complete, so that it can be given to the author. Figures are in JavaScript files, because a page
 from file:// may load no other data; a page loads a flight's figures when the flight is shown. The templates escape all
@@ -26,6 +27,7 @@ import numpy as np
 from drone_sim.files import writing
 from drone_sim.files.containment import remove
 from drone_sim.grading.flight_record import columns_of
+from drone_sim.grading.outputs.html.charts import Chart, chart_of
 from drone_sim.grading.outputs.html.scene import scene_of
 from drone_sim.grading.outputs.script_results import (
     ScriptResults,
@@ -37,14 +39,14 @@ from drone_sim.grading.outputs.script_results import (
     named_outcomes,
 )
 from drone_sim.grading.plan import Plan
-from drone_sim.grading.result import Result
+from drone_sim.grading.result import Outcome, Result
 from drone_sim.grading.submissions.similarity import find_similar, provided_sources
 from drone_sim.message_text import escaped
 from drone_sim.offline import recording
 from drone_sim.offline.recording import COLUMNS
 
 _HERE = Path(__file__).parent
-_SHARED = ("replay.js", "report.css", "view.js", "plots.js", "page.js", "index.js")  # the marker first
+_SHARED = ("replay.js", "report.css", "card.css", "view.js", "plots.js", "page.js", "index.js")  # the marker first
 _MARKER = Path("files", "replay.js")  # exists in every folder of a report
 _REPLACED_FOLDERS = ("scripts", "similar", "files")
 _MAX_SLUG = 40  # characters of a folder's name
@@ -68,6 +70,8 @@ class FlightEntry(NamedTuple):
     result: Result
     figures: str  # the file, '' if there is no table
     note: str  # about the figures
+    rows: list[tuple[str, Outcome, Chart | None]]  # name, outcome and chart of each criterion
+    hint: str  # what to try, '' if the flight passed
 
 
 class ScriptPage(NamedTuple):
@@ -128,15 +132,17 @@ def write(
         (path / name).mkdir(parents=True)
     _write_shared_files(path / "files")
     scene = _assignment("scene", scene_of(plan.parameters().scene))
+    templates = _templates()
     writer = _FlightWriter(plan, tables, path)
     scripts = group_by_script(results, names)
     pages = [writer.write_page(number, script, scripts) for number, script in enumerate(scripts, start=1)]
-    templates = _templates()
     for page in pages:
         own = (path / page.file).parent
         _write_shared_files(own / "files")
         _write(own / "files" / "scene.js", scene)
         _render(templates, "script.html", own / "index.html", plan=plan, page=page)
+        for flight in page.flights:
+            _render(templates, "card.html", own / "flights" / f"{flight.key}.html", flight=flight, script=page.script)
     similar_pages = _similar_pages(plan, pages, sources or {})
     for pair in similar_pages:
         _render(templates, "similar.html", path / pair.file, plan=plan, pair=pair)
@@ -199,9 +205,13 @@ class _FlightWriter:
 
     def _write_flight(self, own: str, key: str, result: Result) -> FlightEntry:
         label, table = flight_label(result), self._tables(result)
-        figures = figures_of(table) if table is not None else Figures({}, "no table of this flight was kept")
+        figures = figures_of(table) if table is not None else Figures({}, {}, "no table of this flight was kept")
+        hint = _hint(self._plan, result)
+        rows: list[tuple[str, Outcome, Chart | None]]
         if not figures.columns:
-            return FlightEntry(key, label, result, "", figures.note)
+            rows = [(name, outcome, None) for name, outcome in named_outcomes(result)]
+            return FlightEntry(key, label, result, "", figures.note, rows, hint)
+        scene = scene_of(self._plan.parameters(result.seed).scene)
         marks = [
             {"name": escaped(name), "at": outcome.at}
             for name, outcome in named_outcomes(result)
@@ -209,10 +219,26 @@ class _FlightWriter:
         ]
         content = {**figures.columns, "marks": marks}
         if self._plan.spread.objects and result.seed:  # the seed has moved objects
-            content["scene"] = scene_of(self._plan.parameters(result.seed).scene)
+            content["scene"] = scene
         file = f"flights/{key}.js"
         _write(self._folder / own / file, _assignment(f'flights["{key}"]', content))
-        return FlightEntry(key, label, result, file, figures.note)
+        rows = [
+            (name, outcome, chart_of(criterion, figures.flown, scene, None if outcome.passed else outcome.at))
+            for criterion, (name, outcome) in zip(self._plan.criteria, named_outcomes(result))
+        ]
+        return FlightEntry(key, label, result, file, figures.note, rows, hint)
+
+
+def _hint(plan: Plan, result: Result) -> str:
+    """Return the hint of the failed criterion with the most points, '' if none failed; errors come first."""
+    if result.troubles:
+        return "Correct the error first; the criteria judge only what was flown before it."
+    failed = [
+        (outcome.of - outcome.points, criterion)
+        for criterion, outcome in zip(plan.criteria, result.outcomes)
+        if not outcome.passed
+    ]
+    return max(failed, key=lambda one: one[0])[1].hint if failed else ""
 
 
 def _slug(label: str) -> str:
@@ -255,6 +281,7 @@ class Figures(NamedTuple):
     """Columns of equal length for plots and replay, by their names in criteria, and a note about them."""
 
     columns: dict[str, list[float]]
+    flown: dict[str, np.ndarray]  # all columns, not rounded
     note: str = ""
 
 
@@ -263,14 +290,14 @@ def figures_of(table: Path) -> Figures:
     try:
         rows = _rows(table)
     except (OSError, recording.TableRefused) as error:
-        return Figures({}, " ".join(str(error).split()))
+        return Figures({}, {}, " ".join(str(error).split()))
     if not len(rows):
-        return Figures({}, "nothing was flown")
+        return Figures({}, {}, "nothing was flown")
     step = -(-len(rows) // _MAX_ROWS)
     values = columns_of(rows[::step])
     columns = {name: list(map(float, np.round(values[name], _DIGITS))) for name in _COLUMNS}
     first = f" of the first {len(rows)}" if len(rows) == recording.MAX_ROWS else ""
-    return Figures(columns, f"one row in {step}{first} is shown" if step > 1 else "")
+    return Figures(columns, values, f"one row in {step}{first} is shown" if step > 1 else "")
 
 
 def _rows(table: Path) -> np.ndarray:

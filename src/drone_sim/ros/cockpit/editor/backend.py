@@ -41,7 +41,7 @@ class EditorBackend:
         self._simulator = simulator
         self._switcher = SceneSwitcher(simulator)
         self._player = player
-        self._grader = Grader()
+        self.grader = Grader()
         self._checker = TextChecker()
 
     @property
@@ -65,7 +65,7 @@ class EditorBackend:
             "lesson": self._lesson,
             "run": self._run,
             "grade": self._grade,
-            "graded": lambda message: self._grader.result(message.get("number")),
+            "graded": lambda message: self.grader.result(message.get("number")),
         }
         return {name: _with_one_line_errors(handler) for name, handler in handlers.items()}
 
@@ -212,7 +212,7 @@ class EditorBackend:
         lesson, script = self._find_lesson(message), self._script(message)
         if lesson is None or not lesson.task:
             raise ScriptStoreError("grade: needs a task; choose one above the text")
-        return {"number": self._grader.start(lesson.task, script.path)}
+        return {"number": self.grader.start(lesson.task, script.path)}
 
 
 def _text(message: _Message) -> str:

@@ -19,16 +19,22 @@ import rospy
 from nav_msgs.msg import Odometry
 from std_msgs.msg import String
 
+from drone_sim.grading.jobs.job import count_results
 from drone_sim.grading.plan import Plan
 from drone_sim.ros.cockpit.editor.script_store import ScriptStoreError
+from drone_sim.ros.cockpit.server.access_control import Content
+from drone_sim.ros.cockpit.server.manual import find_below
 from drone_sim.ros.grading.timeline_sender import TimelineSender
 
 _QUEUE = 1000  # messages; none may be lost, since they are counted
 _STOPPED = "stopped"
 _LINGER = 1.0  # s after the last entry, so that its messages are sent
-_TIMEOUT = 180.0  # s of real time; a flight with cameras takes some seconds, and has its own limits
+_SEEDS = 3  # flights of one grade
+_TIMEOUT = 300.0  # s of real time; a flight with cameras takes some seconds, and has its own limits
 _NICENESS = 10  # the flight in real time has priority
 _MAX_ERROR = 500  # characters
+_REPORT = "report"  # the folder of `grade --html`, in that of the results
+_REPORT_URL = "/graded/"
 
 
 class TimelinePlayer:
@@ -91,7 +97,7 @@ class TimelinePlayer:
 
 
 class Grader:
-    """Grading of one script at a time, with seed 0, in a child process."""
+    """Grading of one script at a time, with the first seeds, in a child process, which also writes its report."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -99,6 +105,7 @@ class Grader:
         # A page that was open while an earlier cockpit ran may ask for a grade of that one.
         self._number = secrets.randbelow(1 << 30)
         self._result: dict[str, Any] = {}
+        self._folder: tempfile.TemporaryDirectory[str] | None = None  # of the last run: its results and its report
         atexit.register(self._kill)
 
     def start(self, task: str, script: Path) -> int:
@@ -106,10 +113,13 @@ class Grader:
         with self._lock:
             if self._process is not None:
                 raise ScriptStoreError("grade: another script is being graded; it takes some seconds")
+            if self._folder is not None:
+                self._folder.cleanup()
             self._folder = tempfile.TemporaryDirectory(prefix="drone_sim_grade_")
+            folder = self._folder.name
             command = ["nice", "-n", str(_NICENESS), sys.executable, "-m", "drone_sim.grading.grade", task, str(script)]
-            command += ["--seeds", "1", "--jobs", "1", "--results", self._folder.name]
-            command += ["--json", f"{self._folder.name}/result.json"]
+            command += ["--seeds", str(_SEEDS), "--jobs", "1", "--results", folder]
+            command += ["--json", f"{folder}/result.json", "--html", f"{folder}/{_REPORT}"]
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
@@ -120,24 +130,35 @@ class Grader:
             )
             self._number += 1
             self._result = {}
-            threading.Thread(target=self._wait, args=(self._process,), name="grade", daemon=True).start()
+            arguments = self._process, Path(folder)
+            threading.Thread(target=self._wait, args=arguments, name="grade", daemon=True).start()
             return self._number
 
     def result(self, number: Any) -> dict[str, Any]:
-        """Return the result of a run, {} until it has ended. Raises ScriptStoreError if a later run replaced it."""
-        if number != self._number:
-            raise ScriptStoreError("grade: another script was graded in the meantime")
-        return self._result
+        """Return the result of a run, until it has ended the number of finished `flights` of all `seeds`.
 
-    def _wait(self, process: subprocess.Popen[str]) -> None:
+        Raises ScriptStoreError if a later run replaced it.
+        """
+        if number != self._number or self._folder is None:
+            raise ScriptStoreError("grade: another script was graded in the meantime")
+        return self._result or {"flights": count_results(Path(self._folder.name)), "seeds": _SEEDS}
+
+    def report_file(self, path: str) -> Content:
+        """Return content type and content of a file of the last run's report by its URL; None if there is none."""
+        folder = self._folder
+        if folder is None or not path.startswith(_REPORT_URL):
+            return None
+        return find_below(Path(folder.name) / _REPORT, path.removeprefix(_REPORT_URL))
+
+    def _wait(self, process: subprocess.Popen[str], folder: Path) -> None:
         try:
             errors = process.communicate(timeout=_TIMEOUT)[1]
         except subprocess.TimeoutExpired:
             self._kill()
             process.communicate()
             errors = f"it took more than {_TIMEOUT:g} s"
-        with self._lock, self._folder:
-            self._result = _read_result(Path(self._folder.name) / "result.json", errors)
+        with self._lock:
+            self._result = _read_result(folder, errors)
             self._process = None
 
     def _kill(self) -> None:
@@ -146,15 +167,24 @@ class Grader:
             os.killpg(process.pid, signal.SIGKILL)
 
 
-def _read_result(file: Path, errors: str) -> dict[str, Any]:
-    """Return the result for the page: points, their maximum, a row for each criterion, and a problem ('' for none).
+def _read_result(folder: Path, errors: str) -> dict[str, Any]:
+    """Return the result for the page, or only a `problem`, a line that says why nothing was graded; otherwise it is ''.
 
-    The problem's key is not `error`, because a reply with that key means that the request itself has failed.
+    The key is not `error`, because a reply with that key means that the request itself has failed. `cards` are the
+    result cards of the flights as HTML; `page` is the report's page, which has the replay of each.
     """
     try:
-        result = json.loads(file.read_text(encoding="utf-8"))["results"][0]
+        content = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        (script,), results = content["scripts"], content["results"]
+        (page,) = (folder / _REPORT).glob("scripts/*/index.html")
+        cards = [(page.parent / f"flights/{key}.html").read_text(encoding="utf-8") for key in range(len(results))]
     except (OSError, ValueError, LookupError):
         return {"problem": " ".join(errors.split())[:_MAX_ERROR] or "nothing was graded"}
-    keys = ("name", "passed", "points", "of", "said")
-    rows = [{key: outcome[key] for key in keys} for outcome in result["outcomes"]]
-    return {"problem": result["error"] or "", "points": result["points"], "of": result["of"], "rows": rows}
+    return {
+        "problem": "",
+        "points": script["points"],
+        "of": script["of"],
+        "flights": [{key: result[key] for key in ("seed", "passed", "points", "of")} for result in results],
+        "cards": cards,
+        "page": f"{_REPORT_URL[1:]}{page.relative_to(folder / _REPORT)}",
+    }

@@ -25,11 +25,16 @@ class Manual:
             return None
         if not self._folder.is_dir():
             return "text/plain; charset=utf-8", _NOT_BUILT.encode()
-        file = (self._folder / path.removeprefix(MANUAL)).resolve()
-        if not file.is_relative_to(self._folder):
-            return None
-        kind = mimetypes.guess_type(file.name)[0] or "text/plain"
-        try:
-            return f"{kind}; charset=utf-8" if kind.startswith("text/") else kind, read_bytes(file, _MAX_SIZE)
-        except (OSError, ValueError):
-            return None
+        return find_below(self._folder, path.removeprefix(MANUAL))
+
+
+def find_below(folder: Path, name: str) -> Content:
+    """Return content type and content of the file `name` in a folder; None if there is none, or it is outside."""
+    file = (folder / name).resolve()
+    if not file.is_relative_to(folder.resolve()):
+        return None
+    kind = mimetypes.guess_type(file.name)[0] or "text/plain"
+    try:
+        return f"{kind}; charset=utf-8" if kind.startswith("text/") else kind, read_bytes(file, _MAX_SIZE)
+    except (OSError, ValueError):
+        return None

@@ -5,6 +5,7 @@ const get = (id) => document.getElementById(id);
 const replay = new Replay(get("canvas"));
 const plots = new Plots(get("plots"), (time) => seek(time));
 const clock = { time: 0, end: 0, playing: false, last: 0 };
+let start = 0; // s, the time at which a flight is shown first
 
 // ---- time
 
@@ -111,12 +112,13 @@ function load(key) {
   }));
   replay.load(flight);
   plots.load(flight);
-  seek(0);
+  seek(start);
 }
 
 function follow() {
   const keys = [...document.querySelectorAll(".flight")].map((section) => section.id);
-  const wanted = decodeURIComponent(location.hash.slice(1));
+  const [wanted, at] = decodeURIComponent(location.hash.slice(1)).split("@"); // a flight, and a time in it
+  start = Number(at) || 0;
   if (keys.length) show(keys.includes(wanted) ? wanted : keys[0]);
 }
 

@@ -1,6 +1,8 @@
 // Projection of points of the world (m, x right, y forward, z up) to the screen.
 "use strict";
 
+const report = { flights: {} }; // filled by the files with figures
+
 const VIEWS = {
   space: { azimuth: -2.2, elevation: 0.42, flat: false },
   top: { azimuth: -Math.PI / 2, elevation: Math.PI / 2, flat: true }, // x to the right, y up

@@ -1,0 +1,57 @@
+// What a grade says: how far it is, the result card of each flight, and the best points of each task.
+import { create } from "./dom.js";
+import { keep, kept } from "./storage.js";
+
+const BEST = "best"; // the key of the best grade of each task: { task: { points, of } }
+
+const digits = (points) => String(Number(points.toFixed(2)));
+
+export const bestOf = (task) => kept(BEST, {})[task] ?? null;
+
+export function bestWords(task) {
+  const best = bestOf(task);
+  return best ? `${digits(best.points)} of ${digits(best.of)} points` : "";
+}
+
+export function keepBest(task, { points, of }) {
+  const best = bestOf(task);
+  if (points === undefined || (best && best.points >= points)) return;
+  keep(BEST, { ...kept(BEST, {}), [task]: { points, of } });
+}
+
+// `flights` of `seeds` have been flown.
+export function showProgress(element, { flights = 0, seeds = 0 }) {
+  const words = seeds ? `Flying without pictures: seed ${Math.min(flights, seeds - 1)}, flight ${Math.min(flights + 1, seeds)} of ${seeds}` : "Flying without pictures ...";
+  if (element.querySelector(".progress")?.textContent === words) return;
+  const bar = seeds ? create("progress", { max: seeds, value: flights, "aria-label": "flights flown" }) : "";
+  element.replaceChildren(create("p", { className: "progress" }, words), bar);
+}
+
+// The card of a flight is HTML of the cockpit's own templates, which escape all other text.
+function cardOf(html, page) {
+  const template = create("template", { innerHTML: html });
+  for (const link of template.content.querySelectorAll("a.when")) {
+    Object.assign(link, { href: `${page}${link.getAttribute("href")}`, target: "_blank", title: "Replay this second, in a new tab" });
+  }
+  return template.content;
+}
+
+const seedWords = ({ seed, passed, points, of }) => `${passed ? "✓" : "✗"} seed ${seed}: ${digits(points)}/${digits(of)}`;
+
+// Shows the flights, and the card of the worst.
+export function showGrade(element, { script, isOld }, { problem, points, of, flights = [], cards = [], page = "" }) {
+  const old = isOld ? create("p", { className: "progress" }, "The script has been changed since.") : "";
+  if (!flights.length) return element.replaceChildren(create("p", { className: "bad" }, problem), old);
+  const passed = flights.filter((one) => one.passed).length;
+  const sum = `${script}: ${digits(points)} of ${digits(of)} points; ${passed} of ${flights.length} flights passed`;
+  const place = create("div");
+  const choose = (index) => {
+    place.replaceChildren(cardOf(cards[index], page));
+    for (const [at, button] of [...seeds.children].entries()) button.setAttribute("aria-pressed", String(at === index));
+  };
+  const seeds = create("div", { className: "seeds", role: "group", "aria-label": "Flights" });
+  seeds.append(...flights.map((one, index) => create("button", { type: "button", onclick: () => choose(index) }, seedWords(one))));
+  const replay = create("a", { href: page, target: "_blank" }, "Replay and plots of all flights");
+  element.replaceChildren(create("p", {}, sum), old, seeds, place, create("p", {}, replay));
+  choose(flights.reduce((worst, one, index) => (one.points < flights[worst].points ? index : worst), 0));
+}
