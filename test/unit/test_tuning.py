@@ -83,8 +83,8 @@ def dumped(values, path):
 
 def test_each_says_what_it_is_and_what_it_may_be(simulate):
     tuning = tuning_of(simulate())
-    assert not [name for name, one in tuning.known.items() if not one.said]
-    assert tuning.known["Kzref"].said == comments()["control/Kzref"] == "(m/s) per m"
+    assert not [name for name, one in tuning.known.items() if not one.description]
+    assert tuning.known["Kzref"].description == comments()["control/Kzref"] == "(m/s) per m"
     assert [(one.low, one.high) for one in (tuning.known["Kzref"], tuning.known["cmd_vel_timeout"])] == [
         (0, 1e4),
         (0, 1e6),

@@ -24,7 +24,7 @@ class ParameterField(NamedTuple):
     high: float = 0.0
     choices: tuple[str, ...] = ()  # for a str
     none: float | None = None  # number that represents `none`, if that is allowed
-    said: str = ""  # unit and description
+    description: str = ""  # unit and description
 
     @property
     def name(self) -> str:
@@ -59,9 +59,9 @@ def _number(value: ValueType, here: ParameterField) -> ParameterField:
     kind, within, unit = value.kind, value.mark(Within), value.mark(Unit)
     text = ", ".join(filter(None, (unit.word if unit else "", value.description)))
     if within is None:
-        return here._replace(kind=kind, said=text)
+        return here._replace(kind=kind, description=text)
     low = 0.0 if within.or_zero or here.none is not None else within.low
-    return here._replace(kind=kind, low=kind(low), high=kind(within.high), said=text)
+    return here._replace(kind=kind, low=kind(low), high=kind(within.high), description=text)
 
 
 def _elements(value: ValueType, here: ParameterField) -> Iterator[ParameterField]:

@@ -25,7 +25,7 @@ def _in_package(file: FoundFile) -> FoundFile:
     return named_in(Path(), f"package://drone_sim/{MODELS}/{file.given}")
 
 
-def model_said(name: str, folder: Path, imported: Callable[[Path], Path]) -> Model:
+def read_model_file(name: str, folder: Path, imported: Callable[[Path], Path]) -> Model:
     """Return the content of a model: a model of the package by name, or a file relative to `folder`.
 
     `imported` converts a V-REP file to a scene file. Raises ValueError and OSError.

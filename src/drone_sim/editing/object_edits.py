@@ -10,7 +10,7 @@ from typing import Any
 from drone_sim.config.errors import changed
 from drone_sim.config.types import ParameterError
 from drone_sim.editing import records
-from drone_sim.editing.library import model_said
+from drone_sim.editing.library import read_model_file
 from drone_sim.editing.scripts import set_parameters
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
@@ -60,7 +60,7 @@ class ObjectEdits:
 
     def add_model(self, op: records.AddModel) -> list[int]:
         """Add the objects of a model, with its origin at `position`."""
-        entries, scripts = model_said(
+        entries, scripts = read_model_file(
             op.model, self._simulation.document.folder, self._simulation.operations.imported
         ).checked()
         at = frames.from_rpy(op.position, (0.0, 0.0, op.yaw))

@@ -44,7 +44,8 @@ def tunables(vehicle: VehicleParameters, declared: Mapping[str, Any]) -> dict[st
                 fields.append(field)
     for name in (*vehicle.sensors, *vehicle.cameras):
         location = "faults", "sensors", name
-        fields.append(ParameterField(location, str, choices=get_args(Failure), said="failure of the sensor, if any"))
+        description = "failure of the sensor, if any"
+        fields.append(ParameterField(location, str, choices=get_args(Failure), description=description))
     of_script = _script_fields({**vehicle.script_parameters, **declared})
     return {**common(vehicle.type), **{field.name: field for field in fields}, **of_script}
 
@@ -81,7 +82,7 @@ def _script_fields(parameters: Mapping[str, Any]) -> dict[str, ParameterField]:
         kind = float if type(value) is int else type(value)
         if kind in bounds and not (isinstance(value, str) and len(value) > LONGEST):
             low, high = bounds[kind]
-            field = ParameterField((SCRIPT, key), kind, low=low, high=high, said="of the child script")
+            field = ParameterField((SCRIPT, key), kind, low=low, high=high, description="of the child script")
             fields[field.name] = field
     return fields
 
@@ -91,7 +92,7 @@ def _with_comment(leaf: ParameterField) -> ParameterField:
     keys: list[Key] = [key for key in leaf.location if isinstance(key, str)]
     if keys[0] == "cameras":
         keys[1] = _DOCUMENTED_CAMERA
-    return leaf._replace(said=comments().get("/".join(map(str, keys))) or leaf.said)
+    return leaf._replace(description=comments().get("/".join(map(str, keys))) or leaf.description)
 
 
 # ---- values

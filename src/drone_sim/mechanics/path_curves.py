@@ -42,8 +42,8 @@ class ControlPoint:
     count: int = 15
 
     @property
-    def said(self) -> dict[str, Any]:
-        """The same with the keys of a scene file."""
+    def entry(self) -> dict[str, Any]:
+        """The point with the keys of a scene file."""
         return {**self.at._asdict(), "factors": (self.before, self.after), "count": self.count}
 
 

@@ -125,7 +125,7 @@ class Pace:
         self._simulation, self._pacer = simulation, pacer
         text = comments()[FACTOR]
         self.known: dict[str, ParameterField] = {
-            leaf.name: leaf._replace(said=text) for leaf in fields_of(PaceParameters)
+            leaf.name: leaf._replace(description=text) for leaf in fields_of(PaceParameters)
         }
 
     def values(self) -> dict[str, Any]:

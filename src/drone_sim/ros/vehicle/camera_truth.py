@@ -1,4 +1,4 @@
-"""The ground truth that a camera publishes for its picture, below `<topic>/truth`; made only while somebody listens."""
+"""Topics with the ground truth of a camera's picture, below `<topic>/truth`; messages are made only for subscribers."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ try:
 except ImportError:  # Debian has no package of it
     Detection2DArray = Detection3DArray = None
 
-_FLOOR = "Floor"  # whose box is around everything
+_FLOOR = "Floor"  # its box would contain everything
 _LINE = 0.01  # m, of the boxes in rviz
 _COLOR = ColorRGBA(1.0, 0.55, 0.1, 0.35)
 
 
 class TruthOutput:
-    """The topics of one camera's truth."""
+    """The topics of one camera's ground truth."""
 
     def __init__(self, topic: str, frame: str, new_subscribers: NewSubscribers):
-        """Advertise below `topic`; what is published is in `frame`, and `new_subscribers` notes who listens."""
+        """Advertise below `topic`, in the frame `frame`; `new_subscribers` collects new subscribers."""
         self._frame = frame
         self._depth_before: np.ndarray | None = None
         self._labels = rospy.Publisher(f"{topic}/truth/labels", String, queue_size=1, latch=True)
-        self._labelled = ""
+        self._published_labels = ""
         kinds: dict[str, tuple[type[genpy.Message], Callable[[PictureTruth, Header], genpy.Message]]] = {
             "instances": (Image, lambda truth, header: image(truth.output("instance"), "mono16", header)),
             "categories": (Image, lambda truth, header: image(truth.categories, "mono16", header)),
@@ -73,14 +73,14 @@ class TruthOutput:
         return [self._labels, *self._made, self._flow, self._flow_known, self._overlay]
 
     def publish(self, camera: Camera, stamp: Stamp) -> None:
-        """Publish what somebody listens to, of what the camera sees now."""
-        heard = [one for one in self._made if one.get_num_connections()]
-        flows = any(one.get_num_connections() for one in (self._flow, self._flow_known))
+        """Publish the truth of the present picture on the topics that have subscribers."""
+        heard = [publisher for publisher in self._made if publisher.get_num_connections()]
+        flows = any(publisher.get_num_connections() for publisher in (self._flow, self._flow_known))
         overlays = self._overlay.get_num_connections() > 0
         if not (heard or flows or overlays or self._labels.get_num_connections()):
             self._depth_before = None
             return
-        picture = camera.look(COLOR) if overlays else None  # before the truth, which comes with it
+        picture = camera.look(COLOR) if overlays else None  # before the truth, which is rendered with it
         truth = camera.truth()
         if truth is None:
             return
@@ -90,32 +90,32 @@ class TruthOutput:
             self._publish_flow(truth, header)
         if picture is not None:
             self._overlay.publish(image(draw_mask(picture, truth.categories), "rgb8", header))
-        for one in heard:
-            one.publish(self._made[one](truth, header))
+        for publisher in heard:
+            publisher.publish(self._made[publisher](truth, header))
 
     def _publish_labels(self, truth: PictureTruth) -> None:
         numbered = truth.numbered
         text = json.dumps({
-            "instances": {number: one._asdict() for number, one in enumerate(numbered.identities, 1)},
+            "instances": {number: identity._asdict() for number, identity in enumerate(numbered.identities, 1)},
             "categories": dict(enumerate(numbered.categories, 1)),
         })  # fmt: skip
-        if text != self._labelled:
-            self._labelled = text
+        if text != self._published_labels:
+            self._published_labels = text
             self._labels.publish(text)
 
     def _publish_flow(self, truth: PictureTruth, header: Header) -> None:
         before = truth.output("depth") if self._depth_before is None else self._depth_before
         flow, known = truth.flow(before)
-        if self._depth_before is None:  # there is no picture before
+        if self._depth_before is None:  # there is no previous picture
             known[:] = False
         self._depth_before = truth.output("depth")
         self._flow.publish(image(flow, "32FC2", header))
         self._flow_known.publish(image(255 * known.astype(np.uint8), "mono8", header))
 
     def close(self) -> None:
-        """Advertise no more."""
-        for one in self._publishers:
-            one.unregister()
+        """Unregister the topics."""
+        for publisher in self._publishers:
+            publisher.unregister()
 
 
 def _cloud(points: np.ndarray, header: Header) -> PointCloud2:
@@ -126,8 +126,8 @@ def _cloud(points: np.ndarray, header: Header) -> PointCloud2:
 
 
 def _boxes(objects: list[Detection], header: Header) -> String:
-    said = {"stamp": header.stamp.to_sec(), "frame": header.frame_id, "objects": described(objects)}
-    return String(json.dumps(said))
+    content = {"stamp": header.stamp.to_sec(), "frame": header.frame_id, "objects": described(objects)}
+    return String(json.dumps(content))
 
 
 def _pose(one: Detection) -> Pose:

@@ -1,4 +1,4 @@
-"""What a camera publishes, as image_transport's subscribers expect it; nothing is made that nobody listens to."""
+"""Topics of a camera, as subscribers of image_transport expect them; messages are made only for subscribers."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from drone_sim.sensors.camera import Camera
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.vehicles.parameters import VehicleParameters
 
-_SELDOM = 5.0  # s, between two errors in the log
+_ERROR_PERIOD = 5.0  # s, between two errors in the log
 _ENCODINGS = {"color": "rgb8", "depth": "32FC1"}
 _COMPRESSION = {
-    "format": ParameterField(("format",), str, choices=("jpeg", "png"), said="compression format"),
-    "jpeg_quality": ParameterField(("jpeg_quality",), int, low=1, high=100, said="JPEG quality in percent"),
-    "png_level": ParameterField(("png_level",), int, low=1, high=9, said="PNG compression level"),
+    "format": ParameterField(("format",), str, choices=("jpeg", "png"), description="compression format"),
+    "jpeg_quality": ParameterField(("jpeg_quality",), int, low=1, high=100, description="JPEG quality in percent"),
+    "png_level": ParameterField(("png_level",), int, low=1, high=9, description="PNG compression level"),
 }
 _DEFAULTS = {"format": "jpeg", "jpeg_quality": 80, "png_level": 9}
 
@@ -39,9 +39,9 @@ class CameraOutput:
     def __init__(
         self, vehicle: VehicleParameters, camera: Camera, parameters: CameraParameters, new_subscribers: NewSubscribers
     ):
-        """Advertise in the vehicle's namespace, by the camera's parameters; `new_subscribers` notes who listens.
+        """Advertise in the vehicle's namespace; `new_subscribers` collects new subscribers to pictures.
 
-        The camera takes pictures only while somebody does.
+        The camera takes pictures only while there are subscribers.
         """
         topic = f"{vehicle.name}/{parameters.topic}"
         self._frame = message_conversion.frame(vehicle, parameters.frame)
@@ -53,7 +53,7 @@ class CameraOutput:
         self.follow(camera)
 
     def follow(self, camera: Camera) -> None:
-        """Publish what this camera sees from now on; it has taken the place of the last one."""
+        """Use this camera, which replaces the last one, from now on."""
         self._camera = camera
         self._describe()
         camera.viewers.add(self._watched)
@@ -63,7 +63,7 @@ class CameraOutput:
         self._info = message_conversion.camera_info(self._intrinsics, self._frame)
 
     def close(self) -> None:
-        """Advertise no more."""
+        """Unregister the topics."""
         for publisher in (self._image, self._compressed, self._info_publisher):
             if publisher is not None:
                 publisher.unregister()
@@ -76,9 +76,9 @@ class CameraOutput:
         return listened or (compressed is not None and compressed.publisher.get_num_connections() > 0)
 
     def publish(self, stamp: Stamp) -> None:
-        """Publish what the camera sees, and the model that belongs to it, stamped with when it was taken.
+        """Publish the picture and its camera_info, stamped with the time of the picture.
 
-        Over a link both arrive together, or neither does; a silent camera publishes nothing.
+        A radio link delays or loses both together; a silent camera publishes nothing.
         """
         camera = self._camera
         if self._truth is not None:
@@ -99,24 +99,24 @@ class CameraOutput:
 
 
 class CompressedPublisher:
-    """Publishes `<base>/compressed` as image_transport's C++ plugin does: formats, and parameters beside it.
+    """Publishes `<base>/compressed` with the formats and parameters of image_transport's C++ plugin.
 
-    A thread of its own encodes: PNG at the plugin's default level takes longer than a step. Pictures that come
-    while it is busy are left out, but for the latest. A picture that cannot be encoded is logged and left out.
+    It encodes in its own thread, because PNG at the plugin's default level takes longer than a step. If pictures arrive
+    while the thread is busy, only the latest is encoded. A picture that cannot be encoded is logged and skipped.
     """
 
     def __init__(self, base: str, new_subscribers: NewSubscribers):
-        """Advertise, and open the dynamic_reconfigure server at `<base>/compressed`; `new_subscribers` notes them."""
+        """Advertise the topic and its dynamic_reconfigure server; `new_subscribers` collects new subscribers."""
         topic = rospy.resolve_name(f"{base}/compressed")
         self.publisher = rospy.Publisher(topic, CompressedImage, subscriber_listener=new_subscribers, queue_size=1)
         self._settings: dict[str, Any] = {}
-        self._server = Server(described(_COMPRESSION, _DEFAULTS), self._keep, topic)
-        self._waiting: deque[tuple[Header, np.ndarray]] = deque(maxlen=1)
-        self._came = threading.Event()
-        self._open = True
+        self._server = Server(described(_COMPRESSION, _DEFAULTS), self._store_settings, topic)
+        self._pending: deque[tuple[Header, np.ndarray]] = deque(maxlen=1)
+        self._has_pending = threading.Event()
+        self._is_open = True
         threading.Thread(target=self._work, name=f"{topic} encoder", daemon=True).start()
 
-    def _keep(self, settings: dict[str, Any], _level: int) -> dict[str, Any]:
+    def _store_settings(self, settings: dict[str, Any], _level: int) -> dict[str, Any]:
         if settings["format"] not in ("jpeg", "png"):
             rospy.logwarn(f"compressed/format = '{settings['format']}': must be jpeg or png; jpeg is used")
             settings["format"] = "jpeg"
@@ -124,30 +124,32 @@ class CompressedPublisher:
         return settings
 
     def unregister(self) -> None:
-        """Advertise no more."""
-        self._open = False
-        self._came.set()
+        """Unregister the topics."""
+        self._is_open = False
+        self._has_pending.set()
         for publisher in (self.publisher, self._server.descr_topic, self._server.update_topic):
             publisher.unregister()
         self._server.set_service.shutdown()
 
     def publish(self, header: Header, image: np.ndarray) -> None:
-        """Have an RGB picture (height, width, 3) encoded and published if somebody listens; it must not change."""
+        """Encode and publish an RGB picture (height, width, 3), which must not change, if there are subscribers."""
         if self.publisher.get_num_connections():
-            self._waiting.append((header, image))
-            self._came.set()
+            self._pending.append((header, image))
+            self._has_pending.set()
 
     def _work(self) -> None:
-        while self._open:
-            self._came.wait()
-            self._came.clear()
-            while self._waiting:
+        while self._is_open:
+            self._has_pending.wait()
+            self._has_pending.clear()
+            while self._pending:
                 try:
-                    self.publisher.publish(_encoded(*self._waiting.popleft(), self._settings))
-                except rospy.ROSException:  # the node ends, and has closed the topic
+                    self.publisher.publish(_encoded(*self._pending.popleft(), self._settings))
+                except rospy.ROSException:  # the node ends
                     return
-                except Exception as error:  # the topic must not fall silent because of one picture
-                    rospy.logerr_throttle(_SELDOM, f"{self.publisher.name}: a picture could not be encoded: {error}")
+                except Exception as error:  # the thread must survive one bad picture
+                    rospy.logerr_throttle(
+                        _ERROR_PERIOD, f"{self.publisher.name}: a picture could not be encoded: {error}"
+                    )
                     rospy.logdebug(traceback.format_exc())
 
 

@@ -1,4 +1,4 @@
-"""What a vehicle listens to. Callbacks run in rospy's threads: they check, and leave a job for the next step."""
+"""Topics that a vehicle subscribes to. Callbacks run in rospy's threads: they check messages and queue jobs."""
 
 from __future__ import annotations
 
@@ -28,11 +28,12 @@ from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
 _COMMAND, _STAMPED_COMMAND = "cmd_vel", "cmd_vel_stamped"
-_QUIET = 5.0  # s, between two warnings
-# Messages; each counts: of all others only the last one does, unless a gate chooses among them.
+_WARNING_PERIOD = 5.0  # s
+# Sizes of queues of topics of which each message counts. Of other topics only the last message counts, unless a gate
+# chooses among them.
 _QUEUES = {"push": 100, "weather": 100, "faults": 100}
 _GATED_QUEUE = 10
-_INTERVENTIONS = {  # what is more than flying
+_INTERVENTIONS = {  # changes of the world, which a graded flight may forbid
     **dict.fromkeys(("set_pose", "initialpose", "reset"), MOVE),
     "push": PUSH,
     **dict.fromkeys(("weather", "set_wind", "faults"), CHANGE),
@@ -41,19 +42,19 @@ _Job = Callable[[Vehicle], Any]
 
 
 class _Limits(NamedTuple):
-    """The limits that callbacks check: they must not read the simulation itself, which runs on in its own thread."""
+    """Limits for the callbacks, which must not read the simulation: it runs in another thread."""
 
     vehicle: VehicleParameters
     weather: WeatherParameters
 
 
 class VehicleInputs:
-    """The commands of one vehicle, in its namespace."""
+    """Subscriptions in the namespace of one vehicle."""
 
     def __init__(self, simulation: Simulation, parameters: VehicleParameters, inbox: Inbox, gate: Gate = open_gate):
-        """Subscribe for the vehicle with these parameters; the thread of `simulation` empties `inbox`.
+        """Subscribe for the vehicle with these parameters.
 
-        `gate` wraps the callback of each topic.
+        The simulation's thread runs the jobs in `inbox`; `gate` wraps the callback of each topic.
         """
         self._simulation, self._gate = simulation, gate
         self._name, self._inbox = parameters.name, inbox
@@ -84,23 +85,23 @@ class VehicleInputs:
     def _commanders(self) -> list[str]:
         """Return the nodes that are connected to cmd_vel, or to cmd_vel_stamped."""
         commands = self._subscribers[:2]
-        return sorted({one.callerid_pub for topic in commands for one in topic.impl.connections})
+        return sorted({each.callerid_pub for topic in commands for each in topic.impl.connections})
 
     def follow(self, vehicle: Vehicle) -> None:
-        """Check against what this vehicle allows from now on; it has been tuned, or taken the place of the last one."""
+        """Use the limits of this vehicle from now on; it was tuned, or replaces the last one."""
         self._limits = _Limits(vehicle.parameters, self._simulation.parameters.weather)
 
     def close(self) -> None:
-        """Listen no more."""
+        """Unregister the topics."""
         for subscriber in self._subscribers:
             subscriber.unregister()
 
     def _taking(self, topic: str, read: Callable[[Any], _Job]) -> Callable[[Any], None]:
-        """Return a callback that leaves what a message asks for to the simulation's thread, or says why not."""
+        """Return a callback that queues the job of a valid message, and logs why another one is refused."""
         is_command = topic in (_COMMAND, _STAMPED_COMMAND)
         kept = ", the last valid one is kept" if is_command else ""
         logged = _COMMAND if is_command else topic
-        throttle, action = Throttle(_QUIET), _INTERVENTIONS.get(topic)
+        throttle, action = Throttle(_WARNING_PERIOD), _INTERVENTIONS.get(topic)
 
         def take(message: Any) -> None:
             try:
@@ -128,7 +129,7 @@ class VehicleInputs:
 
         return take
 
-    # ---- what a message asks for; raise Refused
+    # ---- readers of messages: each returns a job, or raises Refused
 
     def _twist(self, message: TwistMessage) -> _Job:
         twist = checks.twist(xyz(message.linear), xyz(message.angular), self._limits.vehicle)
@@ -146,7 +147,7 @@ class VehicleInputs:
         return lambda _message: lambda vehicle: vehicle.ask(topic)
 
     def _pose_estimate(self, message: PoseWithCovarianceStamped) -> _Job:
-        """Take rviz's 2D Pose Estimate: a place on the floor, a yaw; the height stays as it is."""
+        """Move to rviz's 2D Pose Estimate, x, y and yaw, at the same height."""
         (x, y, _), turn = read_pose(message.header.frame_id, message.pose.pose, self._limits.vehicle)
         return lambda vehicle: vehicle.body.move(Pose((x, y, vehicle.body.state.position[2]), turn))
 
@@ -157,7 +158,7 @@ class VehicleInputs:
         return lambda vehicle: vehicle.pushes.add(push)
 
     def _wind(self, message: Vector3Stamped) -> _Job:
-        """Take the steady wind, for all vehicles; the gusts stay."""
+        """Set the steady wind for all vehicles; gusts stay as they are."""
         check_frame(message.header.frame_id)
         changes = {"wind": xyz(message.vector)}
         check_changes(changes, self._limits.weather)

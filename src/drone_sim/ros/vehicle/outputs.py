@@ -1,4 +1,4 @@
-"""What a vehicle and its sensors publish after each step, pictures aside; what nobody listens to is not made."""
+"""Messages of a vehicle and its sensors after each step, without pictures; made only for topics with subscribers."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.situation import doing, hears_commands
 from drone_sim.vehicles.vehicle import Vehicle
 
-_EYES = 1 / 30  # s of real time, between two messages that are for eyes
-_LOOK = 0.2  # s of real time, between two looks at what the body touches
+_DISPLAY_PERIOD = 1 / 30  # s of real time, between two messages that are only displayed
+_STATE_PERIOD = 0.2  # s of real time, between two updates of the flight state
 # Messages for a subscriber that reads too slowly. In lockstep, a recorder that loses one records another flight.
 _QUEUE_SIZE, _LOCKSTEP_QUEUE_SIZE = 10, 1000
 _READINGS_QUEUE = 100  # messages: half a second at 200 Hz, which come ten at a time
@@ -32,7 +32,7 @@ class VehicleOutputs:
     def __init__(self, parameters: VehicleParameters, new_subscribers: NewSubscribers, is_in_lockstep: bool = False):
         """Advertise in the namespace of the vehicle with these parameters.
 
-        `new_subscribers` notes who begins to listen to odometry.
+        `new_subscribers` collects new subscribers to odometry.
         """
         name, size = parameters.name, _LOCKSTEP_QUEUE_SIZE if is_in_lockstep else _QUEUE_SIZE
         self._base_link, self._track_base = frame(parameters, BASE_LINK), frame(parameters, TRACK_BASE)
@@ -41,79 +41,79 @@ class VehicleOutputs:
         self._propellers = rospy.Publisher(f"{name}/propellers", Float32MultiArray, queue_size=size)
         self._joints = rospy.Publisher(f"{name}/joint_states", JointState, queue_size=size)
         self._flight_state = rospy.Publisher(f"{name}/state", String, queue_size=10, latch=True)
-        self._hears = rospy.Publisher(f"{name}/hears_commands", Bool, queue_size=10, latch=True)
-        self._said = ""  # the script's own state
+        self._hears_commands = rospy.Publisher(f"{name}/hears_commands", Bool, queue_size=10, latch=True)
+        self._script_state = ""
         self._published: tuple[str, bool] = ("", False)
-        self._eyes, self._looks = Throttle(_EYES), Throttle(_LOOK)
+        self._display_throttle, self._state_throttle = Throttle(_DISPLAY_PERIOD), Throttle(_STATE_PERIOD)
 
     def close(self) -> None:
-        """Advertise no more."""
-        state = self._odometry, self._command, self._propellers, self._joints, self._flight_state, self._hears
+        """Unregister the topics."""
+        state = self._odometry, self._command, self._propellers, self._joints, self._flight_state, self._hears_commands
         for publisher in state:
             publisher.unregister()
 
     def publish_state(self, vehicle: Vehicle, stamp: Callable[[], rospy.Time]) -> None:
-        """Publish the state, under what `stamp` returns."""
+        """Publish the state with the stamp that `stamp` returns."""
         if self._odometry.get_num_connections():
             self._odometry.publish(message_conversion.odometry(stamp(), vehicle.body.state, self._base_link))
         if self._propellers.get_num_connections():
             stamp()  # /clock before the message
             self._propellers.publish(message_conversion.propellers(vehicle.propulsion.particle_velocities))
-        said = str(vehicle.flight_state)
-        if said != self._said or self._looks.passes():
-            self._said = said
-            self._tell(doing(vehicle), hears_commands(vehicle))
+        script_state = str(vehicle.flight_state)
+        if script_state != self._script_state or self._state_throttle.passes():
+            self._script_state = script_state
+            self._publish_flight_state(doing(vehicle), hears_commands(vehicle))
 
-    def _tell(self, state: str, hears: bool) -> None:
-        """Publish what the vehicle does, and whether its script listens to commands, where that is news."""
+    def _publish_flight_state(self, state: str, hears: bool) -> None:
+        """Publish the flight state, and whether the script listens to commands, if they have changed."""
         before, self._published = self._published, (state, hears)
         if state != before[0]:
             self._flight_state.publish(state)
         if hears != before[1] or not before[0]:
-            self._hears.publish(hears)
+            self._hears_commands.publish(hears)
 
     def publish_joints(self, vehicle: Vehicle, stamp: Callable[[], rospy.Time]) -> None:
-        """Publish the blades' angles, as often as eyes need them."""
-        if self._joints.get_num_connections() and self._eyes.passes():
+        """Publish the angles of the propellers' blades, at the rate of a display."""
+        if self._joints.get_num_connections() and self._display_throttle.passes():
             self._joints.publish(message_conversion.joint_states(stamp(), vehicle.propulsion.blades.angles))
 
     def publish_command(self, vehicle: Vehicle, stamp: Callable[[], rospy.Time]) -> None:
-        """Publish the command in force, under what `stamp` returns; it may change while the simulation stands."""
+        """Publish the current command, which may also change while the simulation is paused."""
         if self._command.get_num_connections():
             self._command.publish(message_conversion.command(stamp(), vehicle.commands.now, self._track_base))
 
 
 class SensorOutput:
-    """One sensor: a topic for each of its outputs; a message that nobody listens to is not made."""
+    """The topics of one sensor, one for each of its outputs; messages are made only for topics with subscribers."""
 
     def __init__(self, vehicle: VehicleParameters, sensor: Instrument):
-        """Advertise in the vehicle's namespace what the sensor reads.
+        """Advertise the sensor's outputs in the vehicle's namespace.
 
-        Raises ValueError for a message that is not installed.
+        Raises ValueError for a message type that is not installed.
         """
         own: SensorParameters = sensor.parameters
         self._frame = frame(vehicle, own.frame)
         self._publishers = {
-            one.suffix: rospy.Publisher(
-                f"{vehicle.name}/{own.topic}{one.suffix}", message_class(one.kind), queue_size=_READINGS_QUEUE
+            output.suffix: rospy.Publisher(
+                f"{vehicle.name}/{own.topic}{output.suffix}", message_class(output.kind), queue_size=_READINGS_QUEUE
             )
-            for one in sensor.outputs
+            for output in sensor.outputs
         }
         self.follow(sensor)
 
     def follow(self, sensor: Instrument) -> None:
-        """Publish what this sensor reads from now on; it has the place, and the parameters, of the last one."""
+        """Use this sensor from now on; its place and parameters are those of the last one."""
         self._sensor = sensor
 
     def close(self) -> None:
-        """Advertise no more."""
+        """Unregister the topics."""
         for publisher in self._publishers.values():
             publisher.unregister()
 
     def publish(self, stamp: Stamp, now: float) -> None:
-        """Publish the readings of a step that ended at `now` (s of simulated time), each as of when it was measured."""
+        """Publish the readings of a step that ended at `now` (s of simulated time), each stamped with its own time."""
         sensor = self._sensor
-        heard = [one for one in sensor.outputs if self._publishers[one.suffix].get_num_connections()]
+        heard = [output for output in sensor.outputs if self._publishers[output.suffix].get_num_connections()]
         for reading in sensor.readings if heard else ():
             measured = sensor.header(reading)["stamp"]
             header = {"stamp": stamp(now - measured), "frame_id": self._frame}

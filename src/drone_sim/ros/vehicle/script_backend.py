@@ -21,35 +21,35 @@ from drone_sim.ros.core.message_conversion import fill, message_class, service_c
 from drone_sim.scripting.api.backend import Ask, Image
 from drone_sim.scripting.api.service_servers import Unanswered
 
-_LONGEST = 1.0  # s: the simulation waits meanwhile
+_SERVICE_TIMEOUT = 1.0  # s, in which the simulation waits
 
 
 class RosBackend:
-    """Subscribes and advertises any installed message type."""
+    """Subscriptions and publications of any installed message type."""
 
-    def __init__(self, is_of_a_camera: Callable[[str], bool], stamp: Callable[[], rospy.Time], gate: Gate = open_gate):
-        """Take what messages are stamped with.
+    def __init__(self, is_camera_topic: Callable[[str], bool], stamp: Callable[[], rospy.Time], gate: Gate = open_gate):
+        """`stamp` returns the stamp of messages that are sent now.
 
-        `is_of_a_camera` tells the topics on which the node's own cameras publish already. `gate` wraps callbacks of
+        `is_camera_topic` returns whether the node's own cameras publish on a topic. `gate` wraps callbacks of
         subscriptions.
         """
-        self._is_of_a_camera, self._stamp, self._gate = is_of_a_camera, stamp, gate
+        self._is_camera_topic, self._stamp, self._gate = is_camera_topic, stamp, gate
         self._frames: rospy.Publisher | None = None
 
     def time(self) -> float:
-        """Return what messages are stamped with, in s."""
+        """Return the present stamp, in s."""
         return float(self._stamp().to_sec())
 
     def send_transforms(self, transforms: Sequence[Mapping[str, Any]]) -> None:
-        """Broadcast frames; what has no stamp gets that of the step."""
+        """Broadcast frames; those without a stamp get that of the step."""
         self._frames = self._frames or rospy.Publisher("/tf", TFMessage, queue_size=100)
-        made = [fill(TransformStamped(), one, "geometry_msgs/TransformStamped") for one in transforms]
-        for one in made:
-            one.header.stamp = one.header.stamp or self._stamp()
-        self._frames.publish(TFMessage(made))
+        messages = [fill(TransformStamped(), fields, "geometry_msgs/TransformStamped") for fields in transforms]
+        for message in messages:
+            message.header.stamp = message.header.stamp or self._stamp()
+        self._frames.publish(TFMessage(messages))
 
     def parameter(self, name: str) -> Any:
-        """Return a parameter, None where it is not set."""
+        """Return a parameter, None if it is not set."""
         return rospy.get_param(name, None)
 
     def set_parameter(self, name: str, value: Any) -> None:
@@ -57,14 +57,14 @@ class RosBackend:
         rospy.set_param(name, value)
 
     def delete_parameter(self, name: str) -> None:
-        """Forget a parameter, if it is set."""
+        """Delete a parameter if it is set."""
         with contextlib.suppress(KeyError):
             rospy.delete_param(name)
 
     def call_service(self, name: str, kind: str, request: Any) -> Any:
         """Return the response of a service of a type such as std_srvs/Trigger.
 
-        Raises ValueError where the type is not installed, the request does not fit, or no answer comes within a second.
+        Raises ValueError if the type is not installed, the request does not fit, or no answer arrives within a second.
         """
         found = service_class(kind)
         filled = fill(found._request_class(), request, f"{kind}Request")
@@ -72,22 +72,22 @@ class RosBackend:
 
         def ask() -> None:
             try:
-                rospy.wait_for_service(name, _LONGEST)
+                rospy.wait_for_service(name, _SERVICE_TIMEOUT)
                 answers.put(rospy.ServiceProxy(name, found)(filled))
             except (rospy.ROSException, rospy.ServiceException) as error:
                 answers.put(error)
 
         threading.Thread(target=ask, name=f"service {name}", daemon=True).start()
         try:
-            answer = answers.get(timeout=_LONGEST)
+            answer = answers.get(timeout=_SERVICE_TIMEOUT)
         except queue.Empty:
-            raise ValueError(f"the service {name} did not answer within {_LONGEST:g} s") from None
+            raise ValueError(f"the service {name} did not answer within {_SERVICE_TIMEOUT:g} s") from None
         if isinstance(answer, Exception):
             raise ValueError(f"the service {name}: {' '.join(str(answer).split())}")
         return answer
 
     def serve(self, name: str, kind: str, ask: Ask) -> Callable[[], None]:
-        """Offer a service, each of whose requests is handed to `ask` in a thread of rospy's; return what ends that.
+        """Offer a service, whose requests `ask` answers in rospy's threads; return a function that ends it.
 
         Raises ValueError if the type is not installed, or the node has a service of this name already.
         """
@@ -106,7 +106,7 @@ class RosBackend:
         return lambda: server.shutdown("the script ended")
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
-        """Call `take` with every message, in rospy's thread; return what ends that."""
+        """Call `take` with every message, in rospy's thread; return a function that ends it."""
         take = self._gate(topic, take)
         return rospy.Subscriber(topic, message_class(kind), take, queue_size=10).unregister
 
@@ -116,10 +116,10 @@ class RosBackend:
         return _Sender(rospy.Publisher(topic, made, queue_size=queue, latch=latch), made, self._stamp)
 
     def advertise_image(self, topic: str, queue: int) -> Any:
-        """Advertise an image topic; one that a camera publishes already stays the camera's."""
-        if self._is_of_a_camera(topic):
+        """Advertise an image topic; images are dropped if a camera of the node already publishes on it."""
+        if self._is_camera_topic(topic):
             rospy.loginfo(f"{topic}: the node's camera already publishes it, so the script's images are not published")
-            return _Silence()
+            return _NoSender()
         return _ImageSender(rospy.Publisher(topic, ImageMessage, queue_size=queue), ImageMessage, self._stamp)
 
 
@@ -145,7 +145,7 @@ class _ImageSender(_Sender):
         self._publisher.publish(image_messages.image(image.pixels, "rgb8", header))
 
 
-class _Silence:
+class _NoSender:
     def publish(self, _message: Any) -> None:
         pass
 

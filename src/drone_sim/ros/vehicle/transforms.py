@@ -14,15 +14,15 @@ from drone_sim.ros.core.publishing import NewSubscribers
 from drone_sim.run.pacing import Throttle
 from drone_sim.vehicles.vehicle import Vehicle
 
-_EYES = 1 / 30  # s of real time, between two turns of the blades, which are for eyes
+_DISPLAY_PERIOD = 1 / 30  # s of real time, between two transforms of the blades, which are only displayed
 
 
 class Transforms:
-    """Broadcasts where the vehicles are, once a step, and where the links of their URDFs sit on them.
+    """Broadcasts the poses of vehicles once a step, and those of the links of their URDFs.
 
-    world -> base_link, Track_base, cameras with a `mount`; the links hang on each other as the URDF says, and sensors
-    on what carries them. Frames that do not move relative to base_link are published once, on /tf_static; so is the
-    frame that rviz follows: Track_base of the first vehicle, whatever its name, or `world`.
+    Children of `world` are base_link, Track_base and cameras with a `mount`; links have the parents of the URDF, and
+    sensors that of their carrier. Frames that do not move relative to base_link are published once, on /tf_static; so
+    is the frame that rviz follows: Track_base of the first vehicle, whatever its name, or `world`.
     """
 
     def __init__(self) -> None:
@@ -30,36 +30,39 @@ class Transforms:
         self._new_subscribers = NewSubscribers()
         self._moving = rospy.Publisher("/tf", TFMessage, subscriber_listener=self._new_subscribers, queue_size=100)
         self._fixed = rospy.Publisher("/tf_static", TFMessage, queue_size=10, latch=True)
-        self._eyes = Throttle(_EYES)
+        self._display_throttle = Throttle(_DISPLAY_PERIOD)
 
     def publish_static(self, vehicles: Collection[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
-        """Publish the links that do not move, stamped with what `stamp` returns; called when vehicles come or go."""
+        """Publish the fixed links with the stamp that `stamp` returns; called when vehicles are added or removed."""
         now = stamp()
-        first = next((frame(one.parameters, TRACK_BASE) for one in vehicles), WORLD_FRAME)
-        told = [transform(now, first, first_frame(rospy.get_name()), frames.IDENTITY)]
-        for one in vehicles:
-            told += [_link(now, one, name) for name in one.body.links if name not in one.body.rigid.blade_joints]
-            told += [
-                transform(now, frame(one.parameters, BASE_LINK), frame(one.parameters, name), matrix)
-                for name, matrix in one.instruments.fixed_frames.items()
+        first = next((frame(vehicle.parameters, TRACK_BASE) for vehicle in vehicles), WORLD_FRAME)
+        fixed = [transform(now, first, first_frame(rospy.get_name()), frames.IDENTITY)]
+        for vehicle in vehicles:
+            body, own = vehicle.body, vehicle.parameters
+            fixed += [_link(now, vehicle, name) for name in body.links if name not in body.rigid.blade_joints]
+            fixed += [
+                transform(now, frame(own, BASE_LINK), frame(own, name), matrix)
+                for name, matrix in vehicle.instruments.fixed_frames.items()
             ]
-        self._fixed.publish(TFMessage(told))
+        self._fixed.publish(TFMessage(fixed))
 
     def publish(self, vehicles: Iterable[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
-        """Publish all moving frames, stamped with what `stamp` returns: tf2 takes only one transform per stamp."""
+        """Publish all moving frames with the stamp that `stamp` returns: tf2 takes only one transform per stamp."""
         if not self._moving.get_num_connections():
             return
-        self._new_subscribers.take()  # what is published reaches them all
+        self._new_subscribers.take()  # the messages below reach them, too
         now = stamp()
-        self._moving.publish(TFMessage([one for vehicle in vehicles for one in _moving(now, vehicle)]))
-        if self._eyes.passes():
-            self._moving.publish(TFMessage([one for vehicle in vehicles for one in _turning(now, vehicle)]))
+        self._moving.publish(TFMessage([each for vehicle in vehicles for each in _moving(now, vehicle)]))
+        if self._display_throttle.passes():
+            self._moving.publish(TFMessage([each for vehicle in vehicles for each in _turning(now, vehicle)]))
 
     def tell_new_subscribers(self, vehicles: Iterable[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
-        """Send the frames that move, with the present stamp, to new subscribers only."""
-        for tell in self._new_subscribers.take():
+        """Send the moving frames, with the present stamp, to new subscribers only."""
+        for send in self._new_subscribers.take():
             now = stamp()
-            tell(TFMessage([one for vehicle in vehicles for one in (*_moving(now, vehicle), *_turning(now, vehicle))]))
+            send(
+                TFMessage([each for vehicle in vehicles for each in (*_moving(now, vehicle), *_turning(now, vehicle))])
+            )
 
 
 def _moving(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
@@ -68,7 +71,11 @@ def _moving(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
         BASE_LINK: vehicle.body.matrix,
         TRACK_BASE: vehicle.track.matrix(),
         # The URDF does not know cameras with a mount; the frame of a stereo pair is its left camera's.
-        **{one.frame: vehicle.optical(one) for one in own.cameras.values() if one.mount and not one.baseline},
+        **{
+            camera.frame: vehicle.optical(camera)
+            for camera in own.cameras.values()
+            if camera.mount and not camera.baseline
+        },
         **{name: matrix() for name, matrix in vehicle.instruments.moving_frames.items()},
     }
     return [transform(now, WORLD_FRAME, frame(own, name), matrix) for name, matrix in places.items()]
@@ -82,7 +89,7 @@ def _turning(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
 
 
 def _link(now: rospy.Time, vehicle: Vehicle, name: str, angle: float = 0.0) -> TransformStamped:
-    """Return where a link sits on the one that it hangs on, turned about its z axis."""
+    """Return the transform of a link relative to its parent, turned about its z axis."""
     parent, matrix = vehicle.body.links[name]
     if angle:
         matrix = frames.multiply(matrix, frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, angle)))

@@ -39,10 +39,10 @@ class TuningServer:
         rest: str = "limits",
         tuned: Callable[[], None] = lambda: None,
     ):
-        """Advertise in `namespace`, and say what there is of `tuning`, whose thread empties `inbox`.
+        """Advertise the parameters of `tuning` in `namespace`; the simulation's thread runs the jobs in `inbox`.
 
-        `rest` is the group of parameters without one of their own; `tuned` is called in that thread after a change,
-        before the request is answered.
+        `rest` is the group of parameters that have no group; `tuned` is called in that thread after a change, before
+        the request is answered.
         """
         self._tuning, self._inbox, self._rest, self._tuned = tuning, inbox, rest, tuned
         name = self._name = rospy.resolve_name(namespace)
@@ -51,67 +51,68 @@ class TuningServer:
             for topic, kind in (("parameter_descriptions", ConfigDescription), (TOPIC, Config))
         )
         self._known: dict[str, ParameterField] = {}
-        self._said: dict[str, Any] = {}
+        self._published_values: dict[str, Any] = {}
         self._config = Config()
         self.follow(tuning)
         self._service = rospy.Service(f"{name}/set_parameters", Reconfigure, self._set)
 
     def follow(self, tuning: Tuning | Pace) -> None:
-        """Serve this tuning from now on; publish what has changed since."""
+        """Use this tuning from now on; publish changed values."""
         self._tuning = tuning
         known, values = dict(tuning.known), tuning.values()
         if known != self._known:
             self._known = known
             self._description.publish(encode_description(described(known, values, self._rest)))
-        if values != self._said:
-            self._say(values)
+        if values != self._published_values:
+            self._publish(values)
 
-    def _say(self, values: Mapping[str, Any]) -> None:
-        self._said = dict(values)
+    def _publish(self, values: Mapping[str, Any]) -> None:
+        self._published_values = dict(values)
         self._config = encode_config(values)
         self._updates.publish(self._config)
 
     def close(self) -> None:
-        """Advertise no more."""
+        """Unregister topics and service."""
         for publisher in (self._description, self._updates):
             publisher.unregister()
         self._service.shutdown()
 
-    # ---- changing
+    # ---- requests
 
     def _set(self, request: ReconfigureRequest) -> ReconfigureResponse:
-        """Answer with the values in force afterwards; a refusal is only logged: the answer has no field for it."""
+        """Return the values after the change. A refusal is only logged, because the response has no field for it."""
         given = request.config
-        changes = {one.name: one.value for kind in (given.bools, given.ints, given.strs, given.doubles) for one in kind}
-        done = None
+        lists = given.bools, given.ints, given.strs, given.doubles
+        changes = {each.name: each.value for values in lists for each in values}
+        change = None
         if changes and isinstance(self._tuning, Tuning):  # the pace changes nothing in the world
-            done = intervention(CHANGE, self._name.rpartition("/")[2], f"{self._name}/set_parameters", request)
+            change = intervention(CHANGE, self._name.rpartition("/")[2], f"{self._name}/set_parameters", request)
         try:
-            self._inbox.ask(lambda: self._change(changes), done)
+            self._inbox.ask(lambda: self._change(changes), change)
         except (ValueError, TimeoutError) as error:
-            said = error.text if isinstance(error, ParameterError) else error
-            rospy.logwarn(f"{self._name} refused, and nothing was changed: {said}")
+            why = error.text if isinstance(error, ParameterError) else error
+            rospy.logwarn(f"{self._name} refused, and nothing was changed: {why}")
         return ReconfigureResponse(self._config)
 
     def _change(self, changes: Mapping[str, Any]) -> str:
         try:
             self._tuning.change(changes)
         finally:
-            self._say(self._tuning.values())  # also what was refused: a slider goes back
+            self._publish(self._tuning.values())  # also after a refusal, so that a slider goes back
             self._tuned()
         return ""
 
 
 def described(known: Mapping[str, ParameterField], values: Mapping[str, Any], rest: str = "") -> SimpleNamespace:
-    """Return what a module generated from a .cfg file would hold, as far as the encoding and the library read it.
+    """Return the attributes of a module generated from a .cfg file that the encoding and the library read.
 
-    Made at run time: a .cfg file would make the package useless without a build. `rest` is the group of what has none
-    of its own, '' for none.
+    They are made at run time, because with a .cfg file the package would need a build. `rest` is the group of
+    parameters that have no group, '' for none.
     """
     groups: dict[str, list[dict[str, Any]]] = {"": []}
-    for name, one in known.items():
-        first = str(one.location[0])
-        groups.setdefault(first if first in _GROUPS else rest, []).append(_parameter(name, one))
+    for name, field in known.items():
+        first = str(field.location[0])
+        groups.setdefault(first if first in _GROUPS else rest, []).append(_parameter(name, field))
     whole = {"name": "Default", "type": "", "id": 0, "parent": 0, "parameters": groups.pop("")}
     parts = [
         {"name": group, "type": "", "id": number, "parent": 0, "parameters": parameters, "groups": []}
@@ -119,14 +120,14 @@ def described(known: Mapping[str, ParameterField], values: Mapping[str, Any], re
     ]
     return SimpleNamespace(
         config_description={**whole, "groups": parts},
-        min={name: "" if one.kind is str else one.low for name, one in known.items()},
-        max={name: "" if one.kind is str else one.high for name, one in known.items()},
+        min={name: "" if field.kind is str else field.low for name, field in known.items()},
+        max={name: "" if field.kind is str else field.high for name, field in known.items()},
         defaults=dict(values),
     )
 
 
-def _parameter(name: str, leaf: ParameterField) -> dict[str, Any]:
-    kind = _TYPES[leaf.kind]
-    words = [{"name": one, "type": kind, "value": one, "description": ""} for one in leaf.choices]
-    choice = str({"enum": words, "enum_description": leaf.said}) if words else ""
-    return {"name": name, "type": kind, "level": 0, "description": leaf.said, "edit_method": choice}
+def _parameter(name: str, field: ParameterField) -> dict[str, Any]:
+    kind = _TYPES[field.kind]
+    words = [{"name": choice, "type": kind, "value": choice, "description": ""} for choice in field.choices]
+    edit_method = str({"enum": words, "enum_description": field.description}) if words else ""
+    return {"name": name, "type": kind, "level": 0, "description": field.description, "edit_method": edit_method}

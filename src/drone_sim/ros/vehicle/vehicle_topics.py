@@ -1,4 +1,4 @@
-"""Everything that vehicles hear and publish, as they come and go."""
+"""All topics of all vehicles; they follow as vehicles are added and removed."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ _LARGEST_URDF = 4 * 2**20  # bytes
 
 
 class VehicleTopics:
-    """The topics in the namespace of one vehicle, which may be another object after every start."""
+    """The topics in the namespace of one vehicle. Each start may replace the vehicle object, but not the topics."""
 
     def __init__(self, simulation: Simulation, vehicle: Vehicle, inbox: Inbox, gate: Gate):
-        """Advertise, subscribe, and set the vehicle's robot_description; the thread of `simulation` empties `inbox`.
+        """Advertise, subscribe, and set the vehicle's robot_description.
 
-        `gate` wraps the callback of each topic.
+        The simulation's thread runs the jobs in `inbox`; `gate` wraps the callback of each topic.
         """
         self._simulation = simulation
         self.vehicle, parameters = vehicle, vehicle.parameters
@@ -42,9 +42,9 @@ class VehicleTopics:
             name: CameraOutput(parameters, camera, parameters.cameras[name], self.new_subscribers)
             for name, camera in vehicle.cameras.items()
         }
-        self.sensors = {name: SensorOutput(parameters, one) for name, one in vehicle.instruments.by_name.items()}
+        self.sensors = {name: SensorOutput(parameters, sensor) for name, sensor in vehicle.instruments.by_name.items()}
         self._tuning: TuningServer | None = None
-        if rospy.resolve_name(vehicle.name) == rospy.get_name():  # the node's own server is there
+        if rospy.resolve_name(vehicle.name) == rospy.get_name():  # the node has its own server there
             rospy.logwarn(f"vehicle {vehicle.name} cannot be tuned in flight, because it has the same name as the node")
         else:
             tuning = simulation.child_scripts[vehicle.name].tuning
@@ -52,7 +52,7 @@ class VehicleTopics:
         _set_description(parameters)
 
     def follow(self, vehicle: Vehicle) -> None:
-        """Serve this vehicle from now on."""
+        """Use this vehicle from now on."""
         self.vehicle = vehicle
         for name, camera in vehicle.cameras.items():
             self.cameras[name].follow(camera)
@@ -61,25 +61,25 @@ class VehicleTopics:
         self.show_tuning()
 
     def show_tuning(self) -> None:
-        """Publish the tuned values if they have changed, and check commands against them."""
+        """Publish the tuned values if they have changed, and check commands against the new limits."""
         self.inputs.follow(self.vehicle)
         if self._tuning is not None:
             self._tuning.follow(self._simulation.child_scripts[self.vehicle.name].tuning)
 
     def close(self) -> None:
-        """Hear and publish no more."""
+        """Unregister all topics."""
         parts: list[Any] = [self.inputs, self.outputs, self._tuning, *self.cameras.values(), *self.sensors.values()]
-        for one in filter(None, parts):
-            one.close()
+        for part in filter(None, parts):
+            part.close()
 
 
 class FleetTopics:
-    """Topics for every vehicle of a simulation, and their frames."""
+    """The topics and frames of all vehicles of a simulation."""
 
     def __init__(self, simulation: Simulation, inbox: Inbox, stamp: Stamp, gate: Gate = open_gate):
-        """Advertise for the vehicles of `simulation`, whose thread empties `inbox`.
+        """Advertise for the vehicles of `simulation`, whose thread runs the jobs in `inbox`.
 
-        `stamp` returns that of what is sent now; `gate` wraps the callback of each topic.
+        `stamp` returns the stamp of messages that are sent now; `gate` wraps the callback of each topic.
         """
         self._simulation = simulation
         self._inbox, self._gate = inbox, gate
@@ -92,10 +92,11 @@ class FleetTopics:
         self.follow()
 
     def follow(self) -> None:
-        """Advertise for vehicles that have come, and no more for those that have gone; say what has been tuned."""
+        """Add topics of new vehicles, remove those of removed vehicles, and publish tuned values."""
         simulation = self._simulation
         context = simulation.context
-        tuned = context.tunings, context.scripts.asked, simulation.steps > 0  # after a step it is known what is read
+        # After the first step it is known which parameters the scripts read.
+        tuned = context.tunings, context.scripts.asked, simulation.steps > 0
         if self._topology_version != simulation.topology_version:
             self._follow_vehicles()
         elif self._tuned != tuned:
@@ -107,7 +108,9 @@ class FleetTopics:
         self._topology_version = self._simulation.topology_version
         vehicles = self._simulation.vehicles
         for name, topics in list(self._topics.items()):
-            if name not in vehicles or _told(topics.vehicle.parameters) != _told(vehicles[name].parameters):
+            if name not in vehicles or _topic_parameters(topics.vehicle.parameters) != _topic_parameters(
+                vehicles[name].parameters
+            ):
                 del self._topics[name]
                 topics.close()
         for name, vehicle in vehicles.items():
@@ -117,11 +120,11 @@ class FleetTopics:
                 self._topics[name] = VehicleTopics(self._simulation, vehicle, self._inbox, self._gate)
         self.descriptions = tuple(rospy.resolve_name(f"{name}/robot_description") for name in vehicles)
         self._transforms.publish_static(vehicles.values(), self._stamp)
-        # rospy's topics hold on to themselves, and each has a descriptor (epoll) open until the collector comes by.
+        # rospy's topics are in reference cycles, and each has an open descriptor (epoll) until it is collected.
         gc.collect()
 
     def command_logs(self) -> dict[str, CommandLog]:
-        """Return what has come in, by vehicle."""
+        """Return the log of received messages by vehicle."""
         return {name: topics.inputs.log for name, topics in self._topics.items()}
 
     def publish_state(self) -> None:
@@ -136,7 +139,7 @@ class FleetTopics:
                 camera.publish(self._stamp)
 
     def publish_readings(self) -> None:
-        """Publish what the sensors of every vehicle read in the step that has just been."""
+        """Publish the readings of every vehicle's sensors in the last step."""
         for topics in self._topics.values():
             for sensor in topics.sensors.values():
                 sensor.publish(self._stamp, self._simulation.time)
@@ -148,28 +151,27 @@ class FleetTopics:
         self._transforms.publish(self._simulation.vehicles.values(), self._stamp)
 
     def tell_new_subscribers(self) -> bool:
-        """Tell transforms to those who have not heard them; return whether somebody waits for pictures or state."""
+        """Send transforms to new subscribers; return whether there are new subscribers to pictures or state."""
         self._transforms.tell_new_subscribers(self._simulation.vehicles.values(), self._stamp)
         return any([topics.new_subscribers.take() for topics in self._topics.values()])
 
     def publish_command(self) -> None:
-        """Publish the commands in force; they may change while the simulation stands."""
+        """Publish the current commands, which may also change while the simulation is paused."""
         for topics in self._topics.values():
             topics.outputs.publish_command(topics.vehicle, self._stamp)
 
 
-def _told(parameters: VehicleParameters) -> tuple[str, Any]:
+def _topic_parameters(parameters: VehicleParameters) -> tuple[str, Any]:
     """Return the parameters that a vehicle's topics may depend on: without its start place and random seeds.
 
-    Topics that are advertised anew lose the first steps: nobody is connected to them yet.
+    Topics are not advertised again without need: their subscribers would miss the first steps.
     """
-    said = parameters.model_dump(exclude={*PLACE})
-    return parameters.frame_prefix, _without_seeds(said)
+    return parameters.frame_prefix, _without_seeds(parameters.model_dump(exclude={*PLACE}))
 
 
 def _without_seeds(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _without_seeds(one) for key, one in value.items() if key != "seed"}
+        return {key: _without_seeds(inner) for key, inner in value.items() if key != "seed"}
     return value
 
 

@@ -126,7 +126,7 @@ class Paths(Functions):
         points = _points(ptData, size) if count else []
         if len(points) != count:
             raise WrongValue(f"expected {size} numbers for each of {count} points, not {len(ptData)}")
-        entries = [point.said for point in path.control_points]
+        entries = [point.entry for point in path.control_points]
         index = min(max(int(startIndex), 0), len(entries))
         entries[index:index] = [_control_point(point, path.is_flat) for point in points]
         self._change(handle, control_points=entries, closed=bool(int(options) & 1) and len(entries) > 2)
@@ -135,7 +135,7 @@ class Paths(Functions):
     @sim("34")
     def cutPathCtrlPoints(self, handle: Handle, startIndex: int, ptCnt: int) -> int:
         """Remove a number of control points from a curved path, starting at an index (from 0); -1: all. Return 1."""
-        entries = [point.said for point in self._curved(handle).control_points]
+        entries = [point.entry for point in self._curved(handle).control_points]
         first, count = int(startIndex), int(ptCnt)
         if first < 0 or count < 0:
             entries = []
