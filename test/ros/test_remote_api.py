@@ -49,7 +49,7 @@ class RemoteApi(unittest.TestCase):
         served = {"serve": True, "port": 0, "legacy_port": 0}
         given = {"script": "target", "cameras": {}, "remote_api": served, "real_time_factor": 0}
         node = Node(parameters.load(given))
-        cls.port, cls.legacy_port = node._outside.zeromq.port, node._outside.legacy.port
+        cls.port, cls.legacy_port = node._remote.zeromq.port, node._remote.legacy.port
         cls.ready.set()
         node.run()
         node.close()

@@ -54,7 +54,7 @@ class Stage:
         self.simulation = Simulation(parameters.load(given))
         self.player = Player(self.simulation, self.simulation.step, lambda _: None, simulated_time=False)
         self.interventions = interventions.Interventions(self.simulation)
-        self.inbox = Inbox(on_intervention=self.interventions.tell)
+        self.inbox = Inbox(on_intervention=self.interventions.publish)
         self.simulation.step()
 
     def listen(self, name, _kind, callback, **_):

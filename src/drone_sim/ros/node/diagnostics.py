@@ -1,4 +1,4 @@
-"""/diagnostics: once a second of real time, while somebody listens."""
+"""/diagnostics: once a second of real time, only for subscribers."""
 
 from __future__ import annotations
 
@@ -18,22 +18,21 @@ from drone_sim.run.pacing import Throttle
 
 PERIOD = 1.0  # s of real time
 PATIENCE = 2.0  # s, for the simulation's answer
-_SELDOM = 5.0  # s of real time, between two questions to the master
+_MASTER_PERIOD = 5.0  # s of real time, between two questions to the master
 _TWIST = "geometry_msgs/Twist"
-_LONGEST = 600  # characters of a value
-_BUSY = "simulation"  # the finding that says that there is no answer
+_MAX_LENGTH = 600  # characters of a value
+_BUSY = "simulation"  # name of the finding that the simulation does not answer
 
 
 class Diagnostics(threading.Thread):
-    """Asks the simulation's thread for what it finds, between two steps, and publishes it; a daemon thread.
+    """A daemon thread that asks the simulation's thread for findings between two steps, and publishes them.
 
-    While nobody listens it does not disturb the steps. diagnostic_updater is not used: it asks the master for its
-    period, and fails if the master has gone; it has a stamp of its own, and publishes a new entry at once, before the
-    rest.
+    Without subscribers it does not disturb the steps. diagnostic_updater is not used: it asks the master for its
+    period, and fails without a master; it uses its own stamps, and publishes a new entry before all others.
     """
 
     def __init__(self, look: Callable[[], list[Finding]], stamp: Callable[[], rospy.Time], inbox: Inbox):
-        """Advertise. `look` and `stamp` are called in the simulation's thread, which empties `inbox`."""
+        """Advertise. `look` and `stamp` are called in the simulation's thread, which runs the jobs in `inbox`."""
         super().__init__(name="diagnostics", daemon=True)
         self._look, self._stamp, self._inbox = look, stamp, inbox
         self._ended = threading.Event()
@@ -42,13 +41,13 @@ class Diagnostics(threading.Thread):
         self._answered.set()
         self._asked = 0.0  # s, of the monotonic clock
         self._stamped = rospy.Time()
-        self.unheard: dict[str, list[str]] = {}  # what unheard_twists returned last
-        self._seldom = Throttle(_SELDOM)
+        self.unheard: dict[str, list[str]] = {}  # last result of unheard_twists
+        self._master_throttle = Throttle(_MASTER_PERIOD)
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
         rospy.on_shutdown(self.close)
 
     def close(self) -> None:
-        """Publish no more; may be called twice."""
+        """Stop publishing; may be called twice."""
         self._ended.set()
 
     def run(self) -> None:
@@ -56,7 +55,7 @@ class Diagnostics(threading.Thread):
         while not self._ended.wait(PERIOD):
             if not self._publisher.get_num_connections():
                 continue
-            if self._seldom.passes():
+            if self._master_throttle.passes():
                 self.unheard = unheard_twists()
             self._ask()
             try:
@@ -89,7 +88,7 @@ class Diagnostics(threading.Thread):
 
 
 def unheard_twists() -> dict[str, list[str]]:
-    """Ask the master for topics of Twists that other nodes publish and nobody receives, with the publishers' names.
+    """Return topics of Twists without subscribers, with the names of the publishing nodes, from the master.
 
     A node that was started without a remapping publishes commands on such a topic. If the master does not answer,
     there are none.
@@ -109,6 +108,6 @@ def unheard_twists() -> dict[str, list[str]]:
 
 
 def _status(found: Finding) -> DiagnosticStatus:
-    values = [KeyValue(key, value[:_LONGEST]) for key, value in found.values.items()]
+    values = [KeyValue(key, value[:_MAX_LENGTH]) for key, value in found.values.items()]
     name = f"{rospy.get_name()[1:]}: {found.name}"
-    return DiagnosticStatus(found.level, name, found.message[:_LONGEST], "none", values)  # no hardware
+    return DiagnosticStatus(found.level, name, found.message[:_MAX_LENGTH], "none", values)  # no hardware

@@ -1,6 +1,6 @@
-"""~interventions: what somebody outside does to the world beyond flying.
+"""~interventions: changes of the world from outside that are more than flying.
 
-In one line each, the first time in a flight: `push drone at 3.20 s (/drone/push, by /flyer)`.
+One line each, at the first time in a flight: `push drone at 3.20 s (/drone/push, by /flyer)`.
 """
 
 from __future__ import annotations
@@ -32,50 +32,50 @@ class Interventions:
         self._run = self._topology_version = -1
 
     def update(self) -> None:
-        """Begin anew in another run; publish what was tuned before it, and is still in force."""
+        """At the start of a run, publish the tuned values that are still in force."""
         simulation = self._simulation
         if self._run == simulation.run:
             return
         self._run = simulation.run
-        self._told: set[Intervention] = set()
-        self._count: Counter[tuple[str, str]] = Counter()  # of what each has done, by the action
-        for name, one in simulation.child_scripts.items() if simulation.running else ():
-            if one.tuning.chosen:
-                self._say(CHANGE, name, f"{', '.join(one.tuning.chosen)}, tuned before")
+        self._published: set[Intervention] = set()
+        self._count: Counter[tuple[str, str]] = Counter()  # interventions by action and sender
+        for name, script in simulation.child_scripts.items() if simulation.running else ():
+            if script.tuning.chosen:
+                self._publish(CHANGE, name, f"{', '.join(script.tuning.chosen)}, tuned before")
 
-    def tell(self, one: Intervention) -> None:
-        """Say what is done now."""
+    def publish(self, intervention: Intervention) -> None:
+        """Publish an intervention that happens now."""
         self.update()
-        kind = one.action, one.by
-        if one not in self._told and self._count[kind] < MAX_TRIED:
-            self._told.add(one)
+        kind = intervention.action, intervention.by
+        if intervention not in self._published and self._count[kind] < MAX_TRIED:
+            self._published.add(intervention)
             self._count[kind] += 1
-            self._say(one.action, one.what, f"{one.way}, by {one.by}")
+            self._publish(intervention.action, intervention.what, f"{intervention.way}, by {intervention.by}")
 
-    def _say(self, action: str, what: str, how: str) -> None:
+    def _publish(self, action: str, what: str, how: str) -> None:
         self._topic.publish(printable(f"{action} {what:.{MAX_NAME}} at {self._simulation.time:.2f} s ({how})"))
 
     # ---- clients of the remote APIs
 
     def watched(self, name: str, function: Function) -> Function:
-        """Return a function for clients that also publishes what it does; unchanged if it does nothing to the world."""
+        """Return an API function for clients that also publishes its intervention; unchanged if it never intervenes."""
         if name in free_functions():
             return function
 
         @functools.wraps(function)
-        def told(*arguments: Any) -> Any:
+        def published(*arguments: Any) -> Any:
             actions, given = self._clients(), [*arguments]
             action = actions.action_of(name, given)
             if action is not None:
-                self.tell(Intervention(action, actions.subject_of(name, given), name, _CLIENT))
+                self.publish(Intervention(action, actions.subject_of(name, given), name, _CLIENT))
             return function(*arguments)
 
-        return told
+        return published
 
     def _clients(self) -> Actions:
         """Return the rules for clients: they may fly all vehicles, also by the green spheres, and are not scripts."""
         if self._topology_version != self._simulation.topology_version:
             self._topology_version = self._simulation.topology_version
             flown = self._simulation.vehicles.values()
-            self._actions = Actions(self._simulation, flown, frozenset(), [one.target for one in flown])
+            self._actions = Actions(self._simulation, flown, frozenset(), [vehicle.target for vehicle in flown])
         return self._actions

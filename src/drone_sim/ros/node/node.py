@@ -64,19 +64,19 @@ from drone_sim.vehicles.vehicle import Vehicle
 
 _NAME = "drone_sim"
 _USE_SIM_TIME = "/use_sim_time"
-_SOON, _SELDOM = 0.05, 0.2  # s between two messages while the simulation stands: after a change, and without one
+_CHANGED_PERIOD, _IDLE_PERIOD = 0.05, 0.2  # s between two messages while no steps run: after a change, and without
 
 
 class Node:
-    """Steps the simulation in the thread that calls `run`, and no other."""
+    """Steps the simulation. Only the thread that calls `run` touches it."""
 
     def __init__(self, parameters: Parameters):
-        """Build the scene that `parameters` say, and advertise. Raises what Simulation raises."""
+        """Build the scene of `parameters`, and advertise. Raises the errors of Simulation."""
         self._parameters = parameters
         logging.getLogger("drone_sim").handlers = [_ToRosout()]
         drawings = Drawings()
         backend = RosBackend(
-            self._is_of_a_camera, lambda: self._time.stamp(), lambda topic, take: self._gate(topic, take)
+            self._is_camera_topic, lambda: self._time.stamp(), lambda topic, take: self._gate(topic, take)
         )
         self.simulation = Simulation(
             parameters,
@@ -90,14 +90,14 @@ class Node:
         self._state = rospy.Publisher("~state", String, queue_size=10, latch=True)
         self._timeline = RunTimeline(parameters)
         self.player = Player(
-            self.simulation, self._step_and_show, self._state.publish, self._time.simulated, self._timeline.read
+            self.simulation, self._step_and_publish, self._state.publish, self._time.simulated, self._timeline.read
         )
         self._interventions = Interventions(self.simulation)
-        self._outside = start_server(parameters.remote_api, self.player, backend, self._interventions.watched)
-        self._pacer = Pacer(period(parameters), sleep=self._outside.wait)
-        others = self._outside  # who are to be heard while the inbox waits
-        sleep = others.wait if others.address else None
-        self._inbox = Inbox(sleep=sleep, wake=others.wake, on_intervention=self._interventions.tell)
+        self._remote = start_server(parameters.remote_api, self.player, backend, self._interventions.watched)
+        self._pacer = Pacer(period(parameters), sleep=self._remote.wait)
+        # While the inbox waits, clients of the remote APIs are served.
+        sleep = self._remote.wait if self._remote.address else None
+        self._inbox = Inbox(sleep=sleep, wake=self._remote.wake, on_intervention=self._interventions.publish)
         is_awaited = bool(parameters.lockstep.wait_for)
         self._lockstep = Lockstep(parameters.lockstep, self.simulation, self._inbox) if is_awaited else None
         self._gate = self._lockstep.gate if self._lockstep else open_gate
@@ -111,7 +111,7 @@ class Node:
         self._object_poses = ObjectPoses(self.simulation, self._inbox)
         self._inspection = InspectionTopics(self.player, self._inbox)
         self._meshes = RvizMeshes()
-        self._rviz = (  # each is made only while somebody listens to it
+        self._rviz = (  # each publishes only to subscribers
             VehicleHandles(self.simulation, self._inbox),
             ObjectHandles(self.simulation, self._inbox),
             SurroundingsMarkers(self.simulation, self._meshes),
@@ -130,11 +130,11 @@ class Node:
             self._topics.command_logs,
             self._time.simulated,
             frames_below=rospy.get_namespace().lstrip("/"),
-            held=lambda: self._outside.holds,
+            held=lambda: self._remote.holds,
             unheard=lambda: self._diagnostics.unheard,
         )
-        self._diagnostics = Diagnostics(self._look, self._time.stamp, self._inbox)
-        self._beat = Beat(_SOON, _SELDOM)
+        self._diagnostics = Diagnostics(self._findings, self._time.stamp, self._inbox)
+        self._beat = Beat(_CHANGED_PERIOD, _IDLE_PERIOD)
         self._shown = -1  # the world's changes, when it was shown
         for camera in [one for vehicle in self._first() for one in vehicle.cameras.values()]:
             camera.look()  # the first picture takes long: compiling shaders must not make a step late
@@ -147,15 +147,15 @@ class Node:
 
         if over():
             return
-        if self._outside.address:
-            rospy.loginfo(f"drone_sim: the remote API listens on {self._outside.address}")
+        if self._remote.address:
+            rospy.loginfo(f"drone_sim: the remote API listens on {self._remote.address}")
         else:
             with contextlib.suppress(ScriptError):  # said already; the node waits for `start`
                 self.player.start()
             self._topics.follow()  # so that cameras see the first step
         gc.collect()
         gc.freeze()  # what is there by now stays: the collector, looking through it again and again, makes steps late
-        rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; {self._topics_of_commands()}")
+        rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; {self._describe_command_topics()}")
         self._diagnostics.start()
         steps, seconds = 0, 0.0
         self._pacer.restart()
@@ -179,15 +179,15 @@ class Node:
             self._pacer.restart()
         if self._lockstep is not None and not self._lockstep.is_ready():
             self._time.publish_to_new_subscribers()
-            self._inbox.wait(_SOON)
+            self._inbox.wait(_CHANGED_PERIOD)
             self._process_requests()
             self._pacer.excuse()  # the node may take as long as it needs
             return False
         if self.player.paused:  # steps that were ordered have no pace
             self._pacer.excuse()
             return True
-        if self._pacer.is_far:  # at such a pace, who asks for something is not to wait for the step
-            self._inbox.wait(_SOON)
+        if self._pacer.is_far:  # the next step is far away, and requests must not wait for it
+            self._inbox.wait(_CHANGED_PERIOD)
             self._process_requests()
             return False
         late = self._pacer.wait(over)
@@ -196,10 +196,10 @@ class Node:
         return True
 
     def _is_running(self) -> bool:
-        return self.player.is_step_due and not self._outside.holds
+        return self.player.is_step_due and not self._remote.holds
 
     def _reset_pacing(self) -> None:
-        """Do not count a step, or an answer, as late if it came late because the simulation stood still."""
+        """Do not count a step, or an answer, as late because of a pause."""
         if self._lockstep is not None:
             self._lockstep.skip_pause()
         if self.player.playing and not self.player.begun:
@@ -208,7 +208,7 @@ class Node:
             self._pacer.restart()
 
     def step(self) -> bool:
-        """Take what has come in, run one step, publish it under one stamp; return whether a step was run."""
+        """Process requests, run one step, and publish it under one stamp; return whether a step was run."""
         self._process_requests()
         return self._is_running() and self.player.step()
 
@@ -218,9 +218,9 @@ class Node:
 
     def _process_requests(self) -> None:
         self._inbox.run_jobs()
-        self._outside.serve()
+        self._remote.serve()
 
-    def _step_and_show(self) -> None:
+    def _step_and_publish(self) -> None:
         self._time.begin()
         self._timeline.apply(self.simulation)
         if self._lockstep is not None:
@@ -232,12 +232,12 @@ class Node:
             self._time.end(at_once=True)
             if self.simulation.steps == 1:  # only starts the clock
                 return
-        self._show(is_step=True)
-        self._time.end(at_once=self.player.paused)  # who asks for single steps is told of each
+        self._publish(is_step=True)
+        self._time.end(at_once=self.player.paused)  # each single step is published
 
     def _idle(self) -> None:
-        """Paused, stopped or held from outside: wait for something to do, and show what it changed."""
-        if self._outside.holds:  # nobody knows for how long
+        """While paused, stopped or held by a client: wait for a request, and publish its changes."""
+        if self._remote.holds:  # for an unknown time
             self.player.interrupt_steps("interrupted: a client of the remote API holds the simulation")
         self._inbox.wait(self._until_shown())
         self._time.begin()
@@ -245,28 +245,28 @@ class Node:
         if self._is_running() or self._until_shown():
             return
         if self._time.simulated:
-            self._show_at_the_same_time()
+            self._publish_without_step()
         else:
             self.simulation.look()
-            self._show()
+            self._publish()
 
-    def _look(self) -> list[Finding]:
+    def _findings(self) -> list[Finding]:
         return self._diagnosis.look() + ([self._lockstep.finding()] if self._lockstep is not None else [])
 
     def _until_shown(self) -> float:
         return self._beat.left(self.simulation.world.pictures.changes != self._shown)
 
-    def _is_of_a_camera(self, topic: str) -> bool:
-        """Tell whether a resolved topic is that of a camera's images."""
+    def _is_camera_topic(self, topic: str) -> bool:
+        """Return whether a resolved topic is that of a camera's images."""
         return any(
             topic == rospy.resolve_name(f"{vehicle.name}/{camera.topic}")
             for vehicle in self.simulation.vehicles.values()
             for camera in vehicle.parameters.cameras.values()
         )
 
-    # ---- what is there
+    # ---- publishing
 
-    def _show(self, is_step: bool = False) -> None:
+    def _publish(self, is_step: bool = False) -> None:
         self._topics.follow()
         self._topics.publish_state()
         self._topics.publish_transforms()
@@ -274,27 +274,27 @@ class Node:
             self._topics.publish_readings()
         self._topics.publish_pictures()
         self._shown = self.simulation.world.pictures.changes
-        self._show_to_eyes()
+        self._publish_displays()
 
-    def _show_at_the_same_time(self) -> None:
-        """Show changes with a stamp used before; transforms only to new subscribers: tf2 takes one for each stamp."""
+    def _publish_without_step(self) -> None:
+        """Publish changes under the last stamp; transforms only to new subscribers: tf2 takes one for each stamp."""
         self._topics.follow()
         self._time.end(at_once=True)
         self._time.publish_to_new_subscribers()
         if self._topics.tell_new_subscribers() or self.simulation.world.pictures.changes != self._shown:
             self.simulation.look()
-            self._show_state()
-        self._show_to_eyes()
+            self._publish_state()
+        self._publish_displays()
 
-    def _show_state(self) -> None:
+    def _publish_state(self) -> None:
         self._topics.publish_state()
         self._topics.publish_pictures()
         self._shown = self.simulation.world.pictures.changes
 
-    def _show_to_eyes(self) -> None:
+    def _publish_displays(self) -> None:
         self._topics.publish_command()
-        for one in self._rviz:
-            one.update()
+        for markers in self._rviz:
+            markers.update()
         self._windows.update(self._time.stamp)
         self._signals.update()
         self._inspection.update()
@@ -305,8 +305,8 @@ class Node:
                 self.simulation.world.pictures.look_from_behind(position(track), to_euler(track)[2])
         self._beat.restart()
 
-    def _topics_of_commands(self) -> str:
-        """Return where commands are received, in words, and whether a script hears them."""
+    def _describe_command_topics(self) -> str:
+        """Return a sentence with the command topics, and whether a script subscribes to them."""
         vehicles = self.simulation.vehicles
         if not vehicles:
             return "the scene has no vehicle"
@@ -319,9 +319,9 @@ class Node:
         return self._topics.descriptions
 
     def close(self) -> None:
-        """Run the script's cleanup, remove what rviz read, and free the world. Raises ScriptError."""
+        """Run the script's cleanup, remove rviz's meshes, and free the world. Raises ScriptError."""
         self._diagnostics.close()
-        self._outside.close()
+        self._remote.close()
         self._services.close()
         self._meshes.close()
         self.simulation.close()

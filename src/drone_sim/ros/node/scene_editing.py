@@ -89,7 +89,7 @@ class SceneEditing:
             rospy.set_param("~scene_file", self.editor.scene_file)
         if "new" in said or "open" in said or said.get("draft") == "take":
             self._services.forget_script()
-        self._services.tell_vehicles()
+        self._services.update_vehicles()
         return json.dumps(answer)
 
     def update(self) -> None:

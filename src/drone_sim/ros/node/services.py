@@ -26,15 +26,15 @@ from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import script_path
 
 _VEHICLES = "~vehicles"
-_POLL_PERIOD = 0.2  # s, between two looks for the end of the steps
+_POLL_PERIOD = 0.2  # s
 _SEND_TIMEOUT = 1.0  # s, for the messages of a step to be sent
 
 
 class Services:
     """~start, ~stop, ~restart, ~step, ~pause; ~load_scene; ~set_vehicles; ~snapshot, ~restore.
 
-    Each answers when it is done, with one line. The scene's file is the private parameter `scene_file`, the script
-    that of `script`, the vehicles are those of the private parameter `vehicles`, and `step` takes `step_count` steps.
+    Each answers with one line when it is done. Private parameters set the scene's file (`scene_file`), the script
+    (`script`), the vehicles (`vehicles`), and the number of steps of `step` (`step_count`).
     """
 
     def __init__(
@@ -45,9 +45,9 @@ class Services:
         follow: Callable[[], None],
         restored: Callable[[], None] = lambda: None,
     ):
-        """Advertise what is done with `player` by the thread that empties `inbox`.
+        """Advertise the services of `player`; the simulation's thread runs the jobs in `inbox`.
 
-        `player` reads `timeline` at each start. `follow` lets the topics follow vehicles that have come or gone;
+        `player` reads `timeline` at each start. `follow` updates the topics after vehicles were added or removed;
         `restored` is called after a restore.
         """
         self._restored = restored
@@ -56,7 +56,7 @@ class Services:
         self._inbox = inbox
         self._follow = follow
         self._vehicles = VehiclesParameter()
-        self._vehicles.tell(player.simulation.parameters)
+        self._vehicles.write(player.simulation.parameters)
         self._snapshot: Snapshot | None = None
         self._launch_script = rospy.get_param("~script", "")
         # The scene of the config, if the parameter scene_file did not replace it.
@@ -70,29 +70,29 @@ class Services:
         )
 
     def close(self) -> None:
-        """Leave the parameters as they were given."""
+        """Restore the parameters of the launch."""
         self._vehicles.close()
 
-    def tell_vehicles(self) -> None:
-        """Write into the parameter which vehicles fly, and update their topics: the scene may have other vehicles."""
-        self._vehicles.tell(self._player.simulation.parameters)
+    def update_vehicles(self) -> None:
+        """Write the vehicles of the scene into the parameter, and update their topics."""
+        self._vehicles.write(self._player.simulation.parameters)
         self._follow()
 
     def _answer(self, name: str, job: Callable[[], str], request: Any) -> tuple[bool, str]:
-        done = intervention(CHANGE, "the scene", f"~{name}", request) if name != "snapshot" else None
+        change = intervention(CHANGE, "the scene", f"~{name}", request) if name != "snapshot" else None
         try:
-            answer = self._inbox.ask(job, done)
+            answer = self._inbox.ask(job, change)
             rospy.logdebug(answer)
             return True, answer
         except (ParameterError, ScriptError, ValueError, OSError, RuntimeError) as error:
             return False, " ".join(str(error).split())
 
     def _answer_step(self, request: Any) -> tuple[bool, str]:
-        """Answer when as many steps as the parameter `step_count` says have been run, and their messages sent."""
-        done = intervention(CHANGE, "the scene", "~step", request)
+        """Run as many steps as the parameter `step_count` says, and answer when their messages have been sent."""
+        change = intervention(CHANGE, "the scene", "~step", request)
         try:
             count = _step_count(self._player.simulation.parameters.step_count)
-            steps = self._inbox.ask(lambda: self._player.order_steps(count), done)
+            steps = self._inbox.ask(lambda: self._player.order_steps(count), change)
             while not rospy.is_shutdown() and not wait([steps], _POLL_PERIOD).done:
                 pass  # in lockstep, a step may wait for a node for any time
             if not steps.done():
@@ -103,11 +103,11 @@ class Services:
         except (ScriptError, ValueError, OSError, RuntimeError) as error:
             return False, " ".join(str(error).split())
 
-    # ---- carried out in the simulation's thread
+    # ---- run in the simulation's thread
 
     def start(self) -> str:
         """Read scene and the script of `script` from disk, and begin at time 0."""
-        self._take_script()
+        self._read_script()
         return self._report_start(self._player.start())
 
     def stop(self) -> str:
@@ -116,30 +116,32 @@ class Services:
 
     def restart(self) -> str:
         """Stop, and start."""
-        self._take_script()
+        self._read_script()
         return self._report_start(self._player.restart())
 
     def pause(self, on: bool) -> str:
-        """Pause, or resume, if not `on`. `rosservice call ... pause "{}"` means False, so a flight is not paused."""
+        """Pause, or resume if not `on`. `rosservice call ... pause "{}"` means False, so it does not pause."""
         if not on and self._player.playing:
-            said = f"not paused: `rosservice call {rospy.resolve_name('~pause')} true` pauses, false resumes"
-            rospy.logwarn(f"pause: no effect: {said}")
-            return said
+            answer = f"not paused: `rosservice call {rospy.resolve_name('~pause')} true` pauses, false resumes"
+            rospy.logwarn(f"pause: no effect: {answer}")
+            return answer
         return self._player.pause(on)
 
     def load_scene(self) -> str:
-        """Start anew in the scene of `scene_file`."""
+        """Start in the scene of `scene_file`."""
         file = scene_parameter(self._config_scene)
-        self._take_script()
+        self._read_script()
         started = self._player.start(file)
         return self._report_start(f"{started} in {file or 'the scene of the parameters'}")
 
     def _report_start(self, started: str) -> str:
-        self._vehicles.tell(self._player.simulation.parameters)  # the scene was read again, and may have other vehicles
+        self._vehicles.write(
+            self._player.simulation.parameters
+        )  # the scene was read again, and may have other vehicles
         return f"{started}{self._timeline.summary}"
 
-    def _take_script(self) -> None:
-        """Let the script fly that the parameter `script` names now. Raises ScriptError where it is not there."""
+    def _read_script(self) -> None:
+        """Fly the script of the parameter `script` from the next start on. Raises ScriptError if it does not exist."""
         script = script_from_shell(str(rospy.get_param("~script", "")))
         script_path(script)
         self._player.simulation.script = script
@@ -150,11 +152,11 @@ class Services:
         self._player.simulation.script = script_from_shell(str(self._launch_script))
 
     def set_vehicles(self) -> str:
-        """Fly the vehicles in the parameter `vehicles`; those that fly already simply fly on."""
+        """Fly the vehicles in the parameter `vehicles`; those that already fly continue."""
         added, removed = self._player.simulation.set_vehicles(self._vehicles.read())
         self._follow()
-        told = [f"{', '.join(names)} {verb}" for names, verb in ((added, "added"), (removed, "removed")) if names]
-        return "; ".join(told) or "no vehicle was added or removed"
+        changes = [f"{', '.join(names)} {verb}" for names, verb in ((added, "added"), (removed, "removed")) if names]
+        return "; ".join(changes) or "no vehicle was added or removed"
 
     def snapshot(self) -> str:
         """Remember the exact dynamic state."""
@@ -191,19 +193,18 @@ def _step_count(otherwise: int) -> int:
 
 
 class VehiclesParameter:
-    """The private parameter `vehicles`, for people to change.
+    """The private parameter `vehicles`, which users may change.
 
-    It holds an entry for each vehicle that flies, as long as nobody else has written it. rosparam, like roslaunch,
-    leaves out empty entries and merges the others into the present value: an entry merged into a number, or into
-    nothing, would be the only one.
+    The node writes an entry for each vehicle that flies, unless a user has written the parameter. So a user can add
+    one entry: rosparam and roslaunch merge it into the present entries, but would replace a number.
     """
 
     def __init__(self) -> None:
-        """Take what was given."""
+        """Read the value of the launch."""
         self._given = self._written = rospy.get_param(_VEHICLES, None)
 
-    def tell(self, parameters: Parameters) -> None:
-        """Write which vehicles fly, unless the scene file says it: that takes precedence over the parameter."""
+    def write(self, parameters: Parameters) -> None:
+        """Write the vehicles that fly, unless they are the scene file's, which count more than the parameter."""
         try:
             self._write(_sendable(parameters.vehicle_entries) or self._given)
         except (TypeError, OverflowError) as error:  # of XML-RPC: such as a seed of more than 32 bits
@@ -212,11 +213,11 @@ class VehiclesParameter:
             )
 
     def read(self) -> Any:
-        """Return what it holds."""
+        """Return the present value."""
         return rospy.get_param(_VEHICLES, {})
 
     def close(self) -> None:
-        """Put back what was given: the next simulator of this name may be given another drone."""
+        """Restore the value of the launch, because the next simulator of this name may have other vehicles."""
         with contextlib.suppress(*MASTER_FAILURES, OSError):
             self._write(self._given)
 
@@ -233,7 +234,7 @@ class VehiclesParameter:
 def _sendable(value: Any) -> Any:
     """Return a value of YAML without null, which parameters cannot hold."""
     if isinstance(value, dict):
-        return {str(key): _sendable(one) for key, one in value.items()}
+        return {str(key): _sendable(inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_sendable(one) for one in value]
+        return [_sendable(inner) for inner in value]
     return "none" if value is None else value

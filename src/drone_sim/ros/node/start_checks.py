@@ -1,4 +1,4 @@
-"""What is checked before the node starts: roslaunch's arguments, and other simulators under the same master."""
+"""Checks before the node starts: roslaunch's arguments, and other simulators with the same master."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from drone_sim.ros.core.network import call, is_alive
 from drone_sim.run.parameters import ParameterError
 
 _SUFFIXES = (".launch", ".xml", ".test")
-_OURS = "set_vehicles"  # a service that every simulator has, and nobody else
+_OURS = "set_vehicles"  # a service that only simulators have
 _OF_A_VEHICLE = "odom"
 _CLOCK = "/clock"
 
@@ -51,8 +51,8 @@ def check(command: Sequence[str], folder: Path) -> None:
 
 
 def _arguments(command: Sequence[str]) -> list[str]:
-    """Return what follows `roslaunch`; nothing for another program."""
-    for number, word in enumerate(command[:2]):  # python may come first
+    """Return the arguments after `roslaunch`; none for another program."""
+    for number, word in enumerate(command[:2]):  # the first word may be python
         if Path(word).name == "roslaunch":
             return list(command[number + 1 :])
     return []
@@ -70,7 +70,7 @@ def _is(launch: Path, arguments: Sequence[str], number: int, folder: Path) -> bo
 
 
 def check_others(vehicles: Iterable[str], simulated: bool) -> None:
-    """Raise ValueError where another simulator flies one of `vehicles`, or publishes /clock as this one would.
+    """Raise ValueError if another simulator flies one of `vehicles`, or both would publish /clock.
 
     Two simulators must not fly the same vehicle, and only one may publish /clock.
     """

@@ -1,6 +1,6 @@
-"""~windows: what scripts have opened for a person to look at; ~window_answers: what that person says to a dialog.
+"""~windows: views, dialogs and consoles that scripts have opened; ~window_answers: a user's answers to dialogs.
 
-What a floating view shows comes from a vehicle's camera, or from a vision sensor of the scene.
+A floating view shows the pictures of a vehicle's camera or of a vision sensor of the scene.
 """
 
 from __future__ import annotations
@@ -27,33 +27,33 @@ from drone_sim.vehicles.vehicle import Vehicle
 
 _PERIOD = 0.1  # s of real time, between two messages
 _PICTURE_PERIOD = 0.04  # s of real time, between two pictures of a sensor of the scene: every step, at 20 Hz
-_SAME = 0.95  # cosine of the angle between axes that look the same way
-_AHEAD = (0.0, 0.0, 1.0)  # in the frame of whatever looks
-_LONGEST = 10_000  # characters of an answer
+_MIN_COSINE = 0.95  # of the angle between two cameras that look the same way
+_AHEAD = (0.0, 0.0, 1.0)  # in the frame of a camera or sensor
+_MAX_LENGTH = 10_000  # characters of an answer
 
 
 class WindowTopics:
-    """Says what is open, as JSON, whenever it changes; who advertises answers may answer."""
+    """Publishes the open windows as JSON when they change, and takes answers."""
 
     def __init__(self, simulation: Simulation, inbox: Inbox):
-        """Advertise and subscribe for `simulation`, whose thread empties `inbox`."""
+        """Advertise and subscribe for `simulation`, whose thread runs the jobs in `inbox`."""
         self._simulation, self._inbox = simulation, inbox
         self._windows = rospy.Publisher("~windows", String, queue_size=1, latch=True)
         self._answers = rospy.Subscriber("~window_answers", String, self._on_answer, queue_size=10)
         simulation.windows.readers.add(lambda: self._answers.get_num_connections() > 0)
         self._pictures = ViewPictures(simulation)
         self._throttle = Throttle(_PERIOD)
-        self._shown = 0  # the windows' changes, when they were
+        self._shown = 0  # number of changes of the windows at the last message
 
     def update(self, stamp: Stamp) -> None:
-        """Say what is open, where that is news, and what views show."""
+        """Publish the windows if they have changed, and the pictures of views."""
         self._pictures.publish(stamp)
         windows = self._simulation.windows
         if windows.changes == self._shown or not self._throttle.passes():
             return
         self._shown = windows.changes
         state: dict[str, list[dict[str, Any]]] = windows.state()
-        topics = self._pictures.follow([one["sensor"] for one in state["views"]])
+        topics = self._pictures.follow([view["sensor"] for view in state["views"]])
         for view, topic in zip(state["views"], topics):
             view["topic"] = topic
         self._windows.publish(json.dumps(state))
@@ -61,8 +61,8 @@ class WindowTopics:
     def _on_answer(self, message: String) -> None:
         """Press a button before the next step."""
         try:
-            if len(message.data) > _LONGEST:
-                raise ValueError(f"has more than {_LONGEST} characters")
+            if len(message.data) > _MAX_LENGTH:
+                raise ValueError(f"has more than {_MAX_LENGTH} characters")
             answer = read_answer(json.loads(message.data))
         except (ValueError, RecursionError) as error:
             rospy.logwarn_throttle(1, f"window_answers: refused: {error}")
@@ -77,16 +77,16 @@ class WindowTopics:
 
 
 class ViewPictures:
-    """Topics of what is seen. A vision sensor of the scene has one, `~views/NAME`, as long as a view shows it."""
+    """Topics of the pictures in views. A vision sensor of the scene has a topic `~views/NAME` while a view shows it."""
 
     def __init__(self, simulation: Simulation):
-        """Take the simulation whose cameras and sensors are shown; begin without views."""
+        """Begin without views of cameras and sensors of `simulation`."""
         self._simulation = simulation
         self._throttle = Throttle(_PICTURE_PERIOD)
         self._publishers: dict[str, rospy.Publisher] = {}  # of sensors of the scene, by name
 
     def follow(self, sensors: list[str]) -> list[str]:
-        """Return the topics of what sensors see, by the names of their objects; '' where nobody takes pictures."""
+        """Return the picture topics of objects with these names; '' for an object that takes no pictures."""
         own = {name for name in sensors if self._eye(name) is not None}
         for name in self._publishers.keys() - own:
             self._publishers.pop(name).unregister()
@@ -95,8 +95,8 @@ class ViewPictures:
         return [self._own_topic(name) if name in own else self._vehicles_topic(name) for name in sensors]
 
     def publish(self, stamp: Stamp) -> None:
-        """Publish what sensors of the scene see, a few times a second, where somebody listens."""
-        watched = [name for name, one in self._publishers.items() if one.get_num_connections()]
+        """Publish pictures of sensors of the scene to subscribers, at most every _PICTURE_PERIOD."""
+        watched = [name for name, publisher in self._publishers.items() if publisher.get_num_connections()]
         if not watched or not self._throttle.passes():
             return
         for name in watched:
@@ -119,11 +119,12 @@ class ViewPictures:
     def _vehicles_topic(self, name: str) -> str:
         """Return the topic of a vehicle's camera.
 
-        V-REP shows the pictures of its quadricopter's two vision sensors only in its window: here the camera that looks
-        the same way stands for each.
+        For the two vision sensors of V-REP's quadricopter, which take no pictures here, this is the camera that looks
+        the same way.
         """
         for vehicle in self._simulation.vehicles.values():
-            topics = {one.object + vehicle.suffix: one.topic for one in vehicle.parameters.cameras.values()}
+            cameras = vehicle.parameters.cameras.values()
+            topics = {camera.object + vehicle.suffix: camera.topic for camera in cameras}
             name = name if name in topics else self._same_way(vehicle, name)
             if name in topics:
                 return rospy.resolve_name(f"{vehicle.name}/{topics[name]}")
@@ -138,5 +139,6 @@ class ViewPictures:
         def axis(named: str) -> Vector:
             return frames.rotate(objects[objects.handle(named)].matrix(), _AHEAD)
 
-        colors = (one.object + vehicle.suffix for one in vehicle.parameters.cameras.values() if one.kind == "color")
-        return next((one for one in colors if np.dot(axis(one), axis(name)) > _SAME), name)
+        cameras = vehicle.parameters.cameras.values()
+        candidates = (camera.object + vehicle.suffix for camera in cameras if camera.kind == "color")
+        return next((other for other in candidates if np.dot(axis(other), axis(name)) > _MIN_COSINE), name)
