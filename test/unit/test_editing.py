@@ -186,15 +186,26 @@ def test_a_new_drone_flies_what_the_scene_says(editor, tmp_path):
     editor.answer({"new": True})
     assert editor.described()["new"]
     (drone,) = edit(editor, {"do": "add_vehicle", "position": [0, 0, 0]})["handles"]
-    editor.simulation.script = "target"  # what a client has run
-    assert yaml_files.parse(text_of(editor))["vehicles"]["quadricopter"]["script"] == "pilot"
+    assert "script" not in yaml_files.parse(text_of(editor))["vehicles"]["quadricopter"], "what is run flies it"
+    edit(editor, {"do": "add_vehicle", "position": [1, 0, 0]})
+    assert yaml_files.parse(text_of(editor))["vehicles"]["quadricopter2"]["script"] == "pilot"
     (tmp_path / "mine.py").write_text("def sysCall_actuation():\n    pass\n")
     edit(editor, {"do": "set", "object": drone, "values": {"script": str(tmp_path / "mine.py")}})
     editor.answer({"save": str(tmp_path / "scene.yaml")})
     assert not editor.described()["new"]
     editor.answer({"open": str(tmp_path / "scene.yaml")})
+    editor.simulation.script = "target"  # what a client has run
     editor.simulation.start()
     assert editor.simulation.child_scripts["quadricopter"].path == str(tmp_path / "mine.py")
+    assert editor.simulation.child_scripts["quadricopter2"].path.endswith("/pilot.py")
+
+
+def test_a_name_that_is_taken_is_refused_with_the_place_of_the_other_object(editor):
+    edit(editor, {"do": "add", "objects": [GATE, {"name": "Camera", "kind": "vision_sensor", "parent": "Gate"}]})
+    with pytest.raises(ValueError, match=r"'TrackCam' already exists: \S+/TrackCam, a part of the vehicle 'drone'$"):
+        edit(editor, {"do": "rename", "object": "Gate", "name": "TrackCam"})
+    with pytest.raises(ValueError, match=r"'Camera' already exists: /Gate/Camera$"):
+        edit(editor, {"do": "rename", "object": "DronePosition", "name": "Camera"})
 
 
 WRONG_MODELS = {

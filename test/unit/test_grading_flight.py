@@ -416,3 +416,9 @@ def test_a_mistake_in_a_plan_is_named_in_one_line(written, text):
     assert _cases()[text] in str(caught.value)
     assert "steps.yaml: " in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_script_that_no_vehicle_would_fly_is_not_graded(written):
+    text = "duration: 1\nconfig: {vehicles: {drone: {script: target}}}\ncriteria: [{kind: no_contact}]\n"
+    assert "the scene names vehicles/drone/script: target" in flight.grade(written(text), "pilot").error
+    assert not flight.grade(written(text)).error, "the plan names no script: the vehicle's own one is graded"

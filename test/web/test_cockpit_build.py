@@ -1,5 +1,6 @@
 """The scene is built with the mouse: the V-REP tutorial's first scene, and an arena; saved, begun anew, and flown."""
 
+import itertools
 import json
 import math
 import os
@@ -13,7 +14,7 @@ import rospy
 from cockpit_page import PROJECT, STARTED, Panel, open_page, ready, wait_for, wait_until
 from diagnostic_msgs.srv import AddDiagnostics
 from launched import launched
-from scene_builder import Builder
+from scene_builder import SELECTED, Builder
 
 from drone_sim.grading import flight, tasks
 from drone_sim.grading import plan as plans
@@ -272,7 +273,8 @@ def test_a_drag_is_one_step_of_undo_and_the_text_is_the_same_scene(cockpit, brow
     cockpit.load("")
 
 
-def test_a_new_scene_flies_the_script_that_it_names_and_run_writes_it(cockpit, browser):
+def test_a_new_scene_flies_the_pilot_and_a_saved_one_the_script_that_was_run(cockpit, browser):
+    cockpit.scripts.mkdir(exist_ok=True)
     with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
         page.locator("#script").select_option("tutorial/1_thrust.lua")
         wait_for(page, "document.querySelector('.cm-content').textContent.includes('thrust_gravity')")
@@ -288,7 +290,15 @@ def test_a_new_scene_flies_the_script_that_it_names_and_run_writes_it(cockpit, b
         panel.press("Start", "started")
         wait_until(page, lambda: page.inner_text("#flying") == "built-in/pilot.py flies")
         page.click("#run")
+        wait_until(page, lambda: page.inner_text("#flying") == "flies")
+        panel.press("Stop", "stopped")
+        builder.save_as("owned.yaml")
         builder.wait("Drone", lambda one: one["own_script"] == "package://drone_sim/docs/tutorial/1_thrust.lua")
+        wait_until(page, lambda: page.locator("#scene-choice option:checked").inner_text() == "owned.yaml")
+        page.locator("#script").select_option("tutorial/2_elevation.py")
+        wait_for(page, "document.querySelector('.cm-content').textContent.includes('Kzref')")
+        page.click("#run")
+        builder.wait("Drone", lambda one: one["own_script"] == "package://drone_sim/docs/tutorial/2_elevation.py")
         wait_until(page, lambda: page.inner_text("#flying") == "flies")
     cockpit.load("")
 
@@ -302,3 +312,70 @@ def test_what_is_no_model_cannot_be_saved_as_one_and_the_menu_says_why(cockpit, 
             assert why in item.get_attribute("title") and item.is_disabled()
         page.evaluate("scene.editing.select([])")
         assert "Nothing is selected" in item.get_attribute("title") and item.is_disabled()
+
+
+def test_models_added_by_keys_stand_side_by_side_in_view(cockpit, browser):
+    with open_page(cockpit, browser) as page:
+        builder = Builder(page)
+        builder.menu("Scene file", "New")
+        wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
+        page.get_by_role("searchbox", name="Find a model").fill("Cuboid")
+        for _ in range(3):
+            page.locator("#models .card").press("Enter")
+        places = [builder.wait(name, lambda one: True)["position"] for name in ("Cuboid", "Cuboid0", "Cuboid1")]
+        assert min(math.dist(one, other) for one, other in itertools.combinations(places, 2)) >= 0.5, places
+        for place in places:
+            x, y = page.evaluate(PROJECT, place)
+            assert page.evaluate("([x, y]) => document.elementFromPoint(x, y) === scene.canvas.dom", [x, y])
+    cockpit.load("")
+
+
+def test_a_taken_name_selects_its_object_and_the_handles_go_when_a_flight_starts(cockpit, browser):
+    with open_page(cockpit, browser) as page:
+        builder, panel = Builder(page), Panel(page)
+        panel.press("Stop", "stopped")
+        builder.unfold("Drone")
+        builder.row("Quadricopter_floorCamera").dblclick()
+        page.get_by_label("New name of Quadricopter_floorCamera").fill("TrackCam")
+        page.keyboard.press("Enter")
+        panel.wait_for("/TrackCam, a part of the vehicle 'drone'")
+        wait_until(page, lambda: page.evaluate(SELECTED) == "TrackCam")
+        has_handles = "Boolean(scene.editing.handles.controls.object)"
+        builder.select("Drone")
+        wait_for(page, has_handles)
+        panel.press("Start", "started")
+        wait_for(page, f"!{has_handles}")
+        builder.row("Drone").click()
+        wait_for(page, has_handles)
+
+
+def test_properties_are_computed_dragged_and_in_degrees(cockpit, browser):
+    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        builder, fields = Builder(page), page.locator("#properties")
+        panel = Panel(page)
+        builder.menu("Scene file", "New")
+        wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
+        builder.select("Floor")
+        assert fields.locator("[data-key=size]").inner_text() == "size m"
+        camera = builder.drop("Camera", [1, 0, 0])
+        builder.write(X="0.5+0.1", Gamma="2*(40 + 5)")
+        builder.wait(camera, lambda one: abs(one["position"][0] - 0.6) < FAR)
+        angle = fields.locator("[data-key=fov]")
+        assert angle.inner_text().split("\n")[0] == "perspective angle °"
+        assert "fov: in the scene's file, in rad" in angle.get_attribute("title")
+        builder.set("perspective angle", 90)
+        builder.wait(camera, lambda one: abs(one["values"]["fov"] - math.pi / 2) < FAR)
+        builder.set("perspective angle", "2*")
+        panel.wait_for("perspective angle = 2*: must be a number from 0.573 to 177.617")
+        box = fields.get_by_label("far clipping plane", exact=True)
+        box.scroll_into_view_if_needed()
+        place = box.bounding_box()
+        page.mouse.move(place["x"] + 20, place["y"] + 10)
+        page.mouse.down()
+        page.mouse.move(place["x"] + 65, place["y"] + 10, steps=5)
+        page.mouse.up()
+        builder.wait(camera, lambda one: abs(one["values"]["far"] - 100.5) < FAR)
+        builder.drop("Cuboid", [1, 1, 0])
+        groups = page.locator("#properties summary").all_inner_texts()
+        assert groups == ["look", "physics", "advanced"]
+    cockpit.load("")

@@ -173,9 +173,9 @@ def _opaque(color: Any) -> Any:
 
 Finite = Annotated[float, AllowInfNan(False)]
 Coordinate = Annotated[Finite, Within(-1e5, 1e5)]  # m
-Angle = Annotated[Finite, Within(-1e3, 1e3)]  # rad
-Length = Annotated[Finite, Within(1e-4, 1e4)]  # m, size of an object
-Mass = Annotated[Finite, Within(1e-6, 1e6, or_zero=True)]  # kg
+Angle = Annotated[Finite, Within(-1e3, 1e3), Unit("rad")]
+Length = Annotated[Finite, Within(1e-4, 1e4), Unit("m")]  # size of an object
+Mass = Annotated[Finite, Within(1e-6, 1e6, or_zero=True), Unit("kg")]
 Gain = Annotated[Finite, Within(0, 1e4)]
 Velocity = Annotated[Finite, Within(-1e4, 1e4)]  # m/s
 Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(description="3 numbers, [x, y, z] in m")]

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from drone_sim.config.errors import checked
-from drone_sim.config.types import Checked
+from drone_sim.config.types import Checked, ParameterError
 from drone_sim.editing import clipboard, records, scripts, signs
 from drone_sim.editing.object_edits import ObjectEdits
 from drone_sim.editing.vehicle_edits import FLOOR, VehicleEdits
@@ -138,7 +138,19 @@ class EditOperations:
     def _rename(self, op: records.Rename) -> list[int]:
         handle = self._simulation.tree.resolve(op.object)
         is_of_scene = self._is_of_scene(handle)
+        if not self._simulation.is_vehicle(handle):  # the name of a vehicle is not that of an object
+            self._check_free(op.name, handle)
         return self._objects.rename(handle, op.name) if is_of_scene else self._vehicles.rename(handle, op.name)
+
+    def _check_free(self, name: str, handle: int) -> None:
+        """Raise ParameterError, which says where the other object is, if another object has this name."""
+        tree = self._simulation.tree
+        if name not in tree or tree.handle(name) == handle:
+            return
+        other = tree.handle(name)
+        vehicle = self._simulation.vehicle_of(other)
+        owner = f", a part of the vehicle '{vehicle.name}'" if vehicle else ""
+        raise ParameterError(f"an object named '{name}' already exists: {tree.path(other)}{owner}")
 
     def _reparent(self, op: records.Reparent) -> None:
         parent = WORLD if op.parent == WORLD else self._simulation.tree.resolve(op.parent)

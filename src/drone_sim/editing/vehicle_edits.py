@@ -43,14 +43,18 @@ class VehicleEdits:
         return vehicles_in(self._simulation.document.settings, self._simulation.parameters)
 
     def add(self, op: records.AddVehicle) -> list[int]:
-        """Add a vehicle under an unused name; the scene names its script, by default the pilot."""
+        """Add a vehicle under an unused name.
+
+        The scene names the pilot as the script of further vehicles, so that only the first one flies what is run.
+        """
         if op.type not in TYPES:
             raise ParameterError(f"type = '{op.type}': must be one of {', '.join(TYPES)}")
         entries = self._entries()
         name = _unused_name(op.name or op.type, entries)
         x, y, z = op.position
         place = {"position": rounded([x, y, z + op.height]), **({"yaw": op.yaw} if op.yaw else {})}
-        self._apply({**entries, name: merged({"script": DEFAULT, **TYPES[op.type].entry(), **place}, op.values)})
+        script = {"script": DEFAULT} if entries else {}
+        self._apply({**entries, name: merged({**script, **TYPES[op.type].entry(), **place}, op.values)})
         return [self.root(self._simulation.vehicles[name])]
 
     def copy(self, handle: int, places: Sequence[Vector]) -> list[int]:

@@ -12,6 +12,7 @@ from typing import IO, Any, cast
 import numpy as np
 
 from drone_sim.command_line import EXPECTED, format_error
+from drone_sim.config.types import ParameterError
 from drone_sim.files import writing
 from drone_sim.grading.flight_recorder import FlightRecorder, OfflineBackend
 from drone_sim.grading.permissions import Permissions
@@ -20,7 +21,9 @@ from drone_sim.grading.result import Result, result_of
 from drone_sim.grading.rules import Rules, ScriptWatch
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import first_step
+from drone_sim.run.parameters import Parameters
 from drone_sim.run.simulation import Simulation
+from drone_sim.run.simulation_setup import own_script
 from drone_sim.scripting import load
 from drone_sim.scripting.api.calls import Api
 from drone_sim.scripting.api.control import Turns
@@ -81,6 +84,7 @@ class Flight:
         self._plan, self._seed, self._changes = plan, seed, changes or {}
         parameters = plan.parameters(seed, "" if script == "" else None, changes)
         self._script = plan.script_of(script) or parameters.script
+        _check_flown(parameters, self._script)
         self._timeline = plan.timeline_of(parameters)
         self._steps = first_step(plan.duration, parameters.time_step)
         backend = OfflineBackend(plan.topics_of(parameters))
@@ -156,6 +160,14 @@ def write_table(rows: np.ndarray, file: IO[str]) -> None:
     recording = Recording(file)
     for row in cast("list[list[float]]", rows.tolist()):
         recording.write_row(row)
+
+
+def _check_flown(parameters: Parameters, script: str) -> None:
+    """Raise ParameterError if no vehicle flies the script, because the scene names another one for each."""
+    own = {vehicle.name: own_script(vehicle, parameters) for vehicle in parameters.fleet}
+    if script and own and all(own.values()):
+        named = ", ".join(f"vehicles/{name}/script: {path}" for name, path in own.items())
+        raise ParameterError(f"no vehicle would fly {script}: the scene names {named}; remove one of these keys")
 
 
 def script_seed(seed: int) -> int:

@@ -19,6 +19,7 @@ from drone_sim.config.types import (
     ParameterError,
     ParameterProblem,
     Switch,
+    Unit,
     Within,
     named_in,
     one_line,
@@ -49,7 +50,7 @@ MAX_REACH = 1e5  # m, distance of a mesh's vertices from its origin
 class FloorParameters(Checked):
     """A square floor at z = 0, centred on the origin, surrounded by ground or, if `edge`, by nothing."""
 
-    size: Annotated[Finite, Within(0.01, 1e4)]
+    size: Annotated[Finite, Within(0.01, 1e4), Unit("m")]
     texture: File
     edge: Switch
 

@@ -23,6 +23,7 @@ from drone_sim.config.types import (
     ParameterError,
     Parts,
     ScriptValue,
+    Unit,
     Within,
     merged,
 )
@@ -156,10 +157,10 @@ class EquipmentParameters(Checked):
 
     script: FileName
     start: Literal["flying", "landed"]
-    takeoff_height: Annotated[Finite, Within(0.05, 1e3)]
-    cmd_vel_timeout: Annotated[Finite, Within(1e-4, 1e6, or_zero=True)]
+    takeoff_height: Annotated[Finite, Within(0.05, 1e3), Unit("m")]
+    cmd_vel_timeout: Annotated[Finite, Within(1e-4, 1e6, or_zero=True), Unit("s")]
     cmd_vel_limits: TwistLimits
-    position_limit: Annotated[Finite, Within(1e-3, 1e5)]
+    position_limit: Annotated[Finite, Within(1e-3, 1e5), Unit("m")]
     push: PushParameters
     propellers: PropellerParameters
     control: ControlParameters

@@ -27,6 +27,7 @@ export class Edit {
     this.hearing = new Map();
     this.isOn = false;
     this.frame = "world"; // the axes of the handles
+    this.isAway = false; // the handles go when a flight starts, until something is selected
     this.glyphs = new Glyphs(scene.world);
     this.handles = new Handles(scene.camera, { changed: (change) => this.drag(change) });
     this.seen = new Seen(this);
@@ -98,6 +99,8 @@ export class Edit {
       return void this.connected();
     }
     const { objects, gone, version, since, ...is } = told;
+    const isFlying = is.state !== "stopped";
+    this.isAway = isFlying && (this.isAway || this.is.state === "stopped");
     this.is = is;
     this.assumed.tell(is.revision);
     for (const one of [...this.expected]) if (this.objects.get(one)) this.expected.delete(one);
@@ -125,11 +128,13 @@ export class Edit {
   }
 
   select(handles, more = false) {
+    this.isAway = false;
     const known = handles.filter((one) => this.objects.get(one) || this.expected.has(one));
     this.choose(more ? [...this.selected.filter((one) => !known.includes(one)), ...known] : known);
   }
 
   toggle(handle) {
+    this.isAway = false;
     this.choose(this.has(handle) ? this.selected.filter((one) => one !== handle) : [...this.selected, handle]);
   }
 
@@ -155,11 +160,17 @@ export class Edit {
 
   // ---- the handles: the scene asks while one edits
 
-  putHandles() {
+  // The object that has them, undefined for none.
+  get held() {
     const one = this.objects.get(this.last);
-    const isShown = this.isOn && one && this.mayMove(one.handle) && !this.hand.measuring && this.scene.shown.handles;
+    const isShown = this.isOn && !this.isAway && !this.hand.measuring && this.scene.shown.handles;
+    return isShown && one && this.mayMove(one.handle) ? one : undefined;
+  }
+
+  putHandles() {
+    const { held } = this;
     const frame = this.handles.mode === "scale" ? "own" : this.frame;
-    this.handles.put(isShown ? this.frameOf(one.handle, frame) : null, isShown && new THREE.Vector3().setFromMatrixPosition(one.matrix));
+    this.handles.put(held ? this.frameOf(held.handle, frame) : null, held && new THREE.Vector3().setFromMatrixPosition(held.matrix));
   }
 
   frameFloor() {
@@ -246,8 +257,12 @@ export class Edit {
     return `${verb} ${handles.length === 1 ? this.objects.get(handles[0])?.name ?? "" : `${handles.length} objects`}`;
   }
 
-  rename({ handle, name: before }, name) {
-    return this.do([{ do: "rename", object: handle, name }], `Rename ${before}`);
+  // Selects the object that has the name already.
+  async rename({ handle, name: before }, name) {
+    const answer = await this.do([{ do: "rename", object: handle, name }], `Rename ${before}`);
+    const other = this.objects.named(name);
+    if (!answer && other && other.handle !== handle) this.select([other.handle]);
+    return answer;
   }
 
   hang(parent, isRelative) {

@@ -1,12 +1,18 @@
 // The shelf of models, with pictures: dragged into the scene one lands on what is under the mouse. So do files.
+import * as THREE from "three";
 import { create } from "../dom.js";
 import { askFor } from "./ask.js";
 import { isFree } from "./edit_hand.js";
 import { follow } from "./follow.js";
 import { onGrid } from "./handles.js";
 import { Landing } from "./landing.js";
+import { WORLD } from "./objects.js";
 
 const FAR = 5; // px, from which on a press is a drag
+const ROOM = 1; // m, of a model whose size is not known
+const GAP = 0.5, REACH = 16; // m, between two places that are tried, and how many each way
+const SEEN = 0.85; // of the picture's half
+const UNTOLD = 2000; // ms
 const LARGEST = 5 << 20; // bytes of a file: as text it is a third longer, and a message has an end
 const FILES = /\.(?:ttm|obj|stl|dae|urdf|ya?ml)$/i;
 
@@ -14,6 +20,7 @@ export class Models {
   constructor(shelf, find, edit) {
     Object.assign(this, { shelf, find, edit });
     this.groups = [];
+    this.taken = []; // boxes of what has been added by keys, and is not told yet
     this.landing = new Landing(edit.scene);
     find.oninput = () => this.show();
     find.addEventListener("keydown", (event) => event.key === "Escape" && this.clear(event));
@@ -104,15 +111,39 @@ export class Models {
     return this.edit.handles.isSnapped !== free ? [onGrid(x), onGrid(y), Number(z.toFixed(4))] : [x, y, z].map((one) => Number(one.toFixed(4)));
   }
 
-  // By the keyboard it lands where one looks.
+  // By the keyboard it lands beside what stands where one looks.
   key(event) {
     const card = event.target.closest?.(".card");
     if (event.key !== "Enter" || !card) return;
     event.preventDefault();
     event.stopPropagation();
+    if (event.repeat) return;
     const { op, title } = this.ops.get(card.dataset.model);
-    const { x, y } = this.edit.scene.view.aim;
-    this.put(op, title, this.snapped([x, y, 0], false));
+    const place = this.freePlace(Math.max(ROOM, ...(op.objects?.[0].size ?? [])) / 2);
+    this.put(op, title, this.snapped([place.x, place.y, 0], false));
+  }
+
+  // The place on the floor next to what one looks at that is in view, and has room for so much around it, m.
+  freePlace(half) {
+    const { edit } = this;
+    const { camera, view } = edit.scene;
+    const { x, y } = view.aim;
+    const now = performance.now();
+    this.taken = this.taken.filter(({ until }) => until > now);
+    const others = edit.objects.children(WORLD).filter((one) => edit.objects.get(one).of !== "floor");
+    const boxes = [...others.map((one) => edit.seen.boxOf([one])), ...this.taken.map(({ box }) => box)];
+    const isFree = (place) => boxes.every(({ min, max }) => ["x", "y"].some((axis) => place[axis] < min[axis] - half || place[axis] > max[axis] + half));
+    const isSeen = (place) => [place.clone().project(camera)].every((at) => Math.abs(at.x) < SEEN && Math.abs(at.y) < SEEN && at.z < 1);
+    const around = [...Array(2 * REACH + 1).keys()].map((one) => (one - REACH) * GAP);
+    const places = around.flatMap((dx) => around.map((dy) => new THREE.Vector3(x + dx, y + dy, 0)));
+    const far = (place) => Math.hypot(place.x - x, place.y - y);
+    const free = places.sort((one, other) => far(one) - far(other)).filter(isFree);
+    const end = (edit.objects.named("Floor")?.values.size ?? Infinity) / 2 - half;
+    const isOnFloor = (place) => Math.max(Math.abs(place.x), Math.abs(place.y)) <= end;
+    const seen = free.filter(isSeen);
+    const found = seen.find(isOnFloor) ?? seen[0] ?? free[0] ?? places[0];
+    this.taken.push({ box: new THREE.Box3().expandByPoint(found).expandByScalar(half), until: now + UNTOLD });
+    return found;
   }
 
   put(op, title, position) {

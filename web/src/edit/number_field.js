@@ -1,5 +1,10 @@
-// A field for a number: taken when it is entered, put back where it is none; arrow keys step it.
+// A field for a number, or for arithmetic: taken when it is entered, put back where it is none. Arrow keys step it, and so
+// does the mouse that drags it sideways.
 import { create } from "../dom.js";
+import { compute } from "./compute.js";
+import { follow } from "./follow.js";
+
+const PIXELS = 8; // of a drag, for one step
 
 export const shown = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toFixed(digits))) : "");
 const fine = (value, digits) => (value && Math.abs(value) < 0.1 ? String(Number(value.toPrecision(digits))) : shown(value, digits));
@@ -14,7 +19,7 @@ export function numberField(label, { take, wrong, digits = 4, step = 0.1, low, h
   const counts = () => taken ?? asText(holds);
   const isNew = () => written() !== counts();
   field.fill = (value) => {
-    const isWritten = document.activeElement === field && isNew();
+    const isWritten = field.isDragged || (document.activeElement === field && isNew());
     holds = value;
     taken = undefined;
     if (!isWritten) field.value = asText(value);
@@ -23,22 +28,25 @@ export function numberField(label, { take, wrong, digits = 4, step = 0.1, low, h
     if (!isNew()) return; // the browser itself tells of a change after Enter
     const text = written();
     const isNothing = text === "" && mayBeEmpty;
-    const value = text === "" ? NaN : Number(text);
+    const value = text === "" ? NaN : compute(text);
     const isIn = Number.isFinite(value) && !(value < low) && !(value > high) && !(isWhole && value % 1);
     if (isNothing || isIn) {
-      taken = text;
+      taken = isNothing ? "" : asText(value);
+      field.value = taken;
       return void take(isNothing ? null : value);
     }
     wrong(`${label} = ${field.value.slice(0, 40)}: must be a ${isWhole ? "whole " : ""}number${range(low, high)}`);
     field.value = counts();
   };
   field.onchange = enter;
+  const clamp = (value) => Math.min(high ?? Infinity, Math.max(low ?? -Infinity, value));
+  drag(field, () => holds, (value) => (field.value = asText(clamp(value))), enter, step);
   field.onfocus = () => field.select();
   field.onkeydown = (event) => {
     const way = { ArrowUp: 1, ArrowDown: -1 }[event.key];
     if (way && Number.isFinite(holds)) {
       event.preventDefault();
-      field.value = asText(Number(field.value) + way * step);
+      field.value = asText(compute(written()) + way * step);
       enter();
     }
     if (event.key === "Enter") enter();
@@ -53,4 +61,27 @@ export function numberField(label, { take, wrong, digits = 4, step = 0.1, low, h
 function range(low, high) {
   const ends = [low === undefined || low === null ? "" : ` from ${low}`, high === undefined || high === null ? "" : ` to ${high}`];
   return ends.join("");
+}
+
+// A press focuses the field; a drag shows other values, the last of which is entered.
+function drag(field, value, show, enter, step) {
+  field.onmousedown = (event) => document.activeElement === field || event.preventDefault(); // no focus before it is known which
+  field.onpointerdown = (event) => {
+    if (event.button || field.disabled || document.activeElement === field) return;
+    const from = value();
+    let steps = 0;
+    const move = (moved) => {
+      steps = Math.trunc((moved.clientX - event.clientX) / PIXELS);
+      field.isDragged ||= steps !== 0 && Number.isFinite(from);
+      if (field.isDragged) show(from + steps * step);
+    };
+    const up = (_, isCancelled) => {
+      const { isDragged } = field;
+      field.isDragged = false;
+      if (isCancelled) field.fill(value());
+      else if (isDragged) enter();
+      else field.focus();
+    };
+    follow(event, move, up);
+  };
 }

@@ -6,12 +6,35 @@ import { volumeOf } from "./volumes.js";
 // What is changed most comes first; all else as the node tells it.
 const FIRST = ["size", "color", "texture", "mass", "static", "respondable", "visible", "friction", "restitution", "script", "width", "height", "fov", "horizontal_fov", "near", "far", "every", "rate", "min_range", "max_range"];
 const FINE = { size: 0.1, mass: 0.1 }; // steps of the arrow keys
-const STEP = 0.1;
+const STEP = 0.1, TURN = 15; // degrees
 const WHITE = [1, 1, 1, 1];
+const DEGREE = Math.PI / 180; // rad
 
-const words = (key) => key.replaceAll(/[_.]/g, " ");
+// Keys in groups; what is changed most is in none. Of a vehicle, all but its script is for experts.
+const GROUPS = {
+  look: ["color", "texture", "visible"],
+  physics: ["mass", "static", "respondable", "friction", "restitution"],
+  camera: ["width", "height", "fov", "horizontal_fov", "near", "far", "every", "baseline", "lens"],
+  advanced: ["category", "size_factor", "inertia", "suffix"],
+};
+const OF_CAMERAS = ["vision_sensor", "vehicle_camera"];
+const OF_VEHICLES = ["script", "start"];
+// Where the key alone does not say it: as V-REP's dialogs call it.
+const NAMES = {
+  fov: "perspective angle", horizontal_fov: "perspective angle, horizontal", near: "near clipping plane", far: "far clipping plane",
+  every: "a picture every", urdf: "body, a URDF file", cmd_vel_timeout: "commands time out after", objects: "V-REP's objects",
+};
+// What the numbers of a size are.
+const PARTS = { box: ["length, x", "width, y", "height, z"], cylinder: ["radius", "length"], capsule: ["radius", "length"], sphere: ["radius"], mesh: ["scale, x", "scale, y", "scale, z"] };
+
+const words = (key) => NAMES[key] ?? key.replaceAll(/[_.]/g, " ");
 const inner = (key) => words(key.slice(key.lastIndexOf(".") + 1));
-const groupOf = (key) => words(key.slice(0, Math.max(0, key.lastIndexOf("."))).replaceAll(".", ": "));
+function groupOf(key, type) {
+  if (key.includes(".")) return words(key.slice(0, key.lastIndexOf(".")).replaceAll(".", ": "));
+  if (type === "vehicle") return OF_VEHICLES.includes(key) ? "" : "advanced";
+  const [group = ""] = Object.entries(GROUPS).find(([, keys]) => keys.includes(key)) ?? [];
+  return group === "camera" && !OF_CAMERAS.includes(type) ? "" : group;
+}
 const MOST_SHOWN = 1e9; // what is beyond is no limit that anybody meets
 const hex = (color) => `#${color.slice(0, 3).map((one) => Math.round(255 * one).toString(16).padStart(2, "0")).join("")}`;
 const numbers = (text) => [1, 3, 5].map((from) => Number((parseInt(text.slice(from, from + 2), 16) / 255).toFixed(3)));
@@ -55,7 +78,7 @@ export class Properties {
     const { ones } = this;
     const one = ones.at(-1);
     const inside = one && Object.keys(one.values.script_parameters ?? {});
-    const wanted = JSON.stringify([ones.map(({ handle, type, script }) => [handle, type, Boolean(script)]), inside, Boolean(this.types)]);
+    const wanted = JSON.stringify([ones.map(({ handle, type, script, values }) => [handle, type, Boolean(script), type === "joint" && values.type]), inside, Boolean(this.types)]);
     if (wanted !== this.built) this.build(one);
     this.built = wanted;
     if (one) for (const fill of this.fills) fill(one);
@@ -67,26 +90,27 @@ export class Properties {
     const keys = one && !isPlain ? this.keys() : [];
     const rows = this.grouped(keys, one);
     if (one && this.ones.length === 1) rows.unshift(...this.names(one));
-    if (one && keys.some(({ key }) => key === "mass")) rows.splice(rows.findIndex(({ dataset }) => dataset.key === "mass") + 1, 0, this.density());
     if (one?.script && this.ones.length === 1) rows.push(this.parameters(one));
     if (isPlain) rows.push(create("p", { textContent: "A part of a vehicle: it has no properties of its own." }));
     this.element.replaceChildren(...rows.filter(Boolean));
     this.element.parentElement.scrollTop = 0;
   }
 
-  // Keys that are inside another one stand folded below that, unless one of them says something.
-  grouped(keys, { values = {} } = {}) {
+  // Look, physics and camera are open; others stand folded, unless one of their keys says something.
+  grouped(keys, { values = {}, type } = {}) {
     const rows = [];
     const groups = new Map();
+    const begin = (name) => create("details", { open: name !== "advanced" && name in GROUPS }, create("summary", { textContent: name }));
+    for (const name of Object.keys(GROUPS)) if (keys.some(({ key }) => groupOf(key, type) === name)) groups.set(name, begin(name));
     for (const said of keys) {
-      const name = groupOf(said.key);
-      if (!groups.has(name)) groups.set(name, name ? create("details", {}, create("summary", { textContent: name })) : null);
+      const name = groupOf(said.key, type);
+      if (name && !groups.has(name)) groups.set(name, begin(name));
       const group = groups.get(name);
       if (!group) rows.push(this.row(said));
-      else group.append(this.row(said));
-      if (group && !same(values[said.key] ?? said.default, said.default)) group.open = true;
+      else group.append(...[this.row(said), said.key === "mass" && this.density()].filter(Boolean));
+      if (group && type !== "vehicle" && !same(values[said.key] ?? said.default, said.default)) group.open = true;
     }
-    return [...rows, ...[...groups.values()].filter(Boolean)];
+    return [...rows, ...groups.values()];
   }
 
   line(key, hint, ...parts) {
@@ -118,13 +142,22 @@ export class Properties {
     return [name, field("alias", ({ alias }) => alias, (wanted) => this.set("alias", wanted), "Its name in 4.x paths, which siblings may share")];
   }
 
-  row(said) {
+  row(told) {
+    const said = { ...told, unit: this.unitOf(told) };
     const { key, kind, unit } = said;
     const made = (KINDS[kind] ?? other)(this, said);
     const row = this.line(key, hintOf(said), ...[made].flat());
-    if (unit) row.firstChild.append(create("small", { textContent: ` ${unit}` }));
+    if (NAMES[key]) row.firstChild.textContent = NAMES[key];
+    if (unit) row.firstChild.append(create("small", { textContent: ` ${unit === "rad" ? "°" : unit}` }));
     row.classList.add(kind);
     return row;
+  }
+
+  // The values of a joint are angles, or lengths.
+  unitOf({ key, unit }) {
+    const { type, values } = this.ones.at(-1);
+    if (type !== "joint" || !["limits", "value"].includes(key)) return unit ?? "";
+    return { revolute: "rad", prismatic: "m" }[values.type] ?? "";
   }
 
   // Of what has a volume that is known: kg/m³, which sets the mass.
@@ -136,7 +169,9 @@ export class Properties {
     };
     const field = numberField("density", { take, wrong: (line) => this.edit.wrong(line), low: 0, step: 100, digits: 2 });
     this.fills.push((each) => field.fill((each.values.mass ?? 0) / volumeOf(this.whole(each))));
-    return this.line("density", "kg/m³: another one sets the mass", field);
+    const row = this.line("density", "Another density sets the mass", field);
+    row.firstChild.append(create("small", { textContent: " kg/m³" }));
+    return row;
   }
 
   whole(one) {
@@ -174,33 +209,50 @@ export class Properties {
   }
 }
 
-// What a value is, and what is allowed.
-function hintOf({ what, unit, least, most }) {
+// What a value is, what is allowed, and its key in the scene's file.
+function hintOf({ key, what, unit, least, most }) {
   const isLimited = typeof least === "number" && most < MOST_SHOWN;
-  return [what, isLimited && [least, "to", most, unit].filter((one) => one !== "").join(" ")].filter(Boolean).join("; ");
+  const isAngle = unit === "rad";
+  const [low, high] = [least, most].map((one) => (isAngle && isLimited ? degrees(one) : one));
+  const limits = isLimited && [low, "to", high, isAngle ? "°" : unit].filter((one) => one !== "").join(" ");
+  return [what, limits, `${key}: in the scene's file${isAngle ? ", in rad" : ""}`].filter(Boolean).join("; ");
+}
+
+const degrees = (angle) => Number((angle / DEGREE).toFixed(3));
+
+// How a number is shown, and taken: angles in degrees.
+function inUnit({ unit, least, most }) {
+  if (unit !== "rad") return { low: least, high: most, show: (value) => value, take: (value) => value };
+  const [low, high] = [least, most].map((one) => one && degrees(one));
+  return { low, high, show: (value) => value && value / DEGREE, take: (value) => value && Number((value * DEGREE).toFixed(9)), step: TURN, digits: 3 };
 }
 
 // ---- the kinds of values
 
-function number(panel, { key, default: otherwise, least, most, whole: isWhole }) {
+function number(panel, said) {
+  const { key, default: otherwise, whole: isWhole } = said;
+  const { low, high, show, take, step = FINE[key] ?? STEP, digits } = inUnit(said);
   const field = numberField(words(key), {
-    take: (value) => panel.set(key, value), wrong: (line) => panel.edit.wrong(line), low: least, high: most, isWhole,
-    step: isWhole ? 1 : FINE[key] ?? STEP, isFine: true, mayBeEmpty: otherwise === null,
+    take: (value) => panel.set(key, take(value)), wrong: (line) => panel.edit.wrong(line), low, high, isWhole, digits,
+    step: isWhole ? 1 : step, isFine: true, mayBeEmpty: otherwise === null,
   });
-  panel.follow(key, otherwise, (value) => field.fill(value));
+  panel.follow(key, otherwise, (value) => field.fill(show(value)));
   return field;
 }
 
-function several(panel, { key, default: otherwise, count, least, most }) {
+function several(panel, said) {
+  const { key, default: otherwise, count } = said;
+  const { low, high, show, take, step = FINE[key] ?? STEP, digits } = inUnit(said);
+  const names = key === "size" ? PARTS[panel.ones.at(-1).type] : undefined;
   const length = count ?? otherwise?.length ?? 3;
   const now = () => panel.ones.at(-1).values[key] ?? otherwise ?? Array(length).fill(0);
   const fields = [...Array(length).keys()].map((place) =>
     numberField(`${words(key)} ${place + 1}`, {
-      take: (value) => panel.set(key, now().map((one, at) => (at === place ? value : one))),
-      wrong: (line) => panel.edit.wrong(line), low: least, high: most, step: FINE[key] ?? STEP,
+      take: (value) => panel.set(key, now().map((one, at) => (at === place ? take(value) : one))),
+      wrong: (line) => panel.edit.wrong(line), low, high, step, digits, ...(names ? { title: names[place] } : {}),
     }),
   );
-  panel.follow(key, otherwise, (value) => fields.forEach((field, place) => field.fill(value?.[place])));
+  panel.follow(key, otherwise, (value) => fields.forEach((field, place) => field.fill(show(value?.[place]))));
   return create("span", { className: "several" }, ...fields);
 }
 

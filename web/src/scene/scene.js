@@ -112,7 +112,9 @@ export class Scene {
   }
 
   isShown({ layer, ns }) {
-    if (layer === "view/height") return ns === "shadow" ? !this.shown.shadows : this.shown.labels;
+    const areLabelsShown = this.shown.labels && this.editing?.held?.of !== "vehicle"; // its handles would cover them
+    if (layer === "view/height") return ns === "shadow" ? !this.shown.shadows : areLabelsShown;
+    if (layer === LAYERS.labels) return areLabelsShown;
     if (layer === LAYERS.forces) return this.shown.forces || this.bodies.has(this.active);
     const [name] = Object.entries(LAYERS).find(([, one]) => one === layer) ?? [];
     return name ? this.shown[name] : true;

@@ -83,11 +83,12 @@ class SceneEditing:
             return False, encodable(" ".join(said.split()))
 
     def _do(self, said: Any) -> str:
-        before = self.editor.scene_file
+        before, had_vehicle = self.editor.scene_file, bool(self._player.simulation.vehicles)
         answer = self.editor.answer(said)
         if self.editor.scene_file != before:
             rospy.set_param("~scene_file", self.editor.scene_file)
-        if "new" in said or "open" in said or said.get("draft") == "take":
+        has_first_vehicle = not had_vehicle and bool(self._player.simulation.vehicles)
+        if "new" in said or "open" in said or said.get("draft") == "take" or has_first_vehicle:
             self._services.forget_script()
         self._services.update_vehicles()
         return json.dumps(answer)

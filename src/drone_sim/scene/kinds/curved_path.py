@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from drone_sim.config.types import Checked, Finite, ParameterError, Point, Switch, Within
+from drone_sim.config.types import Checked, Finite, ParameterError, Point, Switch, Unit, Within
 from drone_sim.context import SimulationContext
 from drone_sim.mechanics.controlled_path import METRES_PER_RADIAN, ControlledPath, PathRules
 from drone_sim.mechanics.path_curves import ControlPoint, Station
@@ -69,7 +69,7 @@ class CurvedPathParameters(KindParameters):
     )
     metres_per_radian: _Metres = METRES_PER_RADIAN
     metres_per_pause: _Metres = 1.0
-    along: Annotated[Finite, Within(0, LONGEST)] = 0.0
+    along: Annotated[Finite, Within(0, LONGEST), Unit("m")] = 0.0
 
     def model_post_init(self, context: Any) -> None:
         """Raise ParameterError if the curves have too many points."""

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
-from drone_sim.config.types import Finite, Length, ParameterError, Within
+from drone_sim.config.types import Finite, Length, ParameterError, Unit, Within
 from drone_sim.context import SimulationContext
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
@@ -36,9 +36,9 @@ class ProximitySensorParameters(KindParameters):
     kind: Literal["proximity_sensor"]
     type: Literal["ray", "cone", "disc", "cylinder", "pyramid"]
     range: Length
-    offset: Annotated[Finite, Within(0, 1e4)] = 0.0
-    angle: Annotated[Finite, Within(0, 6.3)] = 0.0
-    radius: Annotated[Finite, Within(0, 1e4)] = 0.0
+    offset: Annotated[Finite, Within(0, 1e4), Unit("m")] = 0.0
+    angle: Annotated[Finite, Within(0, 6.3), Unit("rad")] = 0.0
+    radius: Annotated[Finite, Within(0, 1e4), Unit("m")] = 0.0
 
     def model_post_init(self, context: Any) -> None:
         """Raise ParameterError for a missing angle or radius, or too large an angle."""

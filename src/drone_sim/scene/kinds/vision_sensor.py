@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from drone_sim.config.types import Finite, Length, ParameterError, Within
+from drone_sim.config.types import Finite, Length, ParameterError, Unit, Within
 from drone_sim.context import SimulationContext
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
@@ -29,12 +29,12 @@ class VisionSensorParameters(KindParameters):
     """
 
     kind: Literal["vision_sensor"]
-    width: Annotated[int, Within(1, MAX_SIDE)] = 256
-    height: Annotated[int, Within(1, MAX_SIDE)] = 256
-    fov: Annotated[Finite, Within(0.01, 3.1)] = math.pi / 3
+    width: Annotated[int, Within(1, MAX_SIDE), Unit("px")] = 256
+    height: Annotated[int, Within(1, MAX_SIDE), Unit("px")] = 256
+    fov: Annotated[Finite, Within(0.01, 3.1), Unit("rad")] = math.pi / 3
     size: Length | None = None
-    near: Annotated[Finite, Within(1e-4, 1e4)] = 0.01
-    far: Annotated[Finite, Within(1e-3, 1e5)] = 100.0
+    near: Annotated[Finite, Within(1e-4, 1e4), Unit("m")] = 0.01
+    far: Annotated[Finite, Within(1e-3, 1e5), Unit("m")] = 100.0
 
     def model_post_init(self, context: Any) -> None:
         """Raise ParameterError unless near < far."""
