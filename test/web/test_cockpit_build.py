@@ -375,6 +375,11 @@ def test_properties_are_computed_dragged_and_in_degrees(cockpit, browser):
         page.mouse.move(place["x"] + 65, place["y"] + 10, steps=5)
         page.mouse.up()
         builder.wait(camera, lambda one: abs(one["values"]["far"] - 100.5) < FAR)
+        joint = builder.drop("Joint", [1, -1, 0])
+        builder.set("value", 30)
+        builder.wait(joint, lambda one: abs(one["values"].get("value", 0) - math.pi / 6) < FAR)
+        fields.get_by_label("type", exact=True).select_option("prismatic")
+        wait_until(page, lambda: fields.locator("[data-key=value]").inner_text() == "value m")
         builder.drop("Cuboid", [1, 1, 0])
         groups = page.locator("#properties summary").all_inner_texts()
         assert groups == ["look", "physics", "advanced"]

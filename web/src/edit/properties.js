@@ -10,30 +10,32 @@ const STEP = 0.1, TURN = 15; // degrees
 const WHITE = [1, 1, 1, 1];
 const DEGREE = Math.PI / 180; // rad
 
-// Keys in groups; what is changed most is in none. Of a vehicle, all but its script is for experts.
+// Keys in groups; what is changed most is in none. Of a vehicle, all but its script is for experts; of a camera, all but its picture.
 const GROUPS = {
   look: ["color", "texture", "visible"],
   physics: ["mass", "static", "respondable", "friction", "restitution"],
-  camera: ["width", "height", "fov", "horizontal_fov", "near", "far", "every", "baseline", "lens"],
+  camera: ["width", "height", "fov", "horizontal_fov", "near", "far", "every", "baseline", "lens", "size"],
   advanced: ["category", "size_factor", "inertia", "suffix"],
 };
 const OF_CAMERAS = ["vision_sensor", "vehicle_camera"];
 const OF_VEHICLES = ["script", "start"];
 // Where the key alone does not say it: as V-REP's dialogs call it.
 const NAMES = {
-  fov: "perspective angle", horizontal_fov: "perspective angle, horizontal", near: "near clipping plane", far: "far clipping plane",
+  fov: "perspective angle", horizontal_fov: "horizontal angle", near: "near clipping plane", far: "far clipping plane",
   every: "a picture every", urdf: "body, a URDF file", cmd_vel_timeout: "commands time out after", objects: "V-REP's objects",
 };
+const JOINTS = { revolute: { place: "rad", speed: "rad/s", force: "N m" }, prismatic: { place: "m", speed: "m/s", force: "N" } };
 // What the numbers of a size are.
-const PARTS = { box: ["length, x", "width, y", "height, z"], cylinder: ["radius", "length"], capsule: ["radius", "length"], sphere: ["radius"], mesh: ["scale, x", "scale, y", "scale, z"] };
+const PARTS = { box: ["length", "width", "height"], cylinder: ["radius", "length"], capsule: ["radius", "length"], sphere: ["radius"], mesh: ["scale along x", "y", "z"] };
 
 const words = (key) => NAMES[key] ?? key.replaceAll(/[_.]/g, " ");
 const inner = (key) => words(key.slice(key.lastIndexOf(".") + 1));
 function groupOf(key, type) {
   if (key.includes(".")) return words(key.slice(0, key.lastIndexOf(".")).replaceAll(".", ": "));
   if (type === "vehicle") return OF_VEHICLES.includes(key) ? "" : "advanced";
-  const [group = ""] = Object.entries(GROUPS).find(([, keys]) => keys.includes(key)) ?? [];
-  return group === "camera" && !OF_CAMERAS.includes(type) ? "" : group;
+  if (OF_CAMERAS.includes(type)) return GROUPS.camera.includes(key) ? "camera" : "advanced";
+  const [group = ""] = Object.entries(GROUPS).find(([name, keys]) => name !== "camera" && keys.includes(key)) ?? [];
+  return group;
 }
 const MOST_SHOWN = 1e9; // what is beyond is no limit that anybody meets
 const hex = (color) => `#${color.slice(0, 3).map((one) => Math.round(255 * one).toString(16).padStart(2, "0")).join("")}`;
@@ -78,7 +80,7 @@ export class Properties {
     const { ones } = this;
     const one = ones.at(-1);
     const inside = one && Object.keys(one.values.script_parameters ?? {});
-    const wanted = JSON.stringify([ones.map(({ handle, type, script, values }) => [handle, type, Boolean(script), type === "joint" && values.type]), inside, Boolean(this.types)]);
+    const wanted = JSON.stringify([ones.map(({ handle, type, script, values }) => [handle, type, Boolean(script), type === "joint" && [values.type, values.mode]]), inside, Boolean(this.types)]);
     if (wanted !== this.built) this.build(one);
     this.built = wanted;
     if (one) for (const fill of this.fills) fill(one);
@@ -108,7 +110,7 @@ export class Properties {
       const group = groups.get(name);
       if (!group) rows.push(this.row(said));
       else group.append(...[this.row(said), said.key === "mass" && this.density()].filter(Boolean));
-      if (group && type !== "vehicle" && !same(values[said.key] ?? said.default, said.default)) group.open = true;
+      if (group && name !== "advanced" && !same(values[said.key] ?? said.default, said.default)) group.open = true;
     }
     return [...rows, ...groups.values()];
   }
@@ -137,9 +139,9 @@ export class Properties {
       return this.line(label, hint, input);
     };
     const here = () => this.edit.objects.get(one.handle) ?? one;
-    const name = field("name", ({ name }) => name, (wanted) => this.edit.rename(here(), wanted), "V-REP 3.x's scripts find it by this name; no other object has it");
+    const name = field("name", ({ name }) => name, (wanted) => this.edit.rename(here(), wanted), "V-REP 3.x's scripts find it by this name; no other object has it; name: in the scene's file");
     if (one.of !== "scene") return [name];
-    return [name, field("alias", ({ alias }) => alias, (wanted) => this.set("alias", wanted), "Its name in 4.x paths, which siblings may share")];
+    return [name, field("alias", ({ alias }) => alias, (wanted) => this.set("alias", wanted), "Its name in 4.x paths, which siblings may share; alias: in the scene's file")];
   }
 
   row(told) {
@@ -147,17 +149,20 @@ export class Properties {
     const { key, kind, unit } = said;
     const made = (KINDS[kind] ?? other)(this, said);
     const row = this.line(key, hintOf(said), ...[made].flat());
-    if (NAMES[key]) row.firstChild.textContent = NAMES[key];
+    const parts = key === "size" ? PARTS[this.ones.at(-1).type] : undefined;
+    if (parts ?? NAMES[key]) row.firstChild.textContent = parts?.join(", ") ?? NAMES[key];
     if (unit) row.firstChild.append(create("small", { textContent: ` ${unit === "rad" ? "°" : unit}` }));
     row.classList.add(kind);
     return row;
   }
 
-  // The values of a joint are angles, or lengths.
+  // Those of a joint depend on its type, and on what its motor does.
   unitOf({ key, unit }) {
     const { type, values } = this.ones.at(-1);
-    if (type !== "joint" || !["limits", "value"].includes(key)) return unit ?? "";
-    return { revolute: "rad", prismatic: "m" }[values.type] ?? "";
+    if (type !== "joint" || !JOINTS[values.type]) return unit ?? "";
+    const { place, speed, force } = JOINTS[values.type];
+    const target = { position: place, velocity: speed, force }[values.mode] ?? "";
+    return { limits: place, value: place, target, max_force: force }[key] ?? unit ?? "";
   }
 
   // Of what has a volume that is known: kg/m³, which sets the mass.
