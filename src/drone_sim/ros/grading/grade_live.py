@@ -127,7 +127,8 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
     missed = missed_steps(record.times, parameters.time_step)
     if missed and plan.lockstep:
         rospy.logwarn(f"grade_live has missed {missed} steps, as on a busy machine: the digest is that of the others")
-    record, broken_rule = live.cut_at_broken_rule(record)
+    # After a restart the record has steps of two flights, between which the vehicle seems to jump.
+    record, broken_rule = (record, "") if error == _RESTARTED else live.cut_at_broken_rule(record)
     if record is None:
         result = flight.ungraded_result(plan, script, seed, {}, broken_rule)
     else:
