@@ -284,7 +284,12 @@ def test_a_new_scene_flies_the_pilot_and_a_saved_one_the_script_that_was_run(coc
         builder.menu("Scene file", "New")
         wait_until(page, lambda: page.inner_text("#flown") == "")
         wait_until(page, lambda: page.locator("#scene-choice option:checked").inner_text() == "new scene")
-        assert page.evaluate(PROJECT, [2.5, 2.5, 0])[0] > 0, "the whole floor is in view"
+        corners = [[x, y, 0] for x in (-2.5, 2.5) for y in (-2.5, 2.5)]
+        is_seen = "([x, y]) => document.elementFromPoint(x, y) === scene.canvas.dom"
+        wait_until(page, lambda: all(page.evaluate(is_seen, page.evaluate(PROJECT, corner)) for corner in corners))
+        page.evaluate("scene.view.approachBy(0.3)")
+        page.locator("#scene canvas").press("Home")
+        wait_until(page, lambda: all(page.evaluate(is_seen, page.evaluate(PROJECT, corner)) for corner in corners))
         builder.drop("Quadricopter", [0, 0, 0])
         wait_until(page, lambda: page.inner_text("#flown") == "built-in/pilot.py")
         panel.press("Start", "started")

@@ -15,7 +15,7 @@ import { BEHIND, FOV, FREE, View } from "./view.js";
 const BODIES = "view/bodies";
 const OBJECTS = "objects"; // the server of handles, and `scene`, the layer, of what stands in the scene
 const TARGETS = "markers"; // the server of the handles of vehicles and of their green spheres
-const FLOOR = "Floor";
+const SURROUNDINGS = "view/surroundings", FLOOR = "floor"; // layer and name of the floor
 const BASE = "base_link", TRACK = "Track_base", EYE = "_optical";
 const STEP = 0.05; // s, of the simulation
 const HOVERED = 0xffffff;
@@ -161,8 +161,8 @@ export class Scene {
   // Of all that stands in the scene; of the floor where nothing does.
   meshes() {
     const names = new Set(this.things().map(({ userData }) => userData.said.ns));
-    if (names.size > 1) names.delete(FLOOR);
-    return [...names].flatMap((name) => this.meshesOf(name));
+    const meshes = [...names].flatMap((name) => this.meshesOf(name));
+    return meshes.length ? meshes : [...this.tree.markers.values()].filter(({ userData: { said } }) => said.ns === FLOOR && said.layer === SURROUNDINGS);
   }
 
   lookAt(meshes) {
