@@ -47,7 +47,7 @@ class ClientFunction:
     """A function of a client, represented by its name; it is called at the client's next request."""
 
     def __init__(self, name: str):
-        """Use the client's name for the function."""
+        """`name` is the client's name of the function."""
         self.name = name
 
     def __call__(self, *_values: Any) -> Any:

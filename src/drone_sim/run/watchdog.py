@@ -68,7 +68,7 @@ class Watchdog:
         self._set_handler(self._on_signal)
 
     def count(self) -> None:
-        """Require the process to end within PATIENCE, although no signal came. Thread-safe."""
+        """Begin the time limit without a signal: the process must end within PATIENCE from now on. Thread-safe."""
         self._send(signal.SIGTERM)
 
     def stand_down(self) -> None:

@@ -31,7 +31,7 @@ class OwnTopic:
         self._messages[self._topic] = message
 
     def subscribers(self) -> int:
-        """Return 1, for the drone."""
+        """Return the number of subscribers: 1, because without ROS only the drone can listen."""
         return 1
 
     def shutdown(self) -> None:

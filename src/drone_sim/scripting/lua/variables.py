@@ -48,7 +48,10 @@ def _sort_key(row: Row) -> tuple[bool, float, str]:
 def bridge(
     breakpoints: Breakpoints, path_of: Callable[[str], str], known: Callable[[], Any]
 ) -> dict[str, Callable[..., Any] | int]:
-    """Return what variables.lua needs. `path_of` returns the file of a chunk, `known` a Lua table of API names."""
+    """Return the functions and limits that variables.lua calls and uses.
+
+    `path_of` returns the file of a chunk, `known` a Lua table of API names.
+    """
 
     def reached(chunk: bytes, line: int, rows: bytes) -> None:
         breakpoints.reach(path_of(chunk.decode("utf-8", "replace")), int(line), lambda: read_rows(rows))

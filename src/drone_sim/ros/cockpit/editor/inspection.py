@@ -48,7 +48,7 @@ class ScriptInspector:
 
     @property
     def answers(self) -> dict[str, Answer]:
-        """The handler of `inspect`."""
+        """Functions that answer requests of browsers, by the name of the request."""
         return {"inspect": self._inspect}
 
     def _inspect(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
