@@ -31,7 +31,7 @@ class TimelinePlayer:
     def __init__(self):
         self.prepared = self.begun = None
 
-    def prepare(self, plan):
+    def prepare(self, plan, script=""):
         self.prepared, self.begun = plan, False
 
     def begin(self):

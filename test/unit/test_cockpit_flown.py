@@ -42,6 +42,7 @@ def test_a_tasks_scene_is_what_its_plan_says(name, tmp_path):
     )
     assert [one.model_dump() for one in found.fleet] == [one.model_dump() for one in wanted.fleet]
     said = scene_files.describe_scene_of(plan)
+    assert "/" not in said.replace("m/s", "") and ("The wind blows" in said) == any(wanted.weather.wind)
     assert plan.name in said and not any(one.startswith("=") for one in said.split(", "))
 
 
@@ -76,7 +77,7 @@ def test_a_task_brings_its_scene_and_leaving_it_brings_back_the_users(ask, tmp_p
     node.parameters["scene_file"] = "mine.yaml"
     said = ask("run", script="tasks/hover.py", lesson="tasks/hover")
     assert said["done"] and said["said"] == "started in the scene of the task hover"
-    assert "weather/wind = [2.5, 1, 0]" in ask("lesson", lesson="tasks/hover")["flies"]
+    assert "The wind blows with 2.7 m/s" in ask("lesson", lesson="tasks/hover")["flies"]
     assert node.parameters == {
         "scene_file": str(tmp_path / ".ros/drone_sim/tasks/hover.yaml"),
         "script": _start("hover"),
@@ -107,6 +108,13 @@ def test_a_script_that_fails_in_a_tasks_scene_is_shown_at_its_line_and_one_that_
     ask.node.fails = {"load_scene": "gates.yaml: no such file"}
     assert ask("run", script="tasks/gates.py", lesson="tasks/gates")["said"] == "gates.yaml: no such file"
     assert ask.node.parameters["scene_file"] == "mine.yaml"
+
+
+def test_the_easiest_task_is_the_first_and_each_says_how_hard_it_is(ask):
+    listed = [lesson for lesson in ask("scripts")["lessons"] if lesson["task"]]
+    assert {lesson["task"] for lesson in listed} == set(tasks.names()) and listed[0]["task"] == "hover"
+    hardness = [("easy", "medium", "hard").index(lesson["difficulty"]) for lesson in listed]
+    assert hardness[0] == 0 and all(lesson["summary"] and lesson["time"].endswith(("min", "h")) for lesson in listed)
 
 
 def test_a_script_is_graded_in_a_process_of_its_own(ask):
@@ -197,6 +205,12 @@ def test_what_happens_in_a_task_is_sent_by_the_count_of_steps(topics):
     assert topics.sent == [("/drone/cmd_vel", 1.0)] and stamp == 100 + 0.06 * 19, "after 20 steps of 0.05 s"
     topics.hears["/drone_sim/state"](String("stopped"))
     assert not topics.hears
+    starter = Path(tasks.folder() / "hover/start.py").read_text()
+    for script, hears in ((starter, False), ("from pilot import *", True), ("sim.subscribe('home')", True)):
+        player.prepare(plans.read(tasks.find("hover")), script)
+        player.begin()
+        assert bool(topics.hears) == hears, "a request that the script cannot hear would log a warning"
+        player.end()
     player.prepare(plans.read(tasks.find("gates")))
     player.begin()
     assert not topics.hears, "nothing happens in this one"

@@ -62,6 +62,14 @@ def test_at_an_edge_it_falls_and_is_told_so_once(caplog):
     simulation.close()
 
 
+def test_a_drone_that_begins_beside_the_floor_has_not_left_it(caplog):
+    simulation = simulation_at(8.0, edge=True)
+    with caplog.at_level(logging.WARNING):
+        simulation.step()
+    assert not [record for record in caplog.records if "left the floor" in record.getMessage()]
+    simulation.close()
+
+
 def test_pictures_and_depth_show_the_ground():
     simulation = simulation_at(8.0)  # looking away from the floor
     picture, depth = (simulation.drone.cameras[name].look() for name in ("front", "depth"))

@@ -115,7 +115,8 @@ def test_each_stage_flies_when_one_goes_from_one_to_the_next(cockpit, student):
 
 def test_a_task_is_solved_and_graded(student):
     door(student, "Tasks")
-    wait_until(student, lambda: student.input_value("#script").startswith("tasks/"))
+    student.locator("#gallery-tasks button").first.click()
+    wait_until(student, lambda: student.input_value("#script") == "tasks/hover.py")
     student.click("#grade")
     wait_until(student, lambda: student.locator("#graded tr").count() > 1, 120)
     graded = student.inner_text("#graded")
@@ -126,11 +127,15 @@ def test_a_task_is_solved_and_graded(student):
     wait_until(replay, lambda: replay.locator("#stage[data-shown]").count())
     assert float(replay.inner_text("#time").split()[0]) > 0
     replay.close()
+    student.click("#home")
+    door(student, "Tasks")
+    assert "your best: 3 of 6 points" in student.locator("#gallery-tasks button").first.inner_text()
 
 
 def test_a_script_that_fails_its_task_is_graded_with_the_reason(student):
     door(student, "Tasks")
-    wait_until(student, lambda: student.input_value("#script").startswith("tasks/"))
+    student.locator("#gallery-tasks button").first.click()
+    wait_until(student, lambda: student.input_value("#script") == "tasks/hover.py")
     student.locator("#text .cm-content").click()
     student.keyboard.press("Control+a")
     student.keyboard.insert_text("raise ValueError('of the script')\n")

@@ -90,7 +90,15 @@ def test_the_start_page_and_the_way_back(cockpit, browser):
         assert not start.is_visible() and page.locator("#scene").bounding_box()["width"] > 0.5 * 1280
         page.click("#home")
         start.get_by_role("button", name="Tasks").click()
-        wait_for(page, "document.querySelector('#script').value.startsWith('tasks/')")
+        tasks = page.locator("#gallery-tasks button")
+        wait_until(page, lambda: tasks.count() == 10)
+        assert (
+            tasks.first.inner_text().split("\n")[0] == "Hover and hold in wind" and "easy" in tasks.first.inner_text()
+        )
+        page.click("#gallery-back")
+        start.get_by_role("button", name="Tasks").click()
+        tasks.first.click()
+        wait_for(page, "document.querySelector('#script').value === 'tasks/hover.py'")
         page.click("#home")
         start.get_by_role("button", name="Just fly").click()
         wait_until(page, lambda: page.locator("#scene").bounding_box()["width"] == 1280)

@@ -164,3 +164,23 @@ def test_what_was_not_saved_is_there_after_a_reload(cockpit, desk, browser):
         wait_until(page, lambda: (cockpit.scripts / "edited.py").read_text() == "second")
         assert (cockpit.scripts / "edited_2.py").read_text() == "first"
         wait_until(page, lambda: page.evaluate(f"localStorage[{json.dumps(DRAFT)}] === undefined"))
+
+
+def test_a_script_opens_at_its_beginning_wherever_the_one_before_was_scrolled_to(desk):
+    open_script(desk, "built-in/pilot.py", "stops the propellers")
+    scroller = desk.locator("#text .cm-scroller")
+    scroller.evaluate("one => one.scrollTo(60, 700)")
+    for script, words in (("tasks/pad.py", "To begin with"), ("tutorial/4_pitch.py", "Stage 4")):
+        open_script(desk, script, words)
+        assert scroller.evaluate("one => [one.scrollTop, one.scrollLeft]") == [0, 0], script
+    desk.select_option("#script", "built-in/pilot.py")
+    wait_until(desk, lambda: scroller.evaluate("one => one.scrollTop") > 0)
+    scroller.evaluate("one => one.scrollTo(0, 0)")
+
+
+@pytest.mark.parametrize("number", ["5.33", "-1"])
+def test_a_double_click_selects_a_whole_number(desk, number):
+    open_script(desk, "tutorial/1_thrust.py", "Stage 1")
+    found = desk.locator("#text .cm-line", has_text=f" {number}").locator("span", has_text=number.lstrip("-")).last
+    found.dblclick()
+    wait_until(desk, lambda: desk.evaluate("document.getSelection().toString()") == number)

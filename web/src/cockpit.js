@@ -86,8 +86,8 @@ const put = (code) => {
   }
 };
 
-const first = (isTask) => {
-  const text = lesson.all.find((one) => Boolean(one.task) === isTask && one.script);
+const beginTutorial = () => {
+  const text = lesson.all.find((one) => !one.task && one.script);
   if (text) open(text.script);
 };
 const scene = new Scene(at("scene"), { say: (message) => socket.say(message), ask: (...question) => socket.ask(...question) });
@@ -96,7 +96,7 @@ const panels = new Panels({
   store,
   socket: () => socket,
   scene: () => scene,
-  go: { tutorial: () => first(false), tasks: () => first(true) },
+  go: { tutorial: beginTutorial, tasks: () => lesson.all.filter((one) => one.task), take: (name) => lesson.take(name) },
   open,
   goTo: (file, line) => scripts.goTo(file, line).catch((error) => panels.notice.say(error.message, true)),
 });

@@ -11,6 +11,7 @@ import { lua } from "@codemirror/legacy-modes/mode/lua";
 import { tags } from "@lezer/highlight";
 import { breakpointGutter, linesOf, showPaused } from "./breakpoints.js";
 import { completion } from "./completion.js";
+import { numberAt } from "./numbers.js";
 import { keep, kept } from "./storage.js";
 
 const QUIET = 500; // ms without a key before the text is checked
@@ -40,6 +41,16 @@ export function fillWith(view, text, annotations = []) {
   view.dispatch({ changes: { from, to: before.length - end, insert: text.slice(from, text.length - end) }, annotations });
 }
 
+// Selects the number under the pointer as a whole; a double click selects words otherwise, which end at a point.
+function selectNumber(view, event) {
+  const position = view.posAtCoords({ x: event.clientX, y: event.clientY });
+  if (position === null) return false;
+  const { from, text } = view.state.doc.lineAt(position);
+  const number = numberAt(text, position - from);
+  if (number) view.dispatch({ selection: { anchor: from + number.from, head: from + number.to } });
+  return Boolean(number);
+}
+
 export const isLua = (script) => script.endsWith(".lua");
 
 export class Editor {
@@ -65,6 +76,7 @@ export class Editor {
       basicSetup,
       keymap.of([indentWithTab]),
       indentUnit.of("    "),
+      EditorView.domEventHandlers({ dblclick: (event, view) => selectNumber(view, event) }),
       EditorView.contentAttributes.of({ tabindex: "0", "aria-label": "Text of the child script; Escape and then Tab leaves it" }),
       changed,
     ];
@@ -88,6 +100,7 @@ export class Editor {
     this.script = script;
     const known = this.states.get(script);
     this.view.setState(known?.state ?? this.begin(script, text));
+    this.view.scrollDOM.scrollTo(0, 0); // else it would stay where the script before was scrolled to
     this.fill(text);
     if (known) this.view.dispatch({ effects: known.scroll });
     else this.restorePlace();
@@ -153,7 +166,8 @@ export class Editor {
     const within = (position) => Math.min(Math.max(0, position), doc.length);
     const top = doc.line(Math.min(Math.max(1, place.top), doc.lines)).from;
     const selection = { anchor: within(place.anchor), head: within(place.head) };
-    this.view.dispatch({ selection, effects: EditorView.scrollIntoView(top, { y: "start", yMargin: 0 }) });
+    const effects = top ? EditorView.scrollIntoView(top, { y: "start", yMargin: 0 }) : []; // above the first line is a margin
+    this.view.dispatch({ selection, effects });
   }
 
   // ---- what is wrong

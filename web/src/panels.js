@@ -43,8 +43,9 @@ export class Panels {
     this.board.on("vehicles", ({ now }) => (scene().vehicle = now));
     at("toggle").onclick = () => this.showScript(document.body.classList.contains("wide"));
     this.showScript(!TOUCH.matches);
-    const choices = { tutorial: () => this.enter(go.tutorial), tasks: () => this.enter(go.tasks), fly: () => this.showScript(false), build: () => this.enterBuild() };
-    this.start = new Start(choices, (script) => this.enter(() => open(script)));
+    const choices = { tutorial: () => this.enter(go.tutorial), fly: () => this.showScript(false), build: () => this.enterBuild() };
+    const gallery = { list: go.tasks, take: (lesson) => this.enter(() => go.take(lesson)) };
+    this.start = new Start(choices, gallery, (script) => this.enter(() => open(script)));
     this.keys();
   }
 

@@ -1,17 +1,24 @@
-// The start page: where a visitor begins, and the way back to what was open last.
-import { at } from "./dom.js";
+// The start page: where a visitor begins, the gallery of tasks, and the way back to what was open last.
+import { at, create } from "./dom.js";
+import { bestWords } from "./graded.js";
 import { keep, kept } from "./storage.js";
 
+const QUESTION = "A quadricopter, its script, and you. Where do you begin?";
+
 export class Start {
-  // `go` has what each button does: tutorial, tasks, fly, build; `open(script)` opens the last script again.
-  constructor(go, open) {
+  // `go` has what each button does: tutorial, fly, build; `gallery` has list(), which returns the tasks, the easiest first,
+  // and take(lesson), which begins one; `open(script)` opens the last script again.
+  constructor(go, gallery, open) {
     const dialog = at("start-page");
+    this.gallery = gallery;
     for (const button of dialog.querySelectorAll("[data-start]")) {
       button.onclick = () => {
+        if (button.dataset.start === "tasks") return this.showTasks(true);
         dialog.close();
         go[button.dataset.start]();
       };
     }
+    at("gallery-back").onclick = () => this.showTasks(false);
     at("go-on").onclick = () => {
       dialog.close();
       open(kept("script", ""));
@@ -23,7 +30,33 @@ export class Start {
     if (!kept("started", false)) this.show();
   }
 
+  showTasks(on) {
+    at("gallery").hidden = !on;
+    at("start-choices").hidden = on;
+    at("start-question").textContent = on ? "Which task? The easiest come first." : QUESTION;
+    if (!on) return;
+    at("gallery-tasks").replaceChildren(...this.gallery.list().map((one) => this.card(one)));
+    at("gallery-tasks").firstElementChild?.focus();
+  }
+
+  card({ lesson, title, summary, difficulty, time }) {
+    const best = bestWords(lesson);
+    const begin = () => {
+      at("start-page").close();
+      this.gallery.take(lesson);
+    };
+    return create(
+      "button", { type: "button", onclick: begin },
+      create("img", { src: `${lesson}/picture.png`, alt: "" }),
+      create("b", {}, title),
+      create("span", {}, summary),
+      create("small", {}, [difficulty, time].filter(Boolean).join(" · ")),
+      create("small", { className: best ? "best" : "" }, best ? `your best: ${best}` : "not graded yet"),
+    );
+  }
+
   show() {
+    this.showTasks(false);
     const last = kept("script", "");
     at("go-on").hidden = !last;
     at("go-on-name").textContent = last.split("/").pop();

@@ -24,10 +24,11 @@ class DivergenceCheck:
     def __init__(self, floor: FloorParameters, clock: Clock):
         """Use a floor and the simulation's clock.
 
-        If the floor has an edge, each vehicle that crosses it is logged once.
+        If the floor has an edge, each vehicle that crosses it is logged once; one that begins beside the floor is not.
         """
         self._clock = clock
         self._edge = floor.size / 2 if floor.edge else None  # m, largest |x| and |y| on the floor
+        self._over_floor: set[str] = set()  # names of vehicles that have been there
         self._left_floor: set[str] = set()
 
     def check(self, vehicles: Iterable[Vehicle]) -> None:
@@ -41,7 +42,11 @@ class DivergenceCheck:
                 raise Diverged(
                     f"the simulation has diverged at t = {self._clock.time:.2f} s: {name}{where}; `start` begins again"
                 )
-            if self._edge is not None and max(abs(x), abs(y)) > self._edge:
+            if self._edge is None:
+                continue
+            if max(abs(x), abs(y)) <= self._edge:
+                self._over_floor.add(vehicle.name)
+            elif vehicle.name in self._over_floor:
                 self._warn_once(vehicle, x, y)
 
     def _warn_once(self, vehicle: Vehicle, x: float, y: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import metadata
 
 from drone_sim.message_text import shown
@@ -20,6 +20,7 @@ _ENOUGH = 0.9  # fraction of the nominal rate, and of the requested real-time fa
 _FEW = 2  # pictures that may be counted in this diagnosis or the next
 _MAX_UNSUPPORTED = 3  # messages about what an import left out
 _LATE = 0.1  # fraction of the steps; a few are late on any busy computer
+_SUSTAINED = 3  # diagnoses in a row that are too slow before that is a problem: a start, or a busy second, is none
 
 
 def cameras(simulation: Simulation, since: Since | None) -> Finding:
@@ -54,10 +55,25 @@ def _nominal(simulation: Simulation, vehicle: str, name: str, since: Since) -> f
     return parameters.real_time_factor / (parameters.time_step * every)
 
 
-def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool, held: bool) -> Finding:
-    """Check state, script errors, real-time factor and late steps; with `simulated_time`, also whether /clock runs.
+def slowness(player: Player, since: Since | None) -> list[Problem]:
+    """Return the problems of a real-time factor that is not reached, and of late steps."""
+    problems, parameters = [], player.simulation.parameters
+    if since is None:
+        return []
+    factor, target = since.steps * parameters.time_step / since.seconds, parameters.real_time_factor
+    if target and factor < _ENOUGH * target:
+        problems.append(Problem(WARN, f"too slow: {factor:.2f} times real time, {target:g} is wanted"))
+    if since.late > _LATE * since.steps:
+        problems.append(Problem(WARN, f"{since.late} of the last {since.steps} steps were late"))
+    return problems
 
-    `held`: the next step waits for a client of the remote API.
+
+def pace(
+    player: Player, pacer: Pacer, since: Since | None, simulated_time: bool, held: bool, slow: Sequence[Problem] = ()
+) -> Finding:
+    """Check state and script errors; with `simulated_time`, also whether /clock runs.
+
+    `held`: the next step waits for a client of the remote API. `slow` are the problems of the pace that have lasted.
     """
     simulation = player.simulation
     target = simulation.parameters.real_time_factor
@@ -71,10 +87,8 @@ def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool
         problems.append(Problem(WARN, f"{player.state}: /clock stands still, and nodes that use simulated time wait"))
     if held and since and not since.steps:
         problems.append(Problem(WARN, "no step: a client of the remote API asked to trigger each step, and does not"))
-    elif factor is not None and target and factor < _ENOUGH * target:
-        problems.append(Problem(WARN, f"too slow: {factor:.2f} times real time, {target:g} is wanted"))
-    if since and since.late > _LATE * since.steps:
-        problems.append(Problem(WARN, f"{since.late} of the last {since.steps} steps were late"))
+    else:
+        problems += slow
     late = f"{since.late} of the last {since.steps}, " if since else ""
     values = {
         "state": player.state,
@@ -128,12 +142,16 @@ class Diagnosis:
         self._simulated_time = simulated_time
         self._clock = clock
         self._before: Counts | None = None
+        self._slow = 0  # diagnoses in a row that were too slow
         self._unmoved: dict[str, float] = {}  # by vehicle, s of simulated time without any effect of commands
 
     def look(self) -> list[Finding]:
         """Return the findings for the simulation, the cameras, and each vehicle."""
         now = count(self._player, self._pacer, self._clock())
         since, self._before = between(self._before, now), now
+        slow = slowness(self._player, since)
+        self._slow = self._slow + 1 if slow else 0
+        lasting = slow if self._slow >= _SUSTAINED else []
         logs, unheard = self._logs(), self._unheard()
         simulation = self._player.simulation
         flown = since.steps * simulation.parameters.time_step if since else 0.0
@@ -142,7 +160,7 @@ class Diagnosis:
             for name, vehicle in simulation.vehicles.items()
         }
         return [
-            pace(self._player, self._pacer, since, self._simulated_time, self._held()),
+            pace(self._player, self._pacer, since, self._simulated_time, self._held(), lasting),
             cameras(self._player.simulation, since),
             *(
                 VehicleDiagnosis(

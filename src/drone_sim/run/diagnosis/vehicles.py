@@ -137,7 +137,7 @@ class VehicleDiagnosis:
         if taken is None or not self._player.playing or str(vehicle.flight_state) in (LANDED, CRASHED):
             return []
         if not hears_commands(vehicle):
-            return [Problem(WARN, _DEAF)]
+            return [Problem(WARN, _DEAF)] if self._now - taken.at < _RECENT else []
         has_exited = taken.sender not in self._log.senders()
         if has_exited and vehicle.commands.now != Twist() and not vehicle.parameters.cmd_vel_timeout:
             problem = f"still obeys the last command of {taken.sender}, which has exited"

@@ -83,10 +83,7 @@ class EditorBackend:
             "flown": self._flying_script(),
             "digest": self._store.digest(),
             "folder": str(self._store.folder),
-            "lessons": [
-                {"lesson": lesson.name, "title": lesson.title, "task": lesson.task, "script": lesson.script}
-                for lesson in self._lessons.all()
-            ],
+            "lessons": [_describe_lesson(lesson) for lesson in self._lessons.all()],
         }
 
     def _flying_script(self) -> str:
@@ -195,7 +192,8 @@ class EditorBackend:
                 f"{script.name!r}: a ROS parameter cannot hold this name; save the script under another name"
             )
         lesson = self._find_lesson(message)
-        self._player.prepare(plan_of(lesson) if lesson and lesson.task else None)
+        plan = plan_of(lesson) if lesson and lesson.task else None
+        self._player.prepare(plan, self._store.read(script)[0])
         self._simulator.set_parameter("script", path)
         if self._scene.own_script and self._switcher.keeps_scene(lesson):
             self._simulator.call("stop")  # it would undo the edit
@@ -213,6 +211,12 @@ class EditorBackend:
         if lesson is None or not lesson.task:
             raise ScriptStoreError("grade: needs a task; choose one above the text")
         return {"number": self.grader.start(lesson.task, script.path)}
+
+
+def _describe_lesson(lesson: Lesson) -> dict[str, str]:
+    described = {"lesson": lesson.name, "title": lesson.title, "task": lesson.task, "script": lesson.script}
+    keys = ("summary", "difficulty", "time") if lesson.task else ()
+    return {**described, **{key: getattr(lesson, key) for key in keys}}
 
 
 def _text(message: _Message) -> str:

@@ -34,6 +34,8 @@ _ALTERNATIVE = re.compile(r"<!-- browser:\n?(.*?)\n?-->(.*?)<!-- end -->", re.DO
 _CONSOLE = re.compile(r"^( *)```console\n(.*?)^ *```\n", re.MULTILINE | re.DOTALL)
 _COMMAND = re.compile(r"^ *[12]\$ ")
 _FLIGHT_RESULT = re.compile(r"^flew ([\d.]+ s) in .*?; ended at")
+# A row of the table of tasks: name, what the script does, (what it needs,) difficulty, time.
+_TASK_ROW = re.compile(r"^\| \[(\w+)\]\(\1/README\.md\) \| (.+?) \| .+ \| (\w+) \| ([^|]+) \|$", re.MULTILINE)
 _PICTURE = re.compile(r"/(docs/pictures/(?:tutorial_\w+|cockpit_build)\.png|tasks/\w+/\w+\.png)")
 
 
@@ -47,6 +49,9 @@ class Lesson:
     folder: str  # in the package, to which links and pictures are relative
     script: str = ""  # name in the script store of the script that the lesson starts with
     scene: str = ""  # scene file of the section's command, in the package; '' for any scene
+    summary: str = ""  # of a task: what the script does
+    difficulty: str = ""  # of a task: easy, medium or hard
+    time: str = ""  # that a task takes, such as 30 min
 
     @property
     def stem(self) -> str:
@@ -116,10 +121,14 @@ class Lessons:
             )
 
     def _tasks(self) -> Iterator[Lesson]:
-        for name in tasks.names():
+        """Yield the tasks in the order of the table in tasks/README.md, the easiest first, then those without a row."""
+        rows = {row[0]: row[1:] for row in _TASK_ROW.findall(_read(self._package / "tasks/README.md"))}
+        known = tasks.names()
+        for name in [*(name for name in rows if name in known), *(name for name in known if name not in rows)]:
             text = _read(self._package / "tasks" / name / "README.md")
             title = text.partition("\n")[0].removeprefix("# ").strip() or name
-            yield Lesson(f"tasks/{name}", title, text, f"tasks/{name}", f"tasks/{name}.py")
+            script, described = f"tasks/{name}.py", rows.get(name, ("", "", ""))
+            yield Lesson(f"tasks/{name}", title, text, f"tasks/{name}", script, "", *described)
 
 
 def _split_sections(text: str) -> Iterator[tuple[str, str]]:

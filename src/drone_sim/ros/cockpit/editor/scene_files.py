@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,11 @@ from drone_sim.config.types import merged, named_in, read_yaml
 from drone_sim.files import writing
 from drone_sim.files.resources import package_path, resolve
 from drone_sim.files.yaml_writing import dump
+from drone_sim.forces.weather import WeatherParameters
 from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
 from drone_sim.grading.plan import Plan
+from drone_sim.grading.randomization import Randomization
 from drone_sim.ros.cockpit.editor.lessons import Lesson
 from drone_sim.ros.core.simulator import Simulator, script_failure
 from drone_sim.scene import scene_parameters
@@ -52,16 +55,25 @@ def scene_of(plan: Plan, folder: Path | None = None) -> str:
 
 
 def describe_scene_of(plan: Plan) -> str:
-    """Return a description of a plan's scene, in one line. Raises ParameterError and FileNotFoundError."""
-    config = _config(plan)
-    missing = [key for key in config if key not in _SCENE_KEYS]
-    parts = [
-        f"in the scene of the task {plan.name}",
-        *_flat({key: config[key] for key in config if key in _SCENE_KEYS}),
-    ]
-    parts += [f"but without {', '.join(missing)}, which can only be set at launch"] if missing else []
-    parts += ["with the events of its plan"] if plan.timeline else []
-    return ", ".join(parts)
+    """Return where a task is flown and what the wind does, in plain words. Raises ParameterError, FileNotFoundError."""
+    missing = [key for key in _config(plan) if key not in _SCENE_KEYS]
+    without = f", but without {', '.join(missing)}, which can only be set at launch" if missing else ""
+    sentences = [f"in the scene of the task {plan.name}{without}", _describe_wind(plan.parameters().weather)]
+    if plan.spread != Randomization():
+        varied = "start and wind are" if plan.spread.wind and any(plan.spread.wind) else "the start is"
+        sentences.append(f"In a grade, {varied} different with every seed but 0")
+    return ". ".join(filter(None, sentences))
+
+
+def _describe_wind(weather: WeatherParameters) -> str:
+    """Return what the wind of a scene does, '' without wind."""
+    speed, gusts = math.hypot(*weather.wind), max(weather.gusts.deviation)
+    if not speed:
+        return f"There are gusts of about {gusts:.2g} m/s from all sides" if gusts else ""
+    axis = max(range(3), key=lambda axis: abs(weather.wind[axis]))
+    way = f"mostly {'along' if weather.wind[axis] > 0 else 'against'} the world's {'xyz'[axis]} axis"
+    changed = f", and gusts change it by about {gusts:.2g} m/s" if gusts else ""
+    return f"The wind blows with {speed:.2g} m/s, {way}{changed}"
 
 
 def _config(plan: Plan) -> dict[str, Any]:
@@ -90,13 +102,6 @@ def _content(config: Mapping[str, Any], scene: Mapping[str, Any]) -> dict[str, A
         content = {**content, "vehicles": {name: merged(equipment, entry) for name, entry in entries.items()}}
     scene_values = content.pop("scene", {})
     return {**scene_values, **content}
-
-
-def _flat(values: Any, above: str = "") -> list[str]:
-    """Return nested values in lines such as `weather/wind = [2, 0, 0]`."""
-    if isinstance(values, Mapping):
-        return [line for key, value in values.items() for line in _flat(value, f"{above}{key}/")]
-    return [f"{above.rstrip('/')} = {json.dumps(values, default=str)}"]
 
 
 class SceneSwitcher:

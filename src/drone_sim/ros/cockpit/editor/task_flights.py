@@ -21,6 +21,7 @@ from std_msgs.msg import String
 
 from drone_sim.grading.jobs.job import count_results
 from drone_sim.grading.plan import Plan
+from drone_sim.offline.timeline import Entry, ScriptRequest
 from drone_sim.ros.cockpit.editor.script_store import ScriptStoreError
 from drone_sim.ros.cockpit.server.access_control import Content
 from drone_sim.ros.cockpit.server.manual import find_below
@@ -33,6 +34,7 @@ _SEEDS = 3  # flights of one grade
 _TIMEOUT = 300.0  # s of real time; a flight with cameras takes some seconds, and has its own limits
 _NICENESS = 10  # the flight in real time has priority
 _MAX_ERROR = 500  # characters
+_HEARS_ALL = "pilot"  # the built-in script, which others import
 _REPORT = "report"  # the folder of `grade --html`, in that of the results
 _REPORT_URL = "/graded/"
 
@@ -50,13 +52,18 @@ class TimelinePlayer:
         self._sender: TimelineSender | None = None
         self._subscribers: list[rospy.Subscriber] = []
 
-    def prepare(self, plan: Plan | None) -> None:
-        """Replace the plan and advertise its topics; None for no plan. Raises Mismatch."""
+    def prepare(self, plan: Plan | None, script: str = "") -> None:
+        """Replace the plan and advertise its topics; None for no plan. Raises Mismatch.
+
+        Requests that the text of the `script` does not subscribe to are left out: each would log a warning.
+        """
         self.end()
-        if plan is None or not plan.timeline:
+        if plan is None:
             return
         parameters = plan.parameters()
-        entries = plan.timeline_of(parameters).entries
+        entries = [entry for entry in plan.timeline_of(parameters).entries if _is_heard(entry, script)]
+        if not entries:
+            return
         self._step, self._first = parameters.time_step, parameters.first.name
         self._last = max(entry.at for entry in entries)
         self._sender = TimelineSender(entries, parameters, self._node)
@@ -165,6 +172,14 @@ class Grader:
         process = self._process
         if process is not None and process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
+
+
+def _is_heard(entry: Entry, script: str) -> bool:
+    """Return whether a script may hear an entry: a request needs a subscription, which `pilot` has for all of them."""
+    action = entry.action
+    if not isinstance(action, ScriptRequest):
+        return True
+    return _HEARS_ALL in script or f'"{action.topic}"' in script.replace("'", '"')
 
 
 def _read_result(folder: Path, errors: str) -> dict[str, Any]:
