@@ -298,7 +298,7 @@ def test_a_part_without_time_is_refused():
 
 def test_the_documentation_has_every_kind_with_its_keys_and_every_column():
     text = (package_path() / "docs" / "grading.md").read_text()
-    common = {"kind", "name", "points", "after", "until"}
+    common = {"kind", "name", "points", "after", "until", "hint"}
     for model in KINDS:
         (kind,) = model.model_fields["kind"].annotation.__args__
         rows = [line for line in text.splitlines() if line.startswith(f"| `{kind}` |")]

@@ -222,6 +222,7 @@ def test_to_resume_what_is_not_paused_says_how_to_pause(simulation, monkeypatch)
     warnings = []
     monkeypatch.setattr(services, "VehiclesParameter", mock.Mock())
     monkeypatch.setattr(rospy, "Service", mock.Mock())
+    monkeypatch.setattr(rospy, "get_param", lambda _name, default: default)
     monkeypatch.setattr(rospy, "logwarn", warnings.append)
     monkeypatch.setattr(services, "scene_parameter", str)
     offered = services.Services(player, mock.Mock(), Inbox(), lambda: None)

@@ -124,7 +124,8 @@ def test_topics_come_back_under_their_handles():
 def test_a_stopped_script_has_no_snapshots(tmp_path):
     path = tmp_path / "script.lua"
     path.write_text("function sysCall_sensing() string.find(('x'):rep(1e5), '.-.-.-.-.-y') end", encoding="utf-8")
-    simulation = Simulation(parameters.load({"script_time_limit": 0.2}), script=str(path))
+    limit = {"script_time_limit": 2.0}  # s, more than a snapshot takes on a busy machine
+    simulation = Simulation(parameters.load(limit), script=str(path))
     snapshot = simulation.snapshot()
     for attempt in (simulation.step, simulation.step, simulation.snapshot, lambda: simulation.restore(snapshot)):
         with pytest.raises(ScriptError, match="stopped after"):
