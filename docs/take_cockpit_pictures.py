@@ -1,4 +1,4 @@
-"""Takes the pictures of the cockpit, in chromium: docs/take_cockpit_pictures.py FOLDER. Two minutes."""
+"""Takes the pictures of the cockpit, in chromium: docs/take_cockpit_pictures.py FOLDER [NAME...]. Three minutes."""
 
 import shutil
 import sys
@@ -29,6 +29,22 @@ FLIGHT, SETTLED = 2500, 3000  # ms
 def start(page: Any) -> None:
     """The start page of a first visit."""
     page.get_by_role("dialog").first.wait_for()
+
+
+def gallery(page: Any) -> None:
+    """The gallery of tasks."""
+    page.get_by_role("dialog").first.get_by_role("button", name="Tasks").click()
+    page.locator("#gallery-tasks button").first.wait_for()
+
+
+def grade(page: Any) -> None:
+    """The result card of a task's start, which fails one criterion."""
+    page.select_option("#script", "tasks/hover.py")
+    page.locator("#grade").wait_for()
+    page.wait_for_timeout(SETTLED)
+    page.click("#grade")
+    page.locator("#graded .result-card").wait_for(timeout=3 * PATIENCE)
+    page.locator("#graded .charts").scroll_into_view_if_needed()
 
 
 def stage(page: Any) -> None:
@@ -69,6 +85,8 @@ def just_fly(page: Any) -> None:
 # What each shows, on what, and whether the start page has been answered.
 PICTURES: dict[str, tuple[Callable[[Any], None], dict[str, Any], bool]] = {
     "cockpit_start": (start, {"viewport": LARGE}, False),
+    "cockpit_tasks": (gallery, {"viewport": LARGE}, False),
+    "cockpit_grade": (grade, {"viewport": LARGE}, True),
     "cockpit": (stage, {"viewport": LARGE}, True),
     "cockpit_build": (build, {"viewport": LARGE}, True),
     "cockpit_task": (task, {"viewport": LARGE, "color_scheme": "dark"}, True),
@@ -77,13 +95,14 @@ PICTURES: dict[str, tuple[Callable[[Any], None], dict[str, Any], bool]] = {
 }
 
 
-def main(folder: str) -> None:
-    """Take all of them between the gates."""
+def main(folder: str, *names: str) -> None:
+    """Take those that are named, or all of them, between the gates."""
     scene = "scene:=" + str(Path(__file__).resolve().parents[1] / "config/scenes/gates.yaml")
     with launched(scene) as cockpit, sync_playwright() as driver:
         rospy.init_node("pictures", anonymous=True, disable_signals=True)
         browser = driver.chromium.launch(executable_path=shutil.which("chromium"))
-        for name, (act, options, is_started) in PICTURES.items():
+        for name in names or PICTURES:
+            act, options, is_started = PICTURES[name]
             cockpit.start_afresh()
             context = browser.new_context(**options)
             if is_started:
