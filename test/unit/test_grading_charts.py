@@ -11,7 +11,12 @@ T = times()
 SCENE = {
     "floor": 10,
     "boxes": [
-        {"name": "Wall", "corners": [[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], "color": [1, 0, 0]}
+        {
+            "name": "Wall",
+            "object": "Wall",
+            "corners": [[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)],
+            "color": [1, 0, 0],
+        }
     ],
 }
 
@@ -46,6 +51,8 @@ def test_a_path_is_a_corridor_and_places_are_circles():
     path = chart({"x": T}, kind="path", along=[[0, 0, 1], [1, 0, 1]], at_most=0.3)
     assert len(points(path.corridor[0])) == 2 and path.corridor[1] > 0
     assert len(chart({"x": T}, kind="reach", places=[[1, 0, 1], [2, 0, 1], "Gate"], within=0.5).circles) == 2
+    wall = chart({"x": T}, kind="reach", places=["/Wall"], within=0.1)
+    assert wall.circles[0][:2] == pytest.approx(points(wall.objects[0][0]).mean(axis=0), abs=0.1)
     assert chart({}, kind="no_contact") is None
 
 

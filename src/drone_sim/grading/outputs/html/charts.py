@@ -53,7 +53,7 @@ def chart_of(criterion: Criterion, columns: Columns, scene: Mapping[str, Any], a
     bounds = _bounds_of(criterion, columns)
     if bounds is not None:
         return _over_time(bounds, criterion, columns, at)
-    ground = _ground_of(criterion, columns)
+    ground = _ground_of(criterion, columns, scene)
     return None if ground is None else _from_above(ground, columns, scene, at)
 
 
@@ -96,7 +96,7 @@ def _bounds_of(criterion: Criterion, columns: Columns) -> Bounds | None:
     return bounds
 
 
-def _ground_of(criterion: Criterion, columns: Columns) -> Ground | None:
+def _ground_of(criterion: Criterion, columns: Columns, scene: Mapping[str, Any]) -> Ground | None:
     match criterion:
         case Drift(axes="xyz" | "xy"):
             x, y, _ = _origin(criterion, columns)
@@ -105,12 +105,24 @@ def _ground_of(criterion: Criterion, columns: Columns) -> Ground | None:
             corners = [*corners, *corners[: criterion.closed]]
             ground = Ground([], [(x, y) for x, y, _ in corners], 2 * criterion.at_most)
         case Reach(places=places, within=radius):
-            ground = Ground([(place[0], place[1], radius) for place in places if not isinstance(place, str)])
+            ground = Ground([(x, y, radius) for place in places for x, y in _centers(place, scene)])
         case Landed(at=place, within=radius) if place is not None:
-            ground = Ground([] if isinstance(place, str) else [(*place, radius)])
+            ground = Ground([(x, y, radius) for x, y in _centers(place, scene)])
         case _:
             return None
     return ground
+
+
+def _centers(place: str | Sequence[float], scene: Mapping[str, Any]) -> list[Point]:
+    """Return a place over ground; for a name, or a path such as /Gate, the middle of each such object at the start."""
+    if not isinstance(place, str):
+        return [(place[0], place[1])]
+    name = place.removeprefix("/")
+    corners: dict[str, list[Sequence[float]]] = {}
+    for box in scene["boxes"]:
+        if name in (box["name"], box["object"]):
+            corners.setdefault(box["object"], []).extend(box["corners"])
+    return [(float(x), float(y)) for x, y, _ in (np.mean(some, axis=0) for some in corners.values())]
 
 
 def _origin(criterion: Drift, columns: Columns) -> Sequence[float]:

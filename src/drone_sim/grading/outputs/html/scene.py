@@ -22,15 +22,16 @@ _DIGITS = 4
 def scene_of(scene: SceneParameters) -> dict[str, Any]:
     """Return the floor's side (m), and the bounding box of every visible shape at its start pose.
 
-    A box has a `name`, `corners` (8 points, m, world; bit 0, 1, 2 of the index is the side along x, y, z) and a
-    `color` (0 to 1).
+    A box has the `name` that scripts use, the unique name of its `object`, `corners` (8 points, m, world; bit 0, 1, 2
+    of the index is the side along x, y, z) and a `color` (0 to 1).
     """
     entries = {entry.name: entry for entry in scene.objects if entry.name}
     boxes = []
     for entry in scene.objects:
         if isinstance(entry, ObjectParameters) and entry.visible:
             matrix = _world_matrix(entry, entries)
-            boxes += [_box(entry.shown, part, matrix) for part in parts_of(entry.to_shape(), entry.color)]
+            names = {"name": entry.shown, "object": entry.name}
+            boxes += [{**names, **_box(part, matrix)} for part in parts_of(entry.to_shape(), entry.color)]
     return {"floor": scene.floor.size, "boxes": boxes}
 
 
@@ -44,7 +45,7 @@ def _world_matrix(entry: EntryParameters, entries: dict[str, EntryParameters]) -
     return matrix
 
 
-def _box(name: str, part: Part, world: Matrix) -> dict[str, Any]:
+def _box(part: Part, world: Matrix) -> dict[str, Any]:
     matrix = frames.multiply(world, part.local)
     low, high = _bounds(part)
     corners = [
@@ -52,7 +53,6 @@ def _box(name: str, part: Part, world: Matrix) -> dict[str, Any]:
         for index in range(8)
     ]
     return {
-        "name": name,
         "corners": [[round(float(value), _DIGITS) for value in corner] for corner in corners],
         "color": [round(float(value), 3) for value in part.color[:3]],
     }
