@@ -84,7 +84,7 @@ def test_a_stages_text_is_beside_it_and_the_next_follows(desk):
 def test_a_task_flies_in_its_scene_and_after_it_the_users_comes_back(cockpit, desk):
     before = rospy.get_param("/drone_sim/scene_file")
     open_script(desk, "tasks/hover.py", "how far the wind")
-    wait_until(desk, lambda: "weather/wind = [2.5, 1, 0]" in desk.inner_text("#flies"))
+    wait_until(desk, lambda: "The wind blows with 2.7 m/s" in desk.inner_text("#flies"))
     desk.click("#run")
     wait_until(desk, lambda: said(desk) == "started in the scene of the task hover")
     wait_until(desk, lambda: cockpit.drone.place[2] > 1.1)
