@@ -10,6 +10,7 @@ import os
 import socket
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -26,6 +27,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from drone_sim.ros.cockpit.cockpit import Cockpit
+from drone_sim.ros.cockpit.editor.task_flights import Grader
 from drone_sim.ros.cockpit.scene.frames import FrameTree
 from drone_sim.ros.cockpit.scene.markers import MarkerTopic
 from drone_sim.ros.cockpit.scene.meshes import MeshStore, as_glb
@@ -530,11 +532,29 @@ def test_the_manual_is_served_where_it_was_built_and_nothing_beside_it(tmp_path)
     (tmp_path / "secret.css").write_text("p {}")
     manual = Manual(tmp_path / "html")
     assert manual.find("/manual/_static/furo.css") == ("text/css; charset=utf-8", b"p {}")
-    for path in ("/manual/../secret.css", "/manual/_static/../../secret.css", "/manual//etc/hosts", "/manual/"):
+    for path in (
+        "/manual/../secret.css",
+        "/manual/_static/../../secret.css",
+        "/manual//etc/hosts",
+        "/manual/",
+        "/manual/\0",
+    ):
         assert manual.find(path) is None
     assert manual.find("/cockpit.js") is None
     kind, content = Manual(tmp_path / "not_built").find("/manual/index.html")
     assert kind.startswith("text/plain") and b"./dev.sh docs" in content
+
+
+def test_of_a_grade_only_the_report_is_served(tmp_path, monkeypatch):
+    grader = Grader()
+    monkeypatch.setattr(grader, "_folder", SimpleNamespace(name=str(tmp_path)))
+    (tmp_path / "report").mkdir()
+    (tmp_path / "report/index.html").write_text("report")
+    (tmp_path / "report/link.html").symlink_to("/etc/hosts")
+    (tmp_path / "result.json").write_text("{}")
+    assert grader.report_file("/graded/index.html") == ("text/html; charset=utf-8", b"report")
+    for path in ("/graded/../result.json", "/graded//etc/hosts", "/graded/link.html", "/graded/", "/index.html"):
+        assert grader.report_file(path) is None
 
 
 def test_a_page_that_is_opened_early_is_answered_when_all_is_there():

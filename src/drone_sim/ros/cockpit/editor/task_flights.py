@@ -175,7 +175,10 @@ class Grader:
 
 
 def _is_heard(entry: Entry, script: str) -> bool:
-    """Return whether a script may hear an entry: a request needs a subscription, which `pilot` has for all of them."""
+    """Return whether a script may hear an entry, by its text: a request needs a subscription.
+
+    `pilot` subscribes to all requests. A subscription in a helper module of the user's is not found.
+    """
     action = entry.action
     if not isinstance(action, ScriptRequest):
         return True

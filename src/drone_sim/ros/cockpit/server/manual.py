@@ -30,11 +30,11 @@ class Manual:
 
 def find_below(folder: Path, name: str) -> Content:
     """Return content type and content of the file `name` in a folder; None if there is none, or it is outside."""
-    file = (folder / name).resolve()
-    if not file.is_relative_to(folder.resolve()):
-        return None
-    kind = mimetypes.guess_type(file.name)[0] or "text/plain"
     try:
+        file = (folder / name).resolve()
+        if not file.is_relative_to(folder.resolve()):
+            return None
+        kind = mimetypes.guess_type(file.name)[0] or "text/plain"
         return f"{kind}; charset=utf-8" if kind.startswith("text/") else kind, read_bytes(file, _MAX_SIZE)
-    except (OSError, ValueError):
+    except (OSError, ValueError):  # ValueError: a NUL in the name
         return None
