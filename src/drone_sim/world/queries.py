@@ -192,12 +192,17 @@ class Queries:
         return [(bodies[first], bodies[second]) for first, second in np.argwhere(np.triu(meet & meet.T, k=1))]
 
     def is_deep_inside(self, first: int, second: int) -> bool:
-        """Return whether two bodies are in each other by more than a quarter of the shortest side of their bounds."""
+        """Return whether two bodies are in each other by more than a quarter of the shortest side of their bounds.
+
+        Also if their centers are closer than a quarter of the depth: the bounds of a tilted disc are larger than it.
+        """
         extent = min(float((high - low).min()) for low, high in map(self._bounds, (first, second)))
         rows = pybullet.getClosestPoints(first, second, 0.0, physicsClientId=self._client)
         is_permeable = self._filter.is_permeable
         depths = [-row[8] for row in rows if not (is_permeable(first, row[3]) or is_permeable(second, row[4]))]
-        return max(depths, default=0.0) > 0.25 * extent
+        depth = max(depths, default=0.0)
+        centers = [pybullet.getBasePositionAndOrientation(body, self._client)[0] for body in (first, second)]
+        return depth > 0.25 * extent or dist(*centers) < 0.25 * depth
 
     def _bounds(self, body: int) -> tuple[Any, Any]:
         """Return the lowest and the highest corner (m) of the box around a body, in the world."""
