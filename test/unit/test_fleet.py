@@ -203,10 +203,15 @@ def test_what_they_took_is_given_back(fly):
         gc.collect()
 
     come_and_go(10)
-    files, memory = sorted(folder.iterdir()), allocated()
-    come_and_go(30)
+    files = sorted(folder.iterdir())
+    growth = []
+    for _ in range(3):
+        before = allocated()
+        come_and_go(30)
+        growth.append(allocated() - before)
     assert sorted(folder.iterdir()) == files
-    assert allocated() - memory < 30 * 16_000
+    # What leaks grows in every round. A table of the process that doubles, whoever's it is, grows in one.
+    assert min(growth) < 30 * 16_000
 
 
 class Mallinfo(ctypes.Structure):
