@@ -223,7 +223,7 @@ class SimulationSetup:
         pairs = queries.overlaps()
         count, kind, most = len(pairs), "touch or overlap", MAX_OVERLAPS
         if MAX_DEEP_OVERLAPS < count <= MAX_OVERLAPS:
-            deep = [pair for pair in pairs if queries.is_deep_inside(*pair)]
+            deep = [pair for pair in pairs.tolist() if queries.is_deep_inside(*pair)]
             count, kind, most = len(deep), "are deep inside each other", MAX_DEEP_OVERLAPS
         if count > most:
             problem = f"{count} pairs of moving objects or vehicles {kind}; at most {most} are allowed"

@@ -125,9 +125,11 @@ class Scene:
         entry, item = self.records[index].entry, self.records[index].item
         if item is not None:
             return item.matrix()
+        if not entry.parent:
+            return entry.local
         if entry.parent in self.tree:
             return multiply(self.tree[self.tree.handle(entry.parent)].below(), entry.local)
-        parents = (key for key, other in self.records.items() if entry.parent and other.entry.name == entry.parent)
+        parents = (key for key, other in self.records.items() if other.entry.name == entry.parent)
         parent = next(parents, None)
         if parent is None:  # the parent is a vehicle, which is added after the scene
             return entry.local

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -26,10 +27,15 @@ def round_solid(volume: float, xx: float, zz: float) -> Solid:
 
 def hull_of(corners: Sequence[np.ndarray]) -> Solid:
     """Return the convex hull of triangles (m, 3, 3), as a solid; for a flat hull, a thin box of its bounds."""
+    return _hull_of(np.concatenate(corners, dtype=float).tobytes())
+
+
+@lru_cache(maxsize=64)  # scenes have many equal shapes
+def _hull_of(corners: bytes) -> Solid:
     import trimesh  # late: takes longer to import than everything else
     from manifold3d import Manifold
 
-    points = np.concatenate(corners).reshape(-1, 3)
+    points = np.frombuffer(corners).reshape(-1, 3)
     low, high = points.min(axis=0), points.max(axis=0)
     extents = np.maximum(high - low, _THICKNESS)
     hull = Manifold.hull_points(points)

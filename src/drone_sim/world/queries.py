@@ -175,8 +175,8 @@ class Queries:
         """Return the height (m) of the lowest point that can collide, of a body without joints."""
         return float(pybullet.getAABB(body, -1, self._client)[0][2])
 
-    def overlaps(self) -> list[tuple[int, int]]:
-        """Return the pairs of moving bodies whose bounds overlap; permeable bodies do not count."""
+    def overlaps(self) -> np.ndarray:
+        """Return the pairs (n, 2) of moving bodies whose bounds overlap; permeable bodies do not count."""
         bodies, bounds = [], []
         for index in range(pybullet.getNumBodies(self._client)):
             body = pybullet.getBodyUniqueId(index, self._client)
@@ -186,10 +186,10 @@ class Queries:
                 bodies.append(body)
                 bounds.append(self._bounds(body))
         if len(bodies) < 2:  # the usual case
-            return []
+            return np.empty((0, 2), int)
         low, high = np.array(bounds)[:, 0], np.array(bounds)[:, 1]
         meet = (low[:, None] <= high[None]).all(axis=2)
-        return [(bodies[first], bodies[second]) for first, second in np.argwhere(np.triu(meet & meet.T, k=1))]
+        return np.array(bodies)[np.argwhere(np.triu(meet & meet.T, k=1))]
 
     def is_deep_inside(self, first: int, second: int) -> bool:
         """Return whether two bodies are in each other by more than a quarter of the shortest side of their bounds.
