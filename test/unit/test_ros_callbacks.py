@@ -199,9 +199,9 @@ def test_twists_without_a_subscriber_are_found_by_asking_the_master(monkeypatch)
     }
     monkeypatch.setattr(rospy, "get_name", lambda: "/drone_sim")
     monkeypatch.setattr(diagnostics, "call", lambda _uri, method: answers[method])
-    assert diagnostics.unheard_twists() == {"/cmd_vel": ["/teleop"]}
+    assert diagnostics.unheard_commands() == {"/cmd_vel": ["/teleop"]}
     monkeypatch.setattr(diagnostics, "call", mock.Mock(side_effect=ConnectionRefusedError))
-    assert diagnostics.unheard_twists() == {}
+    assert diagnostics.unheard_commands() == {}
 
 
 def test_a_type_whose_code_was_never_generated_is_told_from_one_that_is_not_there(monkeypatch, tmp_path):

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from drone_sim.forces.pushes import Push
+from drone_sim.mechanics.frames import to_rpy
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline import timeline
 from drone_sim.run import parameters
@@ -382,3 +383,42 @@ def test_the_diagnosis_says_the_state(landed):
     until(landed, "crashed")
     found = VehicleDiagnosis(landed.drone, player, log, None).finding()
     assert found.message.startswith("crashed: `reset` puts it back")
+
+
+def test_an_emergency_stops_the_propellers(flying):
+    again(flying)
+    flying.drone.ask("emergency")
+    states = fly(flying, 0.3)
+    assert states[-1].linear_velocity[2] < -1.5  # m/s: it falls
+    until(flying, "landed")
+    flying.drone.ask("takeoff")
+    until(flying, "flying")
+
+
+@pytest.mark.parametrize("yaw", [0.0, 2.0])
+def test_a_tilt_is_held_whatever_the_speed(yaw):
+    simulation = Simulation(parameters.load({"profile": "ardrone", "start": "flying", "drone": {"yaw": yaw}}))
+    drone = simulation.drone
+    meaning = drone.parameters.cmd_vel_meaning
+    drone.commands.receive(Twist(*(Vector3(*one) for one in meaning.converted((1.0, -0.5, 0.0), (0.0, 0.0, 0.0)))))
+    fly(simulation, 2.0)
+    roll, pitch, _ = to_rpy(fly(simulation, 0.05)[-1].matrix)
+    assert (roll, pitch) == pytest.approx((0.105, 0.21), abs=0.015)  # to the right, forward
+    late = fly(simulation, 8.0)
+    speed = math.hypot(*late[-1].linear_velocity[:2])
+    tilt = math.acos(late[-1].matrix[10])
+    assert speed == pytest.approx(9.81 * math.tan(tilt) / 0.58, rel=0.1)  # as tum_ardrone measured
+    drone.commands.receive(Twist())
+    assert math.hypot(*fly(simulation, 6.0)[-1].linear_velocity) < 0.05  # it hovers
+    simulation.close()
+
+
+def test_a_command_upwards_lifts_off_if_the_driver_does(landed):
+    again(landed)
+    landed.drone.commands.receive(Twist(Vector3(0.0, 0.0, 0.5)))
+    fly(landed, 1.0)
+    assert str(landed.drone.flight_state) == "landed"
+    simulation = Simulation(parameters.load({"profile": "hector"}))
+    simulation.drone.commands.receive(Twist(Vector3(0.0, 0.0, 0.5)))
+    assert fly(simulation, 3.0)[-1].position[2] > 0.8
+    simulation.close()

@@ -14,7 +14,7 @@ from drone_sim.run.simulation import Simulation
 
 PARAMETERS = parameters.load()
 
-KINDS = "twist, pose, push, goto, object, reset, takeoff, land, home, weather, faults"
+KINDS = "twist, pose, push, goto, object, reset, takeoff, land, emergency, home, weather, faults"
 
 
 class DroneLog:

@@ -2,6 +2,7 @@
 
 import pilot
 from pilot import (  # called by the simulation
+    on_emergency,
     on_goto,
     on_home,
     on_land,

@@ -1,8 +1,8 @@
 """The tutorial's child script, extended by take-off, landing, flights to a position, and reset.
 
 The controller is the tutorial's, unchanged: the pilot only sets its commands, and stops the propellers on the ground.
-Topics in the drone's namespace: takeoff, land, reset, home (std_msgs/Empty), goto (geometry_msgs/PoseStamped, world);
-state (std_msgs/String) is one of five states.
+Topics in the drone's namespace: takeoff, land, emergency, reset, home (std_msgs/Empty), goto
+(geometry_msgs/PoseStamped, world); state (std_msgs/String) is one of five states.
 """
 
 import math
@@ -31,6 +31,7 @@ def sysCall_init():
         simROS.subscribe("reset", "std_msgs/Empty", "on_reset"),
         simROS.subscribe("takeoff", "std_msgs/Empty", "on_takeoff"),
         simROS.subscribe("land", "std_msgs/Empty", "on_land"),
+        simROS.subscribe("emergency", "std_msgs/Empty", "on_emergency"),
         simROS.subscribe("home", "std_msgs/Empty", "on_home"),
         simROS.subscribe("goto", "geometry_msgs/PoseStamped", "on_goto"),
     ]
@@ -40,6 +41,9 @@ def sysCall_init():
     yaw = sim.getObjectOrientation(self.d, -1)[2]
     self.still = 0.0  # s for which it has not moved although it should
     self.goal = None  # x, y, z (m), yaw (rad)
+    # What commands of a driver mean: docs/drivers.md
+    self.tilts = sim.getScriptSimulationParameter(sim.handle_self, "cmd_vel_means") == "tilt"
+    self.lifts_off = sim.getScriptSimulationParameter(sim.handle_self, "cmd_vel_lifts_off")
     height = takeoff_height()
     if sim.getScriptSimulationParameter(sim.handle_self, "start") == LANDED:
         self.home = (x, y, z + height, yaw)
@@ -51,6 +55,8 @@ def sysCall_init():
 
 def sysCall_sensing():
     """Compute thrust and corrections with the tutorial's script; then call the function of the state."""
+    if self.tilt is not None and self.Kvcorr:
+        lean()
     tutorial.sysCall_sensing()
     if not (-LEANING < self.roll_prev < LEANING and -LEANING < self.pitch_prev < LEANING):
         watch_lean()
@@ -75,9 +81,34 @@ def on_twist(msg):
         self.waiting = msg
     elif self.state == FLYING:
         self.work = self.goal = None
-        tutorial.on_twist(msg)
-    elif any((msg.linear.x, msg.linear.y, msg.linear.z, msg.angular.z)):
+        follow(msg)
+    elif self.state == LANDED and self.lifts_off and msg.linear.z > 0:
+        enter(FLYING)
+        follow(msg)
+    elif any((msg.linear.x, msg.linear.y, msg.linear.z, msg.angular.z)) or (self.tilts and tilt_of(msg)):
         refuse("cmd_vel")
+
+
+def follow(msg):
+    """Follow a command: speeds, or a tilt with a climb and turn rate."""
+    tutorial.on_twist(msg)
+    self.tilt = tilt_of(msg) if self.tilts else None
+
+
+def tilt_of(msg):
+    """Return the tilt (rad, forward and to the left) of a command; None for level, which means: stand still."""
+    tilt = msg.angular.y, -msg.angular.x
+    return tilt if any(tilt) else None
+
+
+def lean():
+    """Command the speeds at which the controller's target angles are the commanded tilt."""
+    yaw = sim.getObjectOrientation(self.d, -1)[2]
+    ahead, left = math.cos(yaw), math.sin(yaw)
+    vx, vy, _ = sim.getObjectVelocity(self.d)[0]
+    forward, sideways = self.tilt
+    self.vx = ahead * vx + left * vy + forward / self.Kvcorr
+    self.vy = ahead * vy - left * vx + sideways / self.Kvcorr
 
 
 def takeoff_height():
@@ -103,6 +134,12 @@ def on_land(_msg):
         refuse("land")
 
 
+def on_emergency(_msg):
+    """Stop the propellers at once; after its fall, the drone has landed, or crashed."""
+    if self.state in (FLYING, TAKING_OFF, LANDING):
+        enter(LANDING, fall)
+
+
 def on_goto(msg):
     """Fly to a pose, and hold its position and heading until the next command."""
     p, q = msg.pose.position, msg.pose.orientation
@@ -123,7 +160,7 @@ def on_reset(_msg):
 def go(goal, topic):
     """Fly to a goal, if the drone is flying."""
     if self.state == FLYING:
-        self.goal, self.work = goal, approach
+        self.goal, self.work, self.tilt = goal, approach, None
     else:
         refuse(topic)
 
@@ -152,6 +189,7 @@ def enter(state, work=None):
     self.state, self.work = state, work
     self.refused, self.waiting, self.still = {}, None, 0.0  # refused: time (s) of the last log line by topic
     self.vx = self.vy = self.vz = self.rz = 0
+    self.tilt = None  # rad, forward and to the left, that a command wants; None: commands are speeds
     simROS.publish(self.state_publisher, {"data": state})
 
 
@@ -174,13 +212,24 @@ def climb():
         waiting = self.waiting
         enter(FLYING)
         if waiting is not None:
-            tutorial.on_twist(waiting)
+            follow(waiting)
 
 
 def descend():
     """Descend, more slowly near the floor, until the drone stands."""
     z = sim.getObjectPosition(self.d, -1)[2]
     self.vz = -min(max(DESCENT_PER_HEIGHT * z, SLOWEST_DESCENT), DESCENT)
+    rest_when_still()
+
+
+def fall():
+    """Keep the propellers stopped until the drone lies still."""
+    stop()
+    rest_when_still()
+
+
+def rest_when_still():
+    """Enter the state landed if the drone has not sunk for a while."""
     vz = sim.getObjectVelocity(self.d)[0][2]
     self.still = self.still + self.dt if abs(vz) < STANDS else 0.0
     if self.still > STANDS_FOR:

@@ -200,10 +200,14 @@ Switch = Annotated[bool, Field(strict=True)]
 
 NAME = r"^[A-Za-z][A-Za-z0-9_]*$"
 TOPIC = r"^[A-Za-z][A-Za-z0-9_]*(/[A-Za-z0-9_]+)*$"
+FOREIGN_TOPIC = r"^/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z0-9_]+)*$"
+MESSAGE_TYPE = r"^[a-z][a-z0-9_]*/[A-Za-z][A-Za-z0-9_]*$"
 ADDRESS = r"^(\*|[A-Za-z0-9.:\[\]-]+)$"
 PATTERNS = {
     NAME: "must begin with a letter and contain only letters, digits and _",
     TOPIC: "must be like rear/image: letters, digits and _, beginning with a letter, separated by /",
+    FOREIGN_TOPIC: "must be like /cmd_vel or rear/image: letters, digits and _, separated by /",
+    MESSAGE_TYPE: "must be like geometry_msgs/Pose: a package and the name of a message in it",
     ADDRESS: "must be an address such as 127.0.0.1, or * for all addresses of this machine",
 }
 Name = Annotated[str, Field(pattern=NAME, max_length=MAX_NAME)]

@@ -357,4 +357,6 @@ def _script_parameters(vehicle: VehicleParameters) -> dict[str, Any]:
     law = vehicle.propellers
     base = {**vehicle.control.model_dump(), **_SHOWN, "fakeShadow": True, **particles(law), "propeller_law": law.law}
     base.update(start=vehicle.start, takeoff_height=vehicle.takeoff_height)
+    meaning = vehicle.cmd_vel_meaning
+    base.update(cmd_vel_means=meaning.means, cmd_vel_lifts_off=meaning.lifts_off)
     return {**base, **vehicle.script_parameters}

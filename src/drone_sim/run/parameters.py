@@ -38,6 +38,7 @@ from drone_sim.importing.cache import imported_scene
 from drone_sim.message_text import MAX_NAME, shown
 from drone_sim.run.dumps import read_config
 from drone_sim.run.lockstep_parameters import LockstepParameters
+from drone_sim.run.profiles import profile_files
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import SceneParameters
 from drone_sim.sensors.validation import check_rates
@@ -75,6 +76,7 @@ class PhysicsParameters(Checked):
 class Parameters(PaceParameters, EquipmentParameters):
     """All parameters in config/drone.yaml."""
 
+    profile: FileName
     config: FileName
     gui: Switch
     script_time_limit: Annotated[Finite, Within(0.01, 1e4, or_zero=True)]
@@ -236,37 +238,40 @@ def _vehicle_entries(value: Any, drone: Any) -> Any:
 
 
 def load(overrides: Mapping[str, Any] | None = None) -> Parameters:
-    """Return the parameters of config/drone.yaml, overridden by config files, then by `overrides` (nested mappings).
+    """Return the parameters of config/drone.yaml, overridden by a profile, by config files, then by `overrides`.
 
-    The key `config` of the overrides names the files, separated by commas ('' for none); later files override earlier
-    ones. File names in a config file are relative to it, those in `overrides` to the working directory.
+    The key `profile` of the overrides names the profile ('' for none), the key `config` the files, separated by commas
+    ('' for none); later files override earlier ones. File names in a config file are relative to it, those in
+    `overrides` to the working directory.
     Raises ParameterError.
     """
     overrides = {} if overrides is None else overrides
     if not isinstance(overrides, Mapping):
         raise ParameterError(f"parameters = {shown(overrides)}: must be a mapping of the keys of config/drone.yaml")
     values = read_yaml(package_path() / "config" / "drone.yaml")
-    config = overrides.get("config") or ""
-    if not isinstance(config, str):
-        raise ParameterError("must be the name of a file", ("config",), shown(config))
-    for name in filter(None, config.split(",")):
-        values = merged(values, _read_config(name, values))
-        _checked(values, "", {}, name)
+    for key, names in (("profile", profile_files), ("config", lambda files: files.split(","))):
+        given = overrides.get(key) or ""
+        if not isinstance(given, str):
+            raise ParameterError("must be the name of a file", (key,), shown(given))
+        for name in filter(None, names(given)):
+            values = merged(values, _read_config(name, values, key))
+            _checked(values, "", {}, name)
     if overrides.get("vehicles") == 0:  # means no override: arguments of roslaunch cannot be omitted
         overrides = {key: value for key, value in overrides.items() if key != "vehicles"}
     values = merged(values, overrides)
     return _parameters_in_scene(values, values["scene_file"])
 
 
-def _read_config(name: str, below: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the content of a config file that overrides `below`. Raises ParameterError."""
+def _read_config(name: str, below: Mapping[str, Any], key: str) -> dict[str, Any]:
+    """Return the content of a profile or config (the `key`) that overrides `below`. Raises ParameterError."""
     try:
         path = resolve(name)
     except FileNotFoundError as error:
-        raise ParameterError(str(error), ("config",), shown(name)) from None
+        raise ParameterError(str(error), (key,), shown(name)) from None
     values = read_config(path, below)
-    if "config" in values:
-        raise ParameterError(f"{name}: a config file must not have the key `config`")
+    for other in ("config", "profile"):
+        if other in values:
+            raise ParameterError(f"{name}: a {key} file must not have the key `{other}`")
     scene_parameters.find_files_beside(path.parent, values)
     for key in ("script", "scene_file", "timeline_file"):
         if isinstance(values.get(key), str) and Path(values[key]).suffix:  # `tutorial` and `target` are no files

@@ -11,8 +11,8 @@ from drone_sim.sensors.sensor import SensorParameters
 # Topics in a vehicle's namespace, other than those of its sensors.
 RESERVED_TOPICS = (
     *("cmd_vel", "set_pose", "initialpose", "push", "target_pose", "odom", "propellers", "joint_states"),
-    *("set_wind", "weather", "faults", "takeoff", "land", "reset", "home", "goto", "state", "hears_commands"),
-    *("cmd_vel_stamped", "parameter_descriptions", "parameter_updates"),
+    *("set_wind", "weather", "faults", "takeoff", "land", "emergency", "reset", "home", "goto", "state"),
+    *("hears_commands", "cmd_vel_stamped", "parameter_descriptions", "parameter_updates"),
     *("command", "scene", "drawing", "markers/update", "markers/update_full", "markers/feedback"),
     *("objects/update", "objects/update_full", "objects/feedback"),
     *(f"view/{what}" for what in ("surroundings", "bodies", "path", "height", "command", "forces", "state")),

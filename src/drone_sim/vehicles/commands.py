@@ -77,7 +77,10 @@ class Commands:
 
 EMPTY, POSE = "std_msgs/Empty", "geometry_msgs/PoseStamped"
 RESET = "reset"
-REQUESTS = {RESET: EMPTY, "takeoff": EMPTY, "land": EMPTY, "home": EMPTY, "goto": POSE}  # topic -> message type
+REQUESTS = {  # topic -> message type
+    **dict.fromkeys((RESET, "takeoff", "land", "emergency", "home"), EMPTY),
+    "goto": POSE,
+}
 
 
 class Empty(NamedTuple):

@@ -36,6 +36,7 @@ from drone_sim.sensors import AnySensor
 from drone_sim.sensors.camera_parameters import MAX_CAMERAS, CameraParameters
 from drone_sim.sensors.sensor import Failure
 from drone_sim.sensors.validation import check_sensors
+from drone_sim.vehicles.driver import MAX_TOPICS, CommandMeaning, DriverTopic
 from drone_sim.vehicles.quadricopter_objects import REMOVABLE, ObjectPlace, own_names
 from drone_sim.vehicles.radio_link import LinkParameters
 from drone_sim.vehicles.types import QUADRICOPTER, TYPES, propeller_places
@@ -160,6 +161,8 @@ class EquipmentParameters(Checked):
     takeoff_height: Annotated[Finite, Within(0.05, 1e3), Unit("m")]
     cmd_vel_timeout: Annotated[Finite, Within(1e-4, 1e6, or_zero=True), Unit("s")]
     cmd_vel_limits: TwistLimits
+    cmd_vel_meaning: CommandMeaning
+    topics: Annotated[dict[Name, DriverTopic], Field(max_length=MAX_TOPICS)]
     position_limit: Annotated[Finite, Within(1e-3, 1e5), Unit("m")]
     push: PushParameters
     propellers: PropellerParameters
@@ -210,7 +213,7 @@ class VehicleParameters(EquipmentParameters, PlaceParameters):
 def laid_over(entry: Mapping[str, Any], name: str, everything: Mapping[str, Any]) -> dict[str, Any]:
     """Return an entry of `vehicles` completed from `everything`, the keys at the top level of the file.
 
-    Cameras and sensors that are null are left out. Raises ParameterError.
+    Cameras, sensors and topics that are null are left out. Raises ParameterError.
     """
     if "name" in entry:
         raise ParameterError("unknown key; a vehicle is named by the key of its entry", ("vehicles", name, "name"))
@@ -218,7 +221,7 @@ def laid_over(entry: Mapping[str, Any], name: str, everything: Mapping[str, Any]
     base = {key: everything[key] for key in EquipmentParameters.model_fields if key in everything}
     place = {key: value for key, value in drone.items() if key != "name"} if isinstance(drone, Mapping) else {}
     result = merged({**base, **place}, entry)
-    for key in ("cameras", "sensors"):
+    for key in ("cameras", "sensors", "topics"):
         if isinstance(result.get(key), Mapping):
             result[key] = {item: value for item, value in result[key].items() if value is not None}
     return {**result, "name": name}

@@ -30,7 +30,13 @@ def parameters_of(name: str, **others: Any) -> Parameters:
         inner = values.get(group)
         if isinstance(inner, dict) and inner.get(argument) == NOT_GIVEN:
             values[group] = {key: value for key, value in inner.items() if key != argument}
-    readers = {"config": from_shell, "script": script_from_shell, "scene_file": from_shell, "timeline_file": from_shell}
+    readers = {
+        "profile": from_shell,
+        "config": from_shell,
+        "script": script_from_shell,
+        "scene_file": from_shell,
+        "timeline_file": from_shell,
+    }
     for key, read in readers.items():
         if isinstance(values.get(key), str):
             names = values[key].split(",") if key == "config" else [values[key]]

@@ -41,6 +41,11 @@ def frame(vehicle: VehicleParameters, name: str) -> str:
     return name if name == WORLD_FRAME else f"{rospy.get_namespace()}{vehicle.frame_prefix}{name}".lstrip("/")
 
 
+def full_name(vehicle: str, topic: str) -> str:
+    """Return a topic's name in the namespace of the node: in that of a vehicle, unless it begins with a slash."""
+    return topic[1:] if topic.startswith("/") else f"{vehicle}/{topic}"
+
+
 def first_frame(simulator: str) -> str:
     """Return the frame that rviz follows, which is at Track_base of the first vehicle of the node `simulator`."""
     return f"{simulator.strip('/')}/first"

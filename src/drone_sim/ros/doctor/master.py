@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 from drone_sim.ros.core.network import FAILURES, MASTER, TIMEOUT, call, check_master_uri, is_alive
 from drone_sim.ros.doctor import HINT, OK, WRONG, Line
+from drone_sim.run.profiles import command_topics, profile_cure
 
 _DIAGNOSTICS_TIMEOUT = 4.0  # s, for all simulators; each publishes once a second
 _MARKS = {0: OK, 1: HINT}  # by the level of a DiagnosticStatus
@@ -107,12 +108,15 @@ class Master:
             yield Line(HINT, "nodes", f"{problem} within {_NODES_TIMEOUT:g} s: {cure}")
 
     def commands(self) -> Iterator[Line]:
-        """Yield a line for each cmd_vel topic that is published without a subscriber."""
+        """Yield a line for each topic that looks like a command and is published without a subscriber."""
         received = [topic for topic in self.subscribed if topic.endswith("/cmd_vel")]
         for topic, nodes in self.published.items():
-            if topic.endswith("cmd_vel") and topic not in self.subscribed:
-                cure = f"start it with cmd_vel:={received[0]}" if received else "no simulator with a drone is running"
-                yield Line(HINT, "commands", f"{', '.join(nodes)} publishes {topic}, which has no subscriber: {cure}")
+            if topic in self.subscribed or not (topic.endswith("cmd_vel") or topic in command_topics()):
+                continue
+            own = f"{received[0].rpartition('/')[0]}/{topic.rpartition('/')[2]}" if received else ""
+            cure = f"start it with {topic}:={own}" if own else "no simulator with a drone is running"
+            cures = ", or ".join(filter(None, (cure, profile_cure(topic))))
+            yield Line(HINT, "commands", f"{', '.join(nodes)} publishes {topic}, which has no subscriber: {cures}")
 
 
 def simulator(master: Master) -> Iterator[Line]:

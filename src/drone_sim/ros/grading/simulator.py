@@ -24,7 +24,17 @@ _POLL_INTERVAL = 0.05  # s of real time
 _MAX_DIFFERENCES = 3  # in a message
 # Parameters that a plan does not set, or that are set in another way.
 _IGNORED = (
-    *("config", "gui", "script", "script_time_limit", "real_time_factor", "remote_api", "scene_file", "samples"),
+    *(
+        "profile",
+        "config",
+        "gui",
+        "script",
+        "script_time_limit",
+        "real_time_factor",
+        "remote_api",
+        "scene_file",
+        "samples",
+    ),
     *("lockstep", "step_count", "timeline_file"),
 )
 _STOPPED = "stopped"

@@ -15,11 +15,12 @@ from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.core.network import FAILURES, call
 from drone_sim.run.diagnosis.finding import ERROR, Finding
 from drone_sim.run.pacing import Throttle
+from drone_sim.run.profiles import command_topics
 
 PERIOD = 1.0  # s of real time
 PATIENCE = 2.0  # s, for the simulation's answer
 _MASTER_PERIOD = 5.0  # s of real time, between two questions to the master
-_TWIST = "geometry_msgs/Twist"
+_TWISTS = "geometry_msgs/Twist", "geometry_msgs/TwistStamped"
 _MAX_LENGTH = 600  # characters of a value
 _BUSY = "simulation"  # name of the finding that the simulation does not answer
 
@@ -41,7 +42,7 @@ class Diagnostics(threading.Thread):
         self._answered.set()
         self._asked = 0.0  # s, of the monotonic clock
         self._stamped = rospy.Time()
-        self.unheard: dict[str, list[str]] = {}  # last result of unheard_twists
+        self.unheard: dict[str, list[str]] = {}  # last result of unheard_commands
         self._master_throttle = Throttle(_MASTER_PERIOD)
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
         rospy.on_shutdown(self.close)
@@ -56,7 +57,7 @@ class Diagnostics(threading.Thread):
             if not self._publisher.get_num_connections():
                 continue
             if self._master_throttle.passes():
-                self.unheard = unheard_twists()
+                self.unheard = unheard_commands()
             self._ask()
             try:
                 message = DiagnosticArray(status=[_status(one) for one in self._findings.values()])
@@ -87,10 +88,11 @@ class Diagnostics(threading.Thread):
         self._answered.set()
 
 
-def unheard_twists() -> dict[str, list[str]]:
-    """Return topics of Twists without subscribers, with the names of the publishing nodes, from the master.
+def unheard_commands() -> dict[str, list[str]]:
+    """Return topics that look like commands, without subscribers, with the publishing nodes, from the master.
 
-    A node that was started without a remapping publishes commands on such a topic. If the master does not answer,
+    These are Twists, and the names of a driver or of ours, such as /bebop/takeoff. A node that was started without a
+    remapping, or that is written for a driver, publishes commands on such a topic. If the master does not answer,
     there are none.
     """
     uri = rosgraph.get_master_uri()
@@ -103,7 +105,7 @@ def unheard_twists() -> dict[str, list[str]]:
     return {
         topic: nodes
         for topic, nodes in sorted(others.items())
-        if nodes and kinds.get(topic) == _TWIST and not subscribed.get(topic)
+        if nodes and not subscribed.get(topic) and (kinds.get(topic) in _TWISTS or topic in command_topics())
     }
 
 

@@ -43,9 +43,10 @@ class CameraOutput:
 
         The camera takes pictures only while there are subscribers.
         """
-        topic = f"{vehicle.name}/{parameters.topic}"
+        topic = message_conversion.full_name(vehicle.name, parameters.topic)
         self._frame = message_conversion.frame(vehicle, parameters.frame)
-        info_topic = topic.rpartition("/")[0] + "/camera_info"  # image_transport's rule
+        folder, slash, _ = topic.rpartition("/")
+        info_topic = f"{folder}{slash}camera_info"  # image_transport's rule
         self._image = rospy.Publisher(topic, Image, subscriber_listener=new_subscribers, queue_size=1)
         self._compressed = CompressedPublisher(topic, new_subscribers) if parameters.kind == "color" else None
         self._info_publisher = rospy.Publisher(info_topic, CameraInfo, queue_size=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import rospy
@@ -17,13 +17,15 @@ from drone_sim.forces.weather import WeatherParameters
 from drone_sim.grading.permissions import CHANGE, MOVE, PUSH
 from drone_sim.mechanics.state import Pose
 from drone_sim.ros.core.inbox import Gate, Inbox, open_gate
-from drone_sim.ros.core.message_conversion import xyz
+from drone_sim.ros.core.message_conversion import full_name, message_class, xyz
 from drone_sim.ros.core.validation import check_changes, check_frame, intervention, read_changes, read_pose, sender
+from drone_sim.ros.vehicle.driver_services import DriverServices, Missing
 from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles import checks
 from drone_sim.vehicles.commands import EMPTY, REQUESTS
+from drone_sim.vehicles.driver import DriverTopic
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -39,6 +41,7 @@ _INTERVENTIONS = {  # changes of the world, which a graded flight may forbid
     **dict.fromkeys(("weather", "set_wind", "faults"), CHANGE),
 }
 _Job = Callable[[Vehicle], Any]
+_Reader = tuple[type, Callable[[Any], _Job]]  # the type of a topic's messages, and what reads them
 
 
 class _Limits(NamedTuple):
@@ -60,32 +63,59 @@ class VehicleInputs:
         self._name, self._inbox = parameters.name, inbox
         self._limits = _Limits(parameters, simulation.parameters.weather)
         self.log = CommandLog(senders=self._commanders)
-        self._subscribers = [
-            self._subscriber(topic, kind, read)
-            for topic, kind, read in (
-                (_COMMAND, TwistMessage, self._twist),
-                (_STAMPED_COMMAND, TwistStamped, lambda message: self._twist(message.twist)),
-                ("goto", PoseStamped, self._posing(lambda vehicle, pose: vehicle.ask("goto", pose))),
-                *((topic, Empty, self._asking(topic)) for topic, kind in REQUESTS.items() if kind == EMPTY),
-                ("set_pose", PoseStamped, self._posing(lambda vehicle, pose: vehicle.body.move(pose))),
-                ("initialpose", PoseWithCovarianceStamped, self._pose_estimate),
-                ("target_pose", PoseStamped, self._posing(lambda vehicle, pose: vehicle.target.put(pose.matrix))),
-                ("push", WrenchStamped, self._push),
-                ("set_wind", Vector3Stamped, self._wind),
-                ("weather", KeyValue, self._weather),
-                ("faults", KeyValue, self._faults),
-            )
-        ]
+        own: dict[str, _Reader] = {
+            _COMMAND: (TwistMessage, self._twist),
+            _STAMPED_COMMAND: (TwistStamped, lambda message: self._twist(message.twist)),
+            "goto": (PoseStamped, self._posing(lambda vehicle, pose: vehicle.ask("goto", pose))),
+            **{topic: (Empty, self._asking(topic)) for topic, kind in REQUESTS.items() if kind == EMPTY},
+            "set_pose": (PoseStamped, self._posing(lambda vehicle, pose: vehicle.body.move(pose))),
+            "initialpose": (PoseWithCovarianceStamped, self._pose_estimate),
+            "target_pose": (PoseStamped, self._posing(lambda vehicle, pose: vehicle.target.put(pose.matrix))),
+            "push": (WrenchStamped, self._push),
+            "set_wind": (Vector3Stamped, self._wind),
+            "weather": (KeyValue, self._weather),
+            "faults": (KeyValue, self._faults),
+        }
+        drivers = {entry.topic: entry for entry in parameters.topics.values() if entry.takes and not entry.service}
+        self._subscribers: list[rospy.Subscriber] = []
+        self._commands: list[rospy.Subscriber] = []  # of the subscribers
+        for topic, reader in own.items():
+            if topic not in drivers:
+                self._subscribe(topic, topic, *reader)
+        missing = Missing()
+        for topic, entry in drivers.items():
+            with missing.noted(entry.type, full_name(self._name, topic)):
+                self._subscribe(topic, str(entry.takes), *self._drivers_reader(entry, own))
+        self._services = DriverServices(parameters, inbox, self._ask, missing)
+        missing.warn()
 
-    def _subscriber(self, topic: str, kind: type, read: Callable[[Any], _Job]) -> rospy.Subscriber:
-        name, queue = f"{self._name}/{topic}", _QUEUES.get(topic, 1 if self._gate is open_gate else _GATED_QUEUE)
-        take = self._gate(name, self._taking(topic, read))
-        return rospy.Subscriber(name, kind, take, queue_size=queue, tcp_nodelay=True)
+    def _drivers_reader(self, entry: DriverTopic, own: Mapping[str, _Reader]) -> _Reader:
+        """Return message type and reader of a driver's topic. Raises ValueError if the type is not installed."""
+        if entry.takes == "nothing":
+            return message_class(entry.type or EMPTY), lambda _message: lambda _vehicle: None
+        if entry.takes == _COMMAND:
+            kind = message_class(entry.type or TwistMessage._type)
+            return kind, lambda message: self._twist(getattr(message, "twist", message), entry)
+        return own[str(entry.takes)]
+
+    def _ask(self, topic: str) -> None:
+        """Ask for what a topic of REQUESTS does, in the simulation's thread."""
+        vehicle = self._simulation.vehicles.get(self._name)
+        if vehicle is not None:
+            vehicle.ask(topic)
+
+    def _subscribe(self, topic: str, what: str, kind: type, read: Callable[[Any], _Job]) -> None:
+        """Subscribe to a topic; `what` is the name of ours that has its meaning."""
+        name, queue = full_name(self._name, topic), _QUEUES.get(what, 1 if self._gate is open_gate else _GATED_QUEUE)
+        take = self._gate(name, self._taking(what, read, name))
+        subscriber = rospy.Subscriber(name, kind, take, queue_size=queue, tcp_nodelay=True)
+        self._subscribers.append(subscriber)
+        if what in (_COMMAND, _STAMPED_COMMAND):
+            self._commands.append(subscriber)
 
     def _commanders(self) -> list[str]:
         """Return the nodes that are connected to cmd_vel, or to cmd_vel_stamped."""
-        commands = self._subscribers[:2]
-        return sorted({each.callerid_pub for topic in commands for each in topic.impl.connections})
+        return sorted({each.callerid_pub for topic in self._commands for each in topic.impl.connections})
 
     def follow(self, vehicle: Vehicle) -> None:
         """Use the limits of this vehicle from now on; it was tuned, or replaces the last one."""
@@ -95,9 +125,13 @@ class VehicleInputs:
         """Unregister the topics."""
         for subscriber in self._subscribers:
             subscriber.unregister()
+        self._services.close()
 
-    def _taking(self, topic: str, read: Callable[[Any], _Job]) -> Callable[[Any], None]:
-        """Return a callback that queues the job of a valid message, and logs why another one is refused."""
+    def _taking(self, topic: str, read: Callable[[Any], _Job], name: str) -> Callable[[Any], None]:
+        """Return a callback that queues the job of a valid message, and logs why another one is refused.
+
+        `topic` is the name of ours that has its meaning, `name` its full name.
+        """
         is_command = topic in (_COMMAND, _STAMPED_COMMAND)
         kept = ", the last valid one is kept" if is_command else ""
         logged = _COMMAND if is_command else topic
@@ -110,7 +144,7 @@ class VehicleInputs:
                 refuse(message, error)
                 return
             self.log.take(logged, sender(message))
-            done = intervention(action, self._name, f"{self._name}/{topic}", message) if action else None
+            done = intervention(action, self._name, name, message) if action else None
             self._inbox.put(lambda: execute(job, message), done)
 
         def execute(job: _Job, message: Any) -> None:
@@ -131,8 +165,14 @@ class VehicleInputs:
 
     # ---- readers of messages: each returns a job, or raises Refused
 
-    def _twist(self, message: TwistMessage) -> _Job:
-        twist = checks.twist(xyz(message.linear), xyz(message.angular), self._limits.vehicle)
+    def _twist(self, message: TwistMessage, entry: DriverTopic | None = None) -> _Job:
+        """Read a velocity, or what the numbers mean on a driver's topic."""
+        linear, angular, meaning = xyz(message.linear), xyz(message.angular), self._limits.vehicle.cmd_vel_meaning
+        if entry is not None:
+            linear, angular = meaning.converted(linear, angular)
+        elif meaning.means == "tilt":
+            angular = (0.0, 0.0, angular[2])
+        twist = checks.twist(linear, angular, self._limits.vehicle)
         return lambda vehicle: vehicle.commands.receive(twist)
 
     def _posing(self, act: Callable[[Vehicle, Pose], Any]) -> Callable[[PoseStamped], _Job]:

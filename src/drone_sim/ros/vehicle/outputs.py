@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import rospy
 from geometry_msgs.msg import TwistStamped
@@ -11,7 +11,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float32MultiArray, String
 
 from drone_sim.ros.core import message_conversion
-from drone_sim.ros.core.message_conversion import BASE_LINK, TRACK_BASE, fill, frame, message_class
+from drone_sim.ros.core.message_conversion import BASE_LINK, TRACK_BASE, fill, frame, full_name, message_class
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.run.pacing import Throttle
 from drone_sim.sensors.sensor import Instrument, SensorParameters
@@ -36,7 +36,11 @@ class VehicleOutputs:
         """
         name, size = parameters.name, _LOCKSTEP_QUEUE_SIZE if is_in_lockstep else _QUEUE_SIZE
         self._base_link, self._track_base = frame(parameters, BASE_LINK), frame(parameters, TRACK_BASE)
-        self._odometry = rospy.Publisher(f"{name}/odom", Odometry, subscriber_listener=new_subscribers, queue_size=size)
+        is_drivers = any(entry.fields and entry.topic == "odom" for entry in parameters.topics.values())
+        own = "exact_odom" if is_drivers else "odom"
+        self._odometry = rospy.Publisher(
+            f"{name}/{own}", Odometry, subscriber_listener=new_subscribers, queue_size=size
+        )
         self._command = rospy.Publisher(f"{name}/command", TwistStamped, queue_size=size)
         self._propellers = rospy.Publisher(f"{name}/propellers", Float32MultiArray, queue_size=size)
         self._joints = rospy.Publisher(f"{name}/joint_states", JointState, queue_size=size)
@@ -86,18 +90,18 @@ class VehicleOutputs:
 class SensorOutput:
     """The topics of one sensor, one for each of its outputs; messages are made only for topics with subscribers."""
 
-    def __init__(self, vehicle: VehicleParameters, sensor: Instrument):
-        """Advertise the sensor's outputs in the vehicle's namespace.
+    def __init__(self, vehicle: VehicleParameters, sensor: Instrument, names: Mapping[str, str] | None = None):
+        """Advertise the sensor's outputs in the vehicle's namespace, or those with a suffix in `names` as they say.
 
         Raises ValueError for a message type that is not installed.
         """
         own: SensorParameters = sensor.parameters
         self._frame = frame(vehicle, own.frame)
+        names = names or {output.suffix: f"{own.topic}{output.suffix}" for output in sensor.outputs}
         self._publishers = {
-            output.suffix: rospy.Publisher(
-                f"{vehicle.name}/{own.topic}{output.suffix}", message_class(output.kind), queue_size=_READINGS_QUEUE
-            )
-            for output in sensor.outputs
+            suffix: rospy.Publisher(full_name(vehicle.name, topic), message_class(kind), queue_size=_READINGS_QUEUE)
+            for suffix, topic in names.items()
+            for kind in [output.kind for output in sensor.outputs if output.suffix == suffix]
         }
         self.follow(sensor)
 
@@ -113,7 +117,8 @@ class SensorOutput:
     def publish(self, stamp: Stamp, now: float) -> None:
         """Publish the readings of a step that ended at `now` (s of simulated time), each stamped with its own time."""
         sensor = self._sensor
-        heard = [output for output in sensor.outputs if self._publishers[output.suffix].get_num_connections()]
+        is_heard = {suffix: publisher.get_num_connections() for suffix, publisher in self._publishers.items()}
+        heard = [output for output in sensor.outputs if is_heard.get(output.suffix)]
         for reading in sensor.readings if heard else ():
             measured = sensor.header(reading)["stamp"]
             header = {"stamp": stamp(now - measured), "frame_id": self._frame}

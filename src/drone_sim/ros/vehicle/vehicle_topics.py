@@ -12,6 +12,7 @@ from drone_sim.files.resources import read_bytes
 from drone_sim.ros.core.inbox import Gate, Inbox, open_gate
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.ros.vehicle.cameras import CameraOutput
+from drone_sim.ros.vehicle.driver_topics import DriverOutputs
 from drone_sim.ros.vehicle.inputs import VehicleInputs
 from drone_sim.ros.vehicle.outputs import SensorOutput, VehicleOutputs
 from drone_sim.ros.vehicle.transforms import Transforms
@@ -38,11 +39,14 @@ class VehicleTopics:
         self.inputs = VehicleInputs(simulation, parameters, inbox, gate)
         self.new_subscribers = NewSubscribers()  # to pictures or state
         self.outputs = VehicleOutputs(parameters, self.new_subscribers, is_in_lockstep=gate is not open_gate)
-        self.cameras = {
-            name: CameraOutput(parameters, camera, parameters.cameras[name], self.new_subscribers)
+        self.driver = DriverOutputs(vehicle, self.new_subscribers)
+        self.cameras = [
+            (name, CameraOutput(parameters, camera, parameters.cameras[name], self.new_subscribers))
             for name, camera in vehicle.cameras.items()
-        }
-        self.sensors = {name: SensorOutput(parameters, sensor) for name, sensor in vehicle.instruments.by_name.items()}
+        ] + self.driver.cameras
+        self.sensors = [
+            (name, SensorOutput(parameters, sensor)) for name, sensor in vehicle.instruments.by_name.items()
+        ] + self.driver.sensors
         self._tuning: TuningServer | None = None
         if rospy.resolve_name(vehicle.name) == rospy.get_name():  # the node has its own server there
             rospy.logwarn(f"vehicle {vehicle.name} cannot be tuned in flight, because it has the same name as the node")
@@ -54,10 +58,10 @@ class VehicleTopics:
     def follow(self, vehicle: Vehicle) -> None:
         """Use this vehicle from now on."""
         self.vehicle = vehicle
-        for name, camera in vehicle.cameras.items():
-            self.cameras[name].follow(camera)
-        for name, sensor in vehicle.instruments.by_name.items():
-            self.sensors[name].follow(sensor)
+        for name, camera in self.cameras:
+            camera.follow(vehicle.cameras[name])
+        for name, sensor in self.sensors:
+            sensor.follow(vehicle.instruments.by_name[name])
         self.show_tuning()
 
     def show_tuning(self) -> None:
@@ -68,7 +72,8 @@ class VehicleTopics:
 
     def close(self) -> None:
         """Unregister all topics."""
-        parts: list[Any] = [self.inputs, self.outputs, self._tuning, *self.cameras.values(), *self.sensors.values()]
+        outputs = [output for _, output in (*self.cameras, *self.sensors)]
+        parts: list[Any] = [self.inputs, self.outputs, self.driver, self._tuning, *outputs]
         for part in filter(None, parts):
             part.close()
 
@@ -131,17 +136,19 @@ class FleetTopics:
         """Publish the state of every vehicle."""
         for topics in self._topics.values():
             topics.outputs.publish_state(topics.vehicle, self._stamp)
+            for message in topics.driver.messages:
+                message.publish(topics.vehicle, self._stamp)
 
     def publish_pictures(self) -> None:
         """Publish the pictures of every vehicle's cameras."""
         for topics in self._topics.values():
-            for camera in topics.cameras.values():
+            for _, camera in topics.cameras:
                 camera.publish(self._stamp)
 
     def publish_readings(self) -> None:
         """Publish the readings of every vehicle's sensors in the last step."""
         for topics in self._topics.values():
-            for sensor in topics.sensors.values():
+            for _, sensor in topics.sensors:
                 sensor.publish(self._stamp, self._simulation.time)
 
     def publish_transforms(self) -> None:

@@ -134,7 +134,7 @@ class Diagnosis:
         """`logs` returns the command logs by vehicle; `clock` is monotonic (s).
 
         `frames_below` is the prefix of the vehicles' frames; `held` returns whether a step waits for a client.
-        `unheard` returns the topics with Twist publishers and no subscriber, with the publishers' names.
+        `unheard` returns the topics that look like commands and have no subscriber, with the publishers' names.
         """
         self._unheard = unheard
         self._frames_below, self._held = frames_below, held

@@ -11,6 +11,7 @@ from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.diagnosis.counts import Since
 from drone_sim.run.diagnosis.finding import ERROR, WARN, Finding, Problem, finding, numbers
 from drone_sim.run.player import Player
+from drone_sim.run.profiles import profile_cure
 from drone_sim.scripting import load
 from drone_sim.sensors.sensor import Contact
 from drone_sim.vehicles.commands import CRASHED, LANDED
@@ -43,7 +44,7 @@ class VehicleDiagnosis:
         """`since` has the counts since the last diagnosis, or None.
 
         `frames_below` is the prefix of the vehicles' frames; `is_unmoved` has been true for `unmoved` s.
-        `unheard` has the topics with Twist publishers and no subscriber, with the publishers' names.
+        `unheard` has the topics that look like commands and have no subscriber, with the publishers' names.
         """
         self._frames_below, self._unmoved, self._unheard = frames_below, unmoved, unheard
         self._vehicle, self._player, self._log, self._since = vehicle, player, log, since
@@ -151,15 +152,16 @@ class VehicleDiagnosis:
         return [Problem(WARN, text)] if rivals else []
 
     def _check_topics(self) -> list[Problem]:
-        """Report Twists on topics without a subscriber, while no command reaches the vehicle."""
+        """Report commands on topics without a subscriber, while no command reaches the vehicle."""
         taken = self._log.taken.get(COMMAND)
         if taken is not None and self._now - taken.at < _RECENT:
             return []
-        own = f"{self._vehicle.name}/{COMMAND}"
-        return [
-            Problem(WARN, f"no command arrives: {', '.join(nodes)} publishes {topic}, without a subscriber, not {own}")
-            for topic, nodes in self._unheard.items()
-        ]
+        own = f"publish to /{self._frames_below}{self._vehicle.name}/{COMMAND}"
+        problems = []
+        for topic, nodes in self._unheard.items():
+            what = f"no command arrives: {', '.join(nodes)} publishes {topic}, without a subscriber"
+            problems.append(Problem(WARN, f"{what}: {', or '.join(filter(None, (own, profile_cure(topic))))}"))
+        return problems
 
     def _check_response(self) -> list[Problem]:
         """Report that the script subscribes to commands, but the vehicle has not followed them for some time."""

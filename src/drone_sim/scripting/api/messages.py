@@ -23,7 +23,7 @@ _LONGEST_QUEUE = 1000  # messages
 _MOST_WAITING = 100  # waiting requests of one service
 _OWN_TOPICS = {
     "cmd_vel": "geometry_msgs/Twist",
-    **dict.fromkeys(("takeoff", "land", "reset", "home"), "std_msgs/Empty"),
+    **dict.fromkeys(("takeoff", "land", "emergency", "reset", "home"), "std_msgs/Empty"),
     "goto": "geometry_msgs/PoseStamped",
     "state": "std_msgs/String",
     "parameter_updates": "dynamic_reconfigure/Config",
