@@ -38,7 +38,7 @@ ENDLESS = (
     "python3 $(rospack find drone_sim)/docs/fleet/follow.py",
 )
 FROM_A_BAG = " -b "
-NEEDS_NONE = ("rosrun drone_sim ", "cat ", "source ", "rosbag info", "python3 loop.py")  # a simulator
+NEEDS_NONE = ("rosrun drone_sim ", "cat ", "source ", "rosbag info", "python3 loop.py", "python3 -m ")  # a simulator
 NEEDS_ONE = ("rosrun drone_sim view", "rosrun drone_sim record_truth", "rosrun drone_sim doctor")
 WRONG = re.compile(r"Traceback|\[(?:ERROR|FATAL)\]|\bERROR:")
 REFUSED = re.compile(rf"{WRONG.pattern}|refused")  # by the simulator, whatever the command has said

@@ -134,12 +134,16 @@ def test_what_pip_installs_flies_without_ros_and_checkout(tmp_path):
     subprocess.run([sys.executable, "-c", install], cwd=ROOT, stdout=subprocess.DEVNULL, check=True, timeout=100)
     (module,) = (tmp_path / "root").rglob("drone_sim/__init__.py")
     program = (
+        "import runpy, sys\n"
+        "sys.modules.update(dict.fromkeys(('rospy', 'roslib', 'rospkg')))\n"  # so that their import fails
         "import drone_sim\n"
         "from drone_sim.run import parameters, simulation\n"
         "flown = simulation.Simulation(parameters.load({'scene_file': 'package://drone_sim/config/scenes/gates.yaml'}))\n"
         "flown.step()\n"
         "flown.close()\n"
-        "print(drone_sim.__file__)\n"
+        "print(drone_sim.__file__, flush=True)\n"
+        "sys.argv[1:] = ['fly', '--duration', '0.1']\n"
+        "runpy.run_module('drone_sim', run_name='__main__')\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", program],
@@ -150,7 +154,15 @@ def test_what_pip_installs_flies_without_ros_and_checkout(tmp_path):
         check=True,
         timeout=100,
     )
-    assert done.stdout.strip() == str(module)
+    place, summary = done.stdout.splitlines()
+    assert place == str(module) and summary.startswith("flew 0.10 s")
+
+
+def test_an_unknown_command_of_the_module_is_one_line():
+    command = [sys.executable, "-m", "drone_sim", "flyy"]
+    done = subprocess.run(command, env=os.environ | {"PYTHONPATH": python_path()}, capture_output=True, timeout=100)
+    assert done.returncode == 1
+    assert done.stderr.count(b"\n") == 1 and b"fly, grade, sweep, import_scene" in done.stderr
 
 
 def test_every_script_that_the_editor_offers_is_installed(tmp_path):
