@@ -114,7 +114,7 @@ class Master:
             if topic in self.subscribed or not (topic.endswith("cmd_vel") or topic in command_topics()):
                 continue
             own = f"{received[0].rpartition('/')[0]}/{topic.rpartition('/')[2]}" if received else ""
-            cure = f"start it with {topic}:={own}" if own else "no simulator with a drone is running"
+            cure = f"start it with {topic[1:]}:={own}" if own else "no simulator with a drone is running"
             cures = ", or ".join(filter(None, (cure, profile_cure(topic))))
             yield Line(HINT, "commands", f"{', '.join(nodes)} publishes {topic}, which has no subscriber: {cures}")
 
