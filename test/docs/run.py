@@ -36,6 +36,7 @@ AT_ONCE = 4
 ENDLESS = (
     *("rostopic echo ", "rosrun drone_sim view", "rosrun drone_sim record_truth"),
     "python3 $(rospack find drone_sim)/docs/fleet/follow.py",
+    "python3 $(rospack find drone_sim)/docs/drivers/follow_ball.py",
 )
 FROM_A_BAG = " -b "
 NEEDS_NONE = ("rosrun drone_sim ", "cat ", "source ", "rosbag info", "python3 loop.py", "python3 -m ")  # a simulator

@@ -2,6 +2,7 @@
 """Each driver's profile, by the driver's names: commands with its meaning, and what it publishes."""
 
 import contextlib
+import math
 import subprocess
 import sys
 import tempfile
@@ -10,7 +11,7 @@ import unittest
 
 import rospy
 import rostest
-from geometry_msgs.msg import Pose, PoseStamped, Twist
+from geometry_msgs.msg import Pose, PoseStamped, TransformStamped, Twist
 from listening import Listener, connected
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image, Imu, Range
@@ -20,9 +21,10 @@ from std_srvs.srv import SetBool
 
 from drone_sim.files.resources import package_path
 from drone_sim.mechanics.frames import from_quaternion, to_rpy
-from drone_sim.ros.core.message_conversion import xyzw
+from drone_sim.ros.core.message_conversion import xyz, xyzw
 
 FACTOR = 2.0  # times real time
+EXAMPLE = package_path() / "docs" / "drivers"
 
 
 class Sender(threading.Thread):
@@ -48,6 +50,13 @@ def pitch_of(odometry):
     return to_rpy(from_quaternion((0, 0, 0), xyzw(odometry.pose.pose.orientation)))[1]
 
 
+def near(odometry, ball):
+    """Return whether it stands still, its camera 1.5 m from the ball, at its height."""
+    place, speed = xyz(odometry.pose.pose.position), math.hypot(*xyz(odometry.twist.twist.linear))
+    distance = math.dist(place[:2], ball[:2])
+    return abs(distance - 1.66) < 0.2 and abs(place[2] - ball[2]) < 0.2 and speed < 0.15
+
+
 def command(**fields):
     """Return a Twist; `linear_x=1` sets its linear.x."""
     twist = Twist()
@@ -67,9 +76,9 @@ class Profiles(unittest.TestCase):
             listener.close()
 
     @contextlib.contextmanager
-    def simulator(self, profile):
+    def simulator(self, profile, *others):
         script = str(package_path() / "scripts" / "simulator")
-        arguments = (f"_profile:={profile}", f"_real_time_factor:={FACTOR}")
+        arguments = (f"_profile:={profile}", f"_real_time_factor:={FACTOR}", *others)
         with tempfile.TemporaryFile("w+") as output:
             process = subprocess.Popen(
                 [sys.executable, script, *arguments], stdout=output, stderr=subprocess.STDOUT, text=True
@@ -179,6 +188,21 @@ class Profiles(unittest.TestCase):
             self.listen("/sonar_height", Range).wait_for()
             self.assertEqual(self.listen("/front_cam/camera/image", Image).wait_for().width, 320)
             self.assertIn("the package hector_uav_msgs is not in your workspace", output())
+
+    def test_the_example_follows_the_ball(self):
+        odometry = self.listen("/bebop/odom", Odometry)
+        with self.simulator("bebop", f"_scene_file:={EXAMPLE}/ball.yaml"):
+            node = subprocess.Popen([sys.executable, f"{EXAMPLE}/follow_ball.py"])
+            try:
+                odometry.wait_for(lambda o: near(o, (3.0, 0.6, 1.2)))
+                move = TransformStamped(child_frame_id="Ball")
+                place = move.transform.translation
+                place.x, place.y, place.z, move.transform.rotation.w = 3.0, 2.5, 1.6, 1.0
+                self.publisher("/drone_sim/set_object_pose", TransformStamped).publish(move)
+                odometry.wait_for(lambda o: near(o, (3.0, 2.5, 1.6)))
+            finally:
+                node.kill()
+                node.wait(60)
 
     def test_own_file(self):
         """A profile of one's own: other names, a service for the motors, and a number as a driver has it."""
