@@ -192,7 +192,7 @@ class Node:
             return False
         late = self._pacer.wait(over)
         if late:
-            rospy.logwarn_throttle(5, f"step late by {late * 1e3:.0f} ms ({self._pacer.overruns} so far)")
+            rospy.logwarn_throttle(5, f"step late by {late * 1e3:.1f} ms ({self._pacer.overruns} so far)")
         return True
 
     def _is_running(self) -> bool:
