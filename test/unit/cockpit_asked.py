@@ -44,7 +44,13 @@ class TimelinePlayer:
 class Scene:
     """A scene that may name a script for its drone."""
 
-    own_script, has_no_vehicle = "", False
+    own_script, has_no_vehicle, is_modified = "", False, False
+
+    opened, on_reopened = None, None
+
+    def reopen(self, file, was_modified):
+        self.opened, self.own_script = (file, was_modified), "pilot"
+        self.on_reopened()
 
     def set_script(self, script):
         self.own_script = script

@@ -93,6 +93,24 @@ def test_a_task_brings_its_scene_and_leaving_it_brings_back_the_users(ask, tmp_p
     assert node.asked == ["restart"] and ask.player.prepared is None
 
 
+@pytest.mark.parametrize(("file", "is_modified"), [("", True), ("mine.yaml", True), ("mine.yaml", False)])
+def test_run_goes_back_to_changes_that_are_not_saved_and_to_a_scene_that_names_a_script(ask, file, is_modified):
+    node, scene = ask.node, ask.scene
+    node.parameters["scene_file"] = file
+    scene.own_script, scene.is_modified = "pilot", is_modified
+    ask("run", script="tasks/hover.py", lesson="tasks/hover")
+    scene.own_script, scene.is_modified = "", False  # those of the task's scene
+    flies = ask("lesson", lesson="stage-1-constant-thrust")["flies"]
+    assert ("changes that are not saved" in flies) == is_modified and (file or "your new scene") in flies
+    ask("run", script="tasks/gates.py", lesson="tasks/gates")
+    node.asked.clear()
+    scene.on_reopened = lambda: node.set_parameter("scene_file", file)
+    assert ask("run", script="tutorial/1_thrust.py", lesson="")["done"]
+    assert scene.opened == (file or "none", is_modified)
+    assert scene.own_script.endswith("1_thrust.py") and node.parameters["script"] == scene.own_script
+    assert node.asked == ["stop", "stop", "restart"]
+
+
 def test_a_scene_that_the_user_has_chosen_meanwhile_stays(ask):
     ask("run", script="tasks/gates.py", lesson="tasks/gates")
     ask.node.parameters["scene_file"] = "other.yaml"

@@ -354,6 +354,17 @@ def test_a_taken_name_selects_its_object_and_the_handles_go_when_a_flight_starts
         wait_for(page, has_handles)
 
 
+def drag_across(page, field, *way):
+    """Press a number, and drag it to the right by so many px; return what lets go of it."""
+    field.scroll_into_view_if_needed()
+    place = field.bounding_box()
+    page.mouse.move(place["x"] + 20, place["y"] + 10)
+    page.mouse.down()
+    for right in way:
+        page.mouse.move(place["x"] + 20 + right, place["y"] + 10, steps=5)
+    return page.mouse.up
+
+
 def test_properties_are_computed_dragged_and_in_degrees(cockpit, browser):
     with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
         builder, fields = Builder(page), page.locator("#properties")
@@ -372,14 +383,15 @@ def test_properties_are_computed_dragged_and_in_degrees(cockpit, browser):
         builder.wait(camera, lambda one: abs(one["values"]["fov"] - math.pi / 2) < FAR)
         builder.set("perspective angle", "2*")
         panel.wait_for("perspective angle = 2*: must be a number from 0.573 to 177.617")
-        box = fields.get_by_label("far clipping plane", exact=True)
-        box.scroll_into_view_if_needed()
-        place = box.bounding_box()
-        page.mouse.move(place["x"] + 20, place["y"] + 10)
-        page.mouse.down()
-        page.mouse.move(place["x"] + 65, place["y"] + 10, steps=5)
-        page.mouse.up()
-        builder.wait(camera, lambda one: abs(one["values"]["far"] - 100.5) < FAR)
+        let_go = drag_across(page, fields.get_by_label("far clipping plane", exact=True), 10)
+        builder.wait(camera, lambda one: abs(one["values"].get("far", 100) - 100.1) < FAR)  # while it is dragged
+        page.mouse.move(*page.evaluate("[innerWidth - 1, 1]"))
+        far = builder.wait(camera, lambda one: one["values"].get("far", 100) > 100.2)["values"]["far"]
+        let_go()
+        panel.press("Undo")
+        builder.wait(camera, lambda one: abs(one["values"].get("far", 100) - 100) < FAR)  # all of it is one step
+        panel.press("Redo")
+        builder.wait(camera, lambda one: abs(one["values"].get("far", 100) - far) < FAR)
         joint = builder.drop("Joint", [1, -1, 0])
         builder.set("value", 30)
         builder.wait(joint, lambda one: abs(one["values"].get("value", 0) - math.pi / 6) < FAR)
@@ -388,4 +400,26 @@ def test_properties_are_computed_dragged_and_in_degrees(cockpit, browser):
         builder.drop("Cuboid", [1, 1, 0])
         groups = page.locator("#properties summary").all_inner_texts()
         assert groups == ["look", "physics", "advanced"]
+    cockpit.load("")
+
+
+def test_run_without_a_lesson_goes_back_to_a_new_scene_that_was_not_saved(cockpit, browser):
+    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        builder = Builder(page)
+        builder.menu("Scene file", "New")
+        wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
+        builder.drop("Quadricopter", [0, 0, 0])
+        builder.drop("Cuboid", [1, 1, 0])
+        page.select_option("#script", "tasks/hover.py")
+        page.locator("#grade").wait_for()
+        page.click("#run")
+        wait_until(page, lambda: page.inner_text("#said") == "started in the scene of the task hover")
+        builder.row("Cuboid").wait_for(state="detached")
+        page.select_option("#script", "tutorial/2_elevation.py")
+        wait_until(page, lambda: page.input_value("#lesson") == "stage-2-elevation")
+        page.select_option("#lesson", "")
+        page.click("#run")
+        builder.row("Cuboid").wait_for()
+        wait_until(page, lambda: page.inner_text("#flown") == "tutorial/2_elevation.py")
+        assert page.inner_text("#scene-file") == "new scene"
     cockpit.load("")

@@ -121,15 +121,40 @@ def test_a_task_is_solved_and_graded(student):
     wait_until(student, lambda: student.locator("#graded tr").count() > 1, 120)
     graded = student.inner_text("#graded")
     assert re.search(r"\d+(\.\d)? of \d+ points", graded) and "seed 2" in graded and "Try this" in graded
+    replay_of_the_second_that_failed(student)
+    student.locator("#graded a.when").first.click()
+    student.locator("#replay").wait_for()
+    run(student)
+    student.locator("#replay").wait_for(state="hidden")
     with student.context.expect_page() as opened:
-        student.locator("#graded a.when").first.click()
-    replay = opened.value
-    wait_until(replay, lambda: replay.locator("#stage[data-shown]").count())
-    assert float(replay.inner_text("#time").split()[0]) > 0
-    replay.close()
+        student.get_by_role("link", name="Replay and plots of all flights").click()
+    wait_until(opened.value, lambda: opened.value.locator("#stage[data-shown]").count())
+    opened.value.close()
     student.click("#home")
     door(student, "Tasks")
     assert "your best: 3 of 6 points" in student.locator("#gallery-tasks button").first.inner_text()
+
+
+def replay_of_the_second_that_failed(page):
+    """A ghost flies in the scene; keys alone choose the second, play, and end it."""
+    view = page.evaluate("scene.view.name")
+    link = page.locator("#graded a.when").first
+    link.press("Enter")
+    slider = page.get_by_role("slider", name="Second of the flight")
+    wait_until(page, lambda: slider.is_visible() and slider.evaluate("one => one === document.activeElement"))
+    second = float(slider.input_value())
+    assert second == pytest.approx(float(link.get_attribute("data-at")), abs=0.05)
+    assert page.evaluate("scene.isShown({ layer: 'view/bodies', ns: 'drone' })") is False, "only the ghost is shown"
+    there = page.evaluate("scene.replay.ghost.position.toArray()")
+    slider.press("Home")
+    assert page.evaluate("scene.replay.ghost.position.toArray()") != there
+    assert page.inner_text("#replay-text") == "Replay, seed 0: 0.00 s"
+    page.get_by_role("button", name="Play", exact=True).press("Enter")
+    wait_until(page, lambda: float(slider.input_value()) > 0.3)
+    page.keyboard.press("Escape")
+    page.locator("#replay").wait_for(state="hidden")
+    assert page.evaluate("scene.view.name") == view
+    assert link.evaluate("one => one === document.activeElement")
 
 
 def test_a_script_that_fails_its_task_is_graded_with_the_reason(student):

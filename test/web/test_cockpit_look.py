@@ -81,6 +81,12 @@ def test_the_scene_has_room_and_nothing_is_cut_off(cockpit, browser, width, heig
         wait_until(page, lambda: scene.bounding_box()["width"] == width)
 
 
+def show_script(page):
+    if not page.locator("#editor").is_visible():  # on a small screen
+        page.locator("#toggle, [data-place=script]").locator("visible=true").click()
+    page.locator("#editor").wait_for()
+
+
 def visible_lines(page):
     """Return how many lines of code the editor shows."""
     return page.evaluate(
@@ -93,8 +99,7 @@ def visible_lines(page):
 )
 def test_code_has_room_beside_a_text_or_the_text_covers_it(cockpit, browser, width, height, beside_text, alone):
     with open_page(cockpit, browser, viewport={"width": width, "height": height}) as page:
-        if not page.locator("#editor").is_visible():  # on a small screen
-            page.click("#toggle")
+        show_script(page)
         page.select_option("#lesson", "stage-2-elevation")
         page.locator("#lesson-text").get_by_text("In sensing").wait_for()
         assert page.locator("#text").is_visible() == (beside_text > 0)
@@ -138,7 +143,27 @@ def test_on_touch_screens_thumbs_reach_both_sticks_and_nothing_lies_above_the_dr
             "([x, y]) => document.elementFromPoint(x, y).closest('#scene') !== null", [width / 2, height / 2]
         )
         assert top, "the middle of the scene is free"
-        page.tap("#toggle")
-        page.locator("#editor").wait_for()
+        show_script(page)
         assert page.locator("#editor").bounding_box()["width"] == width
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_on_a_tablet_that_is_held_upright_scene_script_and_edit_are_tabs(cockpit, browser):
+    size = {"width": 768, "height": 1024}
+    with open_page(cockpit, browser, viewport=size, has_touch=True, is_mobile=True) as page:
+        tabs = page.get_by_role("group", name="What is shown")
+        shown = {  # what each tab shows of these; a strip of the scene is above the script, too
+            "Edit": {"#panel", "#shelf", "#build-bar"},
+            "Script": {"#editor"},
+            "Scene": {"#rail", "#left", "#right"},
+        }
+        for name, parts in shown.items():
+            tabs.get_by_role("button", name=name).tap()
+            for part in set.union(*shown.values()):
+                assert page.locator(part).is_visible() == (part in parts), f"{name}: {part}"
+            assert tabs.locator("[aria-pressed=true]").all_inner_texts() == [name]
+            assert page.locator("#scene").bounding_box()["height"] > 150
+            assert page.locator("#toolbar").evaluate("one => one.scrollWidth <= one.clientWidth")
+        page.locator("#rail").get_by_role("button", name="Plots").tap()
+        assert tabs.locator("[aria-pressed=true]").all_inner_texts() == ["Scene"]
+        assert not page.locator("#toggle").is_visible()

@@ -317,12 +317,13 @@ def test_nothing_is_painted_while_nothing_changes(cockpit, opened):
     wait_until(opened, lambda: opened.evaluate("scene.canvas.frames") > before + 10)
 
 
-def test_shadows_can_be_switched_on_without_a_gpu(cockpit, opened):
+@pytest.mark.parametrize("layer", ["shadows", "marks"])
+def test_shadows_and_metre_marks_can_be_switched_on_and_off_without_a_gpu(cockpit, opened, layer):
     hover(cockpit, opened)
     stand_still(cockpit, opened)
     canvas, pictures = opened.locator("#scene canvas"), []
-    for shadows in ("false", "true", "false"):
-        opened.evaluate(f"scene.show({{ shadows: {shadows}, labels: false }})")
+    for is_shown in ("false", "true", "false"):
+        opened.evaluate(f"scene.show({{ {layer}: {is_shown}, labels: false }})")
         opened.evaluate(UNTIL_PAINTED)
         pictures.append(np.asarray(Image.open(io.BytesIO(canvas.screenshot())).convert("L")).astype(int))
     without, shaded, again = pictures

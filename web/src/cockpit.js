@@ -5,6 +5,7 @@ import { at } from "./dom.js";
 import { Lesson } from "./lesson.js";
 import { Scripts } from "./scripts.js";
 import { Panels } from "./panels.js";
+import { Replay } from "./replay.js";
 import { Scene } from "./scene/scene.js";
 import { putInto } from "./snippets.js";
 import { split } from "./split.js";
@@ -92,6 +93,7 @@ const beginTutorial = () => {
 };
 const scene = new Scene(at("scene"), { say: (message) => socket.say(message), ask: (...question) => socket.ask(...question) });
 window.scene = scene; // for who looks into it from the browser's console, and for tests
+const replay = new Replay(scene, store);
 const panels = new Panels({
   store,
   socket: () => socket,
@@ -108,7 +110,7 @@ const lesson = new Lesson(
   },
   store,
   (...question) => socket.ask(...question),
-  { open, put, run, save: () => scripts.save() },
+  { open, put, run, save: () => scripts.save(), replay: (...flight) => replay.open(...flight).catch(tell) },
 );
 const socket = new PageSocket(store, {
   tell: told,

@@ -28,30 +28,36 @@ export function showProgress(element, { flights = 0, seeds = 0 }) {
 }
 
 // The card of a flight is HTML of the cockpit's own templates, which escape all other text.
-function cardOf(html, page) {
+function cardOf(html, page, replay) {
   const template = create("template", { innerHTML: html });
   for (const link of template.content.querySelectorAll("a.when")) {
-    Object.assign(link, { href: `${page}${link.getAttribute("href")}`, target: "_blank", title: "Replay this second, in a new tab" });
+    Object.assign(link, { href: `${page}${link.getAttribute("href")}`, title: "Replay this second in the scene" });
+    link.onclick = (event) => {
+      if (event.ctrlKey || event.metaKey || event.shiftKey) return; // another tab: the report
+      event.preventDefault();
+      replay(Number(link.dataset.at));
+    };
   }
   return template.content;
 }
 
 const seedWords = ({ seed, passed, points, of }) => `${passed ? "✓" : "✗"} seed ${seed}: ${digits(points)}/${digits(of)}`;
 
-// Shows the flights, and the card of the worst.
-export function showGrade(element, { script, isOld }, { problem, points, of, flights = [], cards = [], page = "" }) {
+// Shows the flights, and the card of the worst. `replay(folder, flight, seed, second)` shows a second in the scene.
+export function showGrade(element, { script, isOld }, { problem, points, of, flights = [], cards = [], page = "" }, replay) {
   const old = isOld ? create("p", { className: "progress" }, "The script has been changed since.") : "";
   if (!flights.length) return element.replaceChildren(create("p", { className: "bad" }, problem), old);
   const passed = flights.filter((one) => one.passed).length;
   const sum = `${script}: ${digits(points)} of ${digits(of)} points; ${passed} of ${flights.length} flights passed`;
   const place = create("div");
   const choose = (index) => {
-    place.replaceChildren(cardOf(cards[index], page));
+    const folder = page.slice(0, page.lastIndexOf("/") + 1);
+    place.replaceChildren(cardOf(cards[index], page, (second) => replay(folder, index, flights[index].seed, second)));
     for (const [at, button] of [...seeds.children].entries()) button.setAttribute("aria-pressed", String(at === index));
   };
   const seeds = create("div", { className: "seeds", role: "group", "aria-label": "Flights" });
   seeds.append(...flights.map((one, index) => create("button", { type: "button", onclick: () => choose(index) }, seedWords(one))));
-  const replay = create("a", { href: page, target: "_blank" }, "Replay and plots of all flights");
-  element.replaceChildren(create("p", {}, sum), old, seeds, place, create("p", {}, replay));
+  const report = create("a", { href: page, target: "_blank" }, "Replay and plots of all flights");
+  element.replaceChildren(create("p", {}, sum), old, seeds, place, create("p", {}, report));
   choose(flights.reduce((worst, one, index) => (one.points < flights[worst].points ? index : worst), 0));
 }

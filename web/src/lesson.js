@@ -9,9 +9,10 @@ const GRADE = "grade"; // the key of the last grade: { task, script, number, isO
 
 export class Lesson {
   // `parts` are elements: choice, before, after, fold, body, start, flies, grade, graded, text. Of `script`, `open` opens one,
-  // `save` saves it, `put` puts lines of Python into it, `run` flies it.
-  constructor(parts, store, ask, { open, save, put, run }) {
-    Object.assign(this, { parts, store, ask, open, save, put, run });
+  // `save` saves it, `put` puts lines of Python into it, `run` flies it;
+  // `replay` shows a second of a graded flight in the scene.
+  constructor(parts, store, ask, { open, save, put, run, replay }) {
+    Object.assign(this, { parts, store, ask, open, save, put, run, replay });
     this.graded = kept(GRADE, null);
     this.result = null; // of this.graded, null while it flies
     this.edits = 0; // of the store, when the graded script was saved
@@ -145,7 +146,7 @@ export class Lesson {
   showGraded() {
     const { graded } = this.parts;
     if (this.graded?.task !== this.name) graded.replaceChildren();
-    else if (this.result) showGrade(graded, this.graded, this.result);
+    else if (this.result) showGrade(graded, this.graded, this.result, this.replay);
     else showProgress(graded, {});
   }
 

@@ -38,12 +38,14 @@ export class Panels {
       this.edits = panel === "edit";
       if (this.isConnected) this.build.turn(this.edits); // else once it is
       if (panel === "view") this.view.list();
+      this.markPlace(panel);
     });
     at("why").onclick = () => this.side.open("log");
     this.board.on("vehicles", ({ now }) => (scene().vehicle = now));
+    for (const button of this.places) button.onclick = () => this.showPlace(button.dataset.place);
     at("toggle").onclick = () => this.showScript(document.body.classList.contains("wide"));
     this.showScript(!TOUCH.matches);
-    const choices = { tutorial: () => this.enter(go.tutorial), fly: () => this.showScript(false), build: () => this.enterBuild() };
+    const choices = { tutorial: () => this.enter(go.tutorial), fly: () => this.showScript(false), build: () => this.showPlace("edit") };
     const gallery = { list: go.tasks, take: (lesson) => this.enter(() => go.take(lesson)) };
     this.start = new Start(choices, gallery, (script) => this.enter(() => open(script)));
     this.keys();
@@ -54,14 +56,27 @@ export class Panels {
     go();
   }
 
-  enterBuild() {
-    this.showScript(false);
-    this.side.open("edit");
+  // ---- the tabs of a tablet that is held upright
+
+  get places() {
+    return [...document.querySelectorAll("[data-place]")];
+  }
+
+  showPlace(place) {
+    this.showScript(place === "script");
+    if (place !== "script") this.side.open(place === "edit" ? "edit" : "");
   }
 
   showScript(is) {
     document.body.classList.toggle("wide", !is);
     at("toggle").setAttribute("aria-expanded", String(is));
+    this.markPlace(this.side.now);
+  }
+
+  markPlace(panel) {
+    const isWide = document.body.classList.contains("wide");
+    const now = !isWide ? "script" : panel === "edit" ? "edit" : "scene";
+    for (const button of this.places) button.setAttribute("aria-pressed", String(button.dataset.place === now));
   }
 
   // Asks, and shows the answer on the message line.

@@ -9,6 +9,7 @@ const SHOWN = {
   forces: ["Forces", "Thrust, wind and contacts, as arrows"],
   handles: ["Handles", "The arrows that drag what is selected"],
   shadows: ["Shadows", "Off at first where the browser has no GPU"],
+  marks: ["Metre marks", "The axes x and y on the floor, with their metres"],
   labels: ["Labels", "What the drone does, in words above it"],
 };
 const WORDS = { behind: "Behind the drone", free: "Free", track: "tracking" };

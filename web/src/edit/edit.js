@@ -271,9 +271,9 @@ export class Edit {
     return this.do([{ do: "reparent", objects, parent, keep: isRelative ? "relative" : "pose" }], `${this.named("Hang", objects)} on ${under}`);
   }
 
-  set(handles, values) {
+  set(handles, values, merge) {
     for (const one of handles) this.assumed.set(one, values);
-    return this.do(handles.map((object) => ({ do: "set", object, values })), this.named("Change", handles));
+    return this.do(handles.map((object) => ({ do: "set", object, values })), this.named("Change", handles), merge);
   }
 
   openScript({ script }) {

@@ -1,17 +1,19 @@
 // A field for a number, or for arithmetic: taken when it is entered, put back where it is none. Arrow keys step it, and so
-// does the mouse that drags it sideways.
+// does the mouse that drags it sideways: then others see each value, and all together are one step of undo.
 import { create } from "../dom.js";
 import { compute } from "./compute.js";
 import { follow } from "./follow.js";
 
 const PIXELS = 8; // of a drag, for one step
+const SAID = 120; // ms between two values of a drag that are taken
 
 export const shown = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toFixed(digits))) : "");
 const fine = (value, digits) => (value && Math.abs(value) < 0.1 ? String(Number(value.toPrecision(digits))) : shown(value, digits));
 
-// `take(value)` gets a new number, `wrong(line)` what is said of a bad one. The element's `fill(value)` shows one,
+// `take(value)` gets a new number, `wrong(line)` what is said of a bad one. While it is dragged, `take(value, merge)` gets
+// values with the key of the drag, and `undo(merge)` takes them back if the drag is cancelled. The element's `fill(value)` shows one,
 // unless somebody writes there. `isFine` shows small numbers, too; `mayBeEmpty`: nothing is null.
-export function numberField(label, { take, wrong, digits = 4, step = 0.1, low, high, isWhole = false, isFine = false, mayBeEmpty = false, ...more }) {
+export function numberField(label, { take, wrong, undo, digits = 4, step = 0.1, low, high, isWhole = false, isFine = false, mayBeEmpty = false, ...more }) {
   const asText = (value) => (isFine ? fine : shown)(value, digits);
   const field = create("input", { type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false, "aria-label": label, ...more });
   let holds, taken; // the number that is told, and the text that has been taken since
@@ -40,7 +42,7 @@ export function numberField(label, { take, wrong, digits = 4, step = 0.1, low, h
   };
   field.onchange = enter;
   const clamp = (value) => Math.min(high ?? Infinity, Math.max(low ?? -Infinity, value));
-  drag(field, () => holds, (value) => (field.value = asText(clamp(value))), enter, step);
+  drag(field, { value: () => holds, limit: (value) => Number(asText(clamp(value))), asText, take, undo, step });
   field.onfocus = () => field.select();
   field.onkeydown = (event) => {
     const way = { ArrowUp: 1, ArrowDown: -1 }[event.key];
@@ -63,23 +65,33 @@ function range(low, high) {
   return ends.join("");
 }
 
-// A press focuses the field; a drag shows other values, the last of which is entered.
-function drag(field, value, show, enter, step) {
+// A press focuses the field; a drag takes other values.
+function drag(field, { value, limit, asText, take, undo, step }) {
   field.onmousedown = (event) => document.activeElement === field || event.preventDefault(); // no focus before it is known which
   field.onpointerdown = (event) => {
     if (event.button || field.disabled || document.activeElement === field) return;
     const from = value();
-    let steps = 0;
+    const merge = `number-${Math.random().toString(36).slice(2)}`;
+    let now = from, told = from, telling;
+    const tell = async () => {
+      while (now !== told) await take((told = now), merge);
+      telling = undefined;
+    };
     const move = (moved) => {
-      steps = Math.trunc((moved.clientX - event.clientX) / PIXELS);
+      const steps = Math.trunc((moved.clientX - event.clientX) / PIXELS);
       field.isDragged ||= steps !== 0 && Number.isFinite(from);
-      if (field.isDragged) show(from + steps * step);
+      if (!field.isDragged) return;
+      now = limit(from + steps * step);
+      field.value = asText(now);
+      telling ??= setTimeout(tell, SAID);
     };
     const up = (_, isCancelled) => {
       const { isDragged } = field;
       field.isDragged = false;
-      if (isCancelled) field.fill(value());
-      else if (isDragged) enter();
+      clearTimeout(telling);
+      if (isCancelled && told !== from) undo(merge);
+      else if (isCancelled) field.fill(value());
+      else if (isDragged) tell();
       else field.focus();
     };
     follow(event, move, up);

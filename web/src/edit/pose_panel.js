@@ -34,7 +34,7 @@ export class PosePanel {
   field(name, unit, digits, step) {
     const number = () => this.fields.indexOf(field);
     const wrong = (line) => this.edit.wrong(line);
-    const field = numberField(`${name}, ${unit}`, { take: (value) => this.take(number(), value), wrong, digits, step });
+    const field = numberField(`${name}, ${unit}`, { take: (value, merge) => this.take(number(), value, merge), undo: (merge) => this.edit.undo("undo", merge), wrong, digits, step });
     return field;
   }
 
@@ -57,10 +57,11 @@ export class PosePanel {
     });
   }
 
-  // What is not written anew stays as it is, to the last digit.
-  take(number, value) {
-    const numbers = numbersOf(seenFrom(this.frame, this.one.matrix));
-    numbers[number] = value;
-    this.edit.place(new Map([[this.one.handle, this.frame.clone().multiply(matrixOfNumbers(numbers))]]));
+  // What is not written anew stays as it is, to the last digit; in a drag, as it was at its beginning.
+  take(number, value, merge) {
+    if (!merge || merge !== this.merge) this.numbers = numbersOf(seenFrom(this.frame, this.one.matrix));
+    this.merge = merge;
+    this.numbers[number] = value;
+    return this.edit.place(new Map([[this.one.handle, this.frame.clone().multiply(matrixOfNumbers(this.numbers))]]), undefined, merge);
   }
 }

@@ -121,8 +121,13 @@ export class Properties {
     return row;
   }
 
-  set(key, value) {
-    return this.edit.set(this.edit.selected, { [key]: value });
+  set(key, value, merge) {
+    return this.edit.set(this.edit.selected, { [key]: value }, merge);
+  }
+
+  // What number fields do, beside taking numbers.
+  get answers() {
+    return { wrong: (line) => this.edit.wrong(line), undo: (merge) => this.edit.undo("undo", merge) };
   }
 
   // Shows the value of now by `fill`.
@@ -168,11 +173,11 @@ export class Properties {
   // Of what has a volume that is known: kg/m³, which sets the mass.
   density() {
     if (!this.ones.every((each) => volumeOf(this.whole(each)))) return null;
-    const take = (value) => {
+    const take = (value, merge) => {
       const operations = this.ones.map((each) => ({ do: "set", object: each.handle, values: { mass: value * volumeOf(this.whole(each)) } }));
-      return this.edit.do(operations, this.edit.named("Change"));
+      return this.edit.do(operations, this.edit.named("Change"), merge);
     };
-    const field = numberField("density", { take, wrong: (line) => this.edit.wrong(line), low: 0, step: 100, digits: 2 });
+    const field = numberField("density", { take, ...this.answers, low: 0, step: 100, digits: 2 });
     this.fills.push((each) => field.fill((each.values.mass ?? 0) / volumeOf(this.whole(each))));
     const row = this.line("density", "Another density sets the mass", field);
     row.firstChild.append(create("small", { textContent: " kg/m³" }));
@@ -186,7 +191,7 @@ export class Properties {
 
   // Of the script on an object: those that have a value, and a line for another one.
   parameters({ values: { script_parameters: known = {} } }) {
-    const set = (name, value) => this.set("script_parameters", { ...this.given, [name]: value });
+    const set = (name, value, merge) => this.set("script_parameters", { ...this.given, [name]: value }, merge);
     const rows = Object.keys(known).map((name) => this.line(name, `${name}: a parameter of its script`, this.parameter(name, known[name], set)));
     const more = create("input", { type: "text", placeholder: "name = value", "aria-label": "Another script parameter", spellcheck: false });
     more.onchange = () => {
@@ -204,7 +209,7 @@ export class Properties {
 
   parameter(name, value, set) {
     if (typeof value === "number") {
-      const field = numberField(name, { take: (entered) => set(name, entered), wrong: (line) => this.edit.wrong(line), digits: 6 });
+      const field = numberField(name, { take: (entered, merge) => set(name, entered, merge), ...this.answers, digits: 6 });
       this.fills.push(() => field.fill(this.given[name]));
       return field;
     }
@@ -238,7 +243,7 @@ function number(panel, said) {
   const { key, default: otherwise, whole: isWhole } = said;
   const { low, high, show, take, step = FINE[key] ?? STEP, digits } = inUnit(said);
   const field = numberField(words(key), {
-    take: (value) => panel.set(key, take(value)), wrong: (line) => panel.edit.wrong(line), low, high, isWhole, digits,
+    take: (value, merge) => panel.set(key, take(value), merge), ...panel.answers, low, high, isWhole, digits,
     step: isWhole ? 1 : step, isFine: true, mayBeEmpty: otherwise === null,
   });
   panel.follow(key, otherwise, (value) => field.fill(show(value)));
@@ -253,8 +258,8 @@ function several(panel, said) {
   const now = () => panel.ones.at(-1).values[key] ?? otherwise ?? Array(length).fill(0);
   const fields = [...Array(length).keys()].map((place) =>
     numberField(`${words(key)} ${place + 1}`, {
-      take: (value) => panel.set(key, now().map((one, at) => (at === place ? take(value) : one))),
-      wrong: (line) => panel.edit.wrong(line), low, high, step, digits, ...(names ? { title: names[place] } : {}),
+      take: (value, merge) => panel.set(key, now().map((one, at) => (at === place ? take(value) : one)), merge),
+      ...panel.answers, low, high, step, digits, ...(names ? { title: names[place] } : {}),
     }),
   );
   panel.follow(key, otherwise, (value) => fields.forEach((field, place) => field.fill(show(value?.[place]))));

@@ -28,6 +28,10 @@ export const SHAPES = {
 };
 for (const shape of Object.values(SHAPES)) shape.userData.shared = true;
 
+// The floor is brighter than in the cameras.
+export const SUNLIT = new THREE.Color(1.19, 1.17, 1.13);
+export const isFloor = ({ layer, ns }) => layer === "view/surroundings" && ns === "floor";
+
 const known = new Map();
 
 // A material for a colour r g b a, 0..1, which all that has this colour shares.

@@ -3,7 +3,7 @@ import * as THREE from "three";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
-import { SHAPES, dispose, material } from "./looks.js";
+import { SHAPES, SUNLIT, dispose, isFloor, material } from "./looks.js";
 import { load } from "./meshes.js";
 import { Words } from "./text.js";
 import { FOV } from "./view.js";
@@ -152,7 +152,8 @@ function corners(points) {
   return new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(points.subarray(0, count), 3));
 }
 
-function mesh({ mesh: address, own, color, scale }, changed) {
+function mesh(said, changed) {
+  const { mesh: address, own, color, scale } = said;
   const group = new THREE.Group();
   group.scale.set(...scale.map((one) => one || 1));
   const outer = new THREE.Group().add(group);
@@ -163,6 +164,7 @@ function mesh({ mesh: address, own, color, scale }, changed) {
       made.traverse((one) => {
         if (!one.isMesh) return;
         if (!own) one.material = material(color);
+        if (isFloor(said)) (one.material = one.material.clone()).color.multiply(SUNLIT);
         shade(one, one.material.opacity);
       });
       group.add(made);

@@ -1,6 +1,6 @@
 // The scene: what the node tells is shown, and what the mouse does to it is told to the node.
 import * as THREE from "three";
-import { ACCENT, quality } from "./looks.js";
+import { ACCENT, isFloor, quality } from "./looks.js";
 import { Batch } from "./batch.js";
 import { Canvas } from "./canvas.js";
 import { Gizmo } from "./gizmo.js";
@@ -15,13 +15,12 @@ import { BEHIND, FOV, FREE, View } from "./view.js";
 const BODIES = "view/bodies";
 const OBJECTS = "objects"; // the server of handles, and `scene`, the layer, of what stands in the scene
 const TARGETS = "markers"; // the server of the handles of vehicles and of their green spheres
-const SURROUNDINGS = "view/surroundings", FLOOR = "floor"; // layer and name of the floor
 const BASE = "base_link", TRACK = "Track_base", EYE = "_optical";
 const STEP = 0.05; // s, of the simulation
 const HOVERED = 0xffffff;
 const STORE = "scene"; // the key of what the browser remembers
 const LAYERS = { path: "view/path", command: "view/command", forces: "view/forces", labels: "view/state" };
-const SHOWN = { frames: false, path: true, command: true, forces: false, handles: true, labels: true };
+const SHOWN = { frames: false, path: true, command: true, forces: false, handles: true, labels: true, marks: true };
 
 export class Scene {
   constructor(element, { say }) {
@@ -30,6 +29,7 @@ export class Scene {
     this.pushes = 0.5; // N
     this.views = [BEHIND, FREE];
     this.selected = "";
+    this.replay = null; // the Replay, while it shows a flight
     this.editing = null; // who edits the scene: Edit, while its panel is open
     this.world = new THREE.Scene();
     this.world.matrixWorldAutoUpdate = false;
@@ -112,6 +112,7 @@ export class Scene {
   }
 
   isShown({ layer, ns }) {
+    if (this.replay && (layer === TARGETS || (layer.startsWith("view/") && !isFloor({ layer, ns })))) return false;
     const areLabelsShown = this.shown.labels && this.editing?.held?.of !== "vehicle"; // its handles would cover them
     if (layer === "view/height") return ns === "shadow" ? !this.shown.shadows : areLabelsShown;
     if (layer === LAYERS.labels) return areLabelsShown;
@@ -162,7 +163,7 @@ export class Scene {
   meshes() {
     const names = new Set(this.things().map(({ userData }) => userData.said.ns));
     const meshes = [...names].flatMap((name) => this.meshesOf(name));
-    return meshes.length ? meshes : [...this.tree.markers.values()].filter(({ userData: { said } }) => said.ns === FLOOR && said.layer === SURROUNDINGS);
+    return meshes.length ? meshes : [...this.tree.markers.values()].filter(({ userData: { said } }) => isFloor(said));
   }
 
   lookAt(meshes) {
@@ -177,6 +178,7 @@ export class Scene {
     Object.assign(this.shown, layers);
     if (this.canvas.renderer) this.canvas.renderer.shadowMap.enabled = this.shown.shadows;
     this.surroundings.sun.castShadow = this.shown.shadows;
+    this.surroundings.marks.visible = this.shown.marks;
     this.tree.showFrames(this.shown.frames);
     this.keep();
     this.rearrange();
@@ -248,8 +250,12 @@ export class Scene {
 
   // Where a vehicle is in the world, undefined where that is not known.
   place(vehicle) {
-    const frame = this.bodies?.has(vehicle) && this.tree.byName.get(this.bodies.get(vehicle) + BASE);
-    return frame ? new THREE.Vector3().setFromMatrixPosition(frame.matrixWorld) : undefined;
+    const frame = this.baseOf(vehicle);
+    return frame && new THREE.Vector3().setFromMatrixPosition(frame.matrixWorld);
+  }
+
+  baseOf(vehicle) {
+    return this.bodies?.has(vehicle) ? this.tree.byName.get(this.bodies.get(vehicle) + BASE) : undefined;
   }
 
   // ---- what has handles

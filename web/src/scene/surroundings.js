@@ -1,13 +1,19 @@
-// Sky, ground and sun, as the simulated cameras see them.
+// Sky, ground, sun and metre marks. They are friendlier than what the simulated cameras see, which they do not change.
 import * as THREE from "three";
+import { quality } from "./looks.js";
 
 const TO_SUN = new THREE.Vector3(-0.34, 0.3, 0.89).normalize();
 const BELOW = 0x6b6966, ABOVE = 0x858a91, SUN = 0x8a857a; // what a surface gets of each, as in scene_markers.py
-// Elevation in degrees, and the colour there: sky.py
+// Elevation in degrees, and the colour there.
 const BANDS = [
-  [-90, [0.6, 0.62, 0.61]], [-8, [0.69, 0.71, 0.72]], [-0.5, [0.78, 0.81, 0.835]], [1.5, [0.84, 0.88, 0.92]], [6, [0.74, 0.83, 0.92]],
-  [20, [0.56, 0.71, 0.88]], [45, [0.4, 0.59, 0.83]], [90, [0.3, 0.5, 0.78]],
+  [-90, [0.72, 0.78, 0.68]], [-4, [0.8, 0.86, 0.82]], [-0.5, [0.9, 0.94, 0.95]], [1.5, [0.89, 0.945, 0.985]], [6, [0.7, 0.845, 0.975]],
+  [20, [0.52, 0.73, 0.95]], [45, [0.42, 0.65, 0.92]], [90, [0.3, 0.54, 0.86]],
 ];
+const MEADOW = "0.66, 0.74, 0.6", HAZE = "0.88, 0.92, 0.92"; // of the ground: near, and far away
+const MARKED = 5; // m, each way from the origin
+const MARK = 0.3; // m, how wide the strip of an axis is
+const LINE = 0.012; // m, how wide the axis is
+const DENSE = 200; // px of a metre of it
 const AROUND = 16; // sides of the sky
 const FAR = 1500; // m, how far the ground goes
 const SHADOWED = 6; // m, each way from the drone
@@ -17,13 +23,14 @@ export class Surroundings {
   constructor(scene, isFast) {
     this.sky = sky();
     this.ground = ground();
+    this.marks = marks();
     this.sun = new THREE.DirectionalLight(SUN, Math.PI);
     this.sun.shadow.mapSize.set(TEXELS, TEXELS);
     this.sun.shadow.normalBias = 0.02;
     this.sun.shadow.bias = -0.0005;
     Object.assign(this.sun.shadow.camera, { left: -SHADOWED, right: SHADOWED, top: SHADOWED, bottom: -SHADOWED, near: 1, far: 80 });
     this.sun.castShadow = isFast;
-    scene.add(this.sky, this.ground, this.sun, this.sun.target, new THREE.HemisphereLight(ABOVE, BELOW, Math.PI));
+    scene.add(this.sky, this.ground, this.marks, this.sun, this.sun.target, new THREE.HemisphereLight(ABOVE, BELOW, Math.PI));
     this.shine(new THREE.Vector3());
   }
 
@@ -104,11 +111,40 @@ function ground() {
       void main() {
         float far = length(away);
         float dark = 0.10 * lines(at, 0.012) + 0.14 * lines(at / 5.0, 0.006);
-        vec3 color = mix(vec3(0.50, 0.52, 0.51), vec3(0.74, 0.765, 0.78), 1.0 - exp(-far / 30.0)) * (1.0 - dark);
+        vec3 color = mix(vec3(${MEADOW}), vec3(${HAZE}), 1.0 - exp(-far / 90.0)) * (1.0 - dark);
         gl_FragColor = vec4(color, exp(-far * far / 160000.0));
       }`,
   });
   return behind(new THREE.Mesh(new THREE.CircleGeometry(FAR, 64), paint), 2);
+}
+
+// The axes x and y on the floor with their metres, for who looks along x. Each is a strip that begins at its axis.
+function marks() {
+  const metres = [1, 2, 3, 4];
+  const x = strip(MARK, MARKED, "#c92a2a", [0, 0, LINE, MARKED], (mark) => metres.forEach((metre) => mark(`${metre} m`, 0.17, MARKED - metre)));
+  const y = strip(2 * MARKED, MARK, "#2b8a3e", [0, 0, 2 * MARKED, LINE], (mark) => metres.forEach((metre) => [-1, 1].forEach((side) => mark(`${side * metre}`, MARKED - side * metre, 0.18))));
+  x.position.set(MARKED / 2, -MARK / 2, 0.002);
+  y.position.set(-MARK / 2, 0, 0.002);
+  return new THREE.Group().add(x, y);
+}
+
+// A plate of width and height (m) on the floor, its top towards x, with a line [left, top, width, height] and words.
+function strip(width, height, color, line, write) {
+  const canvas = document.createElement("canvas");
+  Object.assign(canvas, { width: width * DENSE, height: height * DENSE });
+  const pen = canvas.getContext("2d");
+  Object.assign(pen, { font: `500 ${0.13 * DENSE}px system-ui, "DejaVu Sans", sans-serif`, textAlign: "center", textBaseline: "middle" });
+  pen.fillStyle = color;
+  pen.fillRect(...line.map((metres) => metres * DENSE));
+  pen.fillStyle = "#1a1f29";
+  write((words, right, down) => pen.fillText(words, right * DENSE, down * DENSE));
+  const map = new THREE.CanvasTexture(canvas);
+  map.anisotropy = quality.anisotropy;
+  const paint = new THREE.MeshBasicMaterial({ map, opacity: 0.8, transparent: true, depthWrite: false, polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -1 });
+  const plate = new THREE.Mesh(new THREE.PlaneGeometry(width, height), paint);
+  plate.rotation.z = -Math.PI / 2;
+  plate.raycast = () => {};
+  return plate;
 }
 
 function behind(mesh, order) {

@@ -8,7 +8,8 @@ export const FREE = "free";
 const SHARE = 0.25; // of the picture's width that a drone fills
 const WIDE = 0.32; // m, a drone with its propellers
 const NEAREST = 0.65, FARTHEST = 2.5; // m, of what that comes to
-const LOW = 0.3; // rad, from which one looks down
+const LOW = 0.36; // rad, from which one looks down
+const ABOVE = 0.07; // m: the drone is so far above the middle, and its shadow is in the picture
 const CLOSE = 0.12, AWAY = 800; // m, how far one can zoom
 const STEEPEST = 1.55; // rad
 const WIDE_VIEW = 5, STEEP = 0.5; // m, rad: from where one builds
@@ -32,7 +33,7 @@ export class View {
     this.yaw = 0; // from behind, to the left
     this.pitch = LOW;
     this.zoom = 1;
-    this.center.set(0, 0, 0);
+    this.center.set(0, 0, -ABOVE);
   }
 
   // How far away it is from what it looks at, m.

@@ -35,6 +35,7 @@ const BEGINNING = {
   message: null, // below the script: { kind, text, bad }
   saved: { text: "", bad: false }, // whether the file is on the disk
   notice: null, // over the scene: { text, bad, told (ms) }
+  starts: 0, // of flights, since the page was opened
   edits: 0, // of the user, since the page was opened
   isGrading: false,
 };
@@ -77,7 +78,7 @@ const EVENTS = {
   run: () => ({ failure: null, mended: null, notice: null }),
   answered: () => ({}), // the simulator has replied to Run
   // From the simulator's log, so in the right order with its failures.
-  started: (now) => ({ failure: null, mended: null, notice: now.notice?.bad ? null : now.notice }),
+  started: (now) => ({ starts: now.starts + 1, failure: null, mended: null, notice: now.notice?.bad ? null : now.notice }),
   failure: (now, failure) => (isMended(now, failure) || isDoubled(now, failure) ? {} : { failure: { ...failure, told: now.at } }),
 
   // ---- the file in the editor

@@ -29,7 +29,11 @@ class DistanceCriterion(AtMostCriterion):
         return vectors[..., ["xyz".index(axis) for axis in self.axes]]
 
     def _judge_distances(self, distances: np.ndarray, times: np.ndarray, reference: str) -> Outcome:
-        """Return the outcome of distances (M,) at times (M,); `reference` names what they are measured from."""
+        """Return the outcome of distances (M,) at times (M,); `reference` names what they are measured from.
+
+        The deciding moment is when the largest allowed distance was first exceeded, otherwise when the distance was
+        largest.
+        """
         worst = int(distances.argmax())
         value = {
             "largest": float(distances[worst]),
@@ -38,7 +42,9 @@ class DistanceCriterion(AtMostCriterion):
         }[self.measure]
         when = f" at {times[worst]:.2f} s" if self.measure == "largest" else ""
         sentence = f"was {_MEASURE_WORDS[self.measure]} {format_figure(value, 'm')} from {reference}{when}"
-        return self._compare(value, sentence, float(times[worst]))
+        is_exceeded = self.measure == "largest" and value > self.at_most
+        decisive = int((distances > self.at_most).argmax()) if is_exceeded else worst
+        return self._compare(value, sentence, float(times[decisive]))
 
 
 class Drift(DistanceCriterion):

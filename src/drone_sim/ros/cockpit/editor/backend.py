@@ -39,7 +39,7 @@ class EditorBackend:
         self._store = store
         self._lessons = lessons
         self._simulator = simulator
-        self._switcher = SceneSwitcher(simulator)
+        self._switcher = SceneSwitcher(simulator, scene)
         self._player = player
         self.grader = Grader()
         self._checker = TextChecker()
@@ -194,6 +194,7 @@ class EditorBackend:
         lesson = self._find_lesson(message)
         plan = plan_of(lesson) if lesson and lesson.task else None
         self._player.prepare(plan, self._store.read(script)[0])
+        self._switcher.go_back(lesson)
         self._simulator.set_parameter("script", path)
         if self._scene.own_script and self._switcher.keeps_scene(lesson):
             self._simulator.call("stop")  # it would undo the edit

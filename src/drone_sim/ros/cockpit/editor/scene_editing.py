@@ -7,6 +7,7 @@ import binascii
 import json
 import re
 import threading
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ _Message = Mapping[str, Any]
 _LINE = re.compile(r"\bline (\d+)\b")
 _TREE, _QUEUE_SIZE = "scene_objects", 50
 _UPLOAD_SUFFIXES = (".ttm", ".obj", ".stl", ".dae", ".urdf", ".yaml")
+_TREE_TIMEOUT, _TREE_POLL = 5.0, 0.02  # s, for the tree of a scene that was opened
 _MAX_SIZE = 6 << 20  # bytes of an uploaded model: in base64 it must fit into a message of 8 MiB
 
 
@@ -85,6 +87,21 @@ class SceneEditing:
     def is_new(self) -> bool:
         """Whether the scene was begun in the editor and has no file yet."""
         return bool(self._state("new")["new"])
+
+    @property
+    def is_modified(self) -> bool:
+        """Whether the scene has changes that are not saved."""
+        return bool(self._state("modified")["modified"])
+
+    def reopen(self, file: str, was_modified: bool) -> None:
+        """Open a scene file, or the draft of a scene that another one replaced before it was saved; nothing flies then.
+
+        Returns when the object tree is that of the scene. Raises ValueError.
+        """
+        revision = self._call({"draft": "take"} if was_modified else {"open": file})["revision"]
+        end = time.monotonic() + _TREE_TIMEOUT
+        while (self._state("revision")["revision"] or 0) < revision and time.monotonic() < end:
+            time.sleep(_TREE_POLL)
 
     # ---- the script of the vehicle that the page flies
 

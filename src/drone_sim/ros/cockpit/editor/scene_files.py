@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import json
 import math
@@ -19,6 +20,7 @@ from drone_sim.grading import tasks
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.randomization import Randomization
 from drone_sim.ros.cockpit.editor.lessons import Lesson
+from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
 from drone_sim.ros.core.simulator import Simulator, script_failure
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import BESIDE
@@ -107,10 +109,11 @@ def _content(config: Mapping[str, Any], scene: Mapping[str, Any]) -> dict[str, A
 class SceneSwitcher:
     """Switches to the scene of a lesson, and back to the user's scene afterwards."""
 
-    def __init__(self, simulator: Simulator):
-        self._simulator = simulator
+    def __init__(self, simulator: Simulator, scene: SceneEditing):
+        self._simulator, self._scene = simulator, scene
         self._lesson_scene = ""  # the scene file that the last lesson loaded
         self._user_scene = ""  # the scene file before that
+        self._was_modified = self._named_script = False  # the scene before that: not saved; names the vehicle's script
 
     def describe(self, lesson: Lesson) -> str:
         """Return the scene in which a lesson is flown, in one line; '' for no change. Raises ValueError, OSError."""
@@ -134,11 +137,29 @@ class SceneSwitcher:
         is_of_lesson = self._is_of_lesson(now)
         wanted = _scene(lesson)
         if wanted:
-            self._user_scene = self._user_scene if is_of_lesson else now
+            if not is_of_lesson:
+                self._user_scene, self._was_modified = now, self._scene.is_modified
+                self._named_script = bool(self._scene.own_script)
             return self._load(wanted, now, f"started in {_name(lesson, wanted)}")
         if is_of_lesson:
             return self._load(self._user_scene, now, f"started {self._back()}")
         return self._simulator.call("restart")
+
+    def go_back(self, lesson: Lesson | None) -> None:
+        """Open the user's scene for a lesson without one, if it was not saved, or names a script; nothing flies then.
+
+        Otherwise, or if that fails, `fly` loads it from its file.
+        """
+        if (
+            _scene(lesson)
+            or not self._is_of_lesson(self._scene_file())
+            or not (self._was_modified or self._named_script)
+        ):
+            return
+        self._simulator.call("stop")
+        with contextlib.suppress(ValueError):  # the draft was opened or dropped, or the file is gone
+            self._scene.reopen(_path(self._user_scene), self._was_modified)
+            self._lesson_scene = ""
 
     def _scene_file(self) -> str:
         return str(self._simulator.parameter(_KEY, ""))
@@ -147,7 +168,10 @@ class SceneSwitcher:
         return bool(self._lesson_scene) and scene == self._lesson_scene
 
     def _back(self) -> str:
-        return f"back in {'the scene of the launch' if self._user_scene in ('', 'none') else self._user_scene}"
+        is_file = self._user_scene not in ("", _NONE)
+        if self._was_modified:
+            return f"back in {self._user_scene if is_file else 'your new scene'}, with the changes that are not saved"
+        return f"back in {self._user_scene if is_file else 'the scene of the launch'}"
 
     def _load(self, file: str, now: str, success: str) -> tuple[bool, str]:
         _, cleanup = self._simulator.call(

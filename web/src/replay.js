@@ -1,0 +1,151 @@
+// A graded flight in the scene: its drone, its path and the objects of its scene, at the second that a slider chooses.
+import * as THREE from "three";
+import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
+import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
+import { LineMaterial } from "three/addons/lines/LineMaterial.js";
+import { at } from "./dom.js";
+import { ACCENT } from "./scene/looks.js";
+import { FREE } from "./scene/view.js";
+
+const WIDTH = 3; // px, of the path
+const BOX = 0x364fc7;
+const NEAR = 0.5; // m, what is framed about the drone
+const EDGES = [0, 1, 2, 3, 4, 5, 6, 7].flatMap((corner) => [1, 2, 4].filter((side) => !(corner & side)).map((side) => [corner, corner | side]));
+
+// Values of a file that a report's page loads as a script: report.NAME = {...};
+async function valueOf(address) {
+  const answer = await fetch(address);
+  if (!answer.ok) throw new Error("the recording of this flight is gone: grade the script again");
+  const text = await answer.text();
+  return JSON.parse(text.slice(text.indexOf("{"), text.lastIndexOf("}") + 1));
+}
+
+export class Replay {
+  constructor(scene, store) {
+    Object.assign(this, { scene, store, flight: null, starts: 0 });
+    at("replay-play").onclick = () => this.play(!this.isPlaying);
+    at("replay-time").oninput = () => (this.play(false), this.show(at("replay-time").valueAsNumber));
+    at("replay-close").onclick = () => this.close();
+    window.addEventListener("keydown", (event) => event.key === "Escape" && !event.defaultPrevented && !event.target.closest?.("dialog") && this.close());
+    store.on(({ starts }) => starts !== this.starts && this.close());
+  }
+
+  // Shows a second of a flight of a report; `folder` is that of its page.
+  async open(folder, flight, seed, second) {
+    const address = `${folder}flights/${flight}.js`;
+    if (this.flight?.address !== address) {
+      const figures = await valueOf(address);
+      const { boxes } = figures.scene ?? (await valueOf(`${folder}files/scene.js`));
+      this.close();
+      this.begin({ address, seed, ...figures }, boxes);
+    }
+    this.show(second);
+    this.frame();
+  }
+
+  begin(flight, boxes) {
+    const { scene } = this;
+    this.flight = flight;
+    this.starts = this.store.now.starts;
+    this.before = { view: scene.view.name, focus: document.activeElement };
+    this.ghost = ghostOf(scene);
+    this.group = new THREE.Group().add(this.ghost, pathOf(flight), outlines(boxes));
+    scene.world.add(this.group);
+    const slider = at("replay-time");
+    Object.assign(slider, { min: flight.t[0], max: flight.t.at(-1), step: 0.05 });
+    at("replay").hidden = false;
+    document.body.classList.add("replaying");
+    scene.turn(FREE);
+    scene.replay = this;
+    scene.rearrange();
+    slider.focus();
+  }
+
+  close() {
+    if (!this.flight) return;
+    this.play(false);
+    this.flight = this.scene.replay = null;
+    this.group.removeFromParent();
+    this.group.traverse((one) => one.userData.isOwn && one.geometry.dispose());
+    at("replay").hidden = true;
+    document.body.classList.remove("replaying");
+    this.scene.turn(this.before.view);
+    this.scene.rearrange();
+    this.before.focus?.focus();
+  }
+
+  // Puts the drone where it was at a second, s; the eyes go with it.
+  show(second) {
+    const { t, x, y, z, roll, pitch, yaw } = this.flight;
+    const found = t.findIndex((one) => one >= second);
+    const row = found < 0 ? t.length - 1 : found;
+    const place = new THREE.Vector3(x[row], y[row], z[row]);
+    this.scene.view.center.add(place.clone().sub(this.ghost.position));
+    this.ghost.position.copy(place);
+    this.ghost.rotation.set(roll[row], pitch[row], yaw[row], "ZYX");
+    this.second = t[row];
+    at("replay-time").value = t[row];
+    at("replay-time").setAttribute("aria-valuetext", `${t[row].toFixed(2)} s`);
+    at("replay-text").textContent = `Replay, seed ${this.flight.seed}: ${t[row].toFixed(2)} s`;
+    this.scene.change();
+  }
+
+  frame() {
+    this.scene.view.lookAt(this.ghost.position, NEAR);
+    this.scene.change();
+  }
+
+  play(on) {
+    this.isPlaying = on;
+    at("replay-play").setAttribute("aria-pressed", String(on));
+    cancelAnimationFrame(this.asked);
+    if (!on) return;
+    if (this.second >= this.flight.t.at(-1)) this.show(this.flight.t[0]);
+    const began = performance.now() - 1000 * this.second;
+    const go = (now) => {
+      this.show((now - began) / 1000);
+      if (this.second >= this.flight.t.at(-1)) return this.play(false);
+      this.asked = requestAnimationFrame(go);
+    };
+    this.asked = requestAnimationFrame(go);
+  }
+}
+
+// The drone of the scene in one colour, or a ball where there is none.
+function ghostOf(scene) {
+  const paint = new THREE.MeshLambertMaterial({ color: ACCENT, transparent: true, opacity: 0.8, side: THREE.DoubleSide });
+  const ghost = new THREE.Group();
+  const base = scene.baseOf(scene.vehicle);
+  scene.world.updateMatrixWorld();
+  const back = base?.matrixWorld.clone().invert();
+  for (const mesh of base ? scene.meshesOf(scene.vehicle) : []) {
+    const part = new THREE.Mesh(mesh.geometry, paint);
+    part.matrixAutoUpdate = false;
+    part.matrix.multiplyMatrices(back, mesh.matrixWorld);
+    ghost.add(part);
+  }
+  if (!base) ghost.add(own(new THREE.Mesh(new THREE.SphereGeometry(0.15), paint)));
+  return ghost;
+}
+
+function own(object) {
+  object.userData.isOwn = true;
+  object.raycast = () => {};
+  return object;
+}
+
+function lines(points, look) {
+  return own(new LineSegments2(new LineSegmentsGeometry().setPositions(points), new LineMaterial(look)));
+}
+
+function pathOf({ t, x, y, z }) {
+  const points = [];
+  for (let row = 1; row < t.length; row++) points.push(x[row - 1], y[row - 1], z[row - 1], x[row], y[row], z[row]);
+  return lines(points, { color: ACCENT, linewidth: WIDTH });
+}
+
+// The edges of boxes about what stood in the scene of the flight, which may not be the scene that is shown.
+function outlines(boxes) {
+  const points = boxes.flatMap(({ corners }) => EDGES.flatMap(([from, to]) => [...corners[from], ...corners[to]]));
+  return points.length ? lines(points, { color: BOX, linewidth: 1 }) : new THREE.Group();
+}
