@@ -51,7 +51,6 @@ class Endpoint:
 
     @property
     def port(self) -> int:
-        """The port on which it listens."""
         return int(self.address.rpartition(":")[2])
 
     def watch(self, number: int) -> None:
@@ -93,7 +92,6 @@ class Endpoint:
         return connections
 
     def close(self) -> None:
-        """Close the socket and all connections."""
         self._socket.disable_monitor()
         self._disconnections.close(linger=0)
         self._socket.close()

@@ -69,13 +69,11 @@ class RemoteApiServer(RemoteApi):
         self._endpoint.watch(number)
 
     def wait(self, seconds: float) -> None:
-        """Sleep for `seconds`, or until a request has been handled."""
         if not self._resume_waiting():
             self._endpoint.wait(min(seconds, _CHECK_INTERVAL) if self._waiting else seconds)
         self.serve()
 
     def serve(self) -> None:
-        """Handle the requests received."""
         self._moved.watch()
         self._remove_lost_clients()
         self._resume_waiting()
@@ -86,11 +84,9 @@ class RemoteApiServer(RemoteApi):
             self._take(incoming)
 
     def wake(self) -> None:
-        """End a `wait`; any thread may call it."""
         self._endpoint.wake()
 
     def close(self) -> None:
-        """Disconnect all clients, and close the port."""
         for client in self._clients.values():
             client.leave()
         self._clients.clear()

@@ -39,24 +39,19 @@ class RemoteApiServers(RemoteApi):
 
     @property
     def holds(self) -> bool:
-        """Whether a client in stepping mode has not requested the next step yet."""
         return self.zeromq.holds or self.legacy.holds
 
     def wait(self, seconds: float) -> None:
-        """Sleep for `seconds`, or until a request has been handled."""
         self.zeromq.wait(0.0 if self.legacy.has_work else seconds)
         self.legacy.serve()
 
     def serve(self) -> None:
-        """Handle the requests received."""
         self.zeromq.serve()
         self.legacy.serve()
 
     def wake(self) -> None:
-        """End a `wait`; any thread may call it."""
         self.zeromq.wake()
 
     def close(self) -> None:
-        """Disconnect all clients, and close the ports."""
         self.legacy.close()
         self.zeromq.close()

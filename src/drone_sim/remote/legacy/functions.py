@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from drone_sim.remote.legacy.groups import GROUPS
-from drone_sim.remote.legacy.joints import JOINTS
-from drone_sim.remote.legacy.objects import OBJECTS
+from drone_sim.remote.legacy.objects import JOINTS, OBJECTS
 from drone_sim.remote.legacy.request import Handler, Request, Table
-from drone_sim.remote.legacy.scripts import SCRIPTS
+from drone_sim.remote.legacy.scripts import SCRIPTS, SIGNALS
 from drone_sim.remote.legacy.sensors import SENSORS
-from drone_sim.remote.legacy.signals import SIGNALS
 from drone_sim.remote.legacy.simulator import SIMULATOR
 from drone_sim.remote.legacy.windows import WINDOWS
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from drone_sim.remote.legacy.request import Handler, Request, Table
-from drone_sim.remote.legacy.values import floats, ints, text
+from drone_sim.remote.legacy.request import Handler, Request, Table, floats, ints, text
 
 _SCENE, _ALL, _PARENT, _WORLD = -12, -2, -11, -1  # sim.handle_...
 _ANY, _OBJECT_TYPES = 109, 20  # sim_appobj_object_type; object types are below 20

@@ -1,22 +1,10 @@
-"""Object commands: handles, poses, velocities, parents, parameters, copying and removal."""
+"""Commands for objects and joints: poses, parents, parameters, positions, targets and forces."""
 
 from __future__ import annotations
 
-from drone_sim.remote.legacy.request import Handler, Request, Table, nothing
-from drone_sim.remote.legacy.values import counted, floats, ints
+from drone_sim.remote.legacy.request import Handler, Request, Table, counted, direct, floats, ints, nothing, vector
 
 _SCENE = -12  # sim.handle_scene
-
-
-def _get_pose(function: str) -> Handler:
-    return Handler(f"simxG{function[1:]}", lambda request: floats(*request.sim(function, *request.key)))
-
-
-def _get_pose_3_1(function: str) -> Handler:
-    """Return the older form of a command, whose data is the handle of the reference object."""
-    return Handler(
-        f"simxG{function[1:]}", lambda request: floats(*request.sim(function, *request.key, *request.take("i")))
-    )
 
 
 def _set_pose(function: str, count: int) -> Handler:
@@ -47,12 +35,6 @@ def _parameter(function: str, layout: str) -> Handler:
     return Handler(f"simxG{function[1:]}", read)
 
 
-def _set_parameter(function: str, layout: str) -> Handler:
-    return Handler(
-        f"simxS{function[1:]}", lambda request: nothing(request.sim(function, *request.key, *request.take(layout)))
-    )
-
-
 def _copy(request: Request) -> bytes:
     return counted(request.sim("copyPasteObjects", request.handles()))
 
@@ -68,34 +50,48 @@ def _create_dummy(request: Request) -> bytes:
 
 
 OBJECTS: Table = {
-    0x3001: Handler("simxGetObjectHandle", lambda request: ints(request.sim("getObjectHandle", *request.key))),
-    0x3019: Handler("simxGetCollectionHandle", lambda request: ints(request.sim("getCollectionHandle", *request.key))),
+    0x3001: direct("getObjectHandle", ints),
+    0x3019: direct("getCollectionHandle", ints),
     0x102A: Handler("simxGetObjects", lambda request: counted(request.sim("getObjectsInTree", _SCENE, *request.key))),
-    0x1012: Handler("simxGetObjectParent", lambda request: ints(request.sim("getObjectParent", *request.key))),
+    0x1012: direct("getObjectParent", ints),
     0x101C: Handler("simxSetObjectParent", _set_parent),
-    0x200B: Handler("simxGetObjectChild", lambda request: ints(request.sim("getObjectChild", *request.key))),
-    0x200E: _get_pose("getObjectPosition"),
-    0x200D: _get_pose("getObjectOrientation"),
-    0x2801: _get_pose("getObjectQuaternion"),
-    0x1019: _get_pose_3_1("getObjectPosition"),
-    0x1018: _get_pose_3_1("getObjectOrientation"),
+    0x200B: direct("getObjectChild", ints),
+    0x200E: direct("getObjectPosition", vector),
+    0x200D: direct("getObjectOrientation", vector),
+    0x2801: direct("getObjectQuaternion", vector),
+    0x1019: direct("getObjectPosition", vector, "i"),  # older: the handle of the reference object is in the data
+    0x1018: direct("getObjectOrientation", vector, "i"),
     0x101B: _set_pose("setObjectPosition", 3),
     0x101A: _set_pose("setObjectOrientation", 3),
     0x1801: _set_pose("setObjectQuaternion", 4),
     0x1036: Handler("simxGetObjectVelocity", _velocity),
     0x2007: _parameter("getObjectFloatParameter", "f"),
     0x2008: _parameter("getObjectIntParameter", "i"),
-    0x2009: _set_parameter("setObjectFloatParameter", "f"),
-    0x200A: _set_parameter("setObjectIntParameter", "i"),
-    0x1034: Handler("simxGetModelProperty", lambda request: ints(request.sim("getModelProperty", *request.key))),
-    0x1035: Handler(
-        "simxSetModelProperty",
-        lambda request: nothing(request.sim("setModelProperty", *request.key, *request.take("i"))),
-    ),
+    0x2009: direct("setObjectFloatParameter", nothing, "f"),
+    0x200A: direct("setObjectIntParameter", nothing, "i"),
+    0x1034: direct("getModelProperty", ints),
+    0x1035: direct("setModelProperty", nothing, "i"),
     0x102E: Handler("simxCopyPasteObjects", _copy),
-    0x1028: Handler("simxRemoveObject", lambda request: nothing(request.sim("removeObject", *request.key))),
-    0x1037: Handler("simxRemoveModel", lambda request: nothing(request.sim("removeModel", *request.key))),
+    0x1028: direct("removeObject", nothing),
+    0x1037: direct("removeModel", nothing),
     0x0006: Handler("simxGetObjectSelection", lambda request: counted(request.context.selected)),
     0x102F: Handler("simxSetObjectSelection", _select),
     0x0009: Handler("simxCreateDummy", _create_dummy),
+}
+
+
+def _set_spherical_matrix(request: Request) -> bytes:
+    return nothing(request.sim("setSphericalJointMatrix", *request.key, list(request.take("12f"))))
+
+
+JOINTS: Table = {
+    0x1001: direct("getJointPosition", floats),
+    0x1002: direct("setJointPosition", nothing, "f"),
+    0x1008: direct("setJointTargetVelocity", nothing, "f"),
+    0x100C: direct("setJointTargetPosition", nothing, "f"),
+    0x100D: direct("getJointForce", floats),
+    0x100E: direct("setJointForce", nothing, "f"),
+    0x1038: direct("getJointMaxForce", floats),
+    0x100A: direct("getJointMatrix", vector),
+    0x100B: Handler("simxSetSphericalJointMatrix", _set_spherical_matrix),
 }

@@ -1,14 +1,17 @@
-"""A command of a client, with access to the script API to execute it."""
+"""A command of a client, with access to the script API to execute it, and the encoding of its reply."""
 
 from __future__ import annotations
 
+import math
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from drone_sim.remote.client import one_line
 from drone_sim.remote.legacy.wire import Command
 from drone_sim.scripting.api.calls import Function
+
+_MAX_FLOAT = 3.4028234663852886e38  # largest finite single-precision number
 
 
 class Refused(Exception):
@@ -74,6 +77,61 @@ class Handler(NamedTuple):
 Table = dict[int, Handler]  # by command code
 
 
+def direct(function: str, encode: Callable[[Any], bytes], layout: str = "", name: str = "") -> Handler:
+    """Return the handler of a command that is one call of the script API.
+
+    Arguments are the command's key, then the numbers in its data with a struct `layout`; `encode` writes the result.
+    Without a `name`, the client's function has the API's name, with the prefix simx.
+    """
+
+    def call(request: Request) -> bytes:
+        return encode(request.sim(function, *request.key, *(request.take(layout) if layout else ())))
+
+    return Handler(name or f"simx{function[0].upper()}{function[1:]}", call)
+
+
 def nothing(_returned: Any) -> bytes:
     """Return the empty reply of a function without a result."""
     return b""
+
+
+def floats(*values: float) -> bytes:
+    """Return single-precision numbers; values beyond their range become infinite."""
+    layout = f"<{len(values)}f"
+    try:
+        return struct.pack(layout, *values)
+    except OverflowError:
+        return struct.pack(layout, *(x if abs(x) <= _MAX_FLOAT else math.copysign(math.inf, x) for x in values))
+
+
+def vector(values: Iterable[float]) -> bytes:
+    """Return the single-precision numbers of a list."""
+    return floats(*values)
+
+
+def ints(*values: float) -> bytes:
+    """Return 32-bit integers."""
+    return struct.pack(f"<{len(values)}i", *map(int, values))
+
+
+def counted(values: Iterable[int]) -> bytes:
+    """Return the number of integers, and the integers."""
+    numbers = list(values)
+    return ints(len(numbers), *numbers)
+
+
+def raw(value: str | bytes) -> bytes:
+    return value.encode("utf-8", "surrogateescape") if isinstance(value, str) else value
+
+
+def text(value: str | bytes) -> bytes:
+    """Return a zero-terminated string."""
+    return raw(value) + b"\0"
+
+
+def string(data: bytes) -> str | bytes:
+    """Return a string as scripts represent it: bytes if it is not valid UTF-8."""
+    try:
+        return data.decode()
+    except UnicodeDecodeError:
+        return data

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from drone_sim.remote.legacy.request import Handler, Request, Table, nothing
-from drone_sim.remote.legacy.values import floats, ints
+from drone_sim.remote.legacy.request import Handler, Request, Table, direct, floats, ints, nothing
 
 _GREY = 1  # option of getVisionSensorImg
 
@@ -58,7 +57,7 @@ SENSORS: Table = {
     0x1011: Handler("simxReadVisionSensor", _read_vision),
     0x1009: Handler("simxReadProximitySensor", _proximity),
     0x100F: Handler("simxReadForceSensor", _force),
-    0x1010: Handler("simxBreakForceSensor", lambda request: nothing(request.sim("breakForceSensor", *request.key))),
-    0x200F: Handler("simxCheckCollision", lambda request: ints(request.sim("checkCollision", *request.key)[0])),
+    0x1010: direct("breakForceSensor", nothing),
+    0x200F: direct("checkCollision", lambda result: ints(result[0])),
     0x2010: Handler("simxCheckDistance", _distance),
 }

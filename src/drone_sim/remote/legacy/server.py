@@ -12,8 +12,7 @@ from drone_sim.message_text import printable
 from drone_sim.remote.client import Client
 from drone_sim.remote.control import MovedObjects
 from drone_sim.remote.conversation import RemoteApi, Stepping, Task, Until, Watched, unwatched
-from drone_sim.remote.legacy.connection import Connection
-from drone_sim.remote.legacy.listeners import Listeners
+from drone_sim.remote.legacy.connection import Connection, Listeners
 from drone_sim.remote.legacy.session import Session
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
@@ -83,7 +82,6 @@ class LegacyServer(RemoteApi):
 
     @property
     def holds(self) -> bool:
-        """Whether the next step has to wait for a client."""
         return any(guest.session.holds for guest in self._guests.values())
 
     @property
@@ -92,7 +90,6 @@ class LegacyServer(RemoteApi):
         return bool(self._pending) or any(guest.until and guest.until.over() for guest in self._guests.values())
 
     def wait(self, seconds: float) -> None:
-        """Sleep for `seconds`, or until a request has been handled."""
         if not self.has_work:
             self._epoll.poll(seconds)
         self.serve()
@@ -113,7 +110,6 @@ class LegacyServer(RemoteApi):
             self._disconnect_silent()
 
     def close(self) -> None:
-        """Disconnect all clients, and close the ports."""
         for guest in list(self._guests.values()):
             self._disconnect(guest)
         self._listeners.close()

@@ -14,9 +14,8 @@ from drone_sim.remote.client import Client
 from drone_sim.remote.conversation import Task, Until
 from drone_sim.remote.legacy import wire
 from drone_sim.remote.legacy.functions import served
-from drone_sim.remote.legacy.request import HandlerFunction, Refused, Request, RequestContext
-from drone_sim.remote.legacy.signals import TAKE_STRING
-from drone_sim.remote.legacy.values import ints, text
+from drone_sim.remote.legacy.request import HandlerFunction, Refused, Request, RequestContext, ints, text
+from drone_sim.remote.legacy.scripts import TAKE_STRING
 from drone_sim.remote.legacy.wire import Answer, Command
 from drone_sim.run.player import Player
 from drone_sim.scripting import script_log

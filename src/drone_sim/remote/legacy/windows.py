@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from drone_sim.remote.legacy.request import Handler, Request, Table, nothing
-from drone_sim.remote.legacy.values import ints, text
+from drone_sim.remote.legacy.request import Handler, Request, Table, direct, ints, nothing, text
 
 _NO_BUTTON = -1
 _SKIPPED = 0  # clients skip a number, because they expect a key of two numbers
@@ -20,10 +19,6 @@ def _open_console(request: Request) -> bytes:
 def _print(request: Request) -> bytes:
     printed = request.data.rstrip(b"\0").decode("utf-8", "replace") if request.data else None
     return nothing(request.sim("auxiliaryConsolePrint", *request.key, printed))
-
-
-def _show(request: Request) -> bytes:
-    return nothing(request.sim("auxiliaryConsoleShow", *request.key, *request.take("i")))
 
 
 def _open_dialog(request: Request) -> bytes:
@@ -43,30 +38,22 @@ def _close_dialog(request: Request) -> bytes:
     return b""
 
 
-def _set_ui(name: str, function: str) -> Handler:
-    return Handler(name, lambda request: nothing(request.sim(function, *request.key)))
-
-
 WINDOWS: Table = {
-    0x3008: Handler(
-        "simxAddStatusbarMessage", lambda request: nothing(request.sim("addStatusbarMessage", *request.key))
-    ),
+    0x3008: direct("addStatusbarMessage", nothing),
     0x3009: Handler("simxAuxiliaryConsoleOpen", _open_console),
-    0x1014: Handler(
-        "simxAuxiliaryConsoleClose", lambda request: nothing(request.sim("auxiliaryConsoleClose", *request.key))
-    ),
+    0x1014: direct("auxiliaryConsoleClose", nothing),
     0x1015: Handler("simxAuxiliaryConsolePrint", _print),
-    0x1016: Handler("simxAuxiliaryConsoleShow", _show),
+    0x1016: direct("auxiliaryConsoleShow", nothing, "i"),
     0x300C: Handler("simxDisplayDialog", _open_dialog),
     0x102B: Handler("simxEndDialog", _close_dialog),
-    0x102C: Handler("simxGetDialogInput", lambda request: text(request.sim("getDialogInput", *request.key))),
-    0x102D: Handler("simxGetDialogResult", lambda request: ints(request.sim("getDialogResult", *request.key))),
-    0x3007: Handler("simxGetUIHandle", lambda request: ints(request.sim("getUIHandle", *request.key))),
-    0x2001: Handler("simxGetUISlider", lambda request: ints(request.sim("getUISlider", *request.key))),
-    0x2002: _set_ui("simxSetUISlider", "setUISlider"),
-    0x1029: _set_ui("simxRemoveUI", "removeUI"),
+    0x102C: direct("getDialogInput", text),
+    0x102D: direct("getDialogResult", ints),
+    0x3007: direct("getUIHandle", ints),
+    0x2001: direct("getUISlider", ints),
+    0x2002: direct("setUISlider", nothing),
+    0x1029: direct("removeUI", nothing),
     0x2003: Handler("simxGetUIEventButton", lambda request: ints(_SKIPPED, _NO_BUTTON, 0, 0)),
-    0x2004: Handler("simxGetUIButtonProperty", lambda request: ints(request.sim("getUIButtonProperty", *request.key))),
-    0x2005: _set_ui("simxSetUIButtonProperty", "setUIButtonProperty"),
-    0x2006: _set_ui("simxSetUIButtonLabel", "setUIButtonLabel"),
+    0x2004: direct("getUIButtonProperty", ints),
+    0x2005: direct("setUIButtonProperty", nothing),
+    0x2006: direct("setUIButtonLabel", nothing),
 }

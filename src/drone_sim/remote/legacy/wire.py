@@ -85,7 +85,6 @@ class Packets:
     """Joins the packets of a connection into messages, and splits answers into packets that its client can read."""
 
     def __init__(self) -> None:
-        """Start with an empty buffer."""
         self._is_old = False  # whether the client sends and requires checksums, as up to V-REP 3.1
         self._bytes = bytearray()
         self._at = 0  # offset of the next packet
@@ -93,7 +92,6 @@ class Packets:
         self._left: int | None = None  # missing packets of an incomplete message
 
     def add(self, received: bytes) -> None:
-        """Append received data."""
         del self._bytes[: self._at]
         self._at = 0
         self._bytes += received
@@ -102,7 +100,16 @@ class Packets:
         """Return the next message, None if it is incomplete. Raises ValueError, in one line, for an invalid one."""
         while len(self._bytes) - self._at >= _PACKET.size:
             first, size, left = _PACKET.unpack_from(self._bytes, self._at)
-            self._check(first, size, left)
+            if first != 1:
+                raise ValueError(f"malformed packet: it begins with {first & _CODE:#06x}, must begin with 0x0001")
+            if size <= 0 or left < 0:
+                raise ValueError(f"malformed packet: {size} bytes, followed by {left} packets")
+            if self._left is not None and left != self._left - 1:
+                raise ValueError(
+                    f"malformed packet: {left} packets must follow it, but the one before announced {self._left - 1}"
+                )
+            if len(self._message) + size > LARGEST:
+                raise ValueError(f"a message has more than {LARGEST} bytes")
             begin = self._at + _PACKET.size
             if len(self._bytes) < begin + size:
                 return None
@@ -116,23 +123,10 @@ class Packets:
         return None
 
     def of(self, answer: bytes) -> bytes:
-        """Return a reply as packets."""
         if not self._is_old:
             return packets(answer, _PIECE)
         check_sum = struct.pack("<H", binascii.crc_hqx(answer[2:], 0))
         return packets(check_sum + answer[2:], max(_OLD_PIECE, -(-len(answer) // _MAX_PACKETS)))
-
-    def _check(self, first: int, size: int, left: int) -> None:
-        if first != 1:
-            raise ValueError(f"malformed packet: it begins with {first & _CODE:#06x}, must begin with 0x0001")
-        if size <= 0 or left < 0:
-            raise ValueError(f"malformed packet: {size} bytes, followed by {left} packets")
-        if self._left is not None and left != self._left - 1:
-            raise ValueError(
-                f"malformed packet: {left} packets must follow it, but the one before announced {self._left - 1}"
-            )
-        if len(self._message) + size > LARGEST:
-            raise ValueError(f"a message has more than {LARGEST} bytes")
 
 
 def packets(message: bytes, piece: int) -> bytes:
