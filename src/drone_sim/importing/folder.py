@@ -97,7 +97,6 @@ class Report:
     """The differences from the V-REP file, one line for each; objects with the same difference share a line."""
 
     def __init__(self) -> None:
-        """Create an empty report."""
         self.notes: list[str] = []  # what works the same in another way
         self.unsupported: list[str] = []  # what will not work in the scene
         self._names: dict[str, list[str]] = {}

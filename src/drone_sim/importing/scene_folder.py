@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from drone_sim.files.yaml_writing import dump
-from drone_sim.importing import object_collections
-from drone_sim.importing.entries import Entries
+from drone_sim.importing.entries import Entries, collection_entries
 from drone_sim.importing.folder import LIST, Folder, Report, label, number, pose_keys
 from drone_sim.importing.placing import Placed, floor_parts, floor_size, placed
 from drone_sim.importing.quadricopters import find, plain_name
@@ -160,7 +159,7 @@ class _Import:
             content["scripts"] = scripts
         imported_ids = self._kept | self._of_vehicles
         names = {node.object.handle: node.name for node in self._objects if id(node) in imported_ids}
-        collections = list(object_collections.entries(self._file.collections, names, self._report))
+        collections = list(collection_entries(self._file.collections, names, self._report))
         if collections:
             content["collections"] = collections
         self._write(content)

@@ -82,7 +82,6 @@ def color(surfaces: Sequence[Surface]) -> Rgba | None:
 
 
 def has_triangles(mesh: VrepMesh) -> bool:
-    """Return whether a mesh has triangles."""
     return len(mesh.faces) > 0
 
 

@@ -54,7 +54,10 @@ class VehicleUrdf:
                 mass = max(mass, _MIN_MASS) if mass else 0.0
                 _add_inertial(Xml.SubElement(self._robot, "link", name=name), mass, IDENTITY, (0.0, 0.0, 0.0))
             self._joint(name, "base_link", frames.relative(root.matrix, frame))
-        self._add_front_camera()
+        # The frame of drone_sim's front camera, at the front of the body.
+        _add_inertial(Xml.SubElement(self._robot, "link", name="front_optical"), 0.0, IDENTITY, (0.0, 0.0, 0.0))
+        forward = frames.from_rpy((0.16, 0.0, 0.0), (-1.5707963267948966, 0.0, -1.5707963267948966))
+        self._joint("front_optical", "base_link", forward)
         Xml.indent(self._robot)
         return f'<?xml version="1.0"?>\n{Xml.tostring(self._robot, encoding="unicode")}\n'
 
@@ -109,12 +112,6 @@ class VehicleUrdf:
         _add_origin(joint, place)
         if kind != "fixed":
             Xml.SubElement(joint, "axis", xyz="0 0 1")
-
-    def _add_front_camera(self) -> None:
-        """Add the frame of drone_sim's front camera, at the front of the body."""
-        _add_inertial(Xml.SubElement(self._robot, "link", name="front_optical"), 0.0, IDENTITY, (0.0, 0.0, 0.0))
-        forward = frames.from_rpy((0.16, 0.0, 0.0), (-1.5707963267948966, 0.0, -1.5707963267948966))
-        self._joint("front_optical", "base_link", forward)
 
     # ---- looks
 
