@@ -56,7 +56,6 @@ class Breakpoints:
         self.reached: Reached | None = None  # the first one in the step
 
     def __bool__(self) -> bool:
-        """Return whether there are any."""
         return bool(self._lines)
 
     def set(self, lines: Mapping[str, frozenset[int]]) -> bool:
@@ -72,7 +71,6 @@ class Breakpoints:
         return self._lines
 
     def lines(self, file: str) -> frozenset[int]:
-        """Return the lines of a file."""
         if file not in self._known:
             self._known[file] = self._lines.get(os.path.realpath(file), frozenset())
         return self._known[file]

@@ -130,7 +130,6 @@ class TimeLimit:
         return f"stopped after {self.seconds:g} s without returning (script_time_limit)"
 
     def start(self) -> None:
-        """Start to measure the time."""
         self._expired = False
         self._deadline = monotonic() + self.seconds
 

@@ -137,7 +137,8 @@ class VisionSensors(Functions):
         Depth is 0 at the near plane and 1 at the far plane. If colors are handles, the numbers are the visible handles.
         Python gets at least three values, as CoppeliaSim documents; the third is empty without a script.
         """
-        detected = self._detected(handle)
+        found = self._objects[bare(handle)]
+        detected = found.detected if isinstance(found, Eye) else Detected()
         packets = [np.frombuffer(packet, "<f4").tolist() for packet in detected.packets]
         return int(detected.trigger), self._statistics(handle), *(packets or [()])
 
@@ -181,10 +182,6 @@ class VisionSensors(Functions):
         intensities, depths = colors / np.float32(255), self._depths(bare(handle), only=only)[::-1].ravel()
         channels = np.column_stack([intensities.mean(1), intensities, depths])
         return [*channels.min(0).tolist(), *channels.max(0).tolist(), *channels.mean(0).tolist()]
-
-    def _detected(self, handle: int) -> Detected:
-        found = self._objects[bare(handle)]
-        return found.detected if isinstance(found, Eye) else Detected()
 
     def _colors(
         self,

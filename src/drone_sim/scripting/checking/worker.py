@@ -29,7 +29,6 @@ class Checker:
         self._flat = {*flat, "sim_call_type", *(f"sim_{constant}" for constant in contents(modules["sim"])[2])}
 
     def check(self, text: str, is_lua: bool) -> list[Finding]:
-        """Return the mistakes in a script."""
         if not is_lua:
             return check_python(text, self._known)
         try:

@@ -247,7 +247,11 @@ class LuaScript(Script):
     def _failure(self, phase: str, status: Any, details: Sequence[Any]) -> ScriptError:
         """Return the error for a status from Lua; `details` are a message, or line and file where it was stopped."""
         if status is False:
-            return self._error_with_line(phase, details[0])
+            text = details[0].decode("utf-8", "replace").partition("\nstack traceback:")[0]
+            if text == "not enough memory":
+                return self._error(phase, _ABOUT_MEMORY)
+            path, line, text = self._helpers.parse_message(text)
+            return ScriptError(phase, path, line, text + self._hint(text))
         if status == state.TIME:
             return self._error(phase, str(self._limit), *details)
         if status == state.OVER_MEMORY:
@@ -257,13 +261,6 @@ class LuaScript(Script):
 
     def _error(self, phase: str, message: str, line: int = 0, chunk: bytes = b"") -> ScriptError:
         return ScriptError(phase, self._helpers.path(chunk.decode("utf-8", "replace")), int(line), message)
-
-    def _error_with_line(self, phase: str, message: bytes) -> ScriptError:
-        text = message.decode("utf-8", "replace").partition("\nstack traceback:")[0]
-        if text == "not enough memory":
-            return self._error(phase, _ABOUT_MEMORY)
-        path, line, text = self._helpers.parse_message(text)
-        return ScriptError(phase, path, line, text + self._hint(text))
 
     def _hint(self, text: str) -> str:
         """Return a hint for an error about nil: similar names, or the reason why a plugin is missing."""

@@ -161,7 +161,6 @@ class LuaState:
             self.runtime.execute(text, table, self.sandbox, chunk, name=file)
 
     def close(self) -> None:
-        """Free the Lua state."""
         self.runtime = self.sandbox = None
         self.values.close()
         self.used = int

@@ -57,7 +57,6 @@ class SameThread:
             self._limit.hide()
 
     def close(self) -> None:
-        """Close the API."""
         self.closed = True
 
 

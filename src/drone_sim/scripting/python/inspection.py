@@ -119,15 +119,11 @@ def _show(value: Any, digits: str) -> str:
         bits = int.bit_length(value)
         return int.__repr__(value) if bits <= _LONG else f"a number of {bits} bits"
     if issubclass(kind, (str, bytes, bytearray)):
-        return _show_text(value, kind)
+        base = _base(kind, (str, bytes, bytearray))
+        return str(repr(base.__getitem__(value, slice(0, LONGEST_VALUE))))
     if kind is complex:
         return repr(value)
     return _show_collection(value, kind)
-
-
-def _show_text(value: Any, kind: type) -> str:
-    base = _base(kind, (str, bytes, bytearray))
-    return str(repr(base.__getitem__(value, slice(0, LONGEST_VALUE))))
 
 
 def _show_collection(value: Any, kind: type) -> str:

@@ -16,7 +16,7 @@ from drone_sim.scripting.api.scripts import FunctionsOfScript
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.rpc import effects, values
 from drone_sim.scripting.rpc.api_stubs import NO_ANSWERS, Answers, ApiStubs
-from drone_sim.scripting.rpc.channel import Channel, Disconnected
+from drone_sim.scripting.rpc.connection import Channel, Disconnected
 from drone_sim.scripting.time_limit import TimeLimit
 
 _MAX_QUEUED = 1000  # items in a message
@@ -64,7 +64,6 @@ class ScriptWorker:
         return content
 
     def queue(self, item: list[Any]) -> None:
-        """Queue an item for the next message."""
         self._queued.append(item)
         if len(self._queued) > _MAX_QUEUED:
             self._send()
@@ -99,7 +98,6 @@ class ScriptWorker:
         return FunctionsOfScript(self._caller.call_script_function, script)
 
     def marked(self, value: Any) -> Any:
-        """Return a value encoded for a message."""
         return values.marked(value, self._number)
 
     def _number(self, function: Any) -> int:
@@ -159,7 +157,6 @@ class _LoadedScript:
 
     @property
     def is_threaded(self) -> bool:
-        """Whether the script has an unfinished thread."""
         return self._script.threaded
 
     def do(self, command: str, arguments: list[Any], answers: Any) -> Any:

@@ -19,8 +19,7 @@ from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.breakpoints import Scope
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.rpc import effects, values
-from drone_sim.scripting.rpc.channel import Disconnected
-from drone_sim.scripting.rpc.connection import ScriptConnection
+from drone_sim.scripting.rpc.connection import Disconnected, ScriptConnection
 from drone_sim.scripting.rpc.expected_reads import ExpectedReads
 from drone_sim.scripting.rpc.places import Place
 from drone_sim.scripting.rpc.values import ALL_PLAIN, PLAIN, InvalidMessage, ScriptFunction, kind_of
