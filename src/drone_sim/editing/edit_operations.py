@@ -26,7 +26,6 @@ class EditOperations:
     """Executes operation records on objects of the scene, vehicles or the floor."""
 
     def __init__(self, simulation: Simulation):
-        """Edit this scene."""
         self._simulation = simulation
         self._objects, self._vehicles = ObjectEdits(simulation), VehicleEdits(simulation)
 

@@ -47,7 +47,6 @@ class SceneEditor:
 
     @property
     def is_modified(self) -> bool:
-        """Whether the scene differs from its file."""
         return self.revision != self._saved
 
     @property
@@ -83,7 +82,12 @@ class SceneEditor:
             simulation.read_at_start()
         if run != self._run:
             if self._run != -1:
-                self._stop()
+                # Stop has reverted the edits made since the start.
+                before, was_modified = self._started
+                self.history.stop()
+                if self.revision != before:
+                    self.revision += 1
+                    self._saved = self._saved if was_modified else self.revision
             if run != -1:
                 self.history.start()
                 self._started = self.revision, self.is_modified
@@ -93,14 +97,6 @@ class SceneEditor:
         self.history.clear()
         self.revision += 1
         self._saved, self._run = self.revision, -1  # stop does not revert edits of another scene
-
-    def _stop(self) -> None:
-        """Update history and revision: stop has reverted the edits made since the start."""
-        before, was_modified = self._started
-        self.history.stop()
-        if self.revision != before:
-            self.revision += 1
-            self._saved = self._saved if was_modified else self.revision
 
     def answer(self, message: Any) -> dict[str, Any]:
         """Execute a request and return the answer. Raises ValueError and OSError; then nothing has changed."""

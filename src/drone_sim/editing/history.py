@@ -21,7 +21,6 @@ class History:
     """The steps that can be undone and redone."""
 
     def __init__(self) -> None:
-        """Start with an empty history."""
         self._done: list[Step] = []
         self._undone: list[Step] = []
         self._at_start: tuple[list[Step], list[Step]] | None = None  # both lists at the start of the simulation

@@ -30,7 +30,6 @@ class ObjectEdits:
     """Operations on scene objects; each returns the handles of created or changed objects. All raise ValueError."""
 
     def __init__(self, simulation: Simulation):
-        """Edit this scene."""
         self._simulation = simulation
 
     # ---- adding and removing
@@ -42,11 +41,6 @@ class ObjectEdits:
         entries, scripts = models.Model(**content).checked()
         if op.position is not None:
             entries[0] = _set_down(entries[0], op.position, op.yaw)
-        return self._add_renamed(entries, scripts)
-
-    def _add_renamed(
-        self, entries: Sequence[EntryParameters], scripts: Sequence[AttachedScriptParameters]
-    ) -> list[int]:
         tree = self._simulation.tree
         renames: dict[str, str] = {}
         for entry in entries:
@@ -164,16 +158,13 @@ class ObjectEdits:
             set_parameters(self._simulation, handle, parameters)
         entry = operations.entry(handle)
         values = {key: _default(entry, key) if value is None else value for key, value in values.items()}
-        self._find_files(values)
+        scene_parameters.find_files_beside(self._simulation.document.folder, {"scene": {"objects": [values]}})
         described = {key: values.pop(key) for key in _DESCRIPTION_KEYS if key in values}
         if described:
             operations.describe(handle, **described)
         if "color" in values and isinstance(entry, ObjectParameters):
             operations.paint(handle, changed(entry, {"color": values.pop("color")}).color)
         return values
-
-    def _find_files(self, values: dict[str, Any]) -> None:
-        scene_parameters.find_files_beside(self._simulation.document.folder, {"scene": {"objects": [values]}})
 
     def scale(self, handles: Sequence[int], factors: tuple[float, float, float]) -> None:
         """Scale objects by factors along their own axes."""

@@ -31,7 +31,10 @@ def properties() -> dict[str, list[dict[str, Any]]]:
     models: dict[str, type[Checked]] = {word_of(entry, "shape", "kind"): entry for entry in entries}
     models.update(floor=FloorParameters, vehicle=VehicleParameters)
     return {
-        **{word: _keys(model) for word, model in models.items()},
+        **{
+            word: [_property(key, field) for key, field in model.model_fields.items() if key not in _EXCLUDED]
+            for word, model in models.items()
+        },
         **{word_of_part(model): _part_keys(model) for model in (CameraParameters, *SENSORS)},
     }
 
@@ -51,10 +54,6 @@ def inner_fields(model: type[Checked], prefix: str = "") -> Iterator[tuple[str, 
             yield from inner_fields(value.kind, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", field
-
-
-def _keys(model: type[Checked]) -> list[dict[str, Any]]:
-    return [_property(key, field) for key, field in model.model_fields.items() if key not in _EXCLUDED]
 
 
 def _part_keys(model: type[Checked]) -> list[dict[str, Any]]:

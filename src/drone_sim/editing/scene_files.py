@@ -21,7 +21,6 @@ class SceneFiles:
     """Opens and saves the scene's files for windows."""
 
     def __init__(self, simulation: Simulation):
-        """Open and save this scene."""
         self._simulation = simulation
 
     @property

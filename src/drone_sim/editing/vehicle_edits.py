@@ -30,7 +30,6 @@ class VehicleEdits:
     """Operations on vehicles and the floor; each applies new settings to the scene. All raise ValueError."""
 
     def __init__(self, simulation: Simulation):
-        """Edit this scene."""
         self._simulation = simulation
 
     def _apply(self, entries: dict[str, dict[str, Any]]) -> None:

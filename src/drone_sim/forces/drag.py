@@ -32,7 +32,6 @@ class DragParameters(Checked):
     wind: Annotated[_Velocity, Field(description="3 numbers, [x, y, z] in m/s, in the world")] = (0.0, 0.0, 0.0)
 
     def make(self) -> Drag:
-        """Create the force."""
         return Drag(self)
 
 
@@ -43,11 +42,9 @@ class Drag(Force):
     feels_wind: ClassVar[bool] = True
 
     def __init__(self, parameters: DragParameters):
-        """Create the force from its parameters."""
         self._coefficients, self._wind = parameters.coefficients, parameters.wind
 
     def add_to(self, wrench: Wrench, body: PushedBody) -> None:
-        """Add the present drag."""
         (vx, vy, vz), (wx, wy, wz), (ax, ay, az) = body.state.linear_velocity, self._wind, body.wind
         x, y, z = rotate_back(body.matrix, (vx - wx - ax, vy - wy - ay, vz - wz - az))
         cx, cy, cz = self._coefficients

@@ -139,6 +139,5 @@ class Propellers(Force):
         return [self._newtons * velocity for velocity in self._emitted]
 
     def save_state(self) -> Restore:
-        """Return a function that restores the carry, the last emission, the air moved, and the effectiveness."""
         emission = saved(self, "air", "_emitted", "_newtons")
         return in_turn(saved(self._law, "carry"), emission, partial(self.weaken, self.effectiveness))

@@ -31,11 +31,9 @@ class Pushes(Force):
         self.lasting.append((push, max(1, round(push.duration / self._time_step))))
 
     def add_to(self, wrench: Wrench, body: PushedBody) -> None:
-        """Add all pushes for one step."""
         for push, _ in self.lasting:
             wrench.add(push.force, push.torque, (0.0, 0.0, 0.0))
         self.lasting = [(push, steps - 1) for push, steps in self.lasting if steps > 1]
 
     def save_state(self) -> Restore:
-        """Return a function that restores the present pushes."""
         return saved(self, "lasting")

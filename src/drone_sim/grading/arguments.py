@@ -66,7 +66,6 @@ def _whole_number(low: int, high: int) -> Callable[[str], int]:
 
 
 def results_folder(options: argparse.Namespace) -> Path:
-    """Return the folder in which results are stored."""
     return Path(options.results) if options.results else default_folder()
 
 
@@ -94,7 +93,6 @@ class Runner:
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        """End the flights in progress."""
         self._open.close()
 
     def fly(self, jobs: Sequence[Job], quiet: bool = False) -> Iterator[tuple[Job, Result]]:

@@ -125,7 +125,6 @@ class FlightRecorder:
             self._touched.clear()
 
     def _record_changes(self, name: str, get_value: Callable[[], Any]) -> None:
-        """Record a value whenever it has changed."""
         changes = self._values[name] = []
 
         def record() -> None:
@@ -206,7 +205,6 @@ class OfflineBackend:
         return self._parameters.get(name)
 
     def set_parameter(self, name: str, value: Any) -> None:
-        """Set a parameter."""
         self._parameters[name] = value
 
     def delete_parameter(self, name: str) -> None:

@@ -12,7 +12,6 @@ _PLAN = "plan.yaml"
 
 
 def names() -> list[str]:
-    """Return the names of all tasks, sorted."""
     return sorted(plan.parent.name for plan in folder().glob(f"*/{_PLAN}"))
 
 

@@ -209,7 +209,6 @@ class ChildScript(HostedScript):
         super().actuation()
 
     def close(self) -> None:
-        """Unload the script, without calling cleanup, and end its subscriptions; may be called twice."""
         if self.vehicle.flight_state.is_flown:
             self.tuning.keep_read()
         super().close()
@@ -260,7 +259,6 @@ class AttachedScript(HostedScript):
         return self._vehicles.values()
 
     def script_parameters(self) -> _Parameters:
-        """Return its own parameters."""
         return {self.own_script: self.parameters}
 
     def load_script(self, path: str, operations: Operations) -> None:
@@ -296,7 +294,6 @@ class AttachedScript(HostedScript):
         return self.script.is_busy
 
     def leave(self) -> None:
-        """Unload the script and remove it from the simulation."""
         super().leave()
         self._is_removed = True
         if self.vehicle and self._first_bus in self.vehicle.commands.listening:
@@ -310,7 +307,6 @@ class AttachedScript(HostedScript):
         return running
 
     def close(self) -> None:
-        """Unload the script, without calling cleanup, and end its subscriptions; may be called twice."""
         super().close()
         self.failure = None
 

@@ -221,5 +221,4 @@ def turned(quaternion: Sequence[float], vector: Sequence[float]) -> Vector:
 
 
 def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
-    """Return the cross product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -26,7 +26,6 @@ class Collections:
     """The collections of a run, by name and by handle. Objects and scripts have other handles."""
 
     def __init__(self) -> None:
-        """Start without collections."""
         self.clear()
 
     def clear(self) -> None:
@@ -58,7 +57,6 @@ class Collections:
         return handle
 
     def __contains__(self, handle: object) -> bool:
-        """Return whether a collection has that handle."""
         return handle in self._items
 
     def __iter__(self) -> Iterator[int]:

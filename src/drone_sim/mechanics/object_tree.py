@@ -174,7 +174,6 @@ class ObjectTree:
 
     @property
     def names(self) -> Iterable[str]:
-        """All names of all objects."""
         return self._handles.keys()
 
     def children(self, parent: SceneObject | None) -> Iterator[tuple[int, SceneObject]]:
@@ -196,11 +195,9 @@ class ObjectTree:
         return iter(self._objects)
 
     def __contains__(self, name: object) -> bool:
-        """Return whether an object has that name."""
         return name in self._handles
 
     def get(self, handle: int) -> SceneObject | None:
-        """Return the object with a handle, or None."""
         return self._objects.get(handle)
 
     def handle_of(self, item: SceneObject | None) -> int:

@@ -61,7 +61,6 @@ class SceneObject:
 
     @property
     def name(self) -> str:
-        """The object's first name."""
         return self.names[0]
 
     def is_called(self, name: str) -> bool:

@@ -37,7 +37,6 @@ def compose(a: Pose, b: Pose) -> Pose:
 
 
 def inverse(pose: Pose) -> Pose:
-    """Return the inverse of a pose."""
     x, y, z, w = pose.orientation
     return Pose(position(invert(pose.matrix)), (-x, -y, -z, w))
 

@@ -67,7 +67,6 @@ class Trajectory:
 
     @property
     def is_over(self) -> bool:
-        """Whether the end is reached."""
         return self.elapsed >= self.duration - _TOLERANCE
 
     def advance(self, seconds: float) -> State:

@@ -92,5 +92,4 @@ class VelocityMeter:
         self._now[handle] = now
 
     def save_state(self) -> Restore:
-        """Return a function that restores the measurements."""
         return saved(self, "_before", "_now")

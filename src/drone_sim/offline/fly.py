@@ -33,7 +33,6 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.run.watchdog import Watchdog
 from drone_sim.scripting.api.control import STOP
 from drone_sim.scripting.script_log import LOG as SCRIPT_LOG
-from drone_sim.vehicles.parameters import EquipmentParameters
 from drone_sim.vrep_files.model import SUFFIXES
 
 if TYPE_CHECKING:
@@ -178,23 +177,17 @@ def _camera(options: argparse.Namespace, parameters: Parameters, vehicle: str) -
         if options.camera is not None:
             raise ValueError(f"--camera {_shown(options.camera)}: only works with --video or --truth")
         return ""
-    equipment = next(item for item in parameters.fleet if item.name == vehicle)
-    camera = _camera_of(equipment, options.camera, option)
+    cameras = next(item for item in parameters.fleet if item.name == vehicle).cameras
+    if not cameras:
+        raise ValueError(f"{option}: the vehicle has no camera")
+    if options.camera is not None and options.camera not in cameras:
+        raise ValueError(f"--camera {shown(options.camera)}: no such camera; {near_names(options.camera, cameras)}")
+    camera = next(iter(cameras)) if options.camera is None else options.camera
     if options.video:
         from drone_sim.offline import video  # needs PyAV, an optional dependency
 
-        video.rate_of(equipment.cameras[camera], parameters.time_step)
+        video.rate_of(cameras[camera], parameters.time_step)
     return camera
-
-
-def _camera_of(vehicle: EquipmentParameters, name: str | None, option: str) -> str:
-    """Return the name of a vehicle's camera, by default its first one. Raises ValueError."""
-    cameras = vehicle.cameras
-    if not cameras:
-        raise ValueError(f"{option}: the vehicle has no camera")
-    if name is not None and name not in cameras:
-        raise ValueError(f"--camera {shown(name)}: no such camera; {near_names(name, cameras)}")
-    return next(iter(cameras)) if name is None else name
 
 
 def _camera_writers(

@@ -64,7 +64,13 @@ def save(path: str, recording: Recording, timeline: Timeline, sensors: Sequence[
     for number, series in enumerate(sensors):
         _draw_sensor(axes[str(number)], series)
     for ax in time_axes.values():
-        _finish(ax)
+        low, high = ax.get_ylim()
+        missing = _MIN_AXIS_RANGE - (high - low)
+        if missing > 0:
+            ax.set_ylim(low - missing / 2, high + missing / 2)
+        ax.grid(color=_GRID)
+        ax.set_axisbelow(True)
+        ax.spines[["top", "right"]].set_visible(False)
         _mark(ax, timeline)
         ax.tick_params(labelbottom=ax in bottom_axes)
     for ax in bottom_axes:
@@ -181,16 +187,6 @@ def _title(ax: Axes, title: str = "", legend: bool = False) -> None:
     ax.set_title(title, loc="left", fontweight="bold")
     if legend:  # above the axes, where it covers no data
         ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncol=4, fontsize="small", frameon=False, borderpad=0)
-
-
-def _finish(ax: Axes) -> None:
-    low, high = ax.get_ylim()
-    missing = _MIN_AXIS_RANGE - (high - low)
-    if missing > 0:
-        ax.set_ylim(low - missing / 2, high + missing / 2)
-    ax.grid(color=_GRID)
-    ax.set_axisbelow(True)
-    ax.spines[["top", "right"]].set_visible(False)
 
 
 def _mark(ax: Axes, timeline: Timeline) -> None:

@@ -89,7 +89,6 @@ class ParameterChange:
         return self
 
     def apply(self, vehicle: Vehicle) -> None:
-        """Change the parameters."""
         raise NotImplementedError
 
 
@@ -97,7 +96,6 @@ class WeatherChange(ParameterChange):
     """New values of `weather`, for all vehicles."""
 
     def apply(self, vehicle: Vehicle) -> None:
-        """Change the weather."""
         vehicle.context.change_weather(self.changes)
 
 
@@ -105,7 +103,6 @@ class FaultsChange(ParameterChange):
     """New values of `faults`, for one vehicle."""
 
     def apply(self, vehicle: Vehicle) -> None:
-        """Change the vehicle's faults."""
         vehicle.change_faults(self.changes)
 
 
@@ -130,23 +127,20 @@ class Entry(NamedTuple):
         if vehicle is None:
             raise TimelineError(f"entry at {self.at:g} s: there is no vehicle {self.vehicle}".rstrip())
         try:
-            self._apply_to(vehicle)
+            if isinstance(self.action, Twist):
+                vehicle.commands.receive(self.action)
+            elif isinstance(self.action, Pose):
+                vehicle.body.move(self.action)
+            elif isinstance(self.action, Push):
+                vehicle.pushes.add(self.action)
+            elif isinstance(self.action, ScriptRequest):
+                vehicle.ask(*self.action)
+            elif isinstance(self.action, ObjectMove):
+                self.action.apply(vehicle.context.objects)
+            else:
+                self.action.apply(vehicle)
         except ValueError as error:
             raise TimelineError(f"entry at {self.at:g} s: {error}") from None
-
-    def _apply_to(self, vehicle: Vehicle) -> None:
-        if isinstance(self.action, Twist):
-            vehicle.commands.receive(self.action)
-        elif isinstance(self.action, Pose):
-            vehicle.body.move(self.action)
-        elif isinstance(self.action, Push):
-            vehicle.pushes.add(self.action)
-        elif isinstance(self.action, ScriptRequest):
-            vehicle.ask(*self.action)
-        elif isinstance(self.action, ObjectMove):
-            self.action.apply(vehicle.context.objects)
-        else:
-            self.action.apply(vehicle)
 
 
 class Timeline:

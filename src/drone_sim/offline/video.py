@@ -54,21 +54,18 @@ class Video:
             hud.draw(shown, flight)
         if self._file is None:
             self.size = shown.shape[1], shown.shape[0]
-            self._begin()
+            with _ffmpeg_errors():
+                self._file = av.open(self._path, "w", format="mp4", options=_CONTAINER_OPTIONS)
+                rate = Fraction(self.rate).limit_denominator(_MAX_DENOMINATOR)
+                self._stream = self._file.add_stream(_CODEC, rate, options=_ENCODER_OPTIONS)
+            self._stream.width, self._stream.height = self.size
+            self._stream.pix_fmt = _PIXEL_FORMAT
         elif self.size != (shown.shape[1], shown.shape[0]):
             shown = cv2.resize(shown, self.size)
         for _ in range(times):
             with _ffmpeg_errors():
                 self._file.mux(self._stream.encode(av.VideoFrame.from_ndarray(shown, format="bgr24")))
             self.pictures += 1
-
-    def _begin(self) -> None:
-        with _ffmpeg_errors():
-            self._file = av.open(self._path, "w", format="mp4", options=_CONTAINER_OPTIONS)
-            rate = Fraction(self.rate).limit_denominator(_MAX_DENOMINATOR)
-            self._stream = self._file.add_stream(_CODEC, rate, options=_ENCODER_OPTIONS)
-        self._stream.width, self._stream.height = self.size
-        self._stream.pix_fmt = _PIXEL_FORMAT
 
     def close(self) -> None:
         """Write the remaining data. Raises OutputError."""

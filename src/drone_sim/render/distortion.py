@@ -43,7 +43,6 @@ class Distorted(Intrinsics):
     D: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        """Validate the fields; raise ValueError."""
         if self.model not in MODELS:
             raise ValueError(f"model '{self.model}': must be one of {', '.join(MODELS)}")
         max_coefficients = MODELS[self.model]
@@ -60,7 +59,6 @@ class Distorted(Intrinsics):
 
     @property
     def distortion(self) -> tuple[str, tuple[float, ...]]:
-        """The distortion model and its coefficients, as in sensor_msgs/CameraInfo."""
         return self.model, self.D
 
     @property

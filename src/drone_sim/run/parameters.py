@@ -198,7 +198,6 @@ class Parameters(PaceParameters, EquipmentParameters):
         return f"{self.scene_file}: line {yaml_files.lines(resolve(self.scene_file)).find(location).line}"
 
     def model_post_init(self, _context: Any) -> None:
-        """Check conditions on several keys."""
         steps = self.sub_steps
         if steps < 1 or abs(steps * self.sub_step - self.time_step) > 1e-9 * self.time_step:
             raise ParameterError(

@@ -151,10 +151,6 @@ class Player:
             order = self._orders.popleft()
             order.answer.set_exception(ValueError(f"{reason}: {order.left} of {order.count} steps have not been run"))
 
-    def _fail_steps(self, error: ScriptError | Diverged) -> None:
-        while self._orders:
-            self._orders.popleft().answer.set_exception(error)
-
     def _count_ordered_step(self) -> None:
         if not self._orders:
             return
@@ -171,7 +167,8 @@ class Player:
         try:
             self.attempt(self._step)
         except (ScriptError, Diverged) as error:
-            self._fail_steps(error)
+            while self._orders:
+                self._orders.popleft().answer.set_exception(error)
             return False
         self._count_ordered_step()
         self._pause_at_breakpoint()

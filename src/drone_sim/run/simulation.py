@@ -280,7 +280,12 @@ class Simulation:
             check_changeable(before, settings)
         parameters = self.with_settings(settings)
         if self.running:
-            self._apply_in_flight(parameters)
+            self.scene.is_changed = True
+            if apply_in_flight(self._setup, self.parameters, parameters, self.script):
+                self.topology_version += 1
+                self._stepper.refresh_vehicles()
+            self._stepper.set_floor(parameters.scene.floor)
+            self.parameters = parameters
         elif without_vehicles(settings) == without_vehicles(before) and have_only_moved(
             self.parameters.fleet, parameters.fleet
         ):
@@ -298,14 +303,6 @@ class Simulation:
         present = self.scene.parameters_now()
         scene = result.scene.model_copy(update={"objects": present.objects, "scripts": present.scripts})
         return result.varied(result.weather, scene, result.fleet)
-
-    def _apply_in_flight(self, parameters: Parameters) -> None:
-        self.scene.is_changed = True
-        if apply_in_flight(self._setup, self.parameters, parameters, self.script):
-            self.topology_version += 1
-            self._stepper.refresh_vehicles()
-        self._stepper.set_floor(parameters.scene.floor)
-        self.parameters = parameters
 
     def load_scripts(self) -> None:
         """Load the scripts of a simulation that has none loaded, and run their init. Raises ScriptError."""
@@ -440,7 +437,6 @@ class Simulation:
 
     @property
     def object_handles(self) -> Mapping[str, int]:
-        """Handles of all objects, by name."""
         return self.tree.handles().by_name
 
     def content(self) -> SceneContent:

@@ -33,13 +33,11 @@ class SceneBody:
     """A free dynamic body of the scene, for the object tree."""
 
     def __init__(self, world: World, number: int):
-        """Create it for body `number` of the world."""
         self._world = world
         self.number = number
 
     @property
     def state(self) -> State:
-        """Pose and velocity."""
         return self._world.state(self.number)
 
     @property
@@ -48,7 +46,6 @@ class SceneBody:
         return self.state.matrix
 
     def move(self, pose: Pose) -> None:
-        """Teleport the body, at rest."""
         self._world.set_pose(self.number, pose)
 
 
@@ -64,7 +61,6 @@ class LinkBody:
 
     @property
     def state(self) -> State:
-        """Pose and velocity."""
         link = self._world.joints.link_state(self.number, self.link)
         matrix = frames.multiply(link.matrix, self._local)
         arm = frames.rotate(link.matrix, frames.position(self._local))
@@ -226,7 +222,6 @@ class ShapeObject(SceneObject):
         self.parent = None
 
     def save_state(self) -> Restore:
-        """Return a function that restores its place in the tree and whether it is static."""
         return in_turn(partial(self.set_static, self.is_static), super().save_state())
 
     def forget_body(self, number: int) -> None:

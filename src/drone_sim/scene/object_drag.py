@@ -43,7 +43,6 @@ class ObjectDrag:
         self.held = {name: body for name, body in self.held.items() if body != number}
 
     def let_go_of_all(self) -> None:
-        """Release all objects."""
         for name in tuple(self.held):
             self.let_go(name)
 

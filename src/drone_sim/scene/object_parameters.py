@@ -74,7 +74,6 @@ class ObjectParameters(EntryParameters):
         return bool(self.mass) and not self.static
 
     def to_shape(self) -> SceneShape | Compound:
-        """Return the shape that its keys describe."""
         return _shape_of(self)
 
 
@@ -120,7 +119,6 @@ class CompoundParameters(ObjectParameters):
     parts: Annotated[list[_Part], Field(min_length=1, max_length=MAX_PARTS)]
 
     def to_shape(self) -> Compound:
-        """Return the compound."""
         return Compound(tuple(part.part for part in self.parts))
 
 

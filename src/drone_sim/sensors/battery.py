@@ -46,7 +46,6 @@ class BatteryParameters(SensorParameters):
     noise: NoiseParameters = NoiseParameters()  # V
 
     def make(self, mounting: Mounting) -> Battery:
-        """Return the instrument; call its `reset` before `look`."""
         return Battery(self, mounting)
 
     def check(self, sub_step: float) -> None:
@@ -97,7 +96,6 @@ class Battery(Instrument):
         return BatterySample(measured, current, self._charge)
 
     def save_state(self) -> Restore:
-        """Return a function that restores the sensor and the charge."""
         return in_turn(super().save_state(), saved(self, "_charge"))
 
     def power(self) -> float:

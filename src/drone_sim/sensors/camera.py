@@ -144,6 +144,5 @@ class Camera(Sensor):
         self.age = 0.0
 
     def save_state(self) -> Restore:
-        """Return a function that restores the last delivered image, the optics and the exposure."""
         image = saved(self, "image", "age", "latest", "_last", "period", "intrinsics")
         return in_turn(image, self._photography.save_state())

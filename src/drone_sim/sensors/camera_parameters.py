@@ -60,13 +60,10 @@ class CameraParameters(Imperfections):
         if self.lens is not None:
             self.intrinsics()
         if self.kind == "depth":
-            self._refuse_imperfections()
+            for name in Imperfections.model_fields:
+                if getattr(self, name).is_on:
+                    raise ParameterError("is allowed only for cameras of kind color", (name,))
         return self
-
-    def _refuse_imperfections(self) -> None:
-        for name in Imperfections.model_fields:
-            if getattr(self, name).is_on:
-                raise ParameterError("is allowed only for cameras of kind color", (name,))
 
     def intrinsics(self) -> Intrinsics:
         """Return the camera model."""

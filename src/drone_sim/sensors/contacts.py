@@ -34,7 +34,6 @@ class ContactsParameters(SensorParameters):
     suffixes = ("", "/wrench")
 
     def make(self, mounting: Mounting) -> Contacts:
-        """Return the instrument; call its `reset` before `look`."""
         return Contacts(self, mounting)
 
 
@@ -62,7 +61,6 @@ class Contacts(Instrument):
         self._hardest, self._max_force = ContactsSample(), 0.0  # since the last sample; sum of force magnitudes, N
 
     def reset(self) -> None:
-        """Return to the state at the start of a run."""
         super().reset()
         self._clear()
 
@@ -89,7 +87,6 @@ class Contacts(Instrument):
         return ContactsSample(tuple(contacts), force, torque)
 
     def save_state(self) -> Restore:
-        """Return a function that restores the sensor and the contacts since the last sample."""
         return in_turn(super().save_state(), saved(self, "_hardest", "_max_force"))
 
     # ---- messages

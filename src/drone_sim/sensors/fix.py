@@ -83,7 +83,6 @@ class FixParameters(SensorParameters):
     noise: FixNoise = FixNoise()
 
     def make(self, mounting: Mounting) -> Fix:
-        """Return the instrument; call its `reset` before `look`."""
         return Fix(self, mounting)
 
 
@@ -100,7 +99,6 @@ class Fix(Instrument):
         self.outputs = (Output("", "sensor_msgs/NavSatFix", self._message),)
 
     def sample(self) -> Vector:
-        """Return latitude, longitude and altitude."""
         x, y, z = position(self.mounting.pose())
         datum = self.carrier.datum
         local = (*self._horizontal.add((x, y)), *self._vertical.add((z,)))

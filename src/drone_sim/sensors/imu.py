@@ -55,7 +55,6 @@ class ImuParameters(SensorParameters):
     suffixes = ("/data", "/data_raw")
 
     def make(self, mounting: Mounting) -> Imu:
-        """Return the instrument; call its `reset` before `look`."""
         return Imu(self, mounting)
 
 
@@ -89,7 +88,6 @@ class Imu(Instrument):
     # ---- measuring
 
     def reset(self) -> None:
-        """Return to the state at the start of a run."""
         super().reset()
         self._axes = self.mounting.pose()
         self._velocity = self._point_velocity(self._axes)
@@ -130,7 +128,6 @@ class Imu(Instrument):
         return vx + (wy * z - wz * y), vy + (wz * x - wx * z), vz + (wx * y - wy * x)
 
     def save_state(self) -> Restore:
-        """Return a function that restores the sensor and its integrals."""
         integrals = saved(self, "_velocity", "_axes", "_delta_velocity", "_delta_angle", "_duration")
         return in_turn(super().save_state(), integrals, self._update_teleports)
 

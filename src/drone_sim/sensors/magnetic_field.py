@@ -20,7 +20,6 @@ class MagneticFieldParameters(SensorParameters):
     noise: NoiseParameters = NoiseParameters()  # T
 
     def make(self, mounting: Mounting) -> MagneticField:
-        """Return the instrument; call its `reset` before `look`."""
         return MagneticField(self, mounting)
 
 

@@ -53,7 +53,6 @@ class PressureParameters(SensorParameters):
     suffixes = ("", "/height")
 
     def make(self, mounting: Mounting) -> Pressure:
-        """Return the instrument; call its `reset` before `look`."""
         return Pressure(self, mounting)
 
 

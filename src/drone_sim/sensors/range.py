@@ -35,7 +35,6 @@ class RangeParameters(SensorParameters):
     from_object = _OBJECT
 
     def make(self, mounting: Mounting) -> Range:
-        """Return the instrument; call its `reset` before `look`."""
         return Range(self, mounting)
 
     def check(self, sub_step: float) -> None:
@@ -67,7 +66,6 @@ class Range(Instrument):
         self.outputs = (Output("", "sensor_msgs/Range", self._message),)
 
     def sample(self) -> RangeSample:
-        """Return the distance along the ray."""
         parameters, pose = self.parameters, self.mounting.pose()
         hit = self.carrier.ray(position(pose), transform(pose, (parameters.max_range, 0.0, 0.0)))
         if hit is None:

@@ -44,7 +44,6 @@ class Box2D(NamedTuple):
 
     @property
     def area(self) -> float:
-        """Area in px²."""
         return max(0.0, self.right - self.left) * max(0.0, self.bottom - self.top)
 
 

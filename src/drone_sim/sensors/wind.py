@@ -20,7 +20,6 @@ class WindParameters(SensorParameters):
     noise: NoiseParameters = NoiseParameters()  # m/s
 
     def make(self, mounting: Mounting) -> Wind:
-        """Return the instrument; call its `reset` before `look`."""
         return Wind(self, mounting)
 
 

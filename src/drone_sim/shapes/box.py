@@ -54,18 +54,14 @@ class Box(SceneShape, ReportedShape):
 
     @classmethod
     def from_bullet(cls, dimensions: Sequence[float], file: str) -> Box:
-        """Return a box from its full lengths."""
         length, width, height = dimensions
         return cls((length, width, height))
 
     def triangles(self) -> tuple[Triangles]:
-        """Return two triangles for each side."""
         return (Triangles(_CORNERS * np.asarray(self.size), _UV),)
 
     def shared(self) -> tuple[Box, tuple[float, float, float]]:
-        """Return the unit box, and the scale."""
         return Box((1.0, 1.0, 1.0)), self.size
 
     def for_rviz(self) -> tuple[Primitive]:
-        """Return the triangles."""
         return (Primitive("triangles", self.size, corners=_FOR_RVIZ),)

@@ -45,22 +45,18 @@ class Cylinder(SceneShape, ReportedShape):
         return cls((radius, length))
 
     def triangles(self) -> tuple[Triangles]:
-        """Return a prism."""
         radius, length = self.size
         outer_radius, half = outer(radius), length / 2
         return (Triangles(turned([(0, -half), (outer_radius, -half), (outer_radius, half), (0, half)])),)
 
     def solid(self) -> Solid:
-        """Return the solid of the exact cylinder."""
         radius, length = self.size
         return round_solid(np.pi * radius**2 * length, radius**2 / 4 + length**2 / 12, radius**2 / 2)
 
     def shared(self) -> tuple[DrawnShape, tuple[float, float, float]]:
-        """Return the cylinder of 1 m radius and 1 m length, and the scale."""
         radius, length = self.size
         return Cylinder((1.0, 1.0)), (radius, radius, length)
 
     def for_rviz(self) -> tuple[Primitive, ...]:
-        """Return a cylinder, by its diameters."""
         radius, length = self.size
         return (Primitive("cylinder", (2 * radius, 2 * radius, length)),)

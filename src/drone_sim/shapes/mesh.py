@@ -34,7 +34,6 @@ class Mesh(SceneShape, ReportedShape):
     )
 
     def __str__(self) -> str:
-        """Return the mesh's name for messages."""
         return f"{self.word} {self.file}"
 
     @property
@@ -43,7 +42,6 @@ class Mesh(SceneShape, ReportedShape):
         return (self.file,)
 
     def meshes(self) -> tuple[tuple[str, Sequence[float]]]:
-        """Return the mesh file and its scale."""
         return ((self.file, self.size),)
 
     def for_bullet(self, files: Files, moves: bool) -> Geometry:
@@ -56,12 +54,10 @@ class Mesh(SceneShape, ReportedShape):
 
     @classmethod
     def from_bullet(cls, dimensions: Sequence[float], file: str) -> Mesh:
-        """Return the mesh of a file, at this scale."""
         x, y, z = dimensions
         return cls(file, (x, y, z))
 
     def triangles(self) -> Iterator[Triangles]:
-        """Yield the parts of the file."""
         for part in mesh_files.read(self.file):
             faces = part.faces
             if np.prod(self.size) < 0:

@@ -38,20 +38,16 @@ class Sphere(SceneShape, ReportedShape):
         return cls((dimensions[0],))
 
     def triangles(self) -> tuple[Triangles]:
-        """Return the sphere as slices of rings."""
         return (Triangles(_CORNERS * self.size[0]),)
 
     def solid(self) -> Solid:
-        """Return the solid of the exact sphere."""
         (radius,) = self.size
         return round_solid(4 / 3 * np.pi * radius**3, 2 / 5 * radius**2, 2 / 5 * radius**2)
 
     def shared(self) -> tuple[Sphere, tuple[float, float, float]]:
-        """Return the sphere of 1 m radius, and the scale."""
         (radius,) = self.size
         return Sphere((1.0,)), (radius, radius, radius)
 
     def for_rviz(self) -> tuple[Primitive]:
-        """Return a sphere, by its diameters."""
         diameter = 2 * self.size[0]
         return (Primitive("sphere", (diameter, diameter, diameter)),)

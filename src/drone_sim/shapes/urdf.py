@@ -22,7 +22,6 @@ class Urdf(SceneShape):
     size: tuple[()] = ()
 
     def __str__(self) -> str:
-        """Return the URDF's name for messages."""
         return f"{self.word} {self.file}"
 
     def for_bullet(self, files: Files, moves: bool) -> UrdfFile:

@@ -93,7 +93,6 @@ class Body:
             self.matrix = frames.from_quaternion(state.position, state.orientation)
 
     def move(self, pose: Pose) -> None:
-        """Teleport the body to a pose, at rest."""
         self.teleports += 1
         self._world.set_pose(self.number, pose)
         self.refresh()

@@ -27,7 +27,6 @@ class Commands:
         self.begin()
 
     def begin(self) -> None:
-        """Reset to no command, as at the start of a run."""
         self.now = Twist()
         self.age = 0.0  # s
 

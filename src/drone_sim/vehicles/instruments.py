@@ -40,7 +40,6 @@ class Instruments:
         self._working: tuple[Instrument | Failing, ...] = self._all
 
     def __bool__(self) -> bool:
-        """Whether the vehicle has instruments."""
         return bool(self._all)
 
     def reset(self) -> None:

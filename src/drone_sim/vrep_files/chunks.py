@@ -34,7 +34,6 @@ class Level:
     """The chunks of one level of an object, e.g. of its base class, its class, a wrapper or a mesh."""
 
     def __init__(self) -> None:
-        """Create it without chunks."""
         self.chunks: list[Chunk] = []
 
     def find(self, *tags: str) -> bytes | None:
@@ -52,7 +51,6 @@ class Level:
         return default if integers is None else integers[0]
 
     def bits(self, *tags: str, default: int = 0) -> int:
-        """Return a byte of flags."""
         return self.integer(*tags, default=default, kind="B")
 
     def numbers(self, double: str, single: str, count: int) -> tuple[float, ...] | None:

@@ -64,7 +64,6 @@ def read_object(tag: str, data: bytes, pools: Pools) -> VrepObject:
 
 
 def is_object(tag: str) -> bool:
-    """Return whether a chunk with this tag is an object."""
     return tag in _READERS or tag in _OTHERS
 
 

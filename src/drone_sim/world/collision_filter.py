@@ -21,7 +21,6 @@ class CollisionFilter:
         self._frozen: dict[int, tuple[float, Vector]] = {}  # mass and moments of inertia of frozen bodies
 
     def forget(self, body: int) -> None:
-        """Forget a removed body."""
         self._permeable = {key for key in self._permeable if key[0] != body}
         self._frozen.pop(body, None)
 

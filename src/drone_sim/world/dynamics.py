@@ -47,12 +47,10 @@ class Dynamics:
     # ---- bodies
 
     def add(self, body: int) -> None:
-        """Add a body."""
         self._gyroscopic_term.add(body)
         self._impacts.add(body)
 
     def forget(self, body: int) -> None:
-        """Forget a body that was removed."""
         self.moved(body)
         self._gyroscopic_term.forget(body)
         self._impacts.forget(body)

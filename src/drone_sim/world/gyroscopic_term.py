@@ -49,7 +49,6 @@ class NoGyroscopicTerm:
             self._links[body] = links
 
     def forget(self, body: int) -> None:
-        """Remove a body."""
         self._roots.pop(body, None)
         self._links.pop(body, None)
 

@@ -41,7 +41,6 @@ class Impacts:
             self._jointed.add(body)
 
     def forget(self, body: int) -> None:
-        """Forget a removed body."""
         self._bodies.discard(body)
         self._jointed.discard(body)
 

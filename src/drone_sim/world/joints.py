@@ -38,7 +38,6 @@ class Joints:
         return State(position, orientation, (linear[0] + x, linear[1] + y, linear[2] + z), angular)
 
     def forget(self, body: int) -> None:
-        """Forget a body that was removed."""
         for by_link in (self._inertial, self._limits):
             for key in [key for key in by_link if key[0] == body]:
                 del by_link[key]  # type: ignore[attr-defined]

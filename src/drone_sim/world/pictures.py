@@ -109,7 +109,6 @@ class Pictures:
         self.look_anew()
 
     def all_moved(self) -> None:
-        """Forget all poses."""
         self._static_poses.clear()
         self.look_anew()
 
@@ -265,7 +264,6 @@ class Textures:
     """Textures of PyBullet's visuals. They are loaded late, because only PyBullet's own pictures show them."""
 
     def __init__(self, client: int, files: BulletFiles):
-        """Start without textures."""
         self._client = client
         self._files = files
         self._waiting: dict[int, tuple[str, int]] = {}
@@ -283,5 +281,4 @@ class Textures:
             pybullet.changeVisualShape(body, -1, visual, textureUniqueId=image, physicsClientId=self._client)
 
     def forget(self, body: int) -> None:
-        """Forget a removed body."""
         self._waiting.pop(body, None)

@@ -36,7 +36,6 @@ class SavedStates:
         self._places[body] = (*pybullet.getBasePositionAndOrientation(body, self._client), angles)
 
     def forget(self, body: int) -> None:
-        """Forget a removed body."""
         self._places.pop(body, None)
 
     def begin_anew(self) -> None:
@@ -66,7 +65,6 @@ class SavedStates:
         return number in self._snapshots
 
     def forget_snapshot(self, number: int) -> None:
-        """Free a snapshot."""
         if number in self._snapshots:
             self._snapshots.remove(number)
             pybullet.removeState(number, physicsClientId=self._client)

@@ -13,7 +13,6 @@ class ShapeForces:
     """The sums of forces and torques on each link (-1: the root) of a body in the next step."""
 
     def __init__(self, client: int):
-        """Start without forces."""
         self._client = client
         self.sums: dict[tuple[int, int], tuple[Vector, Vector]] = {}
 
@@ -29,7 +28,6 @@ class ShapeForces:
         self.sums[body, link] = _NONE if forces else force, _NONE if torques else torque
 
     def forget(self, body: int) -> None:
-        """Forget a removed body."""
         self.sums = {key: total for key, total in self.sums.items() if key[0] != body}
 
     def apply(self) -> None:

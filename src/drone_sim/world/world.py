@@ -69,7 +69,6 @@ class World:
         self._set_up()
 
     def clear(self) -> None:
-        """Remove everything."""
         self.saved_states.forget_snapshots()
         pybullet.resetSimulation(physicsClientId=self._client)  # its first argument is not the client
         self._files.clear()
@@ -172,7 +171,6 @@ class World:
         return number
 
     def remove(self, body: int) -> None:
-        """Remove a body."""
         self.saved_states.forget_snapshots()
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]

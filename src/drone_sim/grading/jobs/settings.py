@@ -39,7 +39,6 @@ class BatchSettings(Checked):
     of_a_worker: Annotated[int, Within(1, 1000)]
 
     def size(self, flights: int, workers: int) -> int:
-        """Return the number of flights of a batch."""
         return max(1, min(self.largest, flights // (workers * self.of_a_worker)))
 
 

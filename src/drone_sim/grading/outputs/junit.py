@@ -27,7 +27,6 @@ def write(plan: Plan, results: Sequence[Result], path: str | Path) -> None:
 
 
 def text(plan: Plan, results: Sequence[Result]) -> str:
-    """Return the content of the file."""
     root = Element("testsuites", name=_xml(plan.name))
     for script in group_by_script(results):
         suite = SubElement(root, "testsuite", name=_xml(f"{plan.name}: {script.label}"), skipped="0")

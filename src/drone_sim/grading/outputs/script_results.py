@@ -23,7 +23,6 @@ class ScriptResults:
 
     @property
     def passed(self) -> int:
-        """The number of flights that passed."""
         return sum(flight.passed for flight in self.flights)
 
     @property
@@ -54,7 +53,6 @@ class ScriptResults:
 
     @property
     def has_passed(self) -> bool:
-        """Whether every flight passed."""
         return self.passed == len(self.flights)
 
     @property

@@ -84,7 +84,12 @@ def _unpack_parts(archive: zipfile.ZipFile, folder: Path, arrange: Arrange, room
     folder.mkdir()
     for part, members in sorted(parts.items(), key=lambda item: _size(item[1])):
         try:
-            _check_size(members, room)
+            if len(members) > _MAX_FILES:
+                raise Refused(f"holds more than {_MAX_FILES} files")
+            if _size(members) > MAX_SIZE:
+                raise Refused(f"holds more than {MAX_SIZE // MEBIBYTE} MiB")
+            if _size(members) > room:
+                raise Refused(f"is {_size(members) // MEBIBYTE} MiB, more than is left of the limit for one zip")
             for info, inside in members:
                 _write(archive, info, path_below(folder, part, *inside))
             room -= _size(members)
@@ -141,16 +146,6 @@ def _fault(info: zipfile.ZipInfo, path: Parts) -> str:
 def _size(members: Sequence[_Member]) -> int:
     """Return the largest size of a part in bytes: zipfile reads no more of a file than its declared size."""
     return sum(info.file_size for info, _ in members)
-
-
-def _check_size(members: Sequence[_Member], room: int) -> None:
-    """Raise Refused for a part that is too large."""
-    if len(members) > _MAX_FILES:
-        raise Refused(f"holds more than {_MAX_FILES} files")
-    if _size(members) > MAX_SIZE:
-        raise Refused(f"holds more than {MAX_SIZE // MEBIBYTE} MiB")
-    if _size(members) > room:
-        raise Refused(f"is {_size(members) // MEBIBYTE} MiB, more than is left of the limit for one zip")
 
 
 def _write(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> None:

@@ -56,7 +56,6 @@ class Master:
             yield Line(OK, "master", f"at {self.uri}, with {len(self.nodes())} nodes")
 
     def nodes(self) -> list[str]:
-        """Return the names of all nodes."""
         graphs = (self.published, self.subscribed, self.services)
         return sorted({node for graph in graphs for nodes in graph.values() for node in nodes})
 

@@ -210,7 +210,6 @@ class LiveRules:
         self._subscriber = rospy.Subscriber(topic, String, self._on_intervention, queue_size=_QUEUE_SIZE)
 
     def is_connected(self) -> bool:
-        """Return whether the simulator is connected."""
         return bool(self._subscriber.get_num_connections())
 
     def clear(self) -> None:

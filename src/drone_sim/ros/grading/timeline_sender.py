@@ -76,7 +76,6 @@ class TimelineSender:
             publisher.publish(message)
 
     def close(self) -> None:
-        """Unregister the publishers."""
         for publisher in self._publishers:
             publisher.unregister()
 

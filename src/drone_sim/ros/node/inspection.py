@@ -6,7 +6,6 @@ All three are JSON, and made only for subscribers. None of them changes the flig
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from typing import Any
 
 import rospy
@@ -127,7 +126,4 @@ class InspectionTopics:
         except (ValueError, RecursionError) as error:
             rospy.logwarn_throttle(1, f"breakpoints: refused: {error}")
             return
-        self._inbox.put(self._setting(lines))
-
-    def _setting(self, lines: dict[str, frozenset[int]]) -> Callable[[], None]:
-        return lambda: self._simulation.set_breakpoints(lines)
+        self._inbox.put(lambda: self._simulation.set_breakpoints(lines))

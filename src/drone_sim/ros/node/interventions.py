@@ -26,7 +26,6 @@ class Interventions:
     """Publishes the interventions. Only the simulation's thread calls its methods."""
 
     def __init__(self, simulation: Simulation):
-        """Advertise for `simulation`."""
         self._simulation = simulation
         self._topic = rospy.Publisher("~interventions", String, queue_size=_WAITING)
         self._run = self._topology_version = -1

@@ -283,13 +283,10 @@ class Node:
         self._time.publish_to_new_subscribers()
         if self._topics.tell_new_subscribers() or self.simulation.world.pictures.changes != self._shown:
             self.simulation.look()
-            self._publish_state()
+            self._topics.publish_state()
+            self._topics.publish_pictures()
+            self._shown = self.simulation.world.pictures.changes
         self._publish_displays()
-
-    def _publish_state(self) -> None:
-        self._topics.publish_state()
-        self._topics.publish_pictures()
-        self._shown = self.simulation.world.pictures.changes
 
     def _publish_displays(self) -> None:
         self._topics.publish_command()

@@ -115,7 +115,6 @@ class Services:
         return self._player.stop()
 
     def restart(self) -> str:
-        """Stop, and start."""
         self._read_script()
         return self._report_start(self._player.restart())
 
@@ -213,7 +212,6 @@ class VehiclesParameter:
             )
 
     def read(self) -> Any:
-        """Return the present value."""
         return rospy.get_param(_VEHICLES, {})
 
     def close(self) -> None:

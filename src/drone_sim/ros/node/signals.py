@@ -18,7 +18,6 @@ class SignalTopic:
     """Publishes the numbers as JSON, with the simulated time (s), after every step; latched, only for subscribers."""
 
     def __init__(self, simulation: Simulation):
-        """Advertise for `simulation`."""
         self._simulation = simulation
         self._topic = rospy.Publisher("~signals", String, queue_size=5, latch=True)
         self._published: tuple[float, dict[str, float]] = (-1.0, {})

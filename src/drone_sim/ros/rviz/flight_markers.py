@@ -88,7 +88,6 @@ class StateText(FleetMarkers):
         self._texts: dict[str, str] = {}
 
     def update(self) -> None:
-        """Publish changed texts and positions if there are subscribers."""
         if self._topic.has_subscribers and self._text_throttle.passes():
             self._texts = {name: self._text(vehicle) for name, vehicle in self._simulation.vehicles.items()}
         super().update()
@@ -181,13 +180,11 @@ class PathMarkers(FleetMarkers):
     name, period = "path", _PATH_PERIOD
 
     def __init__(self, simulation: Simulation):
-        """Advertise for the vehicles of `simulation`."""
         super().__init__(simulation)
         self._run = -1
         self._paths: dict[str, _Path] = {}
 
     def update(self) -> None:
-        """Add the vehicles' positions to their paths, and publish changed paths, if there are subscribers."""
         vehicles = self._simulation.vehicles
         if self._run != self._simulation.run or not self._topic.has_subscribers:
             self._paths = {} if self._run != self._simulation.run else self._paths

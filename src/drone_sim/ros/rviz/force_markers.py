@@ -55,7 +55,6 @@ class ForceMarkers(FleetMarkers):
     name = "forces"
 
     def __init__(self, simulation: Simulation):
-        """Advertise for the vehicles of `simulation`."""
         super().__init__(simulation)
         # Step (run and number) and the vehicle's teleports at the first look after it, by vehicle.
         self._teleports: dict[str, tuple[tuple[int, int], int]] = {}

@@ -88,7 +88,6 @@ class HeldHandles:
                 self._received_at[key] = self._clock()
 
     def names(self) -> set[str]:
-        """Return the names of the handles that are held."""
         with self._lock:
             since = self._clock() - TIMEOUT
             self._received_at = {key: time for key, time in self._received_at.items() if time > since}

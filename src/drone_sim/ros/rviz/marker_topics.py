@@ -75,7 +75,6 @@ class FleetMarkers:
     period = MOTION_PERIOD  # s of real time
 
     def __init__(self, simulation: Simulation):
-        """Advertise for the vehicles of `simulation`."""
         self._simulation = simulation
         self._topic = MarkerTopic(f"{namespace(simulation)}/view/{self.name}", self.period)
         self._published: list[Any] = []  # the inputs of the markers

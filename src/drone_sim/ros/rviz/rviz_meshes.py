@@ -37,7 +37,6 @@ class RvizMeshes:
         return self._written[key]
 
     def close(self) -> None:
-        """Remove folder and files."""
         if self._folder is not None:
             self._folder.cleanup()
             self._folder = None
@@ -51,19 +50,16 @@ class RvizMeshes:
         for number, surface in enumerate(surfaces.load(visual)):
             image = "" if surface.texture is None else f"{stem.name}_{number}.png"
             if surface.texture is not None:
-                _write_image(stem.with_name(image), surface.texture)
+                path = stem.with_name(image)
+                order = cv2.COLOR_RGBA2BGRA if surface.texture.shape[2] == 4 else cv2.COLOR_RGB2BGR
+                if not cv2.imwrite(str(path), cv2.cvtColor(surface.texture, order)):
+                    raise OSError(f"{path}: cannot be written")
             materials += _material(number, surface, visual.rgba, glow, image)
             lines += [f"usemtl {number}", *_triangles(surface, first)]
             first += len(surface.vertices)
         stem.with_suffix(".mtl").write_text("\n".join([*materials, ""]), encoding="utf-8")
         stem.with_suffix(".obj").write_text("\n".join([*lines, ""]), encoding="utf-8")
         return f"file://{stem}.obj"
-
-
-def _write_image(path: Path, image: np.ndarray) -> None:
-    order = cv2.COLOR_RGBA2BGRA if image.shape[2] == 4 else cv2.COLOR_RGB2BGR
-    if not cv2.imwrite(str(path), cv2.cvtColor(image, order)):
-        raise OSError(f"{path}: cannot be written")
 
 
 def _material(number: int, surface: Surface, tint: tuple[float, ...], glow: float, image: str) -> list[str]:

@@ -82,7 +82,6 @@ class JoyCommands:
     """
 
     def __init__(self, parameters: JoyParameters):
-        """Start without a gamepad."""
         self._parameters = parameters
         self._buttons = {name: number for name, number in parameters.buttons if number >= 0}
         self.disconnect()

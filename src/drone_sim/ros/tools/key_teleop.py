@@ -65,7 +65,6 @@ class Screen:
         self._help = HELP[teleop.key_map]
 
     def run(self, screen: Any) -> None:
-        """Run in a curses screen."""
         self._screen = screen
         with contextlib.suppress(OSError, termios.error):  # the terminal is gone
             _disable_flow_control(self._terminal)

@@ -77,7 +77,6 @@ class Teleop:
 
     @property
     def is_connected(self) -> bool:
-        """Whether there is a subscriber of the commands."""
         return self._publisher.get_num_connections() > 0
 
     def press(self, key: str) -> bool:

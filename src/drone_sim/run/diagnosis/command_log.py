@@ -41,7 +41,6 @@ class CommandLog:
         self._lock = threading.Lock()
 
     def take(self, topic: str, sender: str) -> None:
-        """Log an accepted message."""
         before, now = self.taken.get(topic), Taken(sender, self.clock())
         self.taken[topic] = now
         if before is None or before.sender != sender:

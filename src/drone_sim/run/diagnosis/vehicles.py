@@ -54,7 +54,6 @@ class VehicleDiagnosis:
         self._contacts = vehicle.body.contacts()
 
     def finding(self) -> Finding:
-        """Return the finding."""
         problems = [
             *self._check_running(),
             *self._check_script(),

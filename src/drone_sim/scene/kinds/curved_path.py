@@ -79,7 +79,6 @@ class CurvedPathParameters(KindParameters):
             raise ParameterError(f"the curves have {count} points, at most {MAX_LINE} are allowed", ("control_points",))
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
-        """Return the path object."""
         counts = self.counts, self.metres_per_radian, self.metres_per_pause
         rules = PathRules(self.closed, self.flat, self.orientation, *counts)
         path = ControlledPath(*place, [point.control_point for point in self.control_points], rules)

@@ -17,7 +17,6 @@ class DummyParameters(KindParameters):
     size: Length = 0.01
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
-        """Return the dummy."""
         return Dummy(place, self.size)
 
 

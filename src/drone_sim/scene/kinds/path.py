@@ -39,5 +39,4 @@ class PathParameters(KindParameters):
             raise ParameterError("each must be a unit quaternion x, y, z, w", ("turns",))
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
-        """Return the path object."""
         return Path(*place, self.points, self.closed, self.turns)

@@ -51,7 +51,6 @@ class ProximitySensorParameters(KindParameters):
             raise ParameterError(f"must be at most {maximum:.4g} rad", ("angle",), f"{self.angle:g}")
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
-        """Return the sensor."""
         return ProximitySensor(place, Volume(self.type, self.range, self.offset, self.angle, self.radius), context)
 
 
@@ -68,14 +67,12 @@ class ProximitySensor(SceneObject):
     """Detects objects on request, except the bodies of its ancestors."""
 
     def __init__(self, place: Place, volume: Volume, context: SimulationContext):
-        """Create the sensor with its detection volume."""
         super().__init__(*place, kind="proximity_sensor")
         self.volume = volume
         self.entity = EVERYTHING
         self._context = context
 
     def save_state(self) -> Restore:
-        """Return a function that restores its place and the entity that it detects."""
         return in_turn(super().save_state(), saved(self, "entity"))
 
     def detect(self, wanted: Callable[[str], bool] = lambda _: True) -> Detection | None:

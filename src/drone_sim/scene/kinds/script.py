@@ -15,5 +15,4 @@ class ScriptParameters(KindParameters):
     kind: Literal["script"]
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
-        """Return the frame."""
         return SceneObject(*place, kind="script")

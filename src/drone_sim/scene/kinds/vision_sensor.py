@@ -43,7 +43,6 @@ class VisionSensorParameters(KindParameters):
             raise ParameterError(f"must be less than far = {self.far:g}", ("near",), f"{self.near:g}")
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
-        """Return the camera."""
         return VisionSensor(place, self, context)
 
 
@@ -51,7 +50,6 @@ class VisionSensor(SceneObject):
     """Renders images on request."""
 
     def __init__(self, place: Place, parameters: VisionSensorParameters, context: SimulationContext):
-        """Create the sensor from its parameters."""
         super().__init__(*place, kind="vision_sensor")
         self.width, self.height = parameters.width, parameters.height
         self.near, self.far = parameters.near, parameters.far
@@ -63,7 +61,6 @@ class VisionSensor(SceneObject):
         self._context = context
 
     def save_state(self) -> Restore:
-        """Return a function that restores its place, settings and its script's detection result."""
         return in_turn(super().save_state(), saved(self, "detected", "entity", "color_coded"))
 
     def picture(self, kind: str = "color", only: Collection[str] | None = None) -> np.ndarray:

@@ -50,7 +50,6 @@ class ExposureParameters(Imperfection):
 
     @property
     def is_on(self) -> bool:
-        """Whether it changes the images."""
         return self.time > 0 or self.gain > 0
 
     @property
@@ -76,11 +75,9 @@ class ExposureControl:
     """The present exposure of a camera, as brightness relative to the rendered images."""
 
     def __init__(self) -> None:
-        """Start without a measurement."""
         self.reset()
 
     def reset(self) -> None:
-        """Forget all measurements."""
         self._brightness, self._wanted, self._at = 0.0, 1.0, 0.0
 
     @property
@@ -102,5 +99,4 @@ class ExposureControl:
         self._brightness = self._wanted if brightness is None else brightness
 
     def save_state(self) -> Restore:
-        """Return a function that restores the exposure."""
         return saved(self, "_brightness", "_wanted", "_at")

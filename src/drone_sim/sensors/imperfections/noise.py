@@ -44,11 +44,9 @@ class PixelNoiseParameters(Imperfection):
 
     @property
     def is_on(self) -> bool:
-        """Whether it changes the images."""
         return self.full_well > 0
 
     def apply(self, light: np.ndarray, shot: Shot) -> np.ndarray:
-        """Return the light with noise."""
         electrons = np.minimum(light * np.float32(self.full_well / shot.gain), np.float32(self.full_well))
         noisy = shot.normal(self.seed)
         noisy *= np.sqrt(electrons + np.float32(self.read**2))

@@ -40,7 +40,6 @@ class Photography:
 
     @property
     def is_perfect(self) -> bool:
-        """Whether the camera has no imperfections."""
         return not self._imperfections
 
     def take(self, lens: Intrinsics, gather: Gather) -> np.ndarray:
@@ -81,7 +80,6 @@ class Photography:
         return numbers.reshape(shape)
 
     def reset(self) -> None:
-        """Return to the state at the start of a run."""
         self._exposure.reset()
 
     def save_state(self) -> Restore:

@@ -19,5 +19,4 @@ class ShutterParameters(Imperfection):
 
     @property
     def is_on(self) -> bool:
-        """Whether it changes the images."""
         return self.readout > 0

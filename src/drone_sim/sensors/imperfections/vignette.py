@@ -28,11 +28,9 @@ class VignetteParameters(Imperfection):
 
     @property
     def is_on(self) -> bool:
-        """Whether it changes the images."""
         return self.power > 0
 
     def apply(self, light: np.ndarray, shot: Shot) -> np.ndarray:
-        """Return the darkened light."""
         light *= _share(shot.lens, self.power)
         return light
 
