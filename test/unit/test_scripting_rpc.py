@@ -78,8 +78,8 @@ DOES = {
     "calls itself": "say(sim.callScriptFunction('twice', sim.handle_self, 3, [1, 'b', b'\\xff', None, {2: 3}]))",
     "calls by attributes": "say(sim.getScriptFunctions(sim.getScriptHandle()).twice(4))",
     "names its arguments": "say(sim.getObjectPosition(self.d, relativeTo=self.mark))",
-    "reads more poses than it may announce": "say(sum(tried(lambda: sim.getObjectPosition(1000 + number, -1))"
-    " != [] for number in range(300)))",
+    "reads more poses than it may announce": "sim.getSimulationTime() < 0.2 and say(sum("
+    "tried(lambda: sim.getObjectPosition(1000 + number, -1)) != [] for number in range(300)))",
     "reads sensors": "say(sim.readSensor(sim.getObjectHandle('imu')))",
     "packs": "say(sim.unpackTable(sim.packTable({'a': [1, 2.5, 'c', True]})))",
 }
