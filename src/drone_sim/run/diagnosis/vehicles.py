@@ -116,7 +116,9 @@ class VehicleDiagnosis:
         if not self._player.playing or state in (FLYING, HELD, UPSIDE_DOWN) or state != situation(self._vehicle.body):
             return []
         is_touched = state.startswith("touches")
-        return [Problem(WARN, state if is_touched else f"{state}: its propellers do not lift it; `restart` puts it back")]
+        return [
+            Problem(WARN, state if is_touched else f"{state}: its propellers do not lift it; `restart` puts it back")
+        ]
 
     def _check_limits(self) -> list[Problem]:
         problems = []
