@@ -101,7 +101,7 @@ def test_without_the_token_nothing_is_served(served, path):
 
 def test_the_token_lets_in_and_leaves_the_address(served):
     status, answer, _ = served.get(f"/?token={TOKEN}")
-    assert status == 303 and answer.headers["Location"] == "/"
+    assert status == 303 and answer.headers["Location"] == "./"
     cookie = answer.headers["Set-Cookie"]
     assert cookie.startswith(served.cookie) and "HttpOnly" in cookie and "SameSite=Strict" in cookie
     for path, word in (("/", b"cockpit.js"), ("/cockpit.js", b"cm-editor")):

@@ -112,7 +112,7 @@ export function render(element, text, folder, knows, go, actions = () => []) {
   for (const picture of element.querySelectorAll("img")) {
     const path = within(picture.getAttribute("src"), folder)?.pathname;
     if (path && PICTURE.test(path)) {
-      picture.src = path;
+      picture.src = path.slice(1); // relative to the page, which may lie below a prefix
       enlargeable(picture);
     } else picture.replaceWith(picture.alt);
   }

@@ -5,7 +5,8 @@ const AGAIN = [1000, 1000, 2000, 4000, 8000]; // ms before each further attempt;
 const REFUSED = 30_000; // ms, while the cockpit does not know this page: nothing changes without the user
 const ABANDON = 7 * SILENCE * 1000; // ms of silence after which another connection is tried
 const PATIENCE = 10_000; // ms for a connection to be opened
-const RETURN = "/return"; // where a page that an earlier cockpit let in asks for a challenge, and signs it
+const FORBIDDEN = 403;
+const RETURN = "return"; // relative to the page: where a page that an earlier cockpit let in asks for a challenge, and signs it
 
 const hex = (bytes) => [...new Uint8Array(bytes)].map((one) => one.toString(16).padStart(2, "0")).join("");
 
@@ -33,7 +34,7 @@ export class PageSocket {
 
   connect() {
     clearTimeout(this.later);
-    const socket = new WebSocket(`ws${location.protocol === "https:" ? "s" : ""}://${location.host}/socket`, "drone_sim");
+    const socket = new WebSocket(new URL("socket", location).href.replace("http", "ws"), "drone_sim");
     this.socket = socket;
     this.begun = performance.now();
     socket.binaryType = "arraybuffer";
@@ -78,12 +79,13 @@ export class PageSocket {
     this.later = setTimeout(() => this.connect(), wait);
   }
 
-  // Returns "nobody" if no cockpit answers, "allowed" if it lets this page in, "refused" if it does not. A cockpit lets
-  // a page in that an earlier one on this port has let in: the page signs a challenge with the key it got from that one.
+  // Returns "nobody" if no cockpit answers (a proxy may answer in its place), "allowed" if it lets this page in, "refused"
+  // if it does not. A cockpit lets a page in that an earlier one on this port has let in: the page signs a challenge with the key it got from that one.
   async askToReturn() {
     try {
       const answer = await fetch(RETURN, { signal: AbortSignal.timeout(PATIENCE) });
-      if (!answer.ok) return "refused";
+      if (answer.status === FORBIDDEN) return "refused";
+      if (!answer.ok) return "nobody";
       const challenge = await answer.text();
       const signature = this.key && (await sign(this.key, challenge));
       if (!signature) return "refused";

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import sys
 from collections.abc import Mapping
@@ -29,6 +30,7 @@ class CockpitParameters(NamedTuple):
     port: Any = 8080
     scripts: Path = Path("~/drone_scripts")  # not ~/drone_sim, where a checkout of this package may be
     simulator: str = "drone_sim"
+    socket: str = ""  # a UNIX socket for a proxy of the same user, instead of address and port
 
 
 def read_parameters(given: Any) -> CockpitParameters:
@@ -43,8 +45,11 @@ def read_parameters(given: Any) -> CockpitParameters:
     node = given.get("simulator", CockpitParameters().simulator)
     if not isinstance(node, str) or not _NODE.fullmatch(node):
         raise ValueError(f"simulator = {shown(node)}: must be the name of a node, such as drone_sim")
+    socket = given.get("socket", CockpitParameters().socket)
+    if not isinstance(socket, str):
+        raise ValueError(f"socket = {shown(socket)}: must be the name of a UNIX socket, or none")
     scripts = locate(from_shell(folder if folder.startswith(("/", "~")) else f"./{folder}"))
-    return CockpitParameters(**{**given, "scripts": scripts, "simulator": node})
+    return CockpitParameters(**{**given, "scripts": scripts, "simulator": node, "socket": from_shell(socket)})
 
 
 def main() -> int:
@@ -58,10 +63,14 @@ def main() -> int:
 
 def _serve() -> None:
     parameters = read_parameters(rospy.get_param("~", {}))
-    server = PageServer(parameters.address, parameters.port)
-    with address_file(server.address, server.port) as where:
-        rospy.loginfo(f"the cockpit listens at {server.address.partition('?')[0]}; {where}")
-        print_to_terminal(f"the cockpit is at {server.addresses}")
+    server = PageServer(parameters.address, parameters.port, parameters.socket)
+    with contextlib.ExitStack() as stack:
+        if parameters.socket:
+            rospy.loginfo(f"the cockpit listens at {parameters.socket}, for a proxy of the same user")
+        else:
+            where = stack.enter_context(address_file(server.address, server.port))
+            rospy.loginfo(f"the cockpit listens at {server.address.partition('?')[0]}; {where}")
+            print_to_terminal(f"the cockpit is at {server.addresses}")
 
         from drone_sim.ros.cockpit.cockpit import Cockpit  # takes more than a second
 

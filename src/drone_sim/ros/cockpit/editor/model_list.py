@@ -96,5 +96,5 @@ class ModelList:
 def _row(title: str, operation: _Operation, picture: str | None = None) -> dict[str, Any]:
     key = title.lower().replace(" ", "_")
     if picture is None:
-        picture = f"{_WEB}{key}.png" if (package_path() / PICTURES / f"{key}.png").is_file() else ""
+        picture = f"{_WEB[1:]}{key}.png" if (package_path() / PICTURES / f"{key}.png").is_file() else ""
     return {"model": key, "title": title, "picture": picture, "op": operation}

@@ -21,12 +21,12 @@ from drone_sim.ros.cockpit.server.access_control import Content
 _LOG = logging.getLogger(__name__)
 _MAX_SIZE = 64 << 20  # bytes of a mesh file
 _MAX_MESHES = 200  # in memory; the least recently used are removed
-_FOLDER, _ENDING, _KIND = "/mesh/", ".glb", "model/gltf-binary"
+_FOLDER, _ENDING, _KIND = "mesh/", ".glb", "model/gltf-binary"
 _File = tuple[str, int, int]  # resource, time of its last change, size
 
 
 class MeshStore:
-    """Meshes as glTF, by URL. Thread-safe."""
+    """Meshes as glTF, by URL relative to the page. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -55,10 +55,11 @@ class MeshStore:
     def find(self, path: str) -> Content:
         """Return type and content of the mesh with a URL path; None if there is none."""
         with self._lock:
-            content = self._contents.get(path)
+            url = path.removeprefix("/")
+            content = self._contents.get(url)
             if content is None:
                 return None
-            self._contents.move_to_end(path)
+            self._contents.move_to_end(url)
         return _KIND, content
 
     def _is_known(self, file: _File) -> bool:

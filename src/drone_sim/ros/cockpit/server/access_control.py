@@ -1,4 +1,8 @@
-"""Check of HTTP requests and WebSockets: they need the token of the printed address, and the cockpit's own origin."""
+"""Check of HTTP requests and WebSockets.
+
+They need the token of the printed address, or come from the user's own proxy, which has checked them. WebSockets also
+need the cockpit's own origin.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,10 @@ import gzip
 import hmac
 import http
 import logging
+import os
 import re
+import socket
+import struct
 from collections.abc import Awaitable, Callable, Mapping
 from functools import lru_cache
 from http.cookies import CookieError, SimpleCookie
@@ -15,7 +22,7 @@ from urllib.parse import parse_qs
 
 import rospy
 from websockets import Headers
-from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.asyncio.server import Server, ServerConnection, serve, unix_serve
 from websockets.exceptions import ConnectionClosedError
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
@@ -25,6 +32,8 @@ from drone_sim.ros.cockpit.server.return_pass import ReturnPass, is_local
 SUBPROTOCOL = "drone_sim"  # of the page's WebSocket
 _MAX_MESSAGE = 8 << 20  # bytes of a message from a browser: a script of at most 1 MiB, escaped as JSON
 _REFUSED = "To open the cockpit, use the whole address that the simulation printed. It ends in ?token=..."
+_NOT_THE_PROXY = "Only a proxy of the same user may use this socket."
+_CREDENTIALS = struct.Struct("3i")  # of a UNIX socket's peer: process, user and group
 _SECURITY_HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
@@ -51,49 +60,63 @@ _VIOLATIONS = (CloseCode.PROTOCOL_ERROR, CloseCode.INVALID_DATA, CloseCode.MESSA
 
 
 class AccessControl:
-    """Server of the page and its WebSocket that accepts only requests with the token."""
+    """Server of the page and its WebSocket that accepts only requests with the token, or of the user's own proxy."""
 
     def __init__(self, token: str, page: Callable[[str], Content], socket: Handler):
         """Accept clients that have `token`; `page` returns a page by its path, `socket` serves a WebSocket."""
         self._token = token
+        self._is_behind_proxy = False
         self.return_pass: ReturnPass | None = None  # for the tabs of an earlier cockpit; None accepts none
         self._page = page
         self._socket = socket
 
     async def serve(self, host: str, port: int) -> Server:
         """Listen at a numeric address, in the running event loop; port 0 is any free port. Raises OSError."""
+        return await serve(self._socket, host, port, **self._options())
+
+    async def serve_proxy(self, path: str) -> Server:
+        """Listen at a UNIX socket for a proxy of the same user, whose requests need no token. Raises OSError."""
+        self._is_behind_proxy = True
+        return await unix_serve(self._socket, path, **self._options())
+
+    def _options(self) -> dict[str, Any]:
         log = logging.Logger("cockpit", logging.ERROR)
         log.addHandler(_OneLineHandler())
-        return await serve(
-            self._socket,
-            host,
-            port,
-            process_request=self._answer,
-            subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
-            compression=None,  # messages stay on this machine, or SSH can compress them
-            max_size=_MAX_MESSAGE,
-            create_connection=_CheckedConnection,
-            logger=log,
-        )
+        return {
+            "process_request": self._answer,
+            "subprotocols": [SUBPROTOCOL],
+            "compression": None,  # messages stay on this machine, or SSH can compress them
+            "max_size": _MAX_MESSAGE,
+            "create_connection": _CheckedConnection,
+            "logger": log,
+        }
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the response to a request; None accepts a WebSocket."""
         try:
-            return self._response_to(request, is_local(connection))
+            host = _checked_host(request.headers)
+            return self._refuse(connection, request) or self._response_to(request, host)
         except ValueError as error:
             return _response(http.HTTPStatus.BAD_REQUEST, str(error))
 
-    def _response_to(self, request: Request, may_return: bool) -> Response | None:
-        host = _checked_host(request.headers)
+    def _refuse(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Return the response to a client that is not let in, or gets a cookie first; None lets it in."""
+        if self._is_behind_proxy:
+            return None if _is_of_this_user(connection) else _response(http.HTTPStatus.FORBIDDEN, _NOT_THE_PROXY)
         path, _, query = request.path.partition("?")
-        if self._is_token(parse_qs(query).get("token", [""])[0]) and not _is_socket(request):
-            return self._accept_token(request)
-        if path == RETURN and may_return and self.return_pass is not None and not _is_socket(request):
-            return self._accept_return(self.return_pass, parse_qs(query), request)
-        if not self._is_token(_cookie(request, self._name_of_cookie(request))):
-            return _response(http.HTTPStatus.FORBIDDEN, _REFUSED)
+        if not _is_socket(request):
+            if path == "/" and self._is_token(parse_qs(query).get("token", [""])[0]):
+                return self._accept_token(request)
+            if path == RETURN and self.return_pass is not None and is_local(connection):
+                return self._accept_return(self.return_pass, parse_qs(query), request)
+        is_known = self._is_token(_cookie(request, self._name_of_cookie(request)))
+        return None if is_known else _response(http.HTTPStatus.FORBIDDEN, _REFUSED)
+
+    def _response_to(self, request: Request, host: str) -> Response | None:
+        """Return the response to a client that is let in."""
         if _is_socket(request):
             return None if _is_of_our_page(request) else _response(http.HTTPStatus.FORBIDDEN, "of another origin")
+        path = request.path.partition("?")[0]
         found = self._page(path)
         if found is None:
             return _response(http.HTTPStatus.NOT_FOUND, "There is no such page.")
@@ -102,7 +125,7 @@ class AccessControl:
     def _accept_token(self, request: Request) -> Response:
         """Set the token as a cookie, and redirect to an address without it, which people can safely share."""
         response = _response(http.HTTPStatus.SEE_OTHER, "")
-        response.headers["Location"] = "/"
+        response.headers["Location"] = "./"  # relative, because a proxy may serve the page below a prefix
         self._set_cookie(request, response)
         return response
 
@@ -117,7 +140,8 @@ class AccessControl:
         return response
 
     def _set_cookie(self, request: Request, response: Response) -> None:
-        cookie = f"{self._name_of_cookie(request)}={self._token}; Path=/; HttpOnly; SameSite=Strict"
+        # Without a path, browsers keep the cookie for the page's folder, which also is a proxy's prefix.
+        cookie = f"{self._name_of_cookie(request)}={self._token}; HttpOnly; SameSite=Strict"
         response.headers["Set-Cookie"] = cookie
 
     def _is_token(self, given: str) -> bool:
@@ -138,6 +162,13 @@ def _checked_host(headers: Headers) -> str:
     if host and not _HOST.fullmatch(host):
         raise ValueError("Host: must be a name or an address, and a port")
     return host
+
+
+def _is_of_this_user(connection: ServerConnection) -> bool:
+    """Return whether the client of a UNIX socket is a process of this process's user."""
+    peer = connection.transport.get_extra_info("socket")
+    _, user, _ = _CREDENTIALS.unpack(peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size))
+    return bool(user == os.getuid())
 
 
 def _is_socket(request: Request) -> bool:
@@ -208,7 +239,8 @@ class _CheckedConnection(ServerConnection):
             raise
 
     def _say(self, what: str) -> None:
-        rospy.logwarn(f"a browser at {self.remote_address[0]} is refused: {what}")
+        where = self.remote_address[0] if self.remote_address else "the proxy"
+        rospy.logwarn(f"a browser at {where} is refused: {what}")
 
 
 class _OneLineHandler(logging.Handler):

@@ -16,7 +16,7 @@ from websockets.asyncio.server import Server, ServerConnection
 from websockets.exceptions import ConnectionClosed
 
 from drone_sim.ros.cockpit.server.access_control import AccessControl, Content, Handler
-from drone_sim.ros.cockpit.server.address import free_place, urls
+from drone_sim.ros.cockpit.server.address import AddressError, free_place, urls
 from drone_sim.ros.cockpit.server.return_pass import is_local, new_pass
 
 _KINDS = {
@@ -38,18 +38,24 @@ def page_files() -> dict[str, tuple[str, bytes]]:
 class PageServer:
     """Web server in a thread of its own. WebSockets wait until `begin` is called."""
 
-    def __init__(self, address: Any, port: Any):
-        """Listen at `address`, at `port` or the next free one. Raises AddressError if that is impossible."""
+    def __init__(self, address: Any, port: Any, socket: str = ""):
+        """Listen at `address`, at `port` or the next free one, or only at the UNIX socket of a proxy.
+
+        Raises AddressError if that is impossible.
+        """
         # What `begin` was called with.
         self._handlers: futures.Future[tuple[Handler, Callable[[str], Content]]] = futures.Future()
         self._files, token = page_files(), secrets.token_urlsafe(16)
-        host, wanted = free_place(address, port)
+        host, wanted = free_place(address, port) if not socket else ("", 0)
         self._loop = asyncio.new_event_loop()
         threading.Thread(target=self._loop.run_forever, name="page server", daemon=True).start()
         self._access = AccessControl(token, self._find, self._serve_socket)
-        self._server = asyncio.run_coroutine_threadsafe(self._listen(host, wanted), self._loop).result()
-        self.port = int(next(iter(self._server.sockets)).getsockname()[1])
-        self.address, self.address_elsewhere = urls(host, self.port, token)
+        listening = self._listen_for_proxy(socket) if socket else self._listen(host, wanted)
+        self._server = asyncio.run_coroutine_threadsafe(listening, self._loop).result()
+        self.port, self.address, self.address_elsewhere = 0, "", ""
+        if not socket:
+            self.port = int(next(iter(self._server.sockets)).getsockname()[1])
+            self.address, self.address_elsewhere = urls(host, self.port, token)
 
     @property
     def addresses(self) -> str:
@@ -77,6 +83,12 @@ class PageServer:
         if port:  # with port 0, the next start has another port, so no tab could return
             self._access.return_pass = new_pass(port)
         return server
+
+    async def _listen_for_proxy(self, socket: str) -> Server:
+        try:
+            return await self._access.serve_proxy(socket)
+        except OSError as error:
+            raise AddressError(f"socket = {socket[:200]}: {error.strerror or error}") from None
 
     def _find(self, path: str) -> Content:
         return self._files.get(path) or (self._handlers.result()[1](path) if self._handlers.done() else None)
