@@ -33,12 +33,18 @@ setup(
     maintainer_email=maintainer.get("email"),
     python_requires=">=3.10",
     install_requires=requirements("requirements.txt"),
-    extras_require={"all": requirements("requirements-all.txt")},
+    extras_require={
+        "all": requirements("requirements-all.txt"),
+        "jupyter": ["jupyterlab>=4,<5", "jupyter-server-proxy>=4.4,<5"],
+    },
+    # CMakeLists.txt has it, too.
+    entry_points={"jupyter_serverproxy_servers": ["drone_sim = drone_sim.ros.jupyter:server"]},
     packages=find_packages("src"),
     package_dir={"": "src"},
     package_data={
         "drone_sim.grading.autograder": ["files/*"],
         "drone_sim.grading.outputs.html": ["templates/*", "files/*"],
+        "drone_sim.ros": ["jupyter.svg"],
         "drone_sim.ros.cockpit": ["page/*.html", "page/*.css", "page/*.js"],
         "drone_sim.scripting.lua": ["*.lua"],
         "drone_sim.child_scripts": ["*.lua"],

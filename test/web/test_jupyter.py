@@ -1,0 +1,156 @@
+"""The tile of Jupyter: a real server starts the simulator, its page is flown and edited, and all end with it."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+from cockpit_page import WAIT, ready, wait_for, wait_until
+from launched import free_port
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+BASE = "/user/a/"
+PAGE = f"{BASE}drone_sim/"
+STARTED = f"localStorage['drone_sim{PAGE}started'] = 'true';"  # the start page has been answered
+PLACE = "() => scene.tree.byName.get('base_link').position.x"
+
+
+@pytest.fixture(name="server", scope="module")
+def _server(tmp_path_factory):
+    """A Jupyter server below a prefix, as JupyterHub starts it for each user, with a home of its own."""
+    home, port = tmp_path_factory.mktemp("home"), free_port()
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("JUPYTER")}
+    extensions = "{'jupyter_server_proxy': True, 'jupyterlab': False, 'jupyter_lsp': False}"
+    options = [
+        f"--ServerApp.jpserver_extensions={extensions}",
+        f"--ServerApp.base_url={BASE}",
+        f"--ServerApp.port={port}",
+        "--IdentityProvider.token=secret",
+    ]
+    with (home / "log").open("w") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "jupyter_server", "--no-browser", "--allow-root", *options],
+            env={**environment, "HOME": str(home), "ROS_HOME": f"{home}/.ros"},
+            cwd=home,
+            stdout=log,
+            stderr=log,
+        )
+    served = SimpleNamespace(home=home, port=port, process=process, address=f"http://127.0.0.1:{port}")
+    try:
+        until(lambda: status(f"{served.address}{BASE}api") == 200)
+        yield served
+    finally:
+        process.kill()
+        process.wait()
+        print((home / "log").read_text())
+
+
+def until(condition):
+    end = time.monotonic() + WAIT / 1000
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.1)
+
+
+def status(address, **headers):
+    try:
+        with urllib.request.urlopen(urllib.request.Request(address, headers=headers), timeout=60) as answer:
+            return answer.status if answer.url == address else 302  # to the login
+    except urllib.error.HTTPError as error:
+        return error.code
+    except OSError:
+        return 0
+
+
+def opens_socket(server, cookie, origin):
+    address = f"ws://127.0.0.1:{server.port}{PAGE}socket"
+    try:
+        with connect(address, subprotocols=["drone_sim"], origin=origin, additional_headers={"Cookie": cookie}) as one:
+            return one.recv(timeout=60) is not None
+    except InvalidStatus as refused:
+        assert refused.response.status_code == 403
+        return False
+
+
+def processes_of(home):
+    """Return the command lines of all processes that have this home."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if f"HOME={home}\0".encode() in (folder / "environ").read_bytes():
+                found.append((folder / "cmdline").read_bytes().replace(b"\0", b" ").decode())
+        except OSError:  # it has ended
+            continue
+    return found
+
+
+def listening():
+    """Return the ports at which this network namespace is listened."""
+    rows = [line.split() for name in ("tcp", "tcp6") for line in Path(f"/proc/net/{name}").read_text().splitlines()[1:]]
+    return {int(row[1].rpartition(":")[2], 16) for row in rows if row[3] == "0A"}
+
+
+def test_the_tile_starts_the_simulator_and_the_server_ends_it(server, browser):
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    context.add_init_script(STARTED)
+    page = context.new_page()
+    page.set_default_timeout(WAIT)
+    tiles = context.request.get(f"{server.address}{BASE}server-proxy/servers-info?token=secret").json()
+    (tile,) = [one["launcher_entry"] for one in tiles["server_processes"] if one["name"] == "drone_sim"]
+    assert tile["enabled"] and tile["title"] == "Drone simulator"
+    assert b"<svg" in context.request.get(f"{server.address}{tile['icon_url']}").body()
+    ports = listening()
+    asked, troubles = [], []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("pageerror", lambda error: troubles.append(str(error)))
+    page.on("console", lambda message: message.type == "error" and troubles.append(message.text))
+    page.goto(f"{server.address}{BASE}{tile['path_info']}", wait_until="commit")
+    ready(page)
+
+    before = page.evaluate(PLACE)
+    page.locator("#command").click()
+    page.keyboard.down("w")
+    wait_for(page, f"{PLACE[6:]} > {before} + 0.3")
+    page.keyboard.up("w")
+
+    page.select_option("#script", "tutorial/2_elevation.py")
+    wait_for(page, "document.querySelector('.cm-content').innerText.includes('Stage 2 of')")
+    page.locator(".cm-line").first.click()
+    page.keyboard.press("Control+Home")
+    page.keyboard.type("print('from', 'Jupyter')\n")
+    page.click("#run")
+    wait_until(page, lambda: "from Jupyter" in page.inner_text("#console"))
+    assert (server.home / "drone_scripts/2_elevation.py").read_text().startswith("print('from', 'Jupyter')\n")
+
+    page.locator("#lesson-body img").first.wait_for()
+    wait_for(page, "[...document.querySelectorAll('#lesson-body img')].every(one => one.complete && one.naturalWidth)")
+    page.locator("#rail").get_by_role("button", name="Edit").click()
+    wait_for(page, "document.querySelectorAll('#models img').length > 5")
+    wait_for(page, "[...document.querySelectorAll('#models img')].every(one => one.complete && one.naturalWidth)")
+    assert page.url == f"{server.address}{PAGE}"
+    assert [url for url in asked if not url.startswith((page.url, "data:", "blob:"))] == []
+    assert any("/mesh/" in url for url in asked) and troubles == []
+    assert listening() - ports == set(), "only the proxy reaches the simulator"
+
+    for path in (PAGE, f"{PAGE}cockpit.js", f"{PAGE}socket"):
+        assert status(f"{server.address}{path}", Cookie=f"drone_sim_{server.port}=secret") in (302, 403)
+    cookie = "; ".join(f"{one['name']}={one['value']}" for one in context.cookies())
+    assert opens_socket(server, cookie, server.address)
+    assert not opens_socket(server, cookie, "http://127.0.0.1:1"), "a page of another origin"
+    assert not opens_socket(server, "", server.address), "a browser that has not logged in"
+    context.close()
+
+    assert len(processes_of(server.home)) > 5
+    server.process.send_signal(signal.SIGTERM)
+    server.process.wait(60)
+    until(lambda: processes_of(server.home) == [])
