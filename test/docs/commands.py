@@ -51,6 +51,8 @@ NOT_RUN = {  # with the reason
     "mkdir wheels": INSTALLS,
     "packaging/pybullet.sh venv/bin/python pybullet==3.2.7 $PWD/wheels": "takes minutes",
     "venv/bin/pip install --find-links wheels .": INSTALLS,
+    ".venv/bin/pip install 'jupyterlab>=4,<5' 'jupyter-server-proxy>=4.4,<5'": INSTALLS,
+    ".venv/bin/jupyter lab": "test/web/test_jupyter.py starts such a server",
     "client/bin/pip install coppeliasim-zmqremoteapi-client": INSTALLS,
     "readers/bin/pip install rosbags": INSTALLS,
     "readers/bin/python read_bag.py flight.bag": PACKAGE,

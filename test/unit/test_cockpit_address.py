@@ -81,7 +81,7 @@ def test_without_a_network_the_machine_goes_by_its_name(monkeypatch):
 
 def test_settings_have_defaults():
     assert read_parameters({}) == ("127.0.0.1", 8080, Path.home() / "drone_scripts", "drone_sim", "")
-    assert read_parameters({"port": 8081, "scripts": "/a/b", "simulator": "/x"})[1:] == (8081, Path("/a/b"), "/x")
+    assert read_parameters({"port": 8081, "scripts": "/a/b", "simulator": "/x"})[1:] == (8081, Path("/a/b"), "/x", "")
 
 
 def test_scripts_are_relative_to_the_shell(monkeypatch):

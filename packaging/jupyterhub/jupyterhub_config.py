@@ -1,0 +1,29 @@
+"""JupyterHub for a course on one machine, each student with an own system user: docs/classroom.md. Run it as root."""
+
+import os
+from pathlib import Path
+
+c = get_config()  # noqa: F821 # of JupyterHub
+
+# Who may come in: the system users of these groups, with their passwords (PAM).
+c.LocalAuthenticator.allowed_groups = {"students"}
+c.LocalAuthenticator.admin_groups = {"teachers"}
+
+# The hub's page. Put HTTPS in front of it, or set c.JupyterHub.ssl_key and c.JupyterHub.ssl_cert.
+c.JupyterHub.bind_url = "http://:8000"
+
+# Each server runs as its student. With systemd (pip install jupyterhub-systemdspawner) it also has limits.
+if Path("/run/systemd/system").exists():
+    c.JupyterHub.spawner_class = "systemd"
+    c.Spawner.mem_limit = "2G"
+    c.Spawner.cpu_limit = 1.0  # cores
+c.Spawner.notebook_dir = "~"
+c.Spawner.default_url = "/lab"  # "/drone_sim/" opens the simulator at once
+c.Spawner.start_timeout = c.Spawner.http_timeout = 120  # s, for many that start at once
+
+# The simulator finds ROS as the shell does in which the hub was started.
+ros = ("CMAKE_PREFIX_PATH", "ROS_DISTRO", "ROS_ETC_DIR", "ROS_PACKAGE_PATH", "ROS_ROOT")
+c.Spawner.environment = {name: os.environ[name] for name in ros if name in os.environ}
+
+# A server whose pages have been closed for an hour ends, with its simulator. Files stay.
+c.Spawner.args = ["--ServerApp.shutdown_no_activity_timeout=3600", "--MappingKernelManager.cull_idle_timeout=3600"]

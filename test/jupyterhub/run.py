@@ -1,0 +1,204 @@
+#!/usr/bin/env python3
+"""`./dev.sh jupyterhub`: a real JupyterHub with packaging/jupyterhub/jupyterhub_config.py, and two students.
+
+It needs root. The students are system users of namespaces of this script, with /etc and /home of their own: nothing of
+it is left on this machine. Each opens the simulator. Then one of them tries to get at the other's: through the hub, and
+as a system user. Exit status 1 if anything is let through, or is left after the end of the hub. It takes a minute.
+"""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import requests
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+ROOT = Path(__file__).resolve().parents[2]
+INSIDE = "DRONE_SIM_JUPYTERHUB"
+NAMESPACES = ["unshare", "--mount", "--net", "--pid", "--fork", "--kill-child", "--mount-proc"]
+HOST = "127.0.0.1:8000"
+PATIENCE = 240  # s
+STUDENTS = ("ann", "ben")
+# What a system user tries; it prints the names of what succeeds.
+ATTACK = """
+import glob, http.client, os, pathlib, signal, socket, subprocess, sys
+victim, pids = sys.argv[1], sys.argv[2].split()
+def tries(name, act):
+    try:
+        if act(): print(name, end=" ")
+    except (OSError, http.client.HTTPException): pass
+def get(port):
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection.request("GET", f"/user/{victim}/drone_sim/")
+    return connection.getresponse().status == 200
+rows = [line.split() for line in pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:]]
+ports = {int(row[1].rpartition(":")[2], 16) for row in rows if row[3] == "0A"}
+assert ports
+for port in ports: tries(f"port-{port}", lambda: get(port))
+for folder in glob.glob("/tmp/jupyter-server-proxy-*"):
+    if pathlib.Path(folder).owner() == victim:
+        tries("socket", lambda: socket.socket(socket.AF_UNIX).connect(f"{folder}/socket") is None)
+tries("home", lambda: os.listdir(f"/home/{victim}"))
+for pid in pids:
+    tries("environ", lambda: pathlib.Path(f"/proc/{pid}/environ").read_bytes())
+    tries("root", lambda: os.listdir(f"/proc/{pid}/root/home/{victim}"))
+    tries("kill", lambda: os.kill(int(pid), signal.SIGCONT) is None)
+    enter = ["nsenter", "--target", pid, "--user", "--net", "--preserve-credentials", "true"]
+    tries("network", lambda: not subprocess.run(enter, stderr=subprocess.DEVNULL).returncode)
+tries("master", lambda: socket.create_connection(("127.0.0.1", 11311), 5))
+print("end")
+"""
+
+
+def main():
+    if os.geteuid() != 0:
+        return "jupyterhub: only root can be several users"
+    if INSIDE not in os.environ:
+        with tempfile.TemporaryDirectory(dir="/var/tmp") as folder:
+            return subprocess.run(
+                [*NAMESPACES, sys.executable, __file__], env={**os.environ, INSIDE: folder}
+            ).returncode
+    folder = Path(os.environ.pop(INSIDE))
+    folder.chmod(0o755)
+    make_users(folder)
+    hub = subprocess.Popen(
+        [sys.executable, "-m", "jupyterhub", "-f", str(ROOT / "packaging/jupyterhub/jupyterhub_config.py")], cwd=folder
+    )
+    until(lambda: hub.poll() is not None or answers(f"http://{HOST}/hub/login"))
+    ann, ben = (Student(name) for name in STUDENTS)
+    for student in (ann, ben):
+        student.open()
+        student.fly(student.name)
+        print(f"{student.name} flies")
+    failures = through_the_hub(ben, ann.name) + as_system_user(ben.name, ann.name)
+    missed = {"socket", "home", "environ", "kill", "network"} - set(as_system_user(ann.name, ann.name))
+    failures += [f"not tried: {name}" for name in sorted(missed)]  # the attack succeeds for the student herself
+    ann.fly(ann.name)
+    if not ann.stops(ann.name):
+        failures.append("not tried: the end of the server")
+    hub.send_signal(signal.SIGTERM)
+    hub.wait(60)
+    until(lambda: not any(processes_of(name) for name in STUDENTS))
+    for failure in failures:
+        print(f"jupyterhub: {failure}")
+    print("jupyterhub: " + ("failed" if failures else "neither gets at the other's simulator, and nothing is left"))
+    return bool(failures)
+
+
+def make_users(folder):
+    shutil.copytree("/etc", folder / "etc", symlinks=True)
+    run("mount", "--bind", str(folder / "etc"), "/etc")
+    run("mount", "-t", "tmpfs", "-o", "mode=755", "tmpfs", "/home")
+    run("mount", "-t", "tmpfs", "-o", "mode=1777", "tmpfs", "/tmp")
+    run("ip", "link", "set", "lo", "up")
+    for group in ("students", "teachers"):
+        run("groupadd", group)
+    for name in STUDENTS:
+        run("useradd", "--create-home", "-K", "HOME_MODE=0700", "--groups", "students", "--shell", "/bin/bash", name)
+    run("chpasswd", input="".join(f"{name}:{name}\n" for name in STUDENTS))
+
+
+class Student:
+    """A browser of a student."""
+
+    def __init__(self, name):
+        self.name, self.session = name, requests.Session()
+
+    def open(self):
+        """Log in, and open the simulator."""
+        login = self.session.get(f"http://{HOST}/hub/login")
+        token = re.search(r'name="_xsrf" value="([^"]+)"', login.text)[1]
+        form = {"username": self.name, "password": self.name, "_xsrf": token}
+        self.session.post(f"http://{HOST}/hub/login", data=form)
+        self.session.get(f"http://{HOST}/hub/spawn/{self.name}")
+        until(lambda: self.sees(self.name))
+
+    def sees(self, name):
+        """Return whether a student's simulator opens."""
+        answer = self.session.get(f"http://{HOST}/user/{name}/drone_sim/", timeout=PATIENCE)
+        return (
+            answer.status_code == 200
+            and answer.url.endswith(f"/user/{name}/drone_sim/")
+            and "cockpit.js" in answer.text
+        )
+
+    @property
+    def cookies(self):
+        """All cookies, whatever their paths are."""
+        return "; ".join(f"{one.name}={one.value}" for one in self.session.cookies)
+
+    def stops(self, name):
+        """Return whether the hub stops a student's server."""
+        headers = {"X-XSRFToken": self.session.cookies.get("_xsrf", path="/hub/")}
+        return self.session.delete(f"http://{HOST}/hub/api/users/{name}/server", headers=headers).ok
+
+    def fly(self, name):
+        """Wait until a student's simulator says that its drone flies. Raises InvalidStatus if it is refused."""
+        address = f"ws://{HOST}/user/{name}/drone_sim/socket"
+        headers = {"Cookie": self.cookies}
+        with connect(
+            address, subprotocols=["drone_sim"], origin=f"http://{HOST}", additional_headers=headers
+        ) as socket:
+            until(lambda: '"flying"' in str(socket.recv(timeout=PATIENCE)))
+
+
+def through_the_hub(attacker, victim):
+    """Return what a student gets from another's server."""
+    failures = ["the page"] if attacker.sees(victim) else []
+    for path in ("drone_sim/", "drone_sim/cockpit.js", "drone_sim/socket", "lab", "api/contents", "proxy/11311/"):
+        address, headers = f"http://{HOST}/user/{victim}/{path}", {"Cookie": attacker.cookies}
+        if requests.get(address, headers=headers, allow_redirects=False).status_code == 200:
+            failures.append(path)
+    try:
+        attacker.fly(victim)
+        failures.append("the socket")
+    except InvalidStatus:
+        pass
+    return failures + (["the end of the server"] if attacker.stops(victim) else [])
+
+
+def as_system_user(attacker, victim):
+    """Return what a system user reaches of another's processes, files and ports."""
+    pids = " ".join(map(str, processes_of(victim)))
+    command = [sys.executable, "-S", "-c", ATTACK, victim, pids]
+    tried = subprocess.run(
+        command, user=attacker, group=attacker, extra_groups=[], cwd="/", capture_output=True, text=True
+    )
+    *succeeded, last = tried.stdout.split() or [tried.stderr]
+    return succeeded if last == "end" else [*succeeded, last]
+
+
+def processes_of(name):
+    listed = subprocess.run(["ps", "-o", "pid=,stat=", "-u", name], capture_output=True, text=True).stdout
+    rows = [line.split() for line in listed.splitlines()]
+    return [int(pid) for pid, state in rows if not state.startswith("Z")]  # nobody reaps them in this namespace
+
+
+def answers(address):
+    try:
+        return requests.get(address, timeout=10).ok
+    except requests.ConnectionError:
+        return False
+
+
+def until(condition):
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        if time.monotonic() > end:
+            sys.exit("jupyterhub: it took too long")
+        time.sleep(0.2)
+
+
+def run(*command, **options):
+    subprocess.run(command, check=True, text=True, **options)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
