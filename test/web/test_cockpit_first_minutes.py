@@ -113,12 +113,25 @@ def test_each_stage_flies_when_one_goes_from_one_to_the_next(cockpit, student):
             student.click("#after")
 
 
-def test_a_task_is_solved_and_graded(student):
-    door(student, "Tasks")
-    student.locator("#gallery-tasks button").first.click()
+def has_focus(page, element):
+    return page.evaluate("one => document.activeElement?.matches(one)", element)
+
+
+def test_keys_alone_lead_from_the_start_page_to_a_graded_task_and_its_replay(student):
+    student.keyboard.press("Tab")
+    student.keyboard.press("Enter")
+    wait_until(student, lambda: has_focus(student, "#gallery-tasks button:first-child"))
+    student.keyboard.press("Enter")
+    wait_until(student, lambda: has_focus(student, "#lesson-body"))
     wait_until(student, lambda: student.input_value("#script") == "tasks/hover.py")
-    student.click("#grade")
+    student.locator("#start").wait_for(state="hidden")
+    student.keyboard.press("Tab")
+    assert has_focus(student, "#grade")
+    student.keyboard.press("Enter")
     wait_until(student, lambda: student.locator("#graded tr").count() > 1, 120)
+    wait_until(student, lambda: has_focus(student, "#grade"))
+    student.keyboard.press("Tab")
+    assert has_focus(student, "#graded .seeds button:first-child")
     graded = student.inner_text("#graded")
     assert re.search(r"\d+(\.\d)? of \d+ points", graded) and "seed 2" in graded and "Try this" in graded
     replay_of_the_second_that_failed(student)

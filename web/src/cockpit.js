@@ -91,6 +91,11 @@ const beginTutorial = () => {
   const text = lesson.all.find((one) => !one.task && one.script);
   if (text) open(text.script);
 };
+// The next Tab of who uses keys alone goes on in the text.
+const beginTask = async (name, byKey) => {
+  await lesson.take(name);
+  if (byKey) at("lesson-body").focus();
+};
 const scene = new Scene(at("scene"), { say: (message) => socket.say(message), ask: (...question) => socket.ask(...question) });
 window.scene = scene; // for who looks into it from the browser's console, and for tests
 const replay = new Replay(scene, store);
@@ -98,7 +103,7 @@ const panels = new Panels({
   store,
   socket: () => socket,
   scene: () => scene,
-  go: { tutorial: beginTutorial, tasks: () => lesson.all.filter((one) => one.task), take: (name) => lesson.take(name) },
+  go: { tutorial: beginTutorial, tasks: () => lesson.all.filter((one) => one.task), take: beginTask },
   open,
   goTo: (file, line) => scripts.goTo(file, line).catch((error) => panels.notice.say(error.message, true)),
 });

@@ -24,7 +24,7 @@ export class Lesson {
     parts.after.onclick = () => this.turn(1);
     parts.fold.onclick = () => this.folded(!parts.body.hidden);
     parts.start.onclick = () => open(this.script);
-    parts.grade.onclick = () => this.grade();
+    parts.grade.onclick = (event) => this.grade(event.detail === 0);
     store.on((now) => this.age(now));
   }
 
@@ -88,8 +88,8 @@ export class Lesson {
 
   // ---- grades
 
-  // Grades the script by this task, beside what flies, and shows how it did.
-  async grade() {
+  // Grades the script by this task, beside what flies, and shows how it did; `byKey`: the button keeps the focus.
+  async grade(byKey) {
     const task = this.name;
     this.store.take("grading", true);
     showProgress(this.parts.graded, {});
@@ -107,6 +107,7 @@ export class Lesson {
       return;
     }
     await this.followGrade();
+    if (byKey && document.activeElement === document.body) this.parts.grade.focus(); // which it has lost meanwhile
   }
 
   // Goes on with a grade that was begun before the page was loaded, or before the connection was lost.

@@ -46,7 +46,7 @@ export class Panels {
     at("toggle").onclick = () => this.showScript(document.body.classList.contains("wide"));
     this.showScript(!TOUCH.matches);
     const choices = { tutorial: () => this.enter(go.tutorial), fly: () => this.showScript(false), build: () => this.showPlace("edit") };
-    const gallery = { list: go.tasks, take: (lesson) => this.enter(() => go.take(lesson)) };
+    const gallery = { list: go.tasks, take: (...task) => this.enter(() => go.take(...task)) };
     this.start = new Start(choices, gallery, (script) => this.enter(() => open(script)));
     this.keys();
   }

@@ -7,7 +7,7 @@ const QUESTION = "A quadricopter, its script, and you. Where do you begin?";
 
 export class Start {
   // `go` has what each button does: tutorial, fly, build; `gallery` has list(), which returns the tasks, the easiest first,
-  // and take(lesson), which begins one; `open(script)` opens the last script again.
+  // and take(lesson, byKey), which begins one; `open(script)` opens the last script again.
   constructor(go, gallery, open) {
     const dialog = at("start-page");
     this.gallery = gallery;
@@ -41,9 +41,9 @@ export class Start {
 
   card({ lesson, title, summary, difficulty, time }) {
     const best = bestWords(lesson);
-    const begin = () => {
+    const begin = (event) => {
       at("start-page").close();
-      this.gallery.take(lesson);
+      this.gallery.take(lesson, event.detail === 0); // no click: it was a key
     };
     return create(
       "button", { type: "button", onclick: begin },
