@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import Panel, let_pass, open_page, wait_until
+from cockpit_page import Panel, let_pass, open_page, ready, wait_until
 
 STAGES = ("1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros", "7_camera", "8_gate")
 GAIN = 'self.thrust = gain("thrust_gravity")'
@@ -181,3 +181,20 @@ def test_a_script_that_fails_its_task_is_graded_with_the_reason(student):
     wait_until(student, lambda: "of the script" in student.inner_text("#graded"), 120)
     student.reload()
     wait_until(student, lambda: "of the script" in student.inner_text("#graded"))
+
+
+def test_the_browsers_back_and_forward_lead_away_and_back_to_what_was_written(cockpit, student):
+    student.click("#start-close")
+    student.select_option("#script", "tutorial/3_yaw.py")
+    wait_until(student, lambda: "Stage 3" in student.inner_text("#text .cm-content"))
+    type_into(student, "Stage 3", ["Home"], "# mine\n")
+    student.goto(cockpit.address.partition("?")[0] + "manual/index.html", wait_until="commit")
+    student.go_back(wait_until="commit")
+    ready(student)
+    wait_until(student, lambda: student.input_value("#script") == "mine/3_yaw.py")
+    wait_until(student, lambda: student.inner_text("#text .cm-content").startswith("# mine"))
+    assert not student.locator("#start-page").is_visible()
+    student.go_forward(wait_until="commit")
+    student.go_back(wait_until="commit")
+    ready(student)
+    wait_until(student, lambda: student.inner_text("#text .cm-content").startswith("# mine"))
