@@ -97,12 +97,13 @@ PICTURES: dict[str, tuple[Callable[[Any], None], dict[str, Any], bool]] = {
 
 def main(folder: str, *names: str) -> None:
     """Take those that are named, or all of them, between the gates."""
-    scene = "scene:=" + str(Path(__file__).resolve().parents[1] / "config/scenes/gates.yaml")
-    with launched(scene) as cockpit, sync_playwright() as driver:
+    scene = str(Path(__file__).resolve().parents[1] / "config/scenes/gates.yaml")
+    with launched(f"scene:={scene}") as cockpit, sync_playwright() as driver:
         rospy.init_node("pictures", anonymous=True, disable_signals=True)
         browser = driver.chromium.launch(executable_path=shutil.which("chromium"))
         for name in names or PICTURES:
             act, options, is_started = PICTURES[name]
+            cockpit.load(scene)  # another picture may have left another one
             cockpit.start_afresh()
             context = browser.new_context(**options)
             if is_started:
