@@ -303,7 +303,8 @@ case "$command" in
     ;;
   two-hosts) setup; exec .venv/bin/python test/two_hosts/run.py "$@" ;;
   jupyterhub)
-    install_packages nodejs npm iproute2
+    install_packages iproute2
+    command -v npm > /dev/null || install_packages nodejs npm # also other packages have it
     setup
     make_venv "${ALL[@]}" requirements-web.txt requirements-jupyterhub.txt
     npm install --silent --prefix "$cache/jupyterhub" configurable-http-proxy@5 >&2
