@@ -51,7 +51,7 @@ class Looked:
         return self.simulation.drone
 
     def command(self, twist=FORWARD, sender="/pilot"):
-        self.log.take("cmd_vel", sender)
+        self.log.take("cmd_vel", sender, twist == Twist())
         self.drone.commands.receive(twist)
 
     def fly(self, steps, step=0.05):
@@ -346,7 +346,7 @@ def test_two_senders_at_once_are_named_and_a_change_of_the_sender_is_no_problem(
         looked.command(FORWARD if number % 5 else Twist(), sender="/pilot" if number % 5 else "/zeros")
         looked.fly(1)
     found = looked.look()
-    assert found.level == WARN and "/pilot and /zeros" in found.message
+    assert found.level == WARN and "/pilot and /zeros" in found.message and "/zeros sends only zeros" in found.message
     for _ in range(80):
         looked.command()
         looked.fly(1)
@@ -360,10 +360,12 @@ def test_a_twist_that_nobody_receives_is_named_while_no_command_comes(looked):
         lambda: {"drone": looked.log},
         False,
         looked.clock,
-        unheard=lambda: {"/cmd_vel": ["/teleop"]},
+        unheard=lambda: {"/cmd_vel": ["/teleop"], "/bebop/cmd_vel": ["/node"]},
     )
     found = looked.look()
     assert found.level == WARN and "/teleop publishes /cmd_vel" in found.message
+    cure = "without a subscriber: publish to /drone/cmd_vel, or start with profile:=bebop"
+    assert f"/node publishes /bebop/cmd_vel, {cure}" in found.message
     looked.command()
 
 

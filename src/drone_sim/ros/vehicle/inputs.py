@@ -51,6 +51,10 @@ class _Limits(NamedTuple):
     weather: WeatherParameters
 
 
+def _is_zero(twist: TwistMessage) -> bool:
+    return not any((*xyz(twist.linear), *xyz(twist.angular)))
+
+
 class VehicleInputs:
     """Subscriptions in the namespace of one vehicle."""
 
@@ -143,7 +147,7 @@ class VehicleInputs:
             except (checks.Refused, ParameterError) as error:
                 refuse(message, error)
                 return
-            self.log.take(logged, sender(message))
+            self.log.take(logged, sender(message), is_command and _is_zero(getattr(message, "twist", message)))
             done = intervention(action, self._name, name, message) if action else None
             self._inbox.put(lambda: execute(job, message), done)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
@@ -38,11 +39,15 @@ class CommandLog:
         self.taken: dict[str, Taken] = {}  # by topic
         self.refused: dict[str, Refusal] = {}
         self._changes: dict[str, deque[Taken]] = {}  # by topic: the last messages whose sender was not the previous one
+        self._moving: dict[tuple[str, str], float] = {}  # s: when a topic's sender last sent something else than zeros
         self._lock = threading.Lock()
 
-    def take(self, topic: str, sender: str) -> None:
+    def take(self, topic: str, sender: str, is_zero: bool = False) -> None:
+        """Log an accepted message; `is_zero` if it is a command of zeros."""
         before, now = self.taken.get(topic), Taken(sender, self.clock())
         self.taken[topic] = now
+        if not is_zero:
+            self._moving[topic, sender] = now.at
         if before is None or before.sender != sender:
             self._changes.setdefault(topic, deque(maxlen=_RIVAL_CHANGES)).append(now)
 
@@ -52,6 +57,10 @@ class CommandLog:
         if len(changes) < _RIVAL_CHANGES or self.clock() - changes[0].at > _RECENT:
             return []
         return sorted({change.sender for change in changes})
+
+    def sends_zeros(self, topic: str, sender: str) -> bool:
+        """Return whether a sender has sent nothing but zeros for some time."""
+        return self.clock() - self._moving.get((topic, sender), -math.inf) > _RECENT
 
     def refuse(self, topic: str, sender: str, why: str, received_on: str = "") -> None:
         """Log a refused message and the reason `why`.

@@ -150,6 +150,8 @@ class VehicleDiagnosis:
         """Report several nodes that send commands at the same time: the drone obeys the last one before each step."""
         rivals = self._log.rivals(COMMAND)
         text = f"{' and '.join(rivals)} send {COMMAND} at the same time, and each overrides the other: stop all but one"
+        idle = [sender for sender in rivals if self._log.sends_zeros(COMMAND, sender)]
+        text += f"; {' and '.join(idle)} sends only zeros" if idle else ""
         return [Problem(WARN, text)] if rivals else []
 
     def _check_topics(self) -> list[Problem]:
