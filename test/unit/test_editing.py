@@ -543,12 +543,26 @@ def test_a_draft_outlives_the_node(tmp_path):
     assert second.is_modified
     assert second.described()["draft"] is None
     second.keep_draft()
-    second._drafts.wait()
+    edit(second, {"do": "move", "object": "Gate", "position": [6, 0, 1]})
+    second.keep_draft()  # writes nothing so soon after the last one
     second.simulation.load_scene("")  # of somebody else's
     second.follow()
-    assert second.described()["draft"]
     assert not second.is_modified
+    second.answer({"draft": "take"})
+    assert place(second, "Gate") == [6, 0, 1]
     second.simulation.close()
+
+
+def test_edits_in_flight_that_the_load_of_a_scene_reverts_leave_no_draft(tmp_path):
+    editor = editor_of(drafts=tmp_path)
+    editor.simulation.start()
+    editor.follow()
+    edit(editor, {"do": "add", "objects": [GATE], "position": [5, 0, 0]})
+    editor.simulation.load_scene("")
+    editor.follow()
+    assert editor.described()["draft"] is None
+    assert not editor.is_modified
+    editor.simulation.close()
 
 
 def test_a_draft_that_cannot_be_written_is_said_once(tmp_path, monkeypatch, caplog):

@@ -95,7 +95,7 @@ def open_page(cockpit, browser, init="", started=True, **options):
     ready(page)
     wait_until(page, lambda: cockpit.drone.place is not None)
     yield page
-    assert page.troubles == []
+    assert page.troubles == [], str(page.troubles)
     context.close()
 
 

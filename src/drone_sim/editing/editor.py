@@ -74,7 +74,11 @@ class SceneEditor:
         simulation = self.simulation
         if simulation.scenes_read != self._scenes_read:
             self._scenes_read, self._is_new = simulation.scenes_read, False
-            if self.is_modified and not self._is_opening:  # loaded over unsaved changes, not by the editor
+            is_modified = self.is_modified if self._run == -1 else self._started[1]  # stop reverts the other edits
+            if is_modified and not self._is_opening and simulation.replaced:  # loaded over unsaved changes
+                document, content = simulation.replaced
+                self._drafts.keep(str(document.file or ""), document.text(content))
+                self._drafts.wait()
                 self._drafts.offer()
             self._reset()
         run = simulation.run if simulation.running else -1

@@ -102,6 +102,8 @@ class Simulation:
             load_script=load_script,
         )
         self.scenes_read = 0  # number of times that a scene was loaded from a file or the parameters
+        # Document and content of the edited scene that the last one loaded replaced; None if it was not edited.
+        self.replaced: tuple[SceneDocument, SceneContent] | None = None
         self._initial = InitialScene(parameters)
         self.run = 0  # run number, incremented by every start and stop
         self.topology_version = 0  # incremented by every start and stop, and when vehicles are added or removed
@@ -241,7 +243,9 @@ class Simulation:
     def _load_scene(self, scene_file: str, prepare: Callable[[Parameters], None] = lambda _parameters: None) -> None:
         parameters = self.parameters.in_scene(scene_file)
         prepare(parameters)
+        replaced = (self.document, self.content()) if self._initial.is_edited else None
         self._rebuild(parameters, NO_HANDLES)
+        self.replaced = replaced
         self._warn_of_unsupported()
         self.document = SceneDocument(self.parameters, self.object_handles)
         self._initial = self._initial._replace(is_edited=False)
