@@ -40,6 +40,7 @@ class ScriptInspector:
         self._node, self._store, self._broadcast = node, store, broadcast
         self._pages: dict[str, _Page] = {}
         self._subscribers: list[rospy.Subscriber] = []
+        self._shows_variables = False  # in some browser
         self._publisher: rospy.Publisher | None = None
         self._published: _Lines = {}
         self._state = ""  # of the simulator, in the last message
@@ -109,12 +110,13 @@ class ScriptInspector:
             **({f"{self._node}/variables": self._on_variables} if variables else {}),
             **({f"{self._node}/names": self._on_names} if names else {}),
         }
+        with self._lock:  # a callback may still run after `unregister`
+            if self._shows_variables and not variables:
+                self._broadcast({"variables": None})
+            self._shows_variables = variables
         for subscriber in [subscriber for subscriber in self._subscribers if subscriber.name not in wanted]:
-            has_variables = subscriber.callback == self._on_variables  # `unregister` clears it
             subscriber.unregister()
             self._subscribers.remove(subscriber)
-            if has_variables:
-                self._broadcast({"variables": None})
         subscribed = {subscriber.name for subscriber in self._subscribers}
         for topic, callback in wanted.items():
             if topic not in subscribed:
@@ -122,13 +124,15 @@ class ScriptInspector:
 
     def _on_variables(self, message: String) -> None:
         state = _read(message)
-        with self._lock:
-            is_live = any(page.live for page in self._pages.values())
         if state is None:
             return
-        before, self._state = self._state, str(state.get("state"))
-        if is_live or {before, self._state} != {"flying"}:  # not live: only changes of the state
-            self._broadcast({"variables": state})
+        with self._lock:
+            if not self._shows_variables:
+                return
+            is_live = any(page.live for page in self._pages.values())
+            before, self._state = self._state, str(state.get("state"))
+            if is_live or {before, self._state} != {"flying"}:  # not live: only changes of the state
+                self._broadcast({"variables": state})
 
     def _on_names(self, message: String) -> None:
         names = _read(message)
