@@ -4,7 +4,7 @@ const LEFT = ["opened", "run"]; // the user opens another file, or flies
 
 export const MESSAGES = {
   starting: { ends: ["opened", "answered", "failure", "unanswered"] }, // Run was pressed, and the simulator has not answered
-  started: { ends: ["run", "failure", "stopped", "unanswered"] }, // the flight goes on
+  started: { ends: [...LEFT, "failure", "stopped", "unanswered"] }, // the flight goes on
   refused: { bad: true, ends: [...LEFT, "edited", "started", "unanswered"] }, // the simulator did not start the script
   trouble: { bad: true, ends: [...LEFT, "edited", "saved", "connected"] }, // an action failed; the next one counts
   restored: { ends: [...LEFT, "edited", "saved"] }, // a draft is in the editor again
