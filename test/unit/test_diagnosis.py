@@ -353,6 +353,15 @@ def test_two_senders_at_once_are_named_and_a_change_of_the_sender_is_no_problem(
     assert "/zeros" not in looked.look().message
 
 
+def test_senders_that_come_and_go_are_not_kept():
+    now = 0.0
+    log = CommandLog(lambda: now)
+    for number in range(100):
+        log.take("cmd_vel", f"/rostopic_{number}")
+        now += 1.0
+    assert len(log._moving) < 5
+
+
 def test_a_twist_that_nobody_receives_is_named_while_no_command_comes(looked):
     looked.diagnosis = Diagnosis(
         looked.player,

@@ -47,7 +47,10 @@ class CommandLog:
         before, now = self.taken.get(topic), Taken(sender, self.clock())
         self.taken[topic] = now
         if not is_zero:
-            self._moving[topic, sender] = now.at
+            with self._lock:
+                if (topic, sender) not in self._moving:  # those who send no more are forgotten
+                    self._moving = {key: at for key, at in self._moving.items() if now.at - at <= _RECENT}
+                self._moving[topic, sender] = now.at
         if before is None or before.sender != sender:
             self._changes.setdefault(topic, deque(maxlen=_RIVAL_CHANGES)).append(now)
 
