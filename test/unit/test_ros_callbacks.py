@@ -10,6 +10,8 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
+import roslib.launcher
+import rospkg
 import rospy
 from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, TwistStamped, Vector3Stamped, WrenchStamped
@@ -215,6 +217,17 @@ def test_a_type_whose_code_was_never_generated_is_told_from_one_that_is_not_ther
             look("course_msgs/Gate")
         with pytest.raises(ValueError, match="'course_msgs/Gat' is not installed"):
             look("course_msgs/Gat")
+
+
+@pytest.mark.parametrize("look", [message_conversion.message_class, message_conversion.service_class])
+def test_a_type_of_a_package_that_ros_cannot_read_is_refused_with_the_reason(look, monkeypatch, tmp_path):
+    (tmp_path / "a_msgs/msg").mkdir(parents=True)
+    person = "<maintainer email='nobody'>N</maintainer><version>1.0.0</version><license>x</license>"
+    text = f"<package format='2'><name>a_msgs</name><description>x</description>{person}</package>"
+    (tmp_path / "a_msgs/package.xml").write_text(text)
+    monkeypatch.setattr(roslib.launcher, "_rospack", rospkg.RosPack([str(tmp_path)]))
+    with pytest.raises(ValueError, match=r"'a_msgs/Gate' cannot be found: .*Invalid email"):
+        look("a_msgs/Gate")
 
 
 def test_to_resume_what_is_not_paused_says_how_to_pause(simulation, monkeypatch):

@@ -158,6 +158,8 @@ def _find_class(find: Callable[[str], Any], kind: str) -> Any:
         return find(kind)
     except (ImportError, ValueError):
         return None
+    except Exception as error:  # such as catkin_pkg's InvalidPackage, of a package.xml
+        raise ValueError(f"type '{kind:.80}' cannot be found: {' '.join(str(error).split())}") from None
 
 
 def _missing_build(kind: str, ending: str) -> str:
