@@ -44,15 +44,17 @@ class Follower:
 
     def on_picture(self, picture):
         """Turn to the ball, climb to it, and lean towards it. Zeros: "hover and maintain its current position"."""
-        command = Twist()
+        command, seen = Twist(), "no ball in sight"
         ball = find(self.bridge.imgmsg_to_cv2(picture, "rgb8"))
         if ball is not None and self.focal:
             x, y, radius = ball
-            far = self.focal * BALL / radius - DISTANCE
-            command.linear.x = cut(TILT * far - BRAKE * self.speed)
+            distance = self.focal * BALL / radius
+            command.linear.x = cut(TILT * (distance - DISTANCE) - BRAKE * self.speed)
             command.linear.z = cut(CLIMB * (1 - 2 * y / picture.height))
             command.angular.z = cut(TURN * (1 - 2 * x / picture.width))
+            seen = f"the ball is {distance:.1f} m away"
         self.commands.publish(command)
+        rospy.loginfo_throttle(5.0, seen)
 
 
 def find(picture):
