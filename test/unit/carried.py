@@ -1,6 +1,7 @@
 """What carries the sensors of the tests: a drone in a world of its own, and a body that moves as it is told."""
 
 import math
+import weakref
 
 from drone_sim.config.types import DatumParameters
 from drone_sim.files.resources import package_path
@@ -83,6 +84,7 @@ class Flown(Carried):
 
     def __init__(self, pose=ABOVE, gravity=GRAVITY, floor=True):
         self.world = World(SUB_STEP, gravity)
+        weakref.finalize(self, self.world.close)
         self.world.solve_contacts_for_instruments()
         self.floor = self.world.add_floor(20.0, FLOOR) if floor else -1
         self.body = self.world.add_rigid_body(BODY, pose)

@@ -53,6 +53,7 @@ def test_reading_a_moved_object_does_not_make_its_place_the_initial_one(tmp_path
     simulation.operations.color(box)
     simulation.stop()
     assert picture(simulation) == before
+    simulation.close()
 
 
 def test_stop_undoes_what_was_done_in_flight(tmp_path):
