@@ -38,7 +38,8 @@ class Drone:
 def _seen(page):
     """Return what the page says, for whoever reads that a test has failed."""
     texts = {name: page.locator(f"#{name}").all_inner_texts() for name in ("notice", "said", "status", "flown")}
-    return {**texts, "script": page.locator("#script").all_inner_texts() and page.input_value("#script")}
+    script = page.locator("#script").all_inner_texts() and page.input_value("#script")
+    return {**texts, "script": script, "text": page.locator("#text .cm-content").all_inner_texts()[:1]}
 
 
 def wait_until(page, condition, seconds=90):
