@@ -80,6 +80,11 @@ SIM: dict[str, list[Example]] = {
     ],
     "isHandle": [Example("NAME(BASE)", [True]), Example("NAME(1000)", [False])],
     "isHandleValid": [Example("NAME(BASE)", [1]), Example("NAME(1000)", [0])],
+    "setLinkDummy": [
+        Example("NAME(sim.createDummy(0.01), sim.createDummy(0.01))", []),
+        Example("REFUSED(NAME, BASE, -1)", ["only objects of the scene can be changed"]),
+    ],
+    "getLinkDummy": [Example("NAME(sim.createDummy(0.01))", [-1])],
     "createDummy": [Example("sim.getObjectType(NAME(0.01)) == sim.object_dummy_type", [True])],
     "removeObject": [
         Example("NAME(sim.createDummy(0.01))", [1]),

@@ -161,7 +161,7 @@ def run(path, text, modules):
     taken = {}
     modules = {**modules, "out": Api("out", {"take": lambda number, values: taken.update({number: values})}, {})}
     path.write_text(text, encoding="utf-8")
-    script = load.load(str(path), modules, TimeLimit(10.0))
+    script = load.load(str(path), modules, TimeLimit(0.0))
     script.call("init")
     script.close()
     return taken
@@ -274,17 +274,17 @@ def test_in_lua_a_packet_that_is_not_there_is_nil(modules, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("link", "draw"),
-    [("simSetLinkDummy", "simAddDrawingObject"), ("sim.setLinkDummy", "sim.addDrawingObject")],
+    ("graph", "draw"),
+    [("simHandleGraph", "simAddDrawingObject"), ("sim.handleGraph", "sim.addDrawingObject")],
 )
-def test_what_is_ignored_is_told_as_the_script_writes_it_and_drawings_at_debug_level(tmp_path, caplog, link, draw):
-    (tmp_path / "script.lua").write_text(f"function sysCall_init()\n{link}(1, 2)\n{draw}(0, 1)\n{draw}(0, 1)\nend")
+def test_what_is_ignored_is_told_as_the_script_writes_it_and_drawings_at_debug_level(tmp_path, caplog, graph, draw):
+    (tmp_path / "script.lua").write_text(f"function sysCall_init()\n{graph}(1, 2)\n{draw}(0, 1)\n{draw}(0, 1)\nend")
     with caplog.at_level(logging.DEBUG), caplog.at_level(logging.DEBUG, "drone_sim.script"):
         Simulation(parameters.load(), script=str(tmp_path / "script.lua")).close()
     told = [
         (one.getMessage().partition(":")[0], one.levelno) for one in caplog.records if "accepted and" in one.message
     ]
-    assert told == [(link, logging.WARNING), (draw, logging.DEBUG)]
+    assert told == [(graph, logging.INFO), (draw, logging.DEBUG)]
 
 
 def test_the_page_is_made_from_the_code():

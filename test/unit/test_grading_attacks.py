@@ -694,7 +694,8 @@ REACHES = {
         getVisionSensorCharImage getVisionSensorDepth getVisionSensorDepthBuffer getVisionSensorImage
         getVisionSensorImg getVisionSensorResolution handleVisionSensor readVisionSensor receiveData
         simROS: getNumSubscribers getParamBool getParamDouble getParamInt getParamString getTime hasParam
-        searchParam""",
+        searchParam
+        sim: getLinkDummy""",
     "its own log, drawings, windows, threads and pictures": """
         sim: addLog addStatusbarMessage auxiliaryConsoleClose auxiliaryConsoleOpen auxiliaryConsolePrint
         auxiliaryConsoleShow displayDialog endDialog getDialogInput getDialogResult addDrawingObject
@@ -734,6 +735,7 @@ REACHES = {
         createForceSensor createJoint createMeshShape createPrimitiveShape createProximitySensor createPureShape
         createVisionSensor removeModel removeObject removeObjects setObjectAlias setObjectName setShapeInertia
         setShapeMassAndInertia groupShapes scaleObject scaleObjects setShapeBB setShapeColor setShapeMass ungroupShape
+        setLinkDummy
         pauseSimulation setArrayParam setBoolParam setFloatParam setInt32Param setSimulationTimeStep setStringParam""",
     "call": "sim: callScriptFunction",
     "run": "sim: executeScriptString",

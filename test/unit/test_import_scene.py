@@ -289,15 +289,7 @@ def test_what_cannot_be_brought_is_said_object_by_object(imported):
     assert "The file has no quadricopter" in imported.said
 
 
-ACTS = "function sysCall_actuation() -- setLinkDummy\nend"
-
-
-def _linked(tag_of_type=b""):
-    """Two bodies, each with a dummy that is linked to the other's."""
-    for first, other in ((0, 3), (2, 1)):
-        yield shape(first, f"Body{first}", mesh(), at=(0, 0, 1 + first), dynamic=True, wrapper=weight(0.1))
-        link = integers("Lli", other) + tag_of_type
-        yield scene_object("DMY", first + 1, f"Tip{first}", parent=first, own=link)
+ACTS = "function sysCall_actuation() end"
 
 
 @pytest.mark.parametrize(
@@ -306,9 +298,6 @@ def _linked(tag_of_type=b""):
         ((scene_object("DMY", 0, "Mover"), script(0, ACTS, kind=6)), "Mover: its customization script acts"),
         ((scene_object("DMY", 0, "Mover"), script(0, "x = 1 --[[ sysCall_actuation ]]", kind=6)), ""),
         ((scene_object("DMY", 0, "Mover"), script(0, ACTS)), ""),
-        ((scene_object("DMY", 0, "Hook"), script(0, "x = simSetLinkDummy")), "Hook: its script links dummies"),
-        (tuple(_linked()), "Tip0, Tip2: this link of dummies holds two bodies together"),
-        (tuple(_linked(integers("Dl2", 5))), ""),
     ],
 )
 def test_what_will_not_work_after_an_import_is_a_warning_at_launch_and_in_the_diagnostics(
@@ -325,6 +314,25 @@ def test_what_will_not_work_after_an_import_is_a_warning_at_launch_and_in_the_di
     warned = [one.getMessage() for one in caplog.records if one.levelno == logging.WARNING]
     assert len([one for one in warned if hole and hole in one]) == bool(hole)
     assert (found.level == WARN) == bool(hole) and hole in found.message
+
+
+def linked(tag_of_type=b""):
+    """Two bodies, each with a dummy that is linked to the other's."""
+    for first, other in ((0, 3), (2, 1)):
+        yield shape(first, f"Body{first}", mesh(), at=(0, 0, 1 + first), dynamic=True, wrapper=weight(0.1))
+        link = integers("Lli", other) + tag_of_type
+        yield scene_object("DMY", first + 1, f"Tip{first}", parent=first, own=link)
+
+
+def test_an_overlap_constraint_of_two_dummies_holds_their_bodies_together(imported):
+    imported(*linked())
+    loaded = parameters.load({"scene_file": str(imported.scene), "vehicles": {"drone": {}}})
+    simulation = Simulation(loaded)
+    tip, other = (simulation.context.objects.handle(name) for name in ("Tip0", "Tip2"))
+    assert simulation.operations.linked(tip) == other
+    simulation.close()
+    imported(*linked(integers("Dl2", 5)))
+    assert "Tip0, Tip2: its link to another dummy is not imported" in (imported.scene.parent / "IMPORT.txt").read_text()
 
 
 PUSH = """

@@ -108,8 +108,8 @@ class Entries:
                 return points
             turns = [numbers([value / length for value in point[3:]]) for point, length in zip(dummy.path, lengths)]
             return {**points, "turns": turns}
-        if dummy.linked >= 0:
-            self._report.add(placed.name, "its link to another dummy is not imported: it holds nothing together")
+        if dummy.linked >= 0 and not dummy.holds:
+            self._report.add(placed.name, "its link to another dummy is not imported: only overlap constraints are")
         return {"kind": "dummy", "size": number(dummy.size)} if dummy.size > 0 else {"kind": "dummy"}
 
     def _path(self, placed: Placed) -> dict[str, Any]:

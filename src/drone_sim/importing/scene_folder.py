@@ -87,11 +87,6 @@ _IDLE_KINDS = ("light", "graph")
 _SIMULATION_CALLBACK = re.compile(
     r"\bsysCall_(?:actuation|sensing|thread|threadmain)\b|\bcustomizationscriptcall_simulation(?:actuation|sensing)\b"
 )
-_LINKS_DUMMIES = re.compile(r"\bsim(?:\.s|S)etLinkDummy\b")
-
-
-def _has_dynamic_parent(dummy: Placed) -> bool:
-    return dummy.above is not None and dummy.above.is_dynamic
 
 
 class Imported(NamedTuple):
@@ -193,7 +188,7 @@ class _Import:
     # ---- what will not work
 
     def _find_holes(self) -> None:
-        """Report customization scripts that act in a simulation, and dummy links that would hold bodies."""
+        """Report customization scripts that act in a simulation."""
         for script in self._file.scripts:
             owner = self._by_handle.get(script.object)
             if owner is None or not script.is_enabled:
@@ -202,16 +197,6 @@ class _Import:
             if script.kind == "customization" and _SIMULATION_CALLBACK.search(code):
                 problem = "its customization script acts in flight, and is not imported: nothing that it drives moves"
                 self._report.unsupported.append(f"{owner.name}: {problem}")
-            if script.kind in ("child", "customization") and _LINKS_DUMMIES.search(code):
-                problem = "its script links dummies (setLinkDummy): links hold nothing here, so the bodies stay apart"
-                self._report.unsupported.append(f"{owner.name}: {problem}")
-        for node in self._objects:
-            content = node.object.of
-            other = self._by_handle.get(content.linked) if isinstance(content, VrepDummy) and content.holds else None
-            is_reported = other is not None and other.object.handle < node.object.handle
-            if other is not None and not is_reported and (_has_dynamic_parent(node) or _has_dynamic_parent(other)):
-                problem = "this link of dummies holds two bodies together; it is not imported, so they come apart"
-                self._report.unsupported.append(f"{node.name}, {other.name}: {problem}")
 
     # ---- scripts
 
@@ -278,6 +263,7 @@ class _Import:
         entries = Entries(self._writer, self._report)
         by_vehicle = {id(node): vehicle for vehicle in self._vehicles for node in vehicle.quadricopter.inside()}
         self._kept = self._objects_to_import()
+        linked: set[int] = set()  # handles of dummies whose link is written
         for node in self._objects:
             if id(node) not in self._kept:
                 continue
@@ -286,7 +272,21 @@ class _Import:
             if vehicle is not None and vehicle.carries(node) and node.object.shape is not None:
                 yield {**entries.frame(node, parent), "position": [0.0, 0.0, 0.0], **pose_keys(pose)}
             else:
-                yield entries.make(node, parent, pose)
+                yield {**entries.make(node, parent, pose), **self._link(node, linked)}
+
+    def _link(self, node: Placed, linked: set[int]) -> dict[str, str]:
+        """Return the key of an overlap constraint between two imported dummies, once for the two."""
+        content = node.object.of
+        if not isinstance(content, VrepDummy) or not content.holds or len(content.path) > 1:
+            return {}
+        other = self._by_handle.get(content.linked)
+        if other is None or id(other) not in self._kept or not isinstance(other.object.of, VrepDummy):
+            return {}
+        handles = {node.object.handle, other.object.handle}
+        if len(other.object.of.path) > 1 or len(handles) == 1 or handles & linked:
+            return {}
+        linked |= handles
+        return {"linked": other.name}
 
     def _objects_to_import(self) -> set[int]:
         """Return ids of the objects that get an entry: no objects of vehicles or the floor, nor unused idle ones."""

@@ -57,13 +57,13 @@ class LinkBody:
         self._world = world
         self.number = number
         self.link = link
-        self._local = local
+        self.local = local
 
     @property
     def state(self) -> State:
         link = self._world.joints.link_state(self.number, self.link)
-        matrix = frames.multiply(link.matrix, self._local)
-        arm = frames.rotate(link.matrix, frames.position(self._local))
+        matrix = frames.multiply(link.matrix, self.local)
+        arm = frames.rotate(link.matrix, frames.position(self.local))
         x, y, z = cross(link.angular_velocity, arm)
         vx, vy, vz = link.linear_velocity
         velocity = vx + x, vy + y, vz + z
@@ -72,12 +72,12 @@ class LinkBody:
     @property
     def matrix(self) -> Matrix:
         """World from its frame."""
-        return frames.multiply(self._world.joints.link_state(self.number, self.link).matrix, self._local)
+        return frames.multiply(self._world.joints.link_state(self.number, self.link).matrix, self.local)
 
     def inertia(self) -> Inertia:
         """Return mass and inertia in the shape's frame."""
         inertia = self._world.inertia(self.number, self.link)
-        return inertia._replace(frame=frames.multiply(frames.invert(self._local), inertia.frame))
+        return inertia._replace(frame=frames.multiply(frames.invert(self.local), inertia.frame))
 
     def move(self, pose: Pose) -> None:
         """Raise ValueError: the joint determines the pose."""

@@ -21,6 +21,7 @@ from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.scene import models
 from drone_sim.scene.attached_scripts import MAX_SCRIPTS, AttachedScriptParameters, RunningScripts
 from drone_sim.scene.entry import EntryParameters, Place, placed
+from drone_sim.scene.kinds.dummy import DummyParameters
 from drone_sim.scene.kinds.force_sensor import ForceSensor, ForceSensorParameters
 from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.kinds.kind import KindParameters
@@ -163,11 +164,13 @@ class SceneOperations:
             copies = (plain(wanted) + suffix for suffix in suffixes() if suffix)
             names.append(first_free(itertools.chain([wanted], copies), tree, names))
             renames.setdefault(entry.name, names[-1])
-        renamed = [
-            entry.model_copy(update={"name": name, "alias": alias, "parent": renames.get(entry.parent, entry.parent)})
-            for entry, name in zip(entries, names)
-            for alias in ["" if entry.shown == name else entry.shown]
-        ]
+        renamed = []
+        for entry, name in zip(entries, names):
+            alias, parent = "" if entry.shown == name else entry.shown, renames.get(entry.parent, entry.parent)
+            values = {"name": name, "alias": alias, "parent": parent}
+            if isinstance(entry, DummyParameters):
+                values["linked"] = renames.get(entry.linked, "")
+            renamed.append(entry.model_copy(update=values))
         new_scripts = [it.model_copy(update={"object": renames[it.object]}) for it in scripts if renames.get(it.object)]
         return self.add(renamed, new_scripts)
 
@@ -240,8 +243,9 @@ class SceneOperations:
         with self._changing(change_tree=lambda: scene.tree.rename(int(handle), name)):
             record.entry = record.entry.model_copy(update={"name": renamed.name})
             for other in scene.records.values():
-                if other.entry.parent == before.name:
-                    other.entry = other.entry.model_copy(update={"parent": name})
+                for key in ("parent", "linked"):
+                    if before.name and getattr(other.entry, key, "") == before.name:
+                        other.entry = other.entry.model_copy(update={key: name})
         self._move_script(before.name, name)
         if not before.alias:
             scene.tree[handle].alias = name
@@ -265,6 +269,30 @@ class SceneOperations:
         self._scene.is_changed = True
         described = self._scene.tree[handle]
         described.alias, described.is_model = checked.shown, checked.model
+
+    def link(self, handle: int, other: int) -> None:
+        """Link two dummies in place of their present links; -1 for `other` only ends the link. Raises ValueError."""
+        scene, linked = self._scene, [self._record(one) for one in (handle, other) if one != WORLD]
+        for record in linked:
+            if not isinstance(record.entry, DummyParameters):
+                raise ValueError(f"'{record.entry.name}' is no dummy: only dummies of the scene can be linked")
+        if handle == other:
+            raise ValueError(f"'{linked[0].entry.name}' cannot be linked to itself")
+        names = {record.entry.name for record in linked}
+        with self._changing(bodies=False):
+            for record in scene.records.values():
+                entry = record.entry
+                if isinstance(entry, DummyParameters) and entry.linked and {entry.name, entry.linked} & names:
+                    record.entry = entry.model_copy(update={"linked": ""})
+            if other != WORLD:
+                linked[0].entry = linked[0].entry.model_copy(update={"linked": linked[1].entry.name})
+
+    def linked(self, handle: int) -> int:
+        """Return the handle of the dummy that a dummy is linked to, -1 if it has no link. Raises ValueError."""
+        entry, tree = self._record(handle).entry, self._scene.tree
+        linking = [one.name for one in self._scene.entries.values() if getattr(one, "linked", "") == entry.name]
+        names = [getattr(entry, "linked", ""), *linking]
+        return next((tree.handle(name) for name in names if name in tree), WORLD)
 
     # ---- scripts
 

@@ -19,6 +19,7 @@ from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.bodies import CarriedBody, ShapeInWorld, ShapeObject, bodies_above
 from drone_sim.scene.building import Built
 from drone_sim.scene.chains import Chain
+from drone_sim.scene.dummy_links import DummyLinks
 from drone_sim.scene.entry import EntryParameters, Place
 from drone_sim.scene.kinds.force_sensor import ForceSensor, ForceSensorParameters
 from drone_sim.scene.kinds.joint import JointParameters
@@ -55,6 +56,7 @@ class Scene:
         self._world = context.world
         self._add_floor(parameters.floor)
         self.drag = ObjectDrag(context, self.things, parameters.floor.size)
+        self.links = DummyLinks(context.world)
         self.next_index = len(self.records)
         self.is_changed = False  # whether any operation (operations.py) changed it
         self.rebuilt = 0  # number of bodies added or removed so far
@@ -191,6 +193,8 @@ class Scene:
             for record in self.records.values():
                 record.start = record.item.matrix() if record.item is not None else None
         self._follow()
+        self._world.rigid_links.set({})  # so that all runs begin equal to the last bit
+        self.links.find(self.records.values())
 
     def rebuild(self, change_tree: Callable[[], None] = lambda: None, bodies: bool = True) -> None:
         """Update world and tree from the entries; `change_tree` is called once the new bodies exist.
@@ -208,6 +212,7 @@ class Scene:
                 item.pass_carriers()
         self._place_free_children(self._add_objects(new_bodies))
         self._follow()
+        self.links.find(self.records.values())
 
     def replace_object(self, record: ObjectRecord, handle: int, entry: KindParameters, place: Place) -> None:
         """Replace an object by one built from `entry`."""
@@ -351,6 +356,7 @@ class Scene:
         def restore() -> None:
             for index, record in self.records.items():
                 record.entry = entries.get(index, record.entry)
+            self.links.find(self.records.values())
             shapes = [it.carried for it in self.objects.values() if isinstance(it, ShapeObject) and not it.is_held]
             for body in (*self._carried_bases.values(), *shapes):
                 body.reapply_pose()

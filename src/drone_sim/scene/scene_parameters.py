@@ -31,7 +31,7 @@ from drone_sim.files.resources import resolve
 from drone_sim.mechanics.object_names import first_free, numbered
 from drone_sim.mechanics.object_tree import DEEPEST
 from drone_sim.message_text import near_names, shown
-from drone_sim.scene import attached_scripts, object_collections
+from drone_sim.scene import attached_scripts, dummy_links, object_collections
 from drone_sim.scene.attached_scripts import AttachedScriptParameters, AttachedScripts
 from drone_sim.scene.entry import EntryParameters
 from drone_sim.scene.kinds import KINDS
@@ -104,6 +104,7 @@ class SceneParameters(Checked):
                 raise _problem(index, "name", entry.name, "is used twice")
             names.add(entry.name)
         check_parents(self.objects)
+        dummy_links.check(self.objects)
         attached_scripts.check(self.scripts)
         object_collections.check(self.collections)
 

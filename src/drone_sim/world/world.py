@@ -27,6 +27,7 @@ from drone_sim.world.dynamics import Dynamics
 from drone_sim.world.joints import Joints
 from drone_sim.world.pictures import Pictures
 from drone_sim.world.queries import Queries
+from drone_sim.world.rigid_links import RigidLinks
 from drone_sim.world.saved_states import SavedStates
 
 _IDENTITY = (0.0, 0.0, 0.0, 1.0)  # quaternion
@@ -85,6 +86,7 @@ class World:
         self.joints = Joints(client, self.pictures.look_anew)
         self.collision_filter = CollisionFilter(client, self._forget_motion_of)
         self.queries = Queries(client, self.collision_filter)
+        self.rigid_links = RigidLinks(client)
         self._dynamics = Dynamics(client, self._sub_step, self.queries, gyroscopic=self._gyroscopic)
         self.shape_forces = self._dynamics.shape_forces
         self.saved_states = SavedStates(client, self._forget_all_motion)
@@ -172,6 +174,7 @@ class World:
 
     def remove(self, body: int) -> None:
         self.saved_states.forget_snapshots()
+        self.rigid_links.forget(body)
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
         self._states.pop(body, None)

@@ -133,6 +133,12 @@ class Operations(Protocol):
     def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None:
         """Hang an object on another, -1 for none."""
 
+    def link(self, handle: int, other: int) -> None:
+        """Link two dummies in place of their present links; -1 for `other` only ends the link."""
+
+    def linked(self, handle: int) -> int:
+        """Return the handle of the dummy that a dummy is linked to, -1 if it has no link."""
+
     def change(self, handle: int, **values: Any) -> None:
         """Set values of keys in the object's entry."""
 

@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 from drone_sim.scripting.api.calls import Function, Module, flat_name
 from drone_sim.scripting.script_log import LOG
 
-_IMPORTANT = ("setLinkDummy",)  # logged as a warning, because without it, connected bodies separate
 HANDLE = object()  # means that the function returns a new handle
 
 # Functions by module and by the reason for the log. A number gives the generations of the functions that follow it (-:
@@ -67,8 +66,7 @@ _TABLE = {
         "propellers are rigidly attached, and nothing breaks": """
             345 breakForceSensor
         """,
-        "dummies cannot be linked to each other": """
-            345 setLinkDummy getLinkDummy=-1
+        "linked dummies always hold their bodies together": """
             - setDummyLinkType getDummyLinkType=0
         """,
         "a picture always shows what the sensor sees: publish your own picture instead": """
@@ -147,10 +145,8 @@ class Ignored:
         }
 
     def _function(self, module: str, name: str, message: str, generations: str, result: Any) -> Function:
-        level = logging.WARNING if name in _IMPORTANT else logging.INFO
-
         def call(*_arguments: Any) -> Any:
-            self.log(name, message, module, level)
+            self.log(name, message, module)
             return self._new_handle() if result is HANDLE else copy.deepcopy(result)
 
         call.__name__ = name

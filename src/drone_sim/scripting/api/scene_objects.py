@@ -101,6 +101,16 @@ class SceneObjects:
         return self._add("Dummy", kind="dummy", **({"size": length} if length else {}))
 
     @sim("345")
+    def setLinkDummy(self, dummyHandle: Handle, linkedDummyHandle: int) -> None:
+        """Link two dummies, -1 to end the link: the dynamics keeps the bodies that carry them rigidly together."""
+        self._do(lambda scene: scene.link(dummyHandle, linkedDummyHandle))
+
+    @sim("345")
+    def getLinkDummy(self, dummyHandle: Handle) -> int:
+        """Return the handle of the dummy that a dummy is linked to, -1 if it has no link."""
+        return self._do(lambda scene: scene.linked(dummyHandle))
+
+    @sim("345")
     def createJoint(
         self, jointType: int, jointMode: int = 0, _options: int = 0, _sizes: Any = None, *_colors: Any
     ) -> int:
