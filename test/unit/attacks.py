@@ -11,6 +11,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -93,6 +94,11 @@ def _attack(path, limit, where, answer):
 def _serve():
     for module in EVERYTHING:
         importlib.import_module(module)
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("empty.py", "empty.lua"):
+            path = Path(folder, name)
+            path.write_text("", encoding="utf-8")
+            flight(str(path), 20)  # forks inherit what this reads and compiles
     gc.freeze()  # a fork need not look through all of that when it ends, which takes longer than most flights
     for line in sys.stdin:
         read, write = os.pipe()
