@@ -49,6 +49,8 @@ TOKEN = "secret-token"
 class Served:
     def __init__(self):
         self.sent = []
+        self.may_answer = threading.Event()
+        self.may_answer.set()
         self.flying = HeldCommands(self.sent.append, lambda: 0.0)
         self.socket = PageSocket(self.flying, {"double": self.double})
         self.loop = asyncio.new_event_loop()
@@ -61,6 +63,7 @@ class Served:
 
     def double(self, message):
         threading.Event().wait(message.get("seconds", 0))
+        self.may_answer.wait()
         return {"twice": 2 * message["number"]}
 
     def stop(self):
@@ -224,6 +227,22 @@ def test_what_a_browser_asks_is_done_in_turn(served):
         for number, seconds in enumerate((0.2, 0.1, 0)):
             socket.send(json.dumps({"id": number, "ask": "double", "number": number, "seconds": seconds}))
         assert [json.loads(socket.recv(timeout=60))["id"] for _ in range(3)] == [0, 1, 2]
+
+
+def test_keys_do_not_wait_for_an_answer_that_takes_long(served):
+    served.sent.clear()
+    served.may_answer.clear()
+    try:
+        with served.connect() as socket:
+            socket.send(json.dumps({"id": 1, "ask": "double", "number": 1}))
+            socket.send(json.dumps({"hold": {"vx": 1.0}}))
+            moment = threading.Event()
+            while not served.sent:
+                moment.wait(0.01)
+            served.may_answer.set()
+            assert json.loads(socket.recv(timeout=60)) == {"id": 1, "twice": 2}
+    finally:
+        served.may_answer.set()
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ Handler = Callable[[int, Mapping[str, Any]], None]
 SceneSince = Callable[[int], tuple[int, bytes]]
 _LOG = logging.getLogger(__name__)
 _MAX_MESSAGES = 32  # in the queue of a browser; then the oldest are dropped
+_MAX_REQUESTS = 64  # of a browser that wait for their answers; then it is not heard until one is answered
 _SCENE = "scene"  # name by which a browser reports that it has shown a message of the scene
 _MAX_SCENES = 2  # sent messages of the scene that are not shown yet: one can be sent while the browser shows another
 
@@ -54,15 +55,18 @@ class PageSocket:
         browser = next(self._numbers)
         queue = SendQueue(self._scene)
         self._queues[browser] = asyncio.get_running_loop(), queue
-        sender = asyncio.create_task(_send_from(queue, connection))
+        requests = asyncio.Queue[tuple[Answer, dict[str, Any]]](_MAX_REQUESTS)
+        tasks = [_send_from(queue, connection), _answer(requests, connection)]
+        running = [asyncio.create_task(task) for task in tasks]
         try:
             async for text in connection:
-                await self._process(browser, text, connection)
+                await self._process(browser, text, connection, requests)
         except ConnectionClosed:
             pass
         finally:
             del self._queues[browser]
-            sender.cancel()
+            for task in running:
+                task.cancel()
             await asyncio.to_thread(self._held.release, browser)
 
     # ---- for any thread
@@ -104,7 +108,13 @@ class PageSocket:
 
     # ---- messages
 
-    async def _process(self, browser: int, text: str | bytes, connection: ServerConnection) -> None:
+    async def _process(
+        self,
+        browser: int,
+        text: str | bytes,
+        connection: ServerConnection,
+        requests: asyncio.Queue[tuple[Answer, dict[str, Any]]],
+    ) -> None:
         try:
             message = _parse(text)
             if "hold" in message:
@@ -124,7 +134,7 @@ class PageSocket:
         except (ValueError, RecursionError) as error:
             await connection.send(json.dumps({"id": None, "error": str(error)}))
             return
-        await connection.send(await asyncio.to_thread(_reply, answer, message))
+        await requests.put((answer, message))
 
 
 def _parse(text: str | bytes) -> dict[str, Any]:
@@ -154,6 +164,13 @@ def _reply(answer: Answer, message: Mapping[str, Any]) -> str:
         return json.dumps(
             {"id": message.get("id"), "error": " ".join(str(error).split()), "kind": type(error).__name__}
         )
+
+
+async def _answer(requests: asyncio.Queue[tuple[Answer, dict[str, Any]]], connection: ServerConnection) -> None:
+    """Answer requests in turn, beside the keys' commands, which must not wait for an answer that takes long."""
+    with contextlib.suppress(ConnectionClosed):
+        while True:
+            await connection.send(await asyncio.to_thread(_reply, *await requests.get()))
 
 
 async def _send_from(queue: SendQueue, connection: ServerConnection) -> None:
