@@ -18,17 +18,18 @@ case "${root//[-._\/@,=~%]/}" in
   *[[:space:][:punct:]]*) fail "ROS cannot be built in '$root': move it to a path without spaces and without signs like + # ; :" ;;
 esac
 
-# The folder of a ROS 1 that has been sourced and is not Debian's own, which lies in /usr.
-sourced_ros() {
-  local folder IFS=:
-  for folder in $CMAKE_PREFIX_PATH; do
+# The first of these folders that has a ROS 1 which is not Debian's own, in /usr.
+find_ros() {
+  local folder
+  for folder in "$@"; do
     if [ "$folder" != /usr ] && [ -f "$folder/share/catkin/cmake/catkinConfig.cmake" ]; then
       echo "$folder"
       return
     fi
   done
 }
-ros=$(sourced_ros)
+IFS=: read -ra prefixes <<<"$CMAKE_PREFIX_PATH:$CONDA_PREFIX"
+ros=$(find_ros "${prefixes[@]}")
 # Debian's ROS, and ROS One, are of the system's python; a conda environment brings its own.
 python=/usr/bin/python3
 if [ -x "$ros/bin/python3" ]; then python=$ros/bin/python3; fi
@@ -76,6 +77,21 @@ planned() { # planned NAME...
     s/^After this operation, \(.*\) of additional.*/, \1 on disk/p' | tr -d '\n'
 }
 
+UNTRIED="has not been tried: see docs/other_systems.md, and please tell us how it went"
+
+# The system's own ROS packages must not come beside another ROS. Only Debian has been tried.
+check_system() {
+  local other system
+  other=$(find_ros /opt/ros/*)
+  system=$(sed -n 's/^PRETTY_NAME="\(.*\)"$/\1/p' /etc/os-release)
+  [ -z "$other" ] || fail "the ROS in $other has not been sourced: 'source $other/setup.bash', then run this again"
+  case $system in
+    "Debian "*) ;;
+    "Ubuntu "*) say "$system, with the ROS packages in its universe, $UNTRIED" ;;
+    *) say "$system $UNTRIED" ;;
+  esac
+}
+
 install_packages() { # install_packages NAME...
   local missing=() wanted=() package there
   if [ -n "$ros" ]; then return; fi
@@ -85,6 +101,7 @@ install_packages() { # install_packages NAME...
     [[ $'\n'$there$'\n' = *$'\n'"installed $package"$'\n'* ]] || missing+=("$package")
   done
   if [ ${#missing[@]} = 0 ] || { [ "${missing[*]}" = rviz ] && ! installable rviz; }; then return; fi
+  check_system
   [ "$(id -u)" = 0 ] || command -v sudo >/dev/null || fail "needs root or sudo to install: ${missing[*]}"
   say "missing packages: ${missing[*]}"
   if [ -z "$updated" ]; then as_root apt-get update -q >&2; fi
@@ -103,6 +120,20 @@ install_packages() { # install_packages NAME...
       fail "an installation of packages was interrupted: 'sudo dpkg --configure -a' mends that"
     fail "cannot install: ${missing[*]}"
   }
+}
+
+# ROS One and RoboStack name their packages like ros-one-cv-bridge and ros-noetic-cv-bridge. rviz is not necessary.
+check_sourced_ros() {
+  local name prefix missing=() install="sudo apt install"
+  say "using the ROS in $ros${ROS_DISTRO:+ ($ROS_DISTRO)}, which $UNTRIED"
+  if [ "$ros" = "$CONDA_PREFIX" ]; then install="conda install"; fi
+  for name in $(sed -n 's:.*<\(build\|exec\)_depend>\([a-z0-9_]*\)</.*:\2:p' package.xml) rosbash; do
+    for prefix in "${prefixes[@]}"; do
+      if [ "$name" = rviz ] || [ -d "$prefix/share/$name" ]; then continue 2; fi
+    done
+    missing+=("ros-${ROS_DISTRO:-noetic}-${name//_/-}")
+  done
+  [ ${#missing[@]} = 0 ] || fail "this ROS lacks packages: '$install ${missing[*]}', then run this again"
 }
 
 writable() { # writable FOLDER
@@ -154,7 +185,7 @@ check_home() {
 setup() { # setup [ON], with the tests
   check_home
   grep -qsw localhost /etc/hosts || fail "ROS needs the line '127.0.0.1 localhost' in /etc/hosts"
-  if [ -n "$ros" ]; then say "using the ROS in $ros"; fi
+  if [ -n "$ros" ]; then check_sourced_ros; fi
   install_packages python3-venv
   if compiles_nothing; then
     fill_both

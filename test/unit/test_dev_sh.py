@@ -54,6 +54,8 @@ class Machine:
             (self.checkout / name).write_text("pybullet==1\n", encoding="utf-8")
         (folder / "ros/share/catkin/cmake").mkdir(parents=True)
         (folder / "ros/share/catkin/cmake/catkinConfig.cmake").touch()
+        for name in ("rosbash", *re.findall(r"_depend>([a-z0-9_]+)<", (ROOT / "package.xml").read_text("utf-8"))):
+            (folder / "ros/share" / name).mkdir(exist_ok=True)
         self.stub("ros/bin/python3", PYTHON)
         self.stub("bin/cmake", CMAKE)
         self.stub("bin/make", "#!/bin/bash\n")
@@ -201,6 +203,26 @@ def test_a_read_only_checkout_is_named(machine, command):
 def test_pip_never_falls_back_to_the_users_own_packages(machine):
     assert machine.run("setup", env={"PIP_USER": "1"})[0] == 0
     assert machine.asked("[user 0]") > 2 and machine.asked("[user 1]") == 0
+
+
+def test_what_a_sourced_ros_lacks_is_named_as_its_packages(machine):
+    (machine.folder / "ros/share/cv_bridge").rmdir()
+    for environment, command in (
+        ({"ROS_DISTRO": "one"}, "sudo apt install ros-one-cv-bridge"),
+        ({"ROS_DISTRO": "noetic", "CONDA_PREFIX": str(machine.folder / "ros")}, "conda install ros-noetic-cv-bridge"),
+    ):
+        code, said = machine.run("setup", env=environment)
+        assert code == 1 and f"'{command}'" in said.splitlines()[-1]
+    overlay = machine.folder / "devel"
+    (overlay / "share/cv_bridge").mkdir(parents=True)
+    prefixes = f"{overlay}:{machine.environment['CMAKE_PREFIX_PATH']}"
+    assert machine.run("setup", env={"CMAKE_PREFIX_PATH": prefixes})[0] == 0
+
+
+def test_a_conda_environment_with_ros_needs_no_cmake_prefix_path(machine):
+    prefix = machine.environment.pop("CMAKE_PREFIX_PATH")
+    code, said = machine.run("setup", env={"CONDA_PREFIX": prefix})
+    assert code == 0 and f"using the ROS in {prefix}" in said
 
 
 @pytest.mark.parametrize("interrupted", ["python3-tf2 is half configured", ""])
