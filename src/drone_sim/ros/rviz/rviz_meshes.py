@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Hashable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -75,8 +76,10 @@ def _material(number: int, surface: Surface, tint: tuple[float, ...], glow: floa
 def _triangles(surface: Surface, first: int) -> list[str]:
     """Return the OBJ lines of a surface; its vertices are numbered from `first`."""
     uv = np.zeros((len(surface.vertices), 2)) if surface.uv is None else surface.uv
-    lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in surface.vertices.tolist()]
-    lines += [f"vt {u:.7g} {v:.7g}" for u, v in uv.tolist()]
-    lines += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in surface.normals.tolist()]
+    vertices: Any = surface.vertices.tolist()  # a str, by the types of numpy 2.2
+    normals: Any = surface.normals.tolist()
+    lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in vertices]
+    lines += [f"vt {u:.7g} {v:.7g}" for u, v in np.asarray(uv, float).tolist()]
+    lines += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in normals]
     lines += [f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}" for a, b, c in (surface.faces.astype(int) + first).tolist()]
     return lines
