@@ -84,9 +84,9 @@ def test_a_task_brings_its_scene_and_leaving_it_brings_back_the_users(ask, tmp_p
     }
     ask("run", script="tutorial/4_pitch.py", lesson="stage-4-pitch")
     assert node.parameters["scene_file"] == str(package_path() / "config/scenes/empty.yaml")
-    assert ask("lesson", lesson="stage-1-constant-thrust")["flies"] == "back in mine.yaml"
+    assert ask("lesson", lesson="stage-1-constant-thrust")["flies"] == "again in mine.yaml"
     said = ask("run", script="tutorial/1_thrust.py", lesson="stage-1-constant-thrust")["said"]
-    assert said == "started back in mine.yaml"
+    assert said == "started again in mine.yaml"
     assert node.parameters["scene_file"] == "mine.yaml"
     node.asked.clear()
     assert ask("run", script="tutorial/2_elevation.py", lesson="")["said"] == "restart"

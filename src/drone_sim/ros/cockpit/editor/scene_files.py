@@ -170,8 +170,8 @@ class SceneSwitcher:
     def _back(self) -> str:
         is_file = self._user_scene not in ("", _NONE)
         if self._was_modified:
-            return f"back in {self._user_scene if is_file else 'your new scene'}, with the changes that are not saved"
-        return f"back in {self._user_scene if is_file else 'the scene of the launch'}"
+            return f"again in {self._user_scene if is_file else 'your new scene'}, with the changes that are not saved"
+        return f"again in {self._user_scene if is_file else 'the scene of the launch'}"
 
     def _load(self, file: str, now: str, success: str) -> tuple[bool, str]:
         _, cleanup = self._simulator.call(

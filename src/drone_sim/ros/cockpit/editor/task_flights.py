@@ -55,13 +55,14 @@ class TimelinePlayer:
     def prepare(self, plan: Plan | None, script: str = "") -> None:
         """Replace the plan and advertise its topics; None for no plan. Raises Mismatch.
 
-        Requests that the text of the `script` does not subscribe to are left out: each would log a warning.
+        Requests that the text of the `script` does not name are left out: if the script did not subscribe to them, each
+        would log a warning.
         """
         self.end()
         if plan is None:
             return
         parameters = plan.parameters()
-        entries = [entry for entry in plan.timeline_of(parameters).entries if _is_heard(entry, script)]
+        entries = [entry for entry in plan.timeline_of(parameters).entries if _is_named(entry, script)]
         if not entries:
             return
         self._step, self._first = parameters.time_step, parameters.first.name
@@ -174,10 +175,11 @@ class Grader:
             os.killpg(process.pid, signal.SIGKILL)
 
 
-def _is_heard(entry: Entry, script: str) -> bool:
-    """Return whether a script may hear an entry, by its text: a request needs a subscription.
+def _is_named(entry: Entry, script: str) -> bool:
+    """Return whether the text of a script names the topic of an entry that is a request; True for all other entries.
 
-    `pilot` subscribes to all requests. A subscription in a helper module of the user's is not found.
+    The simulator does not tell which requests a script subscribes to. `pilot` subscribes to all of them. A request that
+    only a module of the user's names is not sent.
     """
     action = entry.action
     if not isinstance(action, ScriptRequest):
