@@ -8,6 +8,10 @@ from cockpit_page import Panel, open_page, wait_until
 
 PAD = "window.pad = null; navigator.getGamepads = () => [window.pad];"
 STILL = (0.0, 0.0, 0.0)
+FRENCH = """Object.defineProperty(navigator, "keyboard", { value: { getLayoutMap: async () =>
+    new Map(Object.entries({ KeyW: "z", KeyA: "q", KeyQ: "a", KeyS: "s", KeyD: "d" })) } });"""
+PRESS = """([type, code, key]) => document.activeElement.dispatchEvent(
+    new KeyboardEvent(type, { code, key, bubbles: true, cancelable: true }))"""
 
 
 @pytest.fixture(name="tablet", scope="module")
@@ -85,3 +89,16 @@ def test_two_browsers_see_the_same_and_the_keys_of_both_count(cockpit, browser, 
         wait_until(tablet, lambda: cockpit.drone.command == (0.0, 1.0, 0.0))
         other.context.close()
     wait_until(tablet, lambda: cockpit.drone.command == STILL)
+
+
+def test_on_a_french_keyboard_the_same_places_fly_under_their_own_letters(cockpit, browser):
+    with open_page(cockpit, browser, init=FRENCH) as page:
+        wait_until(page, lambda: page.inner_text("#keys").startswith("ZSQD"))
+        page.evaluate(PRESS, ["keydown", "KeyW", "z"])
+        wait_until(page, lambda: cockpit.drone.command[0] == 1.0)
+        page.evaluate(PRESS, ["keyup", "KeyW", "z"])
+        wait_until(page, lambda: cockpit.drone.command == STILL)
+        Panel(page).show("Edit")
+        turn = page.get_by_role("button", name="Turn", exact=True)
+        page.evaluate(PRESS, ["keydown", "Digit2", "é"])
+        wait_until(page, lambda: turn.get_attribute("aria-pressed") == "true")

@@ -167,3 +167,17 @@ def test_on_a_tablet_that_is_held_upright_scene_script_and_edit_are_tabs(cockpit
         page.locator("#rail").get_by_role("button", name="Plots").tap()
         assert tabs.locator("[aria-pressed=true]").all_inner_texts() == ["Scene"]
         assert not page.locator("#toggle").is_visible()
+
+
+def test_in_a_narrow_window_the_scene_is_edited_without_the_script(cockpit, browser):
+    with open_page(cockpit, browser, viewport={"width": 1024, "height": 768}) as page:
+        bar, script = page.locator("#build-bar"), page.locator("#editor")
+        edit = page.locator("#rail").get_by_role("button", name="Edit", exact=True)
+        for _ in range(2):
+            edit.click()
+            assert bar.is_visible() and not script.is_visible()
+            box, last = bar.bounding_box(), page.locator("#edit-menu-open").bounding_box()
+            for side, size in (("x", "width"), ("y", "height")):
+                assert last[side] + last[size] <= box[side] + box[size], "all of the bar is in it"
+            page.click("#toggle")
+            assert script.is_visible() and not bar.is_visible()

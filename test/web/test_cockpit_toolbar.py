@@ -1,5 +1,7 @@
 """The cockpit's panel, pressed button by button, against the running node; its plots, its log, and several drones."""
 
+import re
+
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
@@ -170,6 +172,7 @@ def test_plots_are_drawn_enlarged_and_saved(cockpit, panel):
     panel.show("Plots")
     height = page.get_by_role("group", name="Height, m")
     wait_until(page, lambda: height.evaluate(COLOURED) > 50)
+    assert re.search(r"height:?\s*[01]\.\d\d", height.inner_text()), "without a pointer, the legend has the last value"
     small = height.bounding_box()["width"]
     height.get_by_role("button", name="Enlarge").click()
     wait_until(page, lambda: height.bounding_box()["width"] > 1.3 * small)

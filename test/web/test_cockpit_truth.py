@@ -123,6 +123,10 @@ def test_an_error_box_shows_all_of_it_is_reached_by_keys_and_goes_with_a_good_ru
 def test_a_reload_opens_what_was_edited_last_where_it_was(cockpit, browser):
     cockpit.start_afresh()
     with open_page(cockpit, browser) as page:
+        page.select_option("#script", "tutorial/1_thrust.py")
+        wait_until(page, lambda: "Stage 1" in text(page))
+        page.click("#run")  # what flies is no other launch's script
+        wait_until(page, lambda: page.inner_text("#flown") == "tutorial/1_thrust.py")
         page.select_option("#script", "tasks/hover.py")
         wait_until(page, lambda: "how far the wind" in text(page))
         page.locator("#text .cm-content").click()

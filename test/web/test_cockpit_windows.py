@@ -116,4 +116,7 @@ def test_a_camera_is_recorded_and_the_films_name_says_which(cockpit, opened):
         film.click()
     assert saved.value.suggested_filename.startswith("drone_sim-drone_front-")
     assert Path(saved.value.path()).stat().st_size > 1000
-    switch_camera(opened)
+    film.click()
+    wait_for(opened, "recorded > 2000")
+    with opened.expect_download():  # nothing of a film is lost if its camera is switched off
+        switch_camera(opened)

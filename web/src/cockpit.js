@@ -1,5 +1,5 @@
 // The page: the scene, held keys, the script in an editor with its text, panels, and what floats over the scene.
-import { Teleop } from "./teleop.js";
+import { Teleop, nameKeys } from "./teleop.js";
 import { Desk } from "./desk.js";
 import { at } from "./dom.js";
 import { Lesson } from "./lesson.js";
@@ -160,5 +160,6 @@ split(at("beside"), "--editor", "x", 300, () => Math.max(300, window.innerWidth 
 const above = () => at("lesson-body").getBoundingClientRect().top;
 split(at("under"), "--lesson", "y", 60, () => window.innerHeight - 260, (event) => event.clientY - above());
 teleop.listenTo(window);
+nameKeys(document.querySelectorAll(".flight-keys kbd"));
 teleop.stick(at("left"), "wz", "vz");
 teleop.stick(at("right"), "vy", "vx");

@@ -14,6 +14,7 @@ import { View } from "./view.js";
 
 const NO_EFFECT = /^warning: .*: no effect: /; // in the log: why a button did nothing
 const STARTED = /^started(?: in |$)/; // in the log: the simulation has begun anew
+const NARROW = matchMedia("(max-width: 1120px)"); // where the scene is not edited beside the script
 const TOUCH = matchMedia("(pointer: coarse), (max-width: 900px)"); // where the script covers the scene
 
 export class Panels {
@@ -37,6 +38,7 @@ export class Panels {
       this.plots.show(panel === "plots");
       this.edits = panel === "edit";
       if (this.isConnected) this.build.turn(this.edits); // else once it is
+      if (this.edits && NARROW.matches) this.showScript(false);
       if (panel === "view") this.view.list();
       this.markPlace(panel);
     });
@@ -70,7 +72,7 @@ export class Panels {
   showScript(is) {
     document.body.classList.toggle("wide", !is);
     at("toggle").setAttribute("aria-expanded", String(is));
-    this.markPlace(this.side.now);
+    this.markPlace(this.side?.now);
   }
 
   markPlace(panel) {

@@ -76,7 +76,7 @@ class Chart {
         ...lines.map((label, index) => ({
           label, stroke: style(COLORS[index % COLORS.length]), width: 1.75, spanGaps: false,
           dash: DASHED.test(label) ? [6, 4] : undefined, points: { show: false },
-          value: (_, value) => (value === null || value === undefined ? "" : value.toPrecision(3)),
+          value: (_, value) => (value ?? this.rows.at(-1)?.[index + 1])?.toPrecision(3) ?? "", // without a pointer, the last one
         })),
       ],
       cursor: { y: false, drag: { x: false, y: false } },

@@ -13,7 +13,11 @@ export class Recorder {
     this.ended = ended;
     this.recorder = null;
     button.setAttribute("aria-pressed", "false");
-    button.onclick = () => (this.recorder ? this.recorder.stop() : this.begin());
+    button.onclick = () => (this.recorder ? this.stop() : this.begin());
+  }
+
+  stop() {
+    this.recorder?.stop();
   }
 
   begin() {

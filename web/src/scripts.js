@@ -12,6 +12,7 @@ const LARGEST = 1 << 20; // bytes
 
 const DEFAULT = "built-in/pilot.py"; // flies if the launch names no script
 const SCRIPT = "script"; // the storage key of the open script
+const FLOWN = "flown"; // the storage key of the script that the simulator had last
 const COPIES = "copies"; // the storage key of the user's latest copy of each script of the package
 
 const size = (text) => new TextEncoder().encode(text).length;
@@ -62,14 +63,14 @@ export class Scripts {
   async connected() {
     const isFirst = !this.is.script;
     const last = isFirst ? this.lastOpen() : [];
+    const before = kept(FLOWN, null);
     const { flown, groups, folder } = await this.list();
     await this.save().catch(() => {});
     const left = this.drafts.scripts.filter((script) => script !== this.is.script);
     for (const script of left) await this.open(script).catch((error) => this.store.say("trouble", error.message));
     if (!isFirst || this.conflict) return;
     const all = groups.flatMap(({ scripts }) => scripts);
-    const isNews = flown !== DEFAULT && flown !== kept("flown", flown); // another launch flies another script
-    keep("flown", flown);
+    const isNews = flown !== DEFAULT && flown !== (before ?? flown); // another launch flies another script
     const found = (isNews ? [flown, ...last] : [...last, flown]).find((one) => all.includes(one));
     if (found && found !== this.is.script) await this.open(found);
     if (found) return;
@@ -85,7 +86,9 @@ export class Scripts {
 
   // Hears which script the simulator has.
   hear(flown) {
-    if (flown !== this.store.now.flown) this.store.take("flown", flown);
+    if (flown === this.store.now.flown) return;
+    this.store.take("flown", flown);
+    keep(FLOWN, flown);
   }
 
   open(script) {

@@ -7,7 +7,7 @@ export class Side {
   constructor(onShow) {
     this.onShow = onShow; // hears the name of the panel that is open, '' for none
     this.buttons = [...document.querySelectorAll("#rail button[data-panel]")];
-    for (const button of this.buttons) button.onclick = () => this.open(button.dataset.panel === this.now ? "" : button.dataset.panel);
+    for (const button of this.buttons) button.onclick = () => this.open(button.dataset.panel === this.now && at("panel").checkVisibility() ? "" : button.dataset.panel);
     at("fold-side").onclick = () => this.open("");
     at("other-side").onclick = () => this.place(this.isLeft ? "right" : "left");
     at("panel").addEventListener("keydown", (event) => {

@@ -11,6 +11,13 @@ const KEYS = {
 const PAD = { vx: [3, -1], vy: [2, -1], vz: [1, -1], wz: [0, -1] }; // the standard gamepad's axes: down and right are +1
 const AXES = ["vx", "vy", "vz", "wz"];
 
+// Shows which letters this keyboard has at the places of W, A, S and D: the places fly, and a French keyboard has Z, Q, S and
+// D there. Only Chromium tells, and only on this machine or by https.
+export async function nameKeys(elements) {
+  const letters = await navigator.keyboard?.getLayoutMap?.().catch(() => {});
+  for (const element of elements) element.textContent = letters?.get(`Key${element.textContent}`)?.toUpperCase() ?? element.textContent;
+}
+
 export class Teleop {
   constructor(hold, show) {
     this.hold = hold;

@@ -32,8 +32,9 @@ export class Windows {
   // Leaves of one kind the windows that are listed; what is new is made, what has changed is filled anew.
   keep(kind, listed, make) {
     const keys = new Set(listed.map(({ handle }) => `${kind} ${handle}`));
-    for (const [key, { element }] of this.open) {
+    for (const [key, { element, end }] of this.open) {
       if (!key.startsWith(`${kind} `) || keys.has(key)) continue;
+      end?.();
       element.remove();
       this.open.delete(key);
     }
@@ -101,7 +102,8 @@ export class Windows {
     const turn = (overlay, on) => this.socket.ask("overlay", { topic, overlay, on }).catch((error) => this.notice.say(error.message, true));
     const over = new Overlay(topic, turn);
     const made = { element, image, note, over, title: element.querySelector("span") };
-    new Recorder(film, () => this.film(made), name, this.notice, () => (made.canvas = null));
+    const recorder = new Recorder(film, () => this.film(made), name, this.notice, () => (made.canvas = null));
+    made.end = () => recorder.stop(); // the film is saved
     element.querySelector("header button").before(...over.buttons, film);
     element.append(create("div", { className: "seen" }, image, over.svg), note, over.legend);
     return made;

@@ -1,4 +1,5 @@
-// The keys of editing: none of them flies. Letters with Ctrl, digits, and few others; the help sheet lists them.
+// The keys of editing: none of them flies. Letters with Ctrl, digits, and few others; the help sheet lists them. A digit is
+// the key in its place: on a French keyboard, that key alone writes & or é.
 const isWriting = (target) => target.closest?.("input:not([type=checkbox], [type=range]), textarea, select, article, [contenteditable], dialog");
 
 export const KEYS = {
@@ -21,7 +22,8 @@ export function listen(acts, paste, isOn, isAway) {
     if (!isOn() || event.defaultPrevented || event.altKey || isAway(event.target)) return;
     const ctrl = event.ctrlKey || event.metaKey ? "ctrl+" : "";
     const shift = ctrl && event.shiftKey ? "shift+" : "";
-    const act = KEYS[`${ctrl}${shift}${event.key.toLowerCase()}`];
+    const [, digit] = /^Digit(\d)$/.exec(event.code) ?? [];
+    const act = KEYS[`${ctrl}${shift}${digit ?? event.key.toLowerCase()}`];
     if (!act || (isWriting(event.target) && !ANYWHERE.includes(act))) return;
     if (act === "copy" && String(window.getSelection())) return; // marked text is copied
     event.preventDefault();

@@ -4,6 +4,7 @@ import * as THREE from "three";
 const FONT = 36; // px, in which it is painted
 const LINE = 1.25;
 const PAD = 10;
+const at = new THREE.Vector3();
 
 export class Words extends THREE.Sprite {
   static unit = 0.001; // m, how large a CSS pixel is at 1 m
@@ -15,6 +16,14 @@ export class Words extends THREE.Sprite {
     this.renderOrder = 5;
     this.raycast = () => {};
     this.say(text);
+  }
+
+  // A plate that would reach over the picture's upper edge is lowered.
+  onBeforeRender(_renderer, _scene, camera) {
+    if (!this.fixed) return;
+    const { y } = at.setFromMatrixPosition(this.matrixWorld).project(camera);
+    const height = this.scale.y * camera.projectionMatrix.elements[5]; // half pictures
+    this.center.y = Math.min(1, Math.max(0, 1 - (1 - y) / height));
   }
 
   say(text) {
