@@ -13,6 +13,7 @@ trap 'rm -rf "$out"' EXIT
 stage=$out/root
 own=/usr/lib/drone_sim/python # the environment, as it will be installed
 wheels=$1
+LIMIT=30 # MB that the package may have
 version=$(sed -n 's:.*<version>\(.*\)</version>.*:\1:p' package.xml)+deb$(cut -d. -f1 /etc/debian_version)
 architecture=$(dpkg --print-architecture)
 python=$(/usr/bin/python3 -c 'import sys; print("{}.{}".format(*sys.version_info))')
@@ -39,13 +40,15 @@ grep -hEv '^(opencv|av|matplotlib|scipy)\b' requirements.txt requirements-all.tx
   --find-links "$wheels" --no-compile -r "$out/requirements.txt"
 site=$stage$own/lib/python$python/site-packages
 packaging/slim_pybullet.sh "$site"
-rm -rf "$site"/eglRenderer* "$stage$own/include" # not used here
+rm -rf "$site"/eglRenderer* "${site:?}"/{include,lib64,share} "$stage$own/include" # not used here
 find "$site" -name '*.so' -exec strip --strip-unneeded {} +
 find "$stage$own/bin" -type f -delete
 find "$stage" -name __pycache__ -prune -exec rm -rf {} +
 programs=(simulator key_teleop joy_teleop view show fly grade grade_live sweep record record_truth plot_flight bag_commands
   video import_scene doctor cockpit)
 sed -i "1s:.*:#!$own/bin/python:" "${programs[@]/#/$stage/usr/lib/drone_sim/}"
+
+install -Dm644 packaging/drone_sim.service "$stage/usr/lib/systemd/user/drone_sim.service"
 
 chmod -R u=rwX,go=rX "$stage" # whatever the checkout's are
 
@@ -77,6 +80,9 @@ PRERM
 chmod 755 "$stage/DEBIAN/postinst" "$stage/DEBIAN/prerm"
 cd "$out/deb"
 dpkg-deb --root-owner-group --build "$stage" "ros-drone-sim_${version}_$architecture.deb" >&2
+size=$(stat -c %s ./*.deb)
+printf 'the package has %d.%d MB\n' $((size / 1000000)) $((size / 100000 % 10)) >&2
+[ "$size" -le $((LIMIT * 1000000)) ] || { echo "it may have $LIMIT MB" >&2; exit 1; }
 apt-ftparchive packages . >Packages
 gzip -kn9 Packages
 apt-ftparchive -o APT::FTPArchive::Release::Label=drone_sim release . >"$out/Release"

@@ -63,7 +63,10 @@ NOT_RUN = {  # with the reason
     "git clone URL-OF-DRONE_SIM drone_sim": CONTAINER,
     "cd drone_sim": CONTAINER,
     "docker build -f packaging/Dockerfile -t drone_sim .": CONTAINER,
-    "docker run --rm -p 127.0.0.1:8080:8080 --name drone_sim drone_sim": CONTAINER,
+    "docker run --rm -p 127.0.0.1:8080:8080"
+    " -v drone_scripts:/home/pilot/drone_scripts --name drone_sim drone_sim": CONTAINER,
+    "systemctl --user enable --now drone_sim": "needs the Debian package and systemd",
+    "cat ~/.ros/drone_sim/cockpit_8080.txt": "needs the Debian package and systemd",
     "docker exec -it drone_sim bash": CONTAINER,
     "git clone https://github.com/OBulun/Coppelia-Quad": RECORDED,
     "./dev.sh recordings Coppelia-Quad": RECORDED,
