@@ -39,7 +39,7 @@ class Builder:
         return self.object(name)
 
     def menu(self, which, item):
-        self.page.get_by_role("button", name=which, exact=True).click()
+        self.page.get_by_role("button", name=which).click()  # "Scene file" has the file's name behind it
         self.page.get_by_role("menuitem", name=item).click()
 
     def select(self, name):

@@ -18,6 +18,7 @@ export class SceneFiles {
     const { file, modified, draft, new: isNew } = this.edit.is;
     at("scene-file").textContent = file ? nameOf(file) : isNew ? "new scene" : "as launched";
     at("scene-file").title = file;
+    at("scene-menu-open").ariaLabel = `Scene file: ${at("scene-file").textContent}`;
     at("scene-modified").hidden = !modified;
     const question = at("draft");
     question.hidden = !draft;
