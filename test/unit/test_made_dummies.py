@@ -23,7 +23,8 @@ def sysCall_actuation():
 def simulate(tmp_path, text):
     path = tmp_path / "made.py"
     path.write_text(text, encoding="utf-8")
-    return Simulation(parameters.load({"gravity": 0.0, "drone": {"position": [0.0, 0.0, 2.0]}}), script=str(path))
+    loaded = {"gravity": 0.0, "drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}
+    return Simulation(parameters.load(loaded), script=str(path))
 
 
 def test_a_script_makes_dummies_and_takes_them_away(tmp_path, caplog):

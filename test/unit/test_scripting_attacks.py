@@ -23,7 +23,7 @@ def _attack():
     def attack(path, source, words, where="main"):
         """Fly the source; its message has to hold the words. What is not stopped may take its time."""
         path.write_text(source + PHASE[path.suffix], encoding="utf-8")
-        found = attacker.fly(path, 0.2 if words in QUICK else 20, where)
+        found = attacker.fly(path, 0.2 if words in QUICK else HANGS / 2, where)
         assert found["second"] == [], "the next start works"
         assert found["lines"] < 5000 and found["bytes"] < 5_000_000
         assert len(found["first"]) <= 1 and all("\n" not in line and len(line) < 1000 for line in found["first"])

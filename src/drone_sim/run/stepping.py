@@ -63,7 +63,7 @@ class Stepper:
         """Begin a run at time 0."""
         self._scripts, self._context, self._clock = setup.scripts, setup.context, setup.context.clock
         self._world, self._operations = setup.context.world, setup.operations
-        self._links = setup.scene.links
+        self._hold_linked_dummies = setup.scene.hold_linked_dummies
         self._velocities = setup.context.velocities
         self._sub_steps = setup.parameters.sub_steps
         self._vehicles = setup.vehicles
@@ -126,7 +126,7 @@ class Stepper:
         carried = self._context.carried
         if carried.shapes or carried.bases:
             carried.follow()
-        self._links.hold()
+        self._hold_linked_dummies()
         between = self._with_watch(watch) if self._in_sub_steps else watch
         self._world.advance(wrenches, self._sub_steps, between)
 

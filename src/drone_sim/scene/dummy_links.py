@@ -39,22 +39,12 @@ class DummyLinks:
     def __init__(self, world: World):
         self._world = world
         self._pairs: list[tuple[SceneObject, SceneObject]] = []
+        self.is_stale = True  # set it when a record has changed
 
-    def find(self, records: Iterable[ObjectRecord]) -> None:
-        """Use the links of these records, now that their objects exist."""
-        dummies = [(item.entry, item.item) for item in records if isinstance(item.entry, DummyParameters)]
-        objects = {entry.name: item for entry, item in dummies}
-        pairs = {}
-        for entry, item in dummies:
-            other = objects.get(entry.linked)
-            if item is not None and other is not None:
-                pairs[frozenset((entry.name, entry.linked))] = item, other
-        self._pairs = [*pairs.values()]
-        if not pairs:
-            self._world.rigid_links.set({})
-
-    def hold(self) -> None:
-        """Update the links in the world to where the dummies are on their bodies."""
+    def hold(self, records: Iterable[ObjectRecord]) -> None:
+        """Update the links in the world to where the linked dummies of `records` are on their bodies."""
+        if self.is_stale:
+            self._find(records)
         if not self._pairs:
             return
         links = {}
@@ -63,6 +53,20 @@ class DummyLinks:
             if ends[0][:2] != ends[1][:2] and (first.carrier is not None or second.carrier is not None):
                 links[first.name] = ends
         self._world.rigid_links.set(links)
+
+    def _find(self, records: Iterable[ObjectRecord]) -> None:
+        dummies = [(item.entry, item.item) for item in records if isinstance(item.entry, DummyParameters)]
+        linking = [(entry, item) for entry, item in dummies if entry.linked]
+        objects = {entry.name: item for entry, item in dummies} if linking else {}
+        pairs = {}
+        for entry, item in linking:
+            other = objects.get(entry.linked)
+            if item is not None and other is not None:
+                pairs[frozenset((entry.name, entry.linked))] = item, other
+        self._pairs = [*pairs.values()]
+        self.is_stale = False
+        if not pairs:
+            self._world.rigid_links.set({})
 
 
 def _anchor(dummy: SceneObject) -> Anchor:

@@ -56,7 +56,7 @@ class Scene:
         self._world = context.world
         self._add_floor(parameters.floor)
         self.drag = ObjectDrag(context, self.things, parameters.floor.size)
-        self.links = DummyLinks(context.world)
+        self._links = DummyLinks(context.world)
         self.next_index = len(self.records)
         self.is_changed = False  # whether any operation (operations.py) changed it
         self.rebuilt = 0  # number of bodies added or removed so far
@@ -194,7 +194,7 @@ class Scene:
                 record.start = record.item.matrix() if record.item is not None else None
         self._follow()
         self._world.rigid_links.set({})  # so that all runs begin equal to the last bit
-        self.links.find(self.records.values())
+        self._links.is_stale = True
 
     def rebuild(self, change_tree: Callable[[], None] = lambda: None, bodies: bool = True) -> None:
         """Update world and tree from the entries; `change_tree` is called once the new bodies exist.
@@ -212,7 +212,7 @@ class Scene:
                 item.pass_carriers()
         self._place_free_children(self._add_objects(new_bodies))
         self._follow()
-        self.links.find(self.records.values())
+        self._links.is_stale = True
 
     def replace_object(self, record: ObjectRecord, handle: int, entry: KindParameters, place: Place) -> None:
         """Replace an object by one built from `entry`."""
@@ -320,6 +320,10 @@ class Scene:
         self._context.carried.bases = {body: bases[body] for body in sorted(bases, key=depth)}
         self._context.carried.follow()
 
+    def hold_linked_dummies(self) -> None:
+        """Link the bodies of linked dummies in the world, before a step."""
+        self._links.hold(self.records.values())
+
     def _place_free_children(self, added: Iterable[int]) -> None:
         """Move added free children to their entries' poses relative to the parent, now that it exists."""
         for index in added:
@@ -356,7 +360,7 @@ class Scene:
         def restore() -> None:
             for index, record in self.records.items():
                 record.entry = entries.get(index, record.entry)
-            self.links.find(self.records.values())
+            self._links.is_stale = True
             shapes = [it.carried for it in self.objects.values() if isinstance(it, ShapeObject) and not it.is_held]
             for body in (*self._carried_bases.values(), *shapes):
                 body.reapply_pose()
