@@ -19,6 +19,8 @@ from launched import free_port
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from drone_sim.ros import jupyter
+
 BASE = "/user/a/"
 PAGE = f"{BASE}drone_sim/"
 STARTED = f"localStorage['drone_sim{PAGE}started'] = 'true';"  # the start page has been answered
@@ -28,6 +30,12 @@ PLACE = "() => scene.tree.byName.get('base_link').position.x"
 @pytest.fixture(name="server", scope="module")
 def _server(tmp_path_factory):
     """A Jupyter server below a prefix, as JupyterHub starts it for each user, with a home of its own."""
+    try:
+        jupyter.server()
+    except OSError as error:
+        if "namespace" not in str(error):
+            raise
+        pytest.skip(f"there is no tile where users may not isolate a process: {error}")
     home, port = tmp_path_factory.mktemp("home"), free_port()
     environment = {key: value for key, value in os.environ.items() if not key.startswith("JUPYTER")}
     extensions = "{'jupyter_server_proxy': True, 'jupyterlab': False, 'jupyter_lsp': False}"
