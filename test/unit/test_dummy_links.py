@@ -146,7 +146,7 @@ def test_a_dummy_has_one_link(fly):
         fly(links={"HeavyTip": "LightTip", "WallTip": "LightTip"})
 
 
-def test_operations_keep_links(fly):
+def test_operations_keep_links(fly, tmp_path):
     simulation = fly(links={"HeavyTip": "LightTip"})
     operations, tree = simulation.operations, simulation.context.objects
     tip, other = tree.handle("HeavyTip"), tree.handle("LightTip")
@@ -161,6 +161,13 @@ def test_operations_keep_links(fly):
     assert operations.linked(alone[0]) == -1
     steps(simulation, 2)
     operations.remove([handles[1]])
+    with pytest.raises(ValueError, match="must be the name of another dummy"):
+        operations.change(tip, linked="Nobody")
+    with pytest.raises(ValueError, match="must be the name of another dummy"):
+        operations.add([{"name": "New", **TIP, "linked": "Nobody"}])
+    operations.write_model([tip], tmp_path / "tip.yaml")
+    assert "linked" not in (tmp_path / "tip.yaml").read_text(encoding="utf-8"), "its other end is not in the model"
     operations.remove([other])
-    assert operations.linked(tip) == -1
+    assert operations.linked(tip) == -1 and operations.entry(tip).linked == "", "a file of the scene can be read again"
+    assert operations.linked(tree.handle("Track_base")) == -1
     steps(simulation, 2)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from drone_sim.mechanics.joint import Joint
 from drone_sim.mechanics.object_names import first_free, numbered, plain, shifted, suffixes
 from drone_sim.mechanics.object_tree import PARENT, WORLD, levels
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.scene import models
+from drone_sim.scene import dummy_links, models
 from drone_sim.scene.attached_scripts import MAX_SCRIPTS, AttachedScriptParameters, RunningScripts
 from drone_sim.scene.entry import EntryParameters, Place, placed
 from drone_sim.scene.kinds.dummy import DummyParameters
@@ -112,6 +112,7 @@ class SceneOperations:
             scene.next_index += len(entries)
             scene.records.update((index, ObjectRecord(entry)) for index, entry in enumerate(entries, first))
             scene.scripts.update({script.object: script for script in scripts})
+            self._check_links(entries)
         if scripts:
             self._scripts.attach([script.object for script in scripts])
         return [tree.handle(entry.name) for entry in entries]
@@ -142,6 +143,7 @@ class SceneOperations:
             scene.records = {key: record for key, record in scene.records.items() if record not in removed}
             for record in removed:
                 scene.scripts.pop(record.entry.name, None)
+            self._end_links({record.entry.name for record in removed})
 
     def copy(self, handles: Sequence[int]) -> list[int]:
         """Add copies of objects, which may be children of each other, and of their scripts; return the copies' handles.
@@ -226,6 +228,10 @@ class SceneOperations:
     def write_model(self, members: Sequence[int], path: Path) -> None:
         """Write objects with their scripts to a file, the base first. Raises ValueError."""
         entries = [self.entry(member) for member in members]
+        names = {entry.name for entry in entries}
+        for index, entry in enumerate(entries):
+            if isinstance(entry, DummyParameters) and entry.linked not in names:
+                entries[index] = entry.model_copy(update={"linked": ""})
         scripts = [self._scene.scripts[entry.name] for entry in entries if entry.name in self._scene.scripts]
         models.write(path, [placed(entries[0], "", self._scene.tree.matrix(members[0])), *entries[1:]], scripts)
 
@@ -272,7 +278,7 @@ class SceneOperations:
 
     def link(self, handle: int, other: int) -> None:
         """Link two dummies in place of their present links; -1 for `other` only ends the link. Raises ValueError."""
-        scene, linked = self._scene, [self._record(one) for one in (handle, other) if one != WORLD]
+        _scene, linked = self._scene, [self._record(one) for one in (handle, other) if one != WORLD]
         for record in linked:
             if not isinstance(record.entry, DummyParameters):
                 raise ValueError(f"'{record.entry.name}' is no dummy: only dummies of the scene can be linked")
@@ -280,19 +286,32 @@ class SceneOperations:
             raise ValueError(f"'{linked[0].entry.name}' cannot be linked to itself")
         names = {record.entry.name for record in linked}
         with self._changing(bodies=False):
-            for record in scene.records.values():
-                entry = record.entry
-                if isinstance(entry, DummyParameters) and entry.linked and {entry.name, entry.linked} & names:
-                    record.entry = entry.model_copy(update={"linked": ""})
+            self._end_links(names)
             if other != WORLD:
                 linked[0].entry = linked[0].entry.model_copy(update={"linked": linked[1].entry.name})
 
     def linked(self, handle: int) -> int:
         """Return the handle of the dummy that a dummy is linked to, -1 if it has no link. Raises ValueError."""
-        entry, tree = self._record(handle).entry, self._scene.tree
+        tree = self._scene.tree
+        record = self._record_of(tree[handle])
+        if record is None:  # a vehicle's object
+            return WORLD
+        entry = record.entry
         linking = [one.name for one in self._scene.entries.values() if getattr(one, "linked", "") == entry.name]
         names = [getattr(entry, "linked", ""), *linking]
         return next((tree.handle(name) for name in names if name in tree), WORLD)
+
+    def _end_links(self, names: Collection[str]) -> None:
+        """End the links of dummies with these names."""
+        for record in self._scene.records.values():
+            entry = record.entry
+            if isinstance(entry, DummyParameters) and entry.linked and (entry.name in names or entry.linked in names):
+                record.entry = entry.model_copy(update={"linked": ""})
+
+    def _check_links(self, changed_entries: Iterable[EntryParameters]) -> None:
+        """Raise ParameterError if one of these entries has a link that cannot be; they are records already."""
+        if any(isinstance(entry, DummyParameters) and entry.linked for entry in changed_entries):
+            dummy_links.check(self._scene.entries.values())
 
     # ---- scripts
 
@@ -479,6 +498,7 @@ class SceneOperations:
                 place = {key: getattr(present, key) for key in ("position", "rpy", "parent")}
                 record.entry = entries[handle].model_copy(update=place)
                 record.version += 1
+            self._check_links(new_entries)
 
     # ---- atomic changes
 
