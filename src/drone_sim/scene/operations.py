@@ -278,7 +278,7 @@ class SceneOperations:
 
     def link(self, handle: int, other: int) -> None:
         """Link two dummies in place of their present links; -1 for `other` only ends the link. Raises ValueError."""
-        _scene, linked = self._scene, [self._record(one) for one in (handle, other) if one != WORLD]
+        linked = [self._record(one) for one in (handle, other) if one != WORLD]
         for record in linked:
             if not isinstance(record.entry, DummyParameters):
                 raise ValueError(f"'{record.entry.name}' is no dummy: only dummies of the scene can be linked")
