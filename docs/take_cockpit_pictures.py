@@ -69,8 +69,7 @@ def build(page: Any) -> None:
     """The scene while it is built: another gate has been dropped, and is selected."""
     page.locator("#toggle").click()
     builder = Builder(page)
-    builder.menu("Scene file", "New")
-    builder.row("Drone").wait_for(state="detached")
+    builder.new_scene()
     for model, x, y, turn in GATES:
         builder.drop(model, [x, y, 0])
         builder.write(X=x, Y=y, Gamma=turn)

@@ -42,6 +42,17 @@ class Builder:
         self.page.get_by_role("button", name=which).click()  # "Scene file" has the file's name behind it
         self.page.get_by_role("menuitem", name=item).click()
 
+    def new_scene(self):
+        """Begin a scene of a floor alone, without what is not saved; wait until pictures of the old cameras are gone."""
+        page = self.page
+        self.menu("Scene file", "New")
+        sure = page.get_by_role("button", name="Throw them away")
+        wait_until(page, lambda: sure.is_visible() or page.get_by_role("treeitem").count() == 1)
+        if sure.is_visible():
+            sure.click()
+            wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
+        wait_until(page, lambda: page.locator(".picture").count() == 0)
+
     def select(self, name):
         self.row(name).click()
         wait_until(self.page, lambda: self.page.inner_text("#selected") == name)

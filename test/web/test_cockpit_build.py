@@ -59,6 +59,15 @@ OVERTAKEN = """() => {
     };
     editing.connected();
 }"""
+# Before a new scene is asked for, the tree of the old one is told again.
+TOLD_AGAIN = """() => {
+    const { editing } = scene, { ask } = editing;
+    editing.ask = async (...one) => {
+        editing.emit("tree");
+        editing.emit("objects");
+        return ask(...one);
+    };
+}"""
 COURSE = ({"X": 3, "Y": 0}, {"X": 6, "Y": 1, "Gamma": 30}, {"X": 8, "Y": 4, "Gamma": 90})  # m, degrees
 
 
@@ -68,8 +77,7 @@ def near(one, position):
 
 def build(builder, script):
     """Click what the tutorial's sections "Our first drone scene" and "Game-like tracking camera" ask for."""
-    builder.menu("Scene file", "New")
-    wait_until(builder.page, lambda: builder.page.get_by_role("treeitem").count() == 1)
+    builder.new_scene()
     builder.select("Floor")
     builder.set("size", 10)
     builder.rename(builder.drop("Quadricopter of V-REP", [0.5, 0.5, 0]), "Drone")
@@ -146,8 +154,7 @@ def test_a_start_comes_after_the_numbers_that_were_written_before_it(cockpit, br
     written = (0.5, 0.4, 2)
     with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
         builder, panel = Builder(page), Panel(page)
-        builder.menu("Scene file", "New")
-        wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
+        builder.new_scene()
         gate = builder.drop("Gate", [1, 1, 0])
         builder.wait(gate, lambda one: one["position"][:2] == [1, 1])
         page.evaluate(LATE, 1000)
@@ -180,8 +187,7 @@ def test_a_start_comes_after_the_text_that_was_written_before_it(cockpit, browse
 def test_what_another_does_meanwhile_is_seen_in_the_numbers(cockpit, browser):
     with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
         builder, numbers = Builder(page), page.locator("#pose")
-        builder.menu("Scene file", "New")
-        wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
+        builder.new_scene()
         gate = builder.drop("Gate", [1, 1, 0])
         _, _, height = builder.wait(gate, lambda one: one["position"][:2] == [1, 1])["position"]
         page.evaluate(LATE, 3000)
@@ -203,8 +209,7 @@ def test_a_tree_that_is_older_than_what_was_missed_meanwhile_is_asked_for_once_m
 
 def build_arena(builder):
     """Build three gates, a pad and a wall."""
-    builder.menu("Scene file", "New")
-    wait_until(builder.page, lambda: builder.page.get_by_role("treeitem").count() == 1)
+    builder.new_scene()
     for place in COURSE:
         gate = builder.drop("Gate", [1, 1, 0])
         builder.write(**place)
@@ -247,8 +252,7 @@ def test_saved_in_flight_it_is_a_copy_and_the_page_says_so(cockpit, browser):
 def test_a_drag_is_one_step_of_undo_and_the_text_is_the_same_scene(cockpit, browser):
     with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
         builder = Builder(page)
-        builder.menu("Scene file", "New")
-        builder.row("Drone").wait_for(state="detached")
+        builder.new_scene()
         builder.drop("Cuboid", [1, 0, 0])
         before = builder.wait("Cuboid", lambda one: one["position"][:2] == [1, 0])["position"]
         builder.pull(60)
@@ -281,7 +285,7 @@ def test_a_new_scene_flies_the_pilot_and_a_saved_one_the_script_that_was_run(coc
         page.click("#run")
         wait_until(page, lambda: page.inner_text("#flown") == "tutorial/1_thrust.lua")
         builder, panel = Builder(page), Panel(page)
-        builder.menu("Scene file", "New")
+        builder.new_scene()
         wait_until(page, lambda: page.inner_text("#flown") == "")
         wait_until(page, lambda: page.locator("#scene-choice option:checked").inner_text() == "new scene")
         corners = [[x, y, 0] for x in (-2.5, 2.5) for y in (-2.5, 2.5)]
@@ -308,6 +312,17 @@ def test_a_new_scene_flies_the_pilot_and_a_saved_one_the_script_that_was_run(coc
     cockpit.load("")
 
 
+def test_a_new_scene_is_framed_though_the_old_one_is_told_once_more(cockpit, browser):
+    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        builder = Builder(page)
+        page.evaluate("scene.view.approachBy(0.1)")
+        page.evaluate(TOLD_AGAIN)
+        builder.new_scene()
+        is_seen = "([x, y]) => document.elementFromPoint(x, y) === scene.canvas.dom"
+        wait_until(page, lambda: all(page.evaluate(is_seen, page.evaluate(PROJECT, [x, x, 0])) for x in (-2.5, 2.5)), 20)
+    cockpit.load("")
+
+
 def test_what_is_no_model_cannot_be_saved_as_one_and_the_menu_says_why(cockpit, browser):
     with open_page(cockpit, browser) as page:
         builder = Builder(page)
@@ -322,8 +337,7 @@ def test_what_is_no_model_cannot_be_saved_as_one_and_the_menu_says_why(cockpit, 
 def test_models_added_by_keys_stand_side_by_side_in_view(cockpit, browser):
     with open_page(cockpit, browser) as page:
         builder = Builder(page)
-        builder.menu("Scene file", "New")
-        wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
+        builder.new_scene()
         page.get_by_role("searchbox", name="Find a model").fill("Cuboid")
         for _ in range(3):
             page.locator("#models .card").press("Enter")
@@ -369,8 +383,7 @@ def test_properties_are_computed_dragged_and_in_degrees(cockpit, browser):
     with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
         builder, fields = Builder(page), page.locator("#properties")
         panel = Panel(page)
-        builder.menu("Scene file", "New")
-        wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
+        builder.new_scene()
         builder.select("Floor")
         assert fields.locator("[data-key=size]").inner_text() == "size m"
         camera = builder.drop("Camera", [1, 0, 0])
@@ -406,8 +419,7 @@ def test_properties_are_computed_dragged_and_in_degrees(cockpit, browser):
 def test_run_without_a_lesson_goes_back_to_a_new_scene_that_was_not_saved(cockpit, browser):
     with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
         builder = Builder(page)
-        builder.menu("Scene file", "New")
-        wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
+        builder.new_scene()
         builder.drop("Quadricopter", [0, 0, 0])
         builder.drop("Cuboid", [1, 1, 0])
         page.select_option("#script", "tasks/hover.py")

@@ -12,16 +12,6 @@ BALL = "- {name: Ball, shape: sphere, size: [0.1], position: [1, 1, 0.5]}"
 SIZE = {"width": 1440, "height": 900}
 
 
-def new_scene(page, builder):
-    """Begin a new scene, and throw away what is not saved."""
-    builder.menu("Scene file", "New")
-    sure = page.get_by_role("button", name="Throw them away")
-    wait_until(page, lambda: sure.is_visible() or page.get_by_role("treeitem").count() == 1)
-    if sure.is_visible():
-        sure.click()
-    wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
-
-
 def clipboard(page):
     return page.evaluate("navigator.clipboard.readText()")
 
@@ -34,7 +24,7 @@ def test_what_is_copied_is_pasted_in_another_scene_another_page_and_from_text(co
     options = {"viewport": SIZE, "permissions": ["clipboard-read", "clipboard-write"]}
     with open_page(cockpit, browser, **options) as page:
         panel, builder = Panel(page), Builder(page)
-        new_scene(page, builder)
+        builder.new_scene()
         crate = builder.drop("Cuboid", [1, 0, 0])
         builder.rename(crate, "Crate")
         builder.set("mass", 2)
@@ -49,7 +39,7 @@ def test_what_is_copied_is_pasted_in_another_scene_another_page_and_from_text(co
         page.keyboard.press("Control+z")
         builder.row("Crate0").wait_for(state="detached")
 
-        new_scene(page, builder)
+        builder.new_scene()
         with open_page(cockpit, browser, **options) as other:
             there = Builder(other)
             other.bring_to_front()

@@ -9,8 +9,10 @@ const KINDS = { own: "Yours", recent: "Opened last", package: "Of the package" }
 export class SceneFiles {
   constructor(edit) {
     this.edit = edit;
-    edit.on("objects", () => this.show());
-    edit.on("tree", () => this.frame());
+    edit.on("objects", () => {
+      this.show();
+      this.frame();
+    });
   }
 
   // The name of the file, and whether it lacks something.
@@ -31,12 +33,12 @@ export class SceneFiles {
 
   async act(ask, more) {
     try {
-      const { said } = await this.edit.ask(ask, more);
-      if (said) this.edit.notice.say(said);
-      return true;
+      const answer = await this.edit.ask(ask, more);
+      if (answer.said) this.edit.notice.say(answer.said);
+      return answer;
     } catch (error) {
       this.edit.wrong(error.message);
-      return false;
+      return null;
     }
   }
 
@@ -47,17 +49,18 @@ export class SceneFiles {
     askFor(`${file ? nameOf(file) : "The new scene"} has changes that are not saved`, [], "Throw them away", act);
   }
 
-  // The floor is framed when it is told.
   begin() {
     return this.ifSaved(async () => {
-      this.isBegun = true;
-      if (!(await this.act("new_scene"))) this.isBegun = false;
+      this.begun = (await this.act("new_scene"))?.revision;
+      this.frame();
     });
   }
 
+  // Frames a new scene's floor. Earlier trees may arrive after the request, and the new one before its answer.
   frame() {
-    if (this.isBegun && this.edit.is.new) this.edit.frameFloor();
-    this.isBegun = false;
+    if (!(this.begun <= this.edit.is.revision)) return;
+    this.begun = undefined;
+    this.edit.frameFloor();
   }
 
   save() {
