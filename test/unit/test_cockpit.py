@@ -245,6 +245,23 @@ def test_keys_do_not_wait_for_an_answer_that_takes_long(served):
         served.may_answer.set()
 
 
+def test_changes_of_the_tree_reach_only_browsers_that_follow_it(served):
+    def told(socket, number):
+        socket.send(json.dumps({"id": 1, "ask": "double", "number": 1}))
+        assert json.loads(socket.recv(timeout=60))["twice"] == 2, "what was said before is processed"
+        served.socket.tell_tree({"tree": number})
+        served.socket.tell({"end": number})
+        return json.loads(socket.recv(timeout=60))
+
+    with served.connect() as socket:
+        assert told(socket, 0) == {"end": 0}
+        socket.send(json.dumps({"follow_tree": True}))
+        assert told(socket, 1) == {"tree": 1}
+        assert json.loads(socket.recv(timeout=60)) == {"end": 1}
+        socket.send(json.dumps({"follow_tree": False}))
+        assert told(socket, 2) == {"end": 2}
+
+
 @pytest.mark.parametrize(
     "text, words",
     [

@@ -37,7 +37,7 @@ export class Panels {
     this.side = new Side((panel) => {
       this.plots.show(panel === "plots");
       this.edits = panel === "edit";
-      if (this.isConnected) this.build.turn(this.edits); // else once it is
+      if (this.isConnected) this.turnEditing(); // else once it is
       if (this.edits && NARROW.matches) this.showScript(false);
       if (panel === "view") this.view.list();
       this.markPlace(panel);
@@ -106,6 +106,12 @@ export class Panels {
     });
   }
 
+  // The node sends changes of the object tree only to pages that edit.
+  turnEditing() {
+    this.socket().say({ follow_tree: Boolean(this.edits) });
+    this.build.turn(this.edits);
+  }
+
   // ---- what the node says
 
   async connected() {
@@ -113,7 +119,7 @@ export class Panels {
     this.version = Math.max(this.version ?? 0, whole.version);
     this.board.take(whole);
     this.isConnected = true;
-    this.build.turn(this.edits);
+    this.turnEditing();
     this.build.edit.connected();
     this.start.load();
     this.log.begin(whole.lines);

@@ -58,7 +58,7 @@ class Cockpit:
         self._editing = SceneEditing(
             self._simulator.node,
             scripts,
-            lambda message: self._socket.tell(message),
+            lambda message: self._socket.tell_tree(message),
             lambda: self._commands.vehicle,
         )
         player = TimelinePlayer(self._simulator.node)

@@ -8,6 +8,7 @@ import itertools
 import json
 import logging
 import math
+import socket
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -23,6 +24,7 @@ SceneSince = Callable[[int], tuple[int, bytes]]
 _LOG = logging.getLogger(__name__)
 _MAX_MESSAGES = 32  # in the queue of a browser; then the oldest are dropped
 _MAX_REQUESTS = 64  # of a browser that wait for their answers; then it is not heard until one is answered
+_MAX_UNSENT = 1 << 14  # bytes in the kernel: more would be old when a slow network has sent them, and delay pings
 _SCENE = "scene"  # name by which a browser reports that it has shown a message of the scene
 _MAX_SCENES = 2  # sent messages of the scene that are not shown yet: one can be sent while the browser shows another
 
@@ -53,6 +55,9 @@ class PageSocket:
     async def serve(self, connection: ServerConnection) -> None:
         """Serve one browser until it disconnects."""
         browser = next(self._numbers)
+        own = connection.transport.get_extra_info("socket")
+        if own.family != socket.AF_UNIX:
+            own.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _MAX_UNSENT)
         queue = SendQueue(self._scene)
         self._queues[browser] = asyncio.get_running_loop(), queue
         requests = asyncio.Queue[tuple[Answer, dict[str, Any]]](_MAX_REQUESTS)
@@ -85,6 +90,11 @@ class PageSocket:
         text = json.dumps(message)
         self._call_queues(lambda queue: queue.put(text))
 
+    def tell_tree(self, message: Mapping[str, Any]) -> None:
+        """Send a change of the object tree to the browsers that edit the scene."""
+        text = json.dumps(message)
+        self._call_queues(lambda queue: queue.put(text) if queue.follows_tree else None)
+
     def wants_picture(self, name: str) -> bool:
         """Return whether any browser has shown the last picture with this name."""
         return any(queue.wants(name) for _, queue in list(self._queues.values()))
@@ -101,7 +111,7 @@ class PageSocket:
         """Remove the pictures with this name from the queues."""
         self._call_queues(lambda queue: queue.forget(name))
 
-    def _call_queues(self, call: Callable[[SendQueue], None]) -> None:
+    def _call_queues(self, call: Callable[[SendQueue], Any]) -> None:
         for loop, queue in list(self._queues.values()):
             with contextlib.suppress(RuntimeError):  # the server has ended, and its loop with it
                 loop.call_soon_threadsafe(call, queue)
@@ -122,6 +132,9 @@ class PageSocket:
                 return
             if isinstance(message.get("shown"), str):
                 self._queues[browser][1].shown(message["shown"])
+                return
+            if "follow_tree" in message:
+                self._queues[browser][1].follows_tree = message["follow_tree"] is True
                 return
             handler = next((handler for key, handler in self._handlers.items() if key in message), None)
             if handler is not None:
@@ -190,6 +203,7 @@ class SendQueue:
 
     def __init__(self, scene: SceneSince = lambda version: (version, b"")):
         """`scene` is as for PageSocket."""
+        self.follows_tree = False
         self._scene, self._version = scene, -1
         self._unshown_scenes = 0
         self._messages: deque[str] = deque(maxlen=_MAX_MESSAGES)
