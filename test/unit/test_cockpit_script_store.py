@@ -51,6 +51,8 @@ def test_a_script_of_the_package_becomes_a_copy(store, own):
     again, _ = store.save(copy, "changed again", version)
     assert again == copy and store.original(copy) == "shipped"
     assert store.save(pilot, "other", "")[0].name == "mine/pilot_2.py", "nothing is lost"
+    assert store.save(pilot, "changed again", "")[0].name == "mine/pilot.py", "a page was left before it had the answer"
+    assert sorted(file.name for file in own.iterdir()) == ["pilot.py", "pilot_2.py"]
 
 
 def test_what_another_has_changed_is_not_overwritten_and_both_texts_can_be_kept(store, own):

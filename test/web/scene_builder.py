@@ -43,7 +43,7 @@ class Builder:
         self.page.get_by_role("menuitem", name=item).click()
 
     def new_scene(self):
-        """Begin a scene of a floor alone, without what is not saved; wait until pictures of the old cameras are gone."""
+        """Begin a scene of a floor alone, without what is not saved; wait until old cameras' pictures are gone."""
         page = self.page
         self.menu("Scene file", "New")
         sure = page.get_by_role("button", name="Throw them away")

@@ -31,6 +31,7 @@ def sysCall_init():
     sim.adjustView(view, sim.getObjectHandle("TrackCam"), 64)
 """
 FAR = 1e-4  # m, rad
+IS_SEEN = "([x, y]) => document.elementFromPoint(x, y) === scene.canvas.dom"
 ACTS = """
 window.acts = 0;
 for (const kind of ["pointerdown", "input"]) addEventListener(kind, () => window.acts++, true);
@@ -289,11 +290,10 @@ def test_a_new_scene_flies_the_pilot_and_a_saved_one_the_script_that_was_run(coc
         wait_until(page, lambda: page.inner_text("#flown") == "")
         wait_until(page, lambda: page.locator("#scene-choice option:checked").inner_text() == "new scene")
         corners = [[x, y, 0] for x in (-2.5, 2.5) for y in (-2.5, 2.5)]
-        is_seen = "([x, y]) => document.elementFromPoint(x, y) === scene.canvas.dom"
-        wait_until(page, lambda: all(page.evaluate(is_seen, page.evaluate(PROJECT, corner)) for corner in corners))
+        wait_until(page, lambda: all(page.evaluate(IS_SEEN, page.evaluate(PROJECT, corner)) for corner in corners))
         page.evaluate("scene.view.approachBy(0.3)")
         page.locator("#scene canvas").press("Home")
-        wait_until(page, lambda: all(page.evaluate(is_seen, page.evaluate(PROJECT, corner)) for corner in corners))
+        wait_until(page, lambda: all(page.evaluate(IS_SEEN, page.evaluate(PROJECT, corner)) for corner in corners))
         builder.drop("Quadricopter", [0, 0, 0])
         wait_until(page, lambda: page.inner_text("#flown") == "built-in/pilot.py")
         panel.press("Start", "started")
@@ -318,8 +318,8 @@ def test_a_new_scene_is_framed_though_the_old_one_is_told_once_more(cockpit, bro
         page.evaluate("scene.view.approachBy(0.1)")
         page.evaluate(TOLD_AGAIN)
         builder.new_scene()
-        is_seen = "([x, y]) => document.elementFromPoint(x, y) === scene.canvas.dom"
-        wait_until(page, lambda: all(page.evaluate(is_seen, page.evaluate(PROJECT, [x, x, 0])) for x in (-2.5, 2.5)), 20)
+        corners = [[x, y, 0] for x in (-2.5, 2.5) for y in (-2.5, 2.5)]
+        wait_until(page, lambda: all(page.evaluate(IS_SEEN, page.evaluate(PROJECT, corner)) for corner in corners))
     cockpit.load("")
 
 
@@ -345,7 +345,7 @@ def test_models_added_by_keys_stand_side_by_side_in_view(cockpit, browser):
         assert min(math.dist(one, other) for one, other in itertools.combinations(places, 2)) >= 0.5, places
         for place in places:
             x, y = page.evaluate(PROJECT, place)
-            assert page.evaluate("([x, y]) => document.elementFromPoint(x, y) === scene.canvas.dom", [x, y])
+            assert page.evaluate(IS_SEEN, [x, y])
     cockpit.load("")
 
 

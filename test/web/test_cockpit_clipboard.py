@@ -5,7 +5,7 @@ import yaml
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-from cockpit_page import Panel, open_page, wait_until
+from cockpit_page import Panel, open_page
 from scene_builder import Builder
 
 BALL = "- {name: Ball, shape: sphere, size: [0.1], position: [1, 1, 0.5]}"

@@ -42,7 +42,7 @@ class SceneEditing:
     def __init__(
         self, node: str, folder: Path, broadcast: Callable[[_Message], None], vehicle: Callable[[], str] = lambda: ""
     ):
-        """`node` is the simulator's name, `folder` that of the user's scenes; `broadcast` sends to all browsers that edit.
+        """`node` is the simulator's name, `folder` that of the user's scenes; `broadcast` sends to browsers that edit.
 
         `vehicle` returns the name of the vehicle that the page flies.
         """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -116,13 +117,16 @@ class ScriptStore:
         return _read_text(script.name, script.path)
 
     def save(self, script: ScriptFile, text: str, version: str) -> tuple[ScriptFile, str] | None:
-        """Write a script; a script of the package is copied to the user's folder.
+        """Write a script; a script of the package is copied to the user's folder, unless a copy with `text` exists.
 
         Return the written script and its version. Return None, without writing, if the file no longer has `version`.
         Raises ScriptStoreError.
         """
         with self._writing:
             if not script.is_own:
+                saved = self._find_copy(script, text)  # of a page that was left before it had the answer
+                if saved is not None:
+                    return saved, _version_of(saved.path)
                 original, script = self.read(script)[0], self._copy_of(script)
                 written = _write_text(script.name, script.path, text, is_new=True)
                 self._originals[script.name] = original
@@ -234,6 +238,18 @@ class ScriptStore:
 
     def _own(self, file_name: str) -> ScriptFile:
         return ScriptFile(f"{OWN}/{file_name}", self.folder / file_name, True)
+
+    def _find_copy(self, script: ScriptFile, text: str) -> ScriptFile | None:
+        """Return the user's copy of `script` that contains `text`, None if there is none."""
+        stem, ending = Path(script.file_name).stem, script.path.suffix
+        named = re.compile(rf"{re.escape(stem)}(_\d+)?{re.escape(ending)}")
+        for name in filter(named.fullmatch, scripts_in(self.folder)):
+            with contextlib.suppress(ScriptStoreError):
+                copy = self._own(name)
+                self._resolve(copy)
+                if self.read(copy)[0] == text:
+                    return copy
+        return None
 
     def _copy_of(self, script: ScriptFile) -> ScriptFile:
         """Return a new script of the user's, with the name of `script` and a number if it is taken."""
