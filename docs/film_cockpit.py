@@ -29,7 +29,7 @@ STANDS = 1500  # ms, the last picture
 QUALITY = 55  # of WebP
 SCRIPT, OLD, NEW = "tutorial/6_ros.py", "sim.getObjectPosition(self.d, -1)[2]", "1.4"  # m: climb to that
 UP, ARROW = 2, (0.0, 0.0, 0.95)  # a part of the handle, and the tip of its arrow
-PULL = 0.35  # m
+PULL = 0.15  # m
 POINTER = [(0, 0), (0, 17), (4, 13), (7, 20), (10, 19), (7, 12), (12, 12)]  # px
 LEFT = "document.querySelector('.cm-scroller').scrollLeft = 0"  # a long line moves it
 HELD = """([key, on]) => document.querySelectorAll("kbd").forEach((one) => {
