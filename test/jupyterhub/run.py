@@ -2,10 +2,12 @@
 """`./dev.sh jupyterhub`: a real JupyterHub with packaging/jupyterhub/jupyterhub_config.py, and two students.
 
 It needs root. The students are system users of namespaces of this script, with /etc and /home of their own: nothing of
-it is left on this machine. Each opens the simulator. Then one of them tries to get at the other's: through the hub, and
-as a system user. Exit status 1 if anything is let through, or is left after the end of the hub. It takes a minute.
+it is left on this machine. Each opens the simulator, and hands in a script. Then one of them tries to get at the
+other's: through the hub, and as a system user. A teacher grades what was handed in. Exit status 1 if anything is let
+through, or is left after the end of the hub. It takes a minute.
 """
 
+import json
 import os
 import re
 import shutil
@@ -25,7 +27,10 @@ INSIDE = "DRONE_SIM_JUPYTERHUB"
 NAMESPACES = ["unshare", "--mount", "--net", "--pid", "--fork", "--kill-child", "--mount-proc"]
 HOST = "127.0.0.1:8000"
 PATIENCE = 240  # s
-STUDENTS = ("ann", "ben")
+STUDENTS, TEACHER = ("ann", "ben"), "tea"
+HANDED_IN = "/srv/drone_sim/handed_in/hover"
+SOLUTION = ROOT / "tasks/hover/solution.py"
+NEEDED = {"socket", "home", "environ", "kill", "network", "read-handed-in", "remove-handed-in"}  # of what is below
 # What a system user tries; it prints the names of what succeeds.
 ATTACK = """
 import glob, http.client, os, pathlib, signal, socket, subprocess, sys
@@ -46,6 +51,10 @@ for folder in glob.glob("/tmp/jupyter-server-proxy-*"):
     if pathlib.Path(folder).owner() == victim:
         tries("socket", lambda: socket.socket(socket.AF_UNIX).connect(f"{folder}/socket") is None)
 tries("home", lambda: os.listdir(f"/home/{victim}"))
+tries("list-handed-in", lambda: os.listdir(HANDED_IN))
+for name in sys.argv[3].split():
+    tries("read-handed-in", lambda: pathlib.Path(HANDED_IN, name).read_bytes())
+    tries("remove-handed-in", lambda: os.rename(f"{HANDED_IN}/{name}", f"{HANDED_IN}/gone") is None)
 for pid in pids:
     tries("environ", lambda: pathlib.Path(f"/proc/{pid}/environ").read_bytes())
     tries("root", lambda: os.listdir(f"/proc/{pid}/root/home/{victim}"))
@@ -77,8 +86,11 @@ def main():
         student.open()
         student.fly(student.name)
         print(f"{student.name} flies")
+    ann.hand_in(SOLUTION.read_text())
+    ben.hand_in("def sysCall_actuation():\n    pass\n")
     failures = through_the_hub(ben, ann.name) + as_system_user(ben.name, ann.name)
-    missed = {"socket", "home", "environ", "kill", "network"} - set(as_system_user(ann.name, ann.name))
+    failures += forge_and_grade(ben.name, ann.name)
+    missed = NEEDED - set(as_system_user(ann.name, ann.name))
     failures += [f"not tried: {name}" for name in sorted(missed)]  # the attack succeeds for the student herself
     ann.fly(ann.name)
     if not ann.stops(ann.name):
@@ -100,8 +112,11 @@ def make_users(folder):
     run("ip", "link", "set", "lo", "up")
     for group in ("students", "teachers"):
         run("groupadd", group)
-    for name in STUDENTS:
-        run("useradd", "--create-home", "-K", "HOME_MODE=0700", "--groups", "students", "--shell", "/bin/bash", name)
+    for name, group in [*((name, "students") for name in STUDENTS), (TEACHER, "teachers")]:
+        run("useradd", "--create-home", "-K", "HOME_MODE=0700", "--groups", group, "--shell", "/bin/bash", name)
+    run("mount", "-t", "tmpfs", "-o", "mode=755", "tmpfs", "/srv")
+    run("mkdir", "-p", os.path.dirname(HANDED_IN))
+    run("install", "-d", "-g", "teachers", "-m", "3773", HANDED_IN)  # as in docs/classroom.md
     run("chpasswd", input="".join(f"{name}:{name}\n" for name in STUDENTS))
 
 
@@ -141,12 +156,42 @@ class Student:
 
     def fly(self, name):
         """Wait until a student's simulator says that its drone flies. Raises InvalidStatus if it is refused."""
+        with self.connect(name) as socket:
+            until(lambda: '"flying"' in str(socket.recv(timeout=PATIENCE)))
+
+    def hand_in(self, text):
+        """Write a text over the script of the task hover, and hand it in."""
+        with self.connect(self.name) as socket:
+            version = ask(socket, "open", script="tasks/hover.py")["version"]
+            saved = ask(socket, "save", script="tasks/hover.py", text=text, version=version)["script"]
+            print(f"{self.name} hands in {saved}:", ask(socket, "hand in", script=saved, lesson="tasks/hover"))
+
+    def connect(self, name):
         address = f"ws://{HOST}/user/{name}/drone_sim/socket"
         headers = {"Cookie": self.cookies}
-        with connect(
-            address, subprotocols=["drone_sim"], origin=f"http://{HOST}", additional_headers=headers
-        ) as socket:
-            until(lambda: '"flying"' in str(socket.recv(timeout=PATIENCE)))
+        return connect(address, subprotocols=["drone_sim"], origin=f"http://{HOST}", additional_headers=headers)
+
+
+def ask(socket, question, **more):
+    """Return the cockpit's answer."""
+    socket.send(json.dumps({"id": 1, "ask": question, **more}))
+    while True:
+        message = socket.recv(timeout=PATIENCE)
+        answer = json.loads(message) if isinstance(message, str) else {}
+        if answer.get("id") == 1:
+            return answer
+
+
+def forge_and_grade(forger, victim):
+    """Hand a script in under another's name; return what is wrong with the teacher's grades."""
+    forged = f"{HANDED_IN}/{victim}+2099-01-01T00.00.00Z+000000000000.py"
+    run("touch", forged, user=forger, group=forger, extra_groups=[])
+    report = f"/home/{TEACHER}/grades.json"
+    grade = [sys.executable, "-m", "drone_sim.grading.grade", "hover", HANDED_IN, "--seeds", "1", "--json", report]
+    as_teacher = {"user": TEACHER, "group": TEACHER, "extra_groups": ["teachers"], "cwd": f"/home/{TEACHER}"}
+    subprocess.run(grade, env={**os.environ, "HOME": f"/home/{TEACHER}", "ROS_HOME": f"/home/{TEACHER}"}, **as_teacher)
+    passed = {one["name"]: one["passed"] for one in json.loads(Path(report).read_text())["scripts"]}
+    return [] if passed == {victim: 1, forger: 0} else [f"passed flights: {passed}"]
 
 
 def through_the_hub(attacker, victim):
@@ -167,7 +212,9 @@ def through_the_hub(attacker, victim):
 def as_system_user(attacker, victim):
     """Return what a system user reaches of another's processes, files and ports."""
     pids = " ".join(map(str, processes_of(victim)))
-    command = [sys.executable, "-S", "-c", ATTACK, victim, pids]
+    names = " ".join(name for name in os.listdir(HANDED_IN) if name.startswith(f"{victim}+"))
+    attack = f"HANDED_IN = {HANDED_IN!r}\n{ATTACK}"
+    command = [sys.executable, "-S", "-c", attack, victim, pids, names]
     tried = subprocess.run(
         command, user=attacker, group=attacker, extra_groups=[], cwd="/", capture_output=True, text=True
     )

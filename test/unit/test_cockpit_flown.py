@@ -135,6 +135,18 @@ def test_the_easiest_task_is_the_first_and_each_says_how_hard_it_is(ask):
     assert hardness[0] == 0 and all(lesson["summary"] and lesson["time"].endswith(("min", "h")) for lesson in listed)
 
 
+def test_a_task_with_a_folder_of_the_course_is_handed_in(ask, tmp_path, monkeypatch):
+    monkeypatch.setenv("DRONE_SIM_HAND_IN", str(tmp_path))
+    (tmp_path / "hover").mkdir()
+    assert [lesson["task"] for lesson in ask("scripts")["lessons"] if lesson["hands_in"]] == ["hover"]
+    said = ask("hand in", script="tasks/hover.py", lesson="tasks/hover")
+    (copy,) = (tmp_path / "hover").iterdir()
+    assert copy.read_text() == Path(_start("hover")).read_text() and said["digest"] in copy.name
+    for lesson, words in (("tasks/gates", "cannot be handed in now"), ("stage-2-elevation", "needs a task")):
+        with pytest.raises(ValueError, match=words):
+            ask("hand in", script="tasks/hover.py", lesson=lesson)
+
+
 def test_a_script_is_graded_in_a_process_of_its_own(ask):
     begun = ask("grade", script="tasks/hover.py", lesson="tasks/hover")
     with pytest.raises(ScriptStoreError, match="another script is being graded"):

@@ -111,7 +111,7 @@ const lesson = new Lesson(
   {
     choice: at("lesson"), before: at("before"), after: at("after"), fold: at("fold"),
     body: at("lesson-body"), start: at("start"), flies: at("flies"), text: at("lesson-text"),
-    grade: at("grade"), graded: at("graded"),
+    grade: at("grade"), handIn: at("hand-in"), graded: at("graded"),
   },
   store,
   (...question) => socket.ask(...question),

@@ -1,4 +1,5 @@
 // The text beside the script: a section of the tutorial, or a task. What it says of a scene, Run flies in.
+import { create } from "./dom.js";
 import { keepBest, showGrade, showProgress } from "./graded.js";
 import { render } from "./markdown.js";
 import { hasFunctions } from "./snippets.js";
@@ -8,7 +9,7 @@ const ASK_AGAIN = 500; // ms, for what is being graded
 const GRADE = "grade"; // the key of the last grade: { task, script, number, isOld }; a reload goes on with it
 
 export class Lesson {
-  // `parts` are elements: choice, before, after, fold, body, start, flies, grade, graded, text. Of `script`, `open` opens one,
+  // `parts` are elements: choice, before, after, fold, body, start, flies, grade, handIn, graded, text. Of `script`, `open` opens one,
   // `save` saves it, `put` puts lines of Python into it, `run` flies it;
   // `replay` shows a second of a graded flight in the scene.
   constructor(parts, store, ask, { open, save, put, run, replay }) {
@@ -25,6 +26,7 @@ export class Lesson {
     parts.fold.onclick = () => this.folded(!parts.body.hidden);
     parts.start.onclick = () => open(this.script);
     parts.grade.onclick = (event) => this.grade(event.detail === 0);
+    parts.handIn.onclick = () => this.handIn();
     store.on((now) => this.age(now));
   }
 
@@ -110,6 +112,25 @@ export class Lesson {
     if (byKey && document.activeElement === document.body) this.parts.grade.focus(); // which it has lost meanwhile
   }
 
+  // Copies the script, as it is now, to the folder of the course.
+  async handIn() {
+    const task = this.name;
+    let said;
+    try {
+      await this.save();
+      const { script } = this.opened;
+      const { time, digest } = await this.ask("hand in", { script, lesson: task });
+      const at = new Date(time.replaceAll(".", ":")).toLocaleString();
+      said = `${script} handed in: ${at}, digest ${digest}. You can hand in again: the last copy counts.`;
+    } catch (error) {
+      said = error.message;
+    }
+    const { graded } = this.parts;
+    if (task !== this.name) return;
+    graded.querySelector(".handed-in")?.remove();
+    graded.prepend(create("p", { className: "handed-in" }, said));
+  }
+
   // Goes on with a grade that was begun before the page was loaded, or before the connection was lost.
   connected() {
     if (this.graded && !this.result) this.followGrade(true);
@@ -171,8 +192,9 @@ export class Lesson {
   }
 
   aim() {
-    const { before, after, start, grade } = this.parts;
+    const { before, after, start, grade, handIn } = this.parts;
     grade.hidden = !this.all[this.place]?.task;
+    handIn.hidden = !this.all[this.place]?.hands_in;
     before.disabled = this.place <= 0;
     after.disabled = this.place + 1 >= this.all.length;
     start.hidden = !this.name || !this.script || this.opened.lesson === this.name;

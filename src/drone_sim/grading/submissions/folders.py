@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from drone_sim.grading.jobs.files import Unreadable, is_child_script
-from drone_sim.grading.submissions import archive, exports
+from drone_sim.grading.submissions import archive, exports, handed_in
 from drone_sim.grading.submissions.submission import Person, Refused, Submission
 from drone_sim.message_text import shown
 
@@ -22,8 +22,9 @@ def submissions_of(argument: str, store: Path) -> list[Submission]:
     """Return the submissions that an argument names: a script itself, or all in a folder, a zip or a table of a class.
 
     In a folder, each child script (a file with a sysCall_ function) is a submission, and so is each folder or zip with
-    exactly one child script at any depth. Zips are unpacked below `store`. A submission's own faults are in its
-    `error`. Raises OSError, and ValueError, in one line, if there is no submission, or too many.
+    exactly one child script at any depth. In a folder where scripts are handed in, only these are. Zips are unpacked
+    below `store`. A submission's own faults are in its `error`. Raises OSError, and ValueError, in one line, if there
+    is no submission, or too many.
     """
     path = Path(argument)
     if path.suffix.lower() == ".csv":
@@ -31,7 +32,7 @@ def submissions_of(argument: str, store: Path) -> list[Submission]:
     elif path.suffix.lower() == ".zip":
         submissions = _in_class_zip(path, store)
     elif path.is_dir() and path.suffix not in _SCRIPT_SUFFIXES:
-        submissions = _in_folder(path, store)
+        submissions = handed_in.submissions_in(path, store) or _in_folder(path, store)
     else:
         return [Submission(argument)]
     if not submissions:

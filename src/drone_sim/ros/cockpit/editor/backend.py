@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from drone_sim.grading.submissions import handed_in
 from drone_sim.ros.cockpit.editor.checks import TextChecker
 from drone_sim.ros.cockpit.editor.lessons import Lesson, Lessons
 from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
@@ -65,6 +66,7 @@ class EditorBackend:
             "lesson": self._lesson,
             "run": self._run,
             "grade": self._grade,
+            "hand in": self._hand_in,
             "graded": lambda message: self.grader.result(message.get("number")),
         }
         return {name: _with_one_line_errors(handler) for name, handler in handlers.items()}
@@ -213,9 +215,18 @@ class EditorBackend:
             raise ScriptStoreError("grade: needs a task; choose one above the text")
         return {"number": self.grader.start(lesson.task, script.path)}
 
+    def _hand_in(self, message: _Message) -> dict[str, Any]:
+        """Copy a script as it is saved to the folder of the course; return time and digest of the copy."""
+        lesson, script = self._find_lesson(message), self._script(message)
+        if lesson is None or not lesson.task:
+            raise ScriptStoreError("hand in: needs a task; choose one above the text")
+        now, digest = handed_in.hand_in(lesson.task, self._store.read(script)[0], script.path.suffix)
+        return {"time": now, "digest": digest}
 
-def _describe_lesson(lesson: Lesson) -> dict[str, str]:
+
+def _describe_lesson(lesson: Lesson) -> dict[str, Any]:
     described = {"lesson": lesson.name, "title": lesson.title, "task": lesson.task, "script": lesson.script}
+    described["hands_in"] = handed_in.folder_of(lesson.task) is not None
     keys = ("summary", "difficulty", "time") if lesson.task else ()
     return {**described, **{key: getattr(lesson, key) for key in keys}}
 

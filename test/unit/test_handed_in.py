@@ -1,0 +1,88 @@
+"""Scripts are handed in to a folder where everybody can write; what others put there costs and helps nobody."""
+
+import os
+import pwd
+from pathlib import Path
+
+import pytest
+
+from drone_sim.grading.submissions import handed_in
+from drone_sim.grading.submissions.folders import submissions_of
+
+SCRIPT = "def sysCall_actuation():\n    pass\n"
+ME = pwd.getpwuid(os.getuid()).pw_name
+OTHER = next(one.pw_name for one in pwd.getpwall() if one.pw_uid != os.getuid())
+
+
+@pytest.fixture(name="folder")
+def _folder(tmp_path, monkeypatch):
+    monkeypatch.setenv(handed_in.VARIABLE, str(tmp_path / "course"))
+    folder = tmp_path / "course" / "hover"
+    folder.mkdir(parents=True)
+    return folder
+
+
+@pytest.fixture(name="another")
+def _another(monkeypatch):
+    """Somebody else grades: the files belong to a student."""
+    return lambda: monkeypatch.setattr(handed_in.os, "getuid", lambda: 4_000_000)
+
+
+def graded(folder, tmp_path):
+    return submissions_of(str(folder), tmp_path / "store")
+
+
+def test_the_script_that_a_user_handed_in_last_is_graded(folder, tmp_path, another):
+    handed_in.hand_in("hover", SCRIPT, ".py")
+    handed_in.hand_in("hover", f"# better\n{SCRIPT}", ".py")
+    another()
+    (one,) = graded(folder, tmp_path)
+    assert (one.name, one.error) == (ME, "")
+    assert Path(one.script).read_text() == f"# better\n{SCRIPT}"
+    assert not Path(one.script).is_relative_to(folder), "its owner could replace it during the flight"
+    assert {path.stat().st_mode & 0o777 for path in folder.iterdir()} == {0o640}
+
+
+def test_a_file_under_the_name_of_another_is_not_that_ones(folder, tmp_path, another):
+    handed_in.hand_in("hover", SCRIPT, ".py")
+    (mine,) = folder.iterdir()
+    mine.rename(folder / mine.name.replace(ME, OTHER, 1))
+    another()
+    (one,) = graded(folder, tmp_path)
+    assert one.error.endswith(f"belongs to {ME}, not to {OTHER}") and one.name == ME
+
+
+def test_what_was_changed_afterwards_is_refused(folder, tmp_path, another):
+    handed_in.hand_in("hover", SCRIPT, ".py")
+    (mine,) = folder.iterdir()
+    mine.write_text(f"# later\n{SCRIPT}")
+    another()
+    assert "was changed after it was handed in" in graded(folder, tmp_path)[0].error
+
+
+def test_all_else_in_the_folder_is_ignored(folder, tmp_path, another):
+    _, digest = handed_in.hand_in("hover", SCRIPT, ".py")
+    solution = tmp_path / "solution.py"
+    solution.write_text(SCRIPT)
+    (folder / f"{OTHER}+2026-11-28T12.00.00Z+{digest}.py").symlink_to(solution)
+    (folder / "forged.py").write_text(SCRIPT)
+    (folder / "Bob_8_assignsubmission_file_").mkdir()
+    (folder / "Bob_8_assignsubmission_file_" / "bob.py").write_text(SCRIPT)
+    (folder / "submission_metadata.yml").write_text("forged.py: {':submitters': [{':name': Bob}]}")
+    os.mkfifo(folder / f"{OTHER}+2026-11-28T12.00.01Z+{digest}.py")
+    another()
+    assert [one.name for one in graded(folder, tmp_path)] == [ME]
+
+
+def test_a_copy_of_the_teachers_own_is_told_apart_by_its_names(folder, tmp_path):
+    _, digest = handed_in.hand_in("hover", SCRIPT, ".py")
+    (folder / f"ann+2026-11-28T12.00.00Z+{digest}.py").write_text(SCRIPT)
+    assert {one.name for one in graded(folder, tmp_path)} == {"ann", ME}
+
+
+@pytest.mark.parametrize("task", ["gates", "", "../hover"])
+def test_without_a_folder_nothing_is_handed_in(folder, task):
+    folder.rename(folder.with_name("closed"))
+    assert handed_in.folder_of(task) is None
+    with pytest.raises(ValueError, match="cannot be handed in now"):
+        handed_in.hand_in(task, SCRIPT, ".py")
