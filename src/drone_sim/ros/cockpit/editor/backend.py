@@ -226,9 +226,9 @@ class EditorBackend:
 
 def _describe_lesson(lesson: Lesson) -> dict[str, Any]:
     described = {"lesson": lesson.name, "title": lesson.title, "task": lesson.task, "script": lesson.script}
-    described["hands_in"] = handed_in.folder_of(lesson.task) is not None
+    hands_in = handed_in.folder_of(lesson.task) is not None
     keys = ("summary", "difficulty", "time") if lesson.task else ()
-    return {**described, **{key: getattr(lesson, key) for key in keys}}
+    return {**described, "hands_in": hands_in, **{key: getattr(lesson, key) for key in keys}}
 
 
 def _text(message: _Message) -> str:

@@ -1,0 +1,35 @@
+"""A task that can be handed in has a button for it, and says what was handed in."""
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+from cockpit_page import STARTED, ready, wait_until
+from launched import launched
+
+
+def handed_in(folder, line):
+    return [file for file in folder.iterdir() if file.read_text().startswith(line)]
+
+
+def test_a_changed_script_is_handed_in_and_again(browser, tmp_path, monkeypatch):
+    monkeypatch.setenv("DRONE_SIM_HAND_IN", str(tmp_path))
+    (tmp_path / "hover").mkdir()
+    with launched() as cockpit, browser.new_page() as page:
+        page.add_init_script(STARTED)
+        page.goto(cockpit.address, wait_until="commit")
+        ready(page)
+        button, said = page.locator("#hand-in"), page.locator("#graded .handed-in")
+        page.select_option("#lesson", "tasks/gates")
+        wait_until(page, lambda: page.locator("#grade").is_visible())
+        assert not button.is_visible(), "it has no folder"
+        page.select_option("#lesson", "tasks/hover")
+        wait_until(page, lambda: page.input_value("#script") == "tasks/hover.py")
+        for line in ("# mine\n", "# better\n"):
+            page.locator(".cm-content").press("Control+Home")
+            page.keyboard.type(line)
+            button.click()
+            wait_until(page, lambda line=line: handed_in(tmp_path / "hover", line))
+            (copy,) = handed_in(tmp_path / "hover", line)
+            words = "mine/hover.py handed in", copy.stem.rpartition("+")[2]
+            wait_until(page, lambda words=words: said.count() and all(word in said.inner_text() for word in words))
