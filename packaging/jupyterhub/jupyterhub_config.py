@@ -25,7 +25,8 @@ c.Spawner.start_timeout = c.Spawner.http_timeout = 120  # s, for many that start
 ros = ("CMAKE_PREFIX_PATH", "ROS_DISTRO", "ROS_ETC_DIR", "ROS_PACKAGE_PATH", "ROS_ROOT")
 c.Spawner.environment = {name: os.environ[name] for name in ros if name in os.environ}
 
-# Where students hand in: a task with a folder here has the button *Hand in*.
+# The course's own tasks. And where students hand in: a task with a folder there has the button *Hand in*.
+c.Spawner.environment["DRONE_SIM_TASKS"] = "/srv/drone_sim/tasks"
 c.Spawner.environment["DRONE_SIM_HAND_IN"] = "/srv/drone_sim/handed_in"
 
 # A server whose pages have been closed for an hour ends, with its simulator. Files stay.

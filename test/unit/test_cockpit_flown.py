@@ -1,5 +1,6 @@
 """Where a script of the cockpit flies, what happens to it there, and how it is graded, without a browser."""
 
+import shutil
 import threading
 import time
 from pathlib import Path
@@ -9,7 +10,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_asked import Asked
+from cockpit_asked import LESSONS, Asked
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Header, String
 
@@ -133,6 +134,18 @@ def test_the_easiest_task_is_the_first_and_each_says_how_hard_it_is(ask):
     assert {lesson["task"] for lesson in listed} == set(tasks.names()) and listed[0]["task"] == "hover"
     hardness = [("easy", "medium", "hard").index(lesson["difficulty"]) for lesson in listed]
     assert hardness[0] == 0 and all(lesson["summary"] and lesson["time"].endswith(("min", "h")) for lesson in listed)
+
+
+def test_a_task_of_the_course_is_listed_with_text_script_and_picture(ask, tmp_path, monkeypatch):
+    monkeypatch.setenv("DRONE_SIM_TASKS", str(tmp_path))
+    shutil.copytree(tasks.folder() / "hover", tmp_path / "waltz")
+    (tmp_path / "waltz" / "README.md").write_text("# Waltz\n\n![a picture](picture.png)\n")
+    listed = {lesson["task"]: lesson["title"] for lesson in ask("scripts")["lessons"]}
+    assert listed["waltz"] == "Waltz"
+    lesson = ask("lesson", lesson="tasks/waltz")
+    assert lesson["script"] == "tasks/waltz.py" and lesson["flies"]
+    assert ask("open", script="tasks/waltz.py")["text"] == Path(_start("hover")).read_text()
+    assert LESSONS.picture("/tasks/waltz/picture.png")[1] == (tmp_path / "waltz" / "picture.png").read_bytes()
 
 
 def test_a_task_with_a_folder_of_the_course_is_handed_in(ask, tmp_path, monkeypatch):

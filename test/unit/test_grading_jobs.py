@@ -211,6 +211,18 @@ def test_in_the_sandbox_nothing_else_is_in_reach(name, server, plan, folder):
 
 
 @pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
+@pytest.mark.parametrize("of", ["plan", "script"])
+def test_a_folder_that_python_imports_from_must_not_hold_plan_or_submission(server, plan, tmp_path, monkeypatch, of):
+    flown = tmp_path / "flies.py"
+    flown.write_text("def sysCall_init():\n    pass\n")
+    folder = (plan.path if of == "plan" else flown).parent
+    monkeypatch.setenv("PYTHONPATH", f"/usr/lib{os.pathsep}{folder}")
+    with pytest.raises(sandbox.NoSandbox, match=f"PYTHONPATH has {folder}, so that every script could read") as raised:
+        server.fly(job_of(plan, str(flown), 0))
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
 def test_in_the_sandbox_nothing_else_is_to_be_seen(server, plan, tmp_path, monkeypatch):
     (tmp_path / "other.py").write_text("def sysCall_init():\n    pass\n")
     (tmp_path / "unnamed.csv").write_text("3")

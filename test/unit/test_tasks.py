@@ -34,6 +34,17 @@ def test_a_task_is_found_by_its_name_its_folder_or_its_plan(tmp_path, monkeypatc
     assert tasks.find("hover").resolve() == tmp_path / "hover" / "plan.yaml"  # one's own comes first
 
 
+def test_a_course_has_tasks_of_its_own(tmp_path, monkeypatch):
+    for name in ("hover", "waltz"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "plan.yaml").touch()
+    monkeypatch.setenv("DRONE_SIM_TASKS", str(tmp_path))
+    assert set(tasks.names()) == {*ALL, "waltz"}
+    assert tasks.find("waltz") == tmp_path / "waltz" / "plan.yaml"
+    assert tasks.find("hover") == tmp_path / "hover" / "plan.yaml", "it replaces the package's"
+    assert tasks.find("gates") == tasks.folder() / "gates" / "plan.yaml"
+
+
 @pytest.mark.parametrize(
     "name, near",
     [("hovr", "near names are hover"), ("", "known are chase, count"), ("a/b", "known are"), ("x" * 9999, "known are")],

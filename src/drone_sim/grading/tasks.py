@@ -1,23 +1,36 @@
-"""The package's own tasks: tasks/<name>/plan.yaml. See tasks/README.md."""
+"""Tasks: <name>/plan.yaml in the package's folder tasks, and in that of a course. See tasks/README.md."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from drone_sim.files.resources import is_file, package_path
 from drone_sim.grading.plan import PlanError
 from drone_sim.message_text import near_names, shown
 
+VARIABLE = "DRONE_SIM_TASKS"  # the folder of a course's tasks
 _PLAN = "plan.yaml"
 
 
 def names() -> list[str]:
-    return sorted(plan.parent.name for plan in folder().glob(f"*/{_PLAN}"))
+    return sorted(_folders())
 
 
 def folder() -> Path:
-    """Return the folder of the tasks, in the source tree or installed under share/."""
+    """Return the folder of the package's tasks, in the source tree or installed under share/."""
     return package_path() / "tasks"
+
+
+def folder_of(name: str) -> Path:
+    """Return the folder of a task in `names`; a course's task replaces one of the package with the same name."""
+    return _folders()[name]
+
+
+def _folders() -> dict[str, Path]:
+    course = os.environ.get(VARIABLE)
+    groups = [folder(), *([Path(course)] if course else [])]
+    return {plan.parent.name: plan.parent for group in groups for plan in group.glob(f"*/{_PLAN}")}
 
 
 def find(name: str) -> Path:
@@ -32,5 +45,5 @@ def find(name: str) -> Path:
         return path / _PLAN
     known = names()
     if name in known:
-        return folder() / name / _PLAN
+        return folder_of(name) / _PLAN
     raise PlanError(f"{shown(name)}: no such plan: must be a file.yaml, or a task; {near_names(name, known)}")

@@ -95,6 +95,9 @@ class Flyer:
 
         Raises ServerDied, Unreadable and NoSandbox.
         """
+        if self._sandboxed:
+            sandbox.check_hidden(job.plan)
+            sandbox.check_hidden(job.script)
         handed_in = _submitted_files(plan, job) if self._sandboxed else {}
         limits = self._limits.of_flight(plan.duration)
         script_request = {

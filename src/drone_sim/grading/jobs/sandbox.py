@@ -20,6 +20,7 @@ TEMPORARY = "/dev/shm"  # the only writable folder, in memory
 _TRIAL_TIMEOUT = 20.0  # s, on a busy machine; usually a trial takes 10 ms
 # Without /dev/zero, whose memory counts for no process, and the graphics card: the judge renders the cameras.
 _DEVICES = ("/dev/null", "/dev/random", "/dev/urandom")
+_VARIABLES = ("PYTHONPATH", "LD_LIBRARY_PATH")  # their folders are readable
 _TASKS = "tasks"
 _MIB = 2**20
 _ROOT = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")  # links on most systems
@@ -46,6 +47,21 @@ def command(files: int) -> list[str]:
     if reason:
         raise NoSandbox(reason)
     return _arguments(program, files)
+
+
+def check_hidden(path: str) -> None:
+    """Raise NoSandbox if scripts could read a plan or a submission, because a folder in _VARIABLES contains it."""
+    file = Path(path).resolve()
+    if not file.is_file() or file.is_relative_to((package_path() / _TASKS).resolve()):  # hidden anyway
+        return
+    for name in _VARIABLES:
+        for folder in _folders_in(name):
+            if file.is_relative_to(Path(folder).resolve()):
+                raise NoSandbox(f"{name} has {folder}, so that every script could read {path}: remove it from {name}")
+
+
+def _folders_in(variable: str) -> Iterator[str]:
+    yield from (path for path in os.environ.get(variable, "").split(os.pathsep) if os.path.isabs(path))
 
 
 @functools.cache
@@ -113,8 +129,8 @@ def _python_files() -> Iterator[str]:
     yield from site.getsitepackages()
     if site.ENABLE_USER_SITE:
         yield site.getusersitepackages()
-    for name in ("PYTHONPATH", "LD_LIBRARY_PATH"):
-        yield from (path for path in os.environ.get(name, "").split(os.pathsep) if os.path.isabs(path))
+    for name in _VARIABLES:
+        yield from _folders_in(name)
     program = sys.executable
     while os.path.islink(program):  # a venv's program is a link to another Python, which may be a link, too
         program = os.path.join(os.path.dirname(program), os.readlink(program))

@@ -103,8 +103,11 @@ class Lessons:
         """Return content type and content of a lesson's picture, by its path in the package; None if there is none."""
         if not _PICTURE.fullmatch(path):
             return None
+        _, top, name, *_ = path.split("/")
+        is_of_task = top == "tasks" and name in tasks.names()
+        file = tasks.folder_of(name) / Path(path).name if is_of_task else self._package / path[1:]
         try:
-            return "image/png", read_bytes(self._package / path[1:], _MAX_SIZE)
+            return "image/png", read_bytes(file, _MAX_SIZE)
         except (OSError, ValueError):
             return None
 
@@ -125,7 +128,7 @@ class Lessons:
         rows = {row[0]: row[1:] for row in _TASK_ROW.findall(_read(self._package / "tasks/README.md"))}
         known = tasks.names()
         for name in [*(name for name in rows if name in known), *(name for name in known if name not in rows)]:
-            text = _read(self._package / "tasks" / name / "README.md")
+            text = _read(tasks.folder_of(name) / "README.md")
             title = text.partition("\n")[0].removeprefix("# ").strip() or name
             script, described = f"tasks/{name}.py", rows.get(name, ("", "", ""))
             yield Lesson(f"tasks/{name}", title, text, f"tasks/{name}", script, "", *described)
