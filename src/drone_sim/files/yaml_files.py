@@ -93,7 +93,7 @@ class YamlLines:
     """Line numbers of the values in a YAML text."""
 
     def __init__(self, text: str):
-        """Compose the text. If `parse` refuses it, no value is found in it."""
+        """Compose the text. If it is not valid YAML, `find` finds no value."""
         try:
             self._root = compose(text)
         except (yaml.YAMLError, RecursionError):

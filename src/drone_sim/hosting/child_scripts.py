@@ -182,7 +182,7 @@ class ChildScript(HostedScript):
             self.context.scripts.add(name, values, is_law=values is not self.parameters)
 
     def seen(self) -> Sequence[Vehicle]:
-        """Return only its vehicle."""
+        """Return the vehicles that the script can see: only its own."""
         return [self.vehicle]
 
     reached = seen

@@ -173,7 +173,7 @@ def with_floor(settings: Settings, values: Mapping[str, Any]) -> Settings:
 
 
 def with_files_seen_from(settings: Settings, here: Path, there: Path) -> Settings:
-    """Return settings of a file in folder `here`, with file names as a file in folder `there` needs them."""
+    """Return settings whose file names, relative to the folder `here`, are made relative to the folder `there`."""
     if here == there:
         return settings
     content = scene_parameters.from_content(copy.deepcopy(dict(settings)), here)

@@ -295,7 +295,7 @@ class _Timer:
         _setitimer(signal.ITIMER_REAL, min(max(seconds, _SOONEST), _LONGEST), _RETRY)
 
     def forget(self) -> None:
-        """Mark it as not set: a forked process does not inherit the timer."""
+        """Mark the timer as not set, because a forked process does not inherit it."""
         self.next = math.inf
 
     def switch_off(self) -> None:

@@ -59,7 +59,7 @@ def _arguments(command: Sequence[str]) -> list[str]:
 
 
 def _is(launch: Path, arguments: Sequence[str], number: int, folder: Path) -> bool:
-    """Whether an argument means that launch file, as a path or as `PACKAGE FILE`."""
+    """Return whether an argument names the file `launch`, as a path or as `PACKAGE FILE`."""
     if number and arguments[number - 1] == "drone_sim" and arguments[number] == launch.name:
         return True
     path = folder / arguments[number]

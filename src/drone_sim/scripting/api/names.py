@@ -170,9 +170,10 @@ def _is_of_the_scene(objects: ObjectTree, name: str, own: str) -> bool:
 
 
 def _only_copy(objects: ObjectTree, name: str, own: str) -> str:
-    """Return the first copy that an import has made of a name, if its suffix belongs to no copy of `own`, or the name.
+    """Return the object that a script named `own` means by `name`, if an import has renamed only that object's tree.
 
-    An import adds a suffix to all names of a tree if one of them exists already (importing/scene_folder.py).
+    An import adds a suffix to all names of a tree if one of them exists already (importing/scene_folder.py). Return the
+    first name with a suffix that no copy of `own` has; if there is none, return `name`.
     """
     is_copied = objects.is_copied(name)
     suffixes = sorted(split(other)[1] for other in objects.names if plain(other) == name) if is_copied else []

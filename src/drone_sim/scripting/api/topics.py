@@ -91,7 +91,7 @@ class Subscriptions:
         subscription.end()
 
     def close(self) -> None:
-        """End all of them."""
+        """End all subscriptions."""
         self._new_callbacks = []
         for handle in list(self._by_handle):
             self.end(handle)
