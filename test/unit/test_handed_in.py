@@ -74,6 +74,29 @@ def test_all_else_in_the_folder_is_ignored(folder, tmp_path, another):
     assert [one.name for one in graded(folder, tmp_path)] == [ME]
 
 
+def test_the_time_in_the_name_counts_so_that_a_copy_of_the_folder_has_the_same_last_scripts(folder, tmp_path, another):
+    for day, text in (("29", f"# last\n{SCRIPT}"), ("28", SCRIPT)):  # the earlier one is written later
+        _, digest = handed_in.hand_in("hover", text, ".py")
+        (made,) = folder.glob(f"*+{digest}.py")
+        made.rename(folder / f"{ME}+2026-11-{day}T12.00.00Z+{digest}.py")
+    another()
+    assert Path(graded(folder, tmp_path)[0].script).read_text().startswith("# last")
+
+
+@pytest.mark.parametrize("user", ["..", ".", ".ann", ""])
+def test_a_name_that_leads_elsewhere_is_ignored(folder, tmp_path, user):
+    _, digest = handed_in.hand_in("hover", SCRIPT, ".py")
+    (folder / f"{user}+2026-11-28T12.00.00Z+{digest}.py").write_text(SCRIPT)
+    assert [one.name for one in graded(folder, tmp_path)] == [ME]
+
+
+def test_a_file_with_two_links_is_nobodys(folder, tmp_path):
+    _, digest = handed_in.hand_in("hover", SCRIPT, ".py")
+    (mine,) = folder.iterdir()
+    os.link(mine, folder / f"bob+2026-11-28T12.00.00Z+{digest}.py")
+    assert handed_in.submissions_in(folder, tmp_path / "store") == []
+
+
 def test_a_copy_of_the_teachers_own_is_told_apart_by_its_names(folder, tmp_path):
     _, digest = handed_in.hand_in("hover", SCRIPT, ".py")
     (folder / f"ann+2026-11-28T12.00.00Z+{digest}.py").write_text(SCRIPT)

@@ -14,7 +14,7 @@ from drone_sim.shapes.shape import DrawnShape
 
 
 class PrincipalInertia(NamedTuple):
-    """Principal moments (kg m²), and the pose of the shape's frame in the frame of centre of mass and principal axes."""
+    """Principal moments (kg m²), and the pose of the shape in the frame of centre of mass and principal axes."""
 
     moments: tuple[float, float, float]
     frame: Matrix = IDENTITY

@@ -1,7 +1,7 @@
 """Scripts that students hand in from the cockpit, in a folder where everybody can write and only the teacher can read.
 
 The folder of a task is below $DRONE_SIM_HAND_IN. Its files are named USER+TIME+DIGEST.py. Students can write whatever
-they like there, so `grade` believes only what the kernel says: who owns a file, and when it was changed last.
+they like there, so `grade` believes only who owns a file. The time in the name only says which of a user's files counts.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from drone_sim.grading.submissions.submission import Person, Submission
 from drone_sim.message_text import shown
 
 VARIABLE = "DRONE_SIM_HAND_IN"
-_NAME = re.compile(r"(?P<user>[\w.@-]{1,64})\+(?P<time>[\dT.Z-]{20})\+(?P<digest>[0-9a-f]{12})(?P<suffix>\.py|\.lua)")
+_NAME = re.compile(r"(?P<user>\w[\w.@-]{0,63})\+(?P<time>[\dT.Z-]{20})\+(?P<digest>[0-9a-f]{12})(?P<suffix>\.py|\.lua)")
 _LARGEST = 1 << 20  # bytes
 _MODE = 0o640  # the folder's group, the teachers, can read it
 
@@ -32,7 +32,7 @@ class _Entry:
     digest: str
     suffix: str
     owner: int
-    changed: int  # ns, which the owner cannot set
+    age: tuple[str, int]  # the time in its name, and that of its last change (ns), which a copy of the folder loses
 
 
 def folder_of(task: str) -> Path | None:
@@ -68,7 +68,7 @@ def submissions_in(folder: Path, store: Path) -> list[Submission]:
             continue
         # Copies of the teacher's own all have the same owner.
         key = entry.owner, entry.user if entry.owner == os.getuid() else ""
-        if key not in latest or latest[key].changed < entry.changed:
+        if key not in latest or latest[key].age < entry.age:
             latest[key] = entry
     copies = store / f"{folder.resolve().name:.40}-{_digest(os.fsencode(folder.resolve()))}"
     return sorted((_copy(entry, copies) for entry in latest.values()), key=lambda submission: submission.script)
@@ -80,9 +80,10 @@ def _entry_of(path: Path) -> _Entry | None:
         status = path.lstat()
     except FileNotFoundError:  # its owner has just removed it
         return None
-    if match is None or not stat.S_ISREG(status.st_mode):
+    if match is None or not stat.S_ISREG(status.st_mode) or status.st_nlink > 1:
         return None
-    return _Entry(path, match["user"], match["digest"], match["suffix"], status.st_uid, status.st_ctime_ns)
+    age = match["time"], status.st_ctime_ns
+    return _Entry(path, match["user"], match["digest"], match["suffix"], status.st_uid, age)
 
 
 def _copy(entry: _Entry, store: Path) -> Submission:
