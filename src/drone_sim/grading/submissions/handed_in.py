@@ -1,7 +1,7 @@
 """Scripts that students hand in from the cockpit, in a folder where everybody can write and only the teacher can read.
 
 The folder of a task is below $DRONE_SIM_HAND_IN. Its files are named USER+TIME+DIGEST.py. Students can write whatever
-they like there, so `grade` believes only who owns a file. The time in the name only says which of a user's files counts.
+they like there, so `grade` believes only who owns a file; the time in the name only decides which of a user's counts.
 """
 
 from __future__ import annotations
