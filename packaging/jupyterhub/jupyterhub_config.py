@@ -1,12 +1,14 @@
 """JupyterHub for a course on one machine, each student with an own system user: docs/classroom.md. Run it as root."""
 
 import os
+import pwd
+import sys
 from pathlib import Path
 
 c = get_config()  # noqa: F821 # of JupyterHub
 
 # Who may come in: the system users of these groups, with their passwords (PAM).
-c.LocalAuthenticator.allowed_groups = {"students"}
+c.LocalAuthenticator.allowed_groups = {"students", "teachers"}
 c.LocalAuthenticator.admin_groups = {"teachers"}
 
 # The hub's page. Put HTTPS in front of it, or set c.JupyterHub.ssl_key and c.JupyterHub.ssl_cert.
@@ -23,11 +25,25 @@ c.Spawner.start_timeout = c.Spawner.http_timeout = 120  # s, for many that start
 
 # The simulator finds ROS as the shell does in which the hub was started.
 ros = ("CMAKE_PREFIX_PATH", "ROS_DISTRO", "ROS_ETC_DIR", "ROS_PACKAGE_PATH", "ROS_ROOT")
-c.Spawner.environment = {name: os.environ[name] for name in ros if name in os.environ}
-
+environment = {name: os.environ[name] for name in ros if name in os.environ}
 # The course's own tasks. And where students hand in: a task with a folder there has the button *Hand in*.
-c.Spawner.environment["DRONE_SIM_TASKS"] = "/srv/drone_sim/tasks"
-c.Spawner.environment["DRONE_SIM_HAND_IN"] = "/srv/drone_sim/handed_in"
+environment["DRONE_SIM_TASKS"] = "/srv/drone_sim/tasks"
+environment["DRONE_SIM_HAND_IN"] = "/srv/drone_sim/handed_in"
+c.Spawner.environment = environment
+
+# The teachers' page, http://THE-MACHINE:8000/services/course/, if there is a system user for it.
+if any(user.pw_name == "drone_sim" for user in pwd.getpwall()):
+    c.JupyterHub.services = [
+        {
+            "name": "course",
+            "url": "http://127.0.0.1:10108",
+            "user": "drone_sim",
+            "command": [sys.executable, "-m", "drone_sim.grading.teacher_page", "/srv/drone_sim/reports"],
+            "environment": {**environment, "PYTHONPATH": os.environ.get("PYTHONPATH", "")},
+            "oauth_no_confirm": True,
+        }
+    ]
+    c.JupyterHub.load_roles = [{"name": "course", "services": ["course"], "scopes": ["list:users", "read:users"]}]
 
 # A server whose pages have been closed for an hour ends, with its simulator. Files stay.
 c.Spawner.args = ["--ServerApp.shutdown_no_activity_timeout=3600", "--MappingKernelManager.cull_idle_timeout=3600"]

@@ -90,6 +90,7 @@ def main():
     ben.hand_in("def sysCall_actuation():\n    pass\n")
     failures = through_the_hub(ben, ann.name) + as_system_user(ben.name, ann.name)
     failures += forge_and_grade(ben.name, ann.name)
+    failures += teachers_page(Student(TEACHER), ann, ben)
     missed = NEEDED - set(as_system_user(ann.name, ann.name))
     failures += [f"not tried: {name}" for name in sorted(missed)]  # the attack succeeds for the student herself
     ann.fly(ann.name)
@@ -97,7 +98,7 @@ def main():
         failures.append("not tried: the end of the server")
     hub.send_signal(signal.SIGTERM)
     hub.wait(60)
-    until(lambda: not any(processes_of(name) for name in STUDENTS))
+    until(lambda: not any(processes_of(name) for name in (*STUDENTS, "drone_sim")))
     for failure in failures:
         print(f"jupyterhub: {failure}")
     print("jupyterhub: " + ("failed" if failures else "neither gets at the other's simulator, and nothing is left"))
@@ -116,8 +117,11 @@ def make_users(folder):
         run("useradd", "--create-home", "-K", "HOME_MODE=0700", "--groups", group, "--shell", "/bin/bash", name)
     run("mount", "-t", "tmpfs", "-o", "mode=755", "tmpfs", "/srv")
     run("mkdir", "-p", os.path.dirname(HANDED_IN))
-    run("install", "-d", "-g", "teachers", "-m", "3773", HANDED_IN)  # as in docs/classroom.md
-    run("chpasswd", input="".join(f"{name}:{name}\n" for name in STUDENTS))
+    run("install", "-d", "-g", "teachers", "-m", "3773", HANDED_IN)
+    run("chpasswd", input="".join(f"{name}:{name}\n" for name in (*STUDENTS, TEACHER)))
+    # As in docs/classroom.md.
+    run("useradd", "--system", "--create-home", "--groups", "teachers", "drone_sim")
+    run("install", "-d", "-o", "drone_sim", "-g", "teachers", "-m", "2750", "/srv/drone_sim/reports")
 
 
 class Student:
@@ -128,12 +132,16 @@ class Student:
 
     def open(self):
         """Log in, and open the simulator."""
+        self.log_in()
+        self.session.get(f"http://{HOST}/hub/spawn/{self.name}")
+        until(lambda: self.sees(self.name))
+
+    def log_in(self):
+        """Log in at the hub."""
         login = self.session.get(f"http://{HOST}/hub/login")
         token = re.search(r'name="_xsrf" value="([^"]+)"', login.text)[1]
         form = {"username": self.name, "password": self.name, "_xsrf": token}
         self.session.post(f"http://{HOST}/hub/login", data=form)
-        self.session.get(f"http://{HOST}/hub/spawn/{self.name}")
-        until(lambda: self.sees(self.name))
 
     def sees(self, name):
         """Return whether a student's simulator opens."""
@@ -192,6 +200,28 @@ def forge_and_grade(forger, victim):
     subprocess.run(grade, env={**os.environ, "HOME": f"/home/{TEACHER}", "ROS_HOME": f"/home/{TEACHER}"}, **as_teacher)
     passed = {one["name"]: one["passed"] for one in json.loads(Path(report).read_text())["scripts"]}
     return [] if passed == {victim: 1, forger: 0} else [f"passed flights: {passed}"]
+
+
+def teachers_page(teacher, student, other):
+    """Grade by the button of the teachers' page; return what is wrong with it, or with who may open it."""
+    address = f"http://{HOST}/services/course/"
+    failures = ["the teachers' page"] if student.session.get(address).status_code != 403 else []
+    teacher.log_in()
+    page = teacher.session.get(address)
+    failures += [f"not on the teachers' page: {one.name}" for one in (student, other) if one.name not in page.text]
+    token = re.search(r'name="_xsrf" value="([^"]+)"', page.text)[1]
+    if student.session.post(address, data={"task": "hover", "_xsrf": token}).status_code != 403:
+        failures.append("a student can grade")
+    teacher.session.post(address, data={"task": "hover", "_xsrf": token}).raise_for_status()
+    until(lambda: "marks.csv" in teacher.session.get(address).text)
+    page = teacher.session.get(address).text
+    report, marks = (re.search(rf'href="([^"]+{end})"', page)[1] for end in ("index.html", "marks.csv"))
+    print(teacher.session.get(f"http://{HOST}{marks}").text)
+    if student.name not in teacher.session.get(f"http://{HOST}{report}").text:
+        failures.append("no report")
+    if student.session.get(f"http://{HOST}{report}").status_code != 403:
+        failures.append("a student can read the report")
+    return failures
 
 
 def through_the_hub(attacker, victim):

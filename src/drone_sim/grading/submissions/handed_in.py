@@ -61,6 +61,16 @@ def submissions_in(folder: Path, store: Path) -> list[Submission]:
 
     The scripts are copied to `store`, because their owners can replace them at any time. Other files are ignored.
     """
+    copies = store / f"{folder.resolve().name:.40}-{_digest(os.fsencode(folder.resolve()))}"
+    return sorted((_copy(entry, copies) for entry in _latest_in(folder)), key=lambda submission: submission.script)
+
+
+def times_in(folder: Path) -> dict[str, str]:
+    """Return when each user handed in last (UTC), by the name of the files' owner."""
+    return {_name_of(entry.owner): entry.age[0] for entry in _latest_in(folder)}
+
+
+def _latest_in(folder: Path) -> list[_Entry]:
     latest: dict[tuple[int, str], _Entry] = {}
     for path in folder.iterdir():
         entry = _entry_of(path)
@@ -70,8 +80,7 @@ def submissions_in(folder: Path, store: Path) -> list[Submission]:
         key = entry.owner, entry.user if entry.owner == os.getuid() else ""
         if key not in latest or latest[key].age < entry.age:
             latest[key] = entry
-    copies = store / f"{folder.resolve().name:.40}-{_digest(os.fsencode(folder.resolve()))}"
-    return sorted((_copy(entry, copies) for entry in latest.values()), key=lambda submission: submission.script)
+    return list(latest.values())
 
 
 def _entry_of(path: Path) -> _Entry | None:
