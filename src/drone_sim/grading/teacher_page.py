@@ -115,10 +115,12 @@ class TeacherPage(HubOAuthenticated, web.RequestHandler):  # type: ignore[misc]
 
 
 class Reports(HubOAuthenticated, web.StaticFileHandler):  # type: ignore[misc]
-    """Reports and marks. A report runs in an origin of its own: it shows students' names and errors."""
+    """Reports and marks. A report shows what students wrote, so it may run only scripts of its own."""
 
     def set_extra_headers(self, path: str) -> None:
-        self.set_header("Content-Security-Policy", "sandbox allow-scripts allow-popups")
+        reports = f"{self.request.protocol}://{self.request.host}{_PREFIX}reports/"
+        policy = f"default-src {reports} data: blob:; script-src {reports}; style-src {reports} 'unsafe-inline'"
+        self.set_header("Content-Security-Policy", f"{policy}; base-uri 'none'; form-action 'none'")
 
     @web.authenticated
     async def get(self, path: str, include_body: bool = True) -> None:  # type: ignore[override]
@@ -141,7 +143,7 @@ async def main() -> None:
         xsrf_cookies=True,
     )
     address = urlsplit(os.environ["JUPYTERHUB_SERVICE_URL"])
-    application.listen(address.port or 0, address.hostname or "")
+    application.listen(address.port or 0, address.hostname or "", xheaders=True)
     try:
         await asyncio.Event().wait()
     finally:
