@@ -26,6 +26,7 @@ export class Panels {
     this.board = new Board();
     this.notice = new Notice(store);
     this.ask = (ask, more) => socket().ask(ask, more);
+    this.say = (message) => socket().say(message);
     this.toolbar = new Toolbar(store, this.board, (...asked) => this.act(...asked), this.notice, scene);
     this.cameras = new Cameras(this.board, (...asked) => this.act(...asked));
     this.plots = new Plots(this.board, this.ask);
@@ -108,7 +109,7 @@ export class Panels {
 
   // The node sends changes of the object tree only to pages that edit.
   turnEditing() {
-    this.socket().say({ follow_tree: Boolean(this.edits) });
+    this.say({ follow_tree: Boolean(this.edits) });
     this.build.turn(this.edits);
   }
 
