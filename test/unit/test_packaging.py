@@ -39,8 +39,8 @@ KEYS = {
 }
 # Imported by name, by trimesh, and what the launch file starts.
 INDIRECT = {"python3-lupa-pip", "python3-pycollada-pip", "rviz"}
-# Used where they are: Debian has no package of them.
-OPTIONAL = {"vision_msgs"}
+# Used where they are: Debian has no package of the first, and JupyterHub starts what needs the others.
+OPTIONAL = {"vision_msgs", "jupyterhub", "tornado"}
 
 
 def imported():
