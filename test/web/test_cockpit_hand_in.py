@@ -1,5 +1,7 @@
 """A task that can be handed in has a button for it, and says what was handed in."""
 
+import os
+
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
@@ -12,12 +14,13 @@ def handed_in(folder, line):
     return [file for file in folder.iterdir() if file.read_text().startswith(line)]
 
 
-def test_a_changed_script_is_handed_in_and_again(browser, tmp_path, monkeypatch):
+def test_a_changed_script_is_handed_in_and_again(cockpit, browser, tmp_path, monkeypatch):
+    monkeypatch.setenv("ROS_MASTER_URI", os.environ["ROS_MASTER_URI"])  # that of this process, afterwards
     monkeypatch.setenv("DRONE_SIM_HAND_IN", str(tmp_path))
     (tmp_path / "hover").mkdir()
-    with launched() as cockpit, browser.new_page() as page:
+    with launched() as course, browser.new_page() as page:
         page.add_init_script(STARTED)
-        page.goto(cockpit.address, wait_until="commit")
+        page.goto(course.address, wait_until="commit")
         ready(page)
         button, said = page.locator("#hand-in"), page.locator("#graded .handed-in")
         page.select_option("#lesson", "tasks/gates")
