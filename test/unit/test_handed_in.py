@@ -97,6 +97,17 @@ def test_a_file_with_two_links_is_nobodys(folder, tmp_path):
     assert handed_in.submissions_in(folder, tmp_path / "store") == []
 
 
+def test_while_nobody_has_handed_in_a_forged_folder_of_another_kind_is_not_graded(folder, tmp_path):
+    (folder / "Bob_8_assignsubmission_file_").mkdir()
+    (folder / "Bob_8_assignsubmission_file_" / "bob.py").write_text(SCRIPT)
+    folder.chmod(0o3773)
+    with pytest.raises(ValueError, match="no submission is in it"):
+        graded(folder, tmp_path)
+    folder.chmod(0o3770)  # after the end of the handing in
+    with pytest.raises(ValueError, match="no submission is in it"):
+        graded(folder, tmp_path)
+
+
 def test_a_copy_of_the_teachers_own_is_told_apart_by_its_names(folder, tmp_path):
     _, digest = handed_in.hand_in("hover", SCRIPT, ".py")
     (folder / f"ann+2026-11-28T12.00.00Z+{digest}.py").write_text(SCRIPT)

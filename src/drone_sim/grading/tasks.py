@@ -14,7 +14,7 @@ _PLAN = "plan.yaml"
 
 
 def names() -> list[str]:
-    return sorted(_folders())
+    return sorted(folders())
 
 
 def folder() -> Path:
@@ -22,12 +22,8 @@ def folder() -> Path:
     return package_path() / "tasks"
 
 
-def folder_of(name: str) -> Path:
-    """Return the folder of a task in `names`; a course's task replaces one of the package with the same name."""
-    return _folders()[name]
-
-
-def _folders() -> dict[str, Path]:
+def folders() -> dict[str, Path]:
+    """Return the folder of each task; a course's task replaces one of the package with the same name."""
     course = os.environ.get(VARIABLE)
     groups = [folder(), *([Path(course)] if course else [])]
     return {plan.parent.name: plan.parent for group in groups for plan in group.glob(f"*/{_PLAN}")}
@@ -43,7 +39,7 @@ def find(name: str) -> Path:
         return path
     if name and is_file(path / _PLAN):
         return path / _PLAN
-    known = names()
+    known = folders()
     if name in known:
-        return folder_of(name) / _PLAN
-    raise PlanError(f"{shown(name)}: no such plan: must be a file.yaml, or a task; {near_names(name, known)}")
+        return known[name] / _PLAN
+    raise PlanError(f"{shown(name)}: no such plan: must be a file.yaml, or a task; {near_names(name, sorted(known))}")

@@ -32,7 +32,9 @@ def submissions_of(argument: str, store: Path) -> list[Submission]:
     elif path.suffix.lower() == ".zip":
         submissions = _in_class_zip(path, store)
     elif path.is_dir() and path.suffix not in _SCRIPT_SUFFIXES:
-        submissions = handed_in.submissions_in(path, store) or _in_folder(path, store)
+        submissions = handed_in.submissions_in(path, store)
+        if not submissions and not handed_in.is_shared(path):
+            submissions = _in_folder(path, store)
     else:
         return [Submission(argument)]
     if not submissions:

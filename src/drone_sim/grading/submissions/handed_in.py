@@ -56,6 +56,11 @@ def hand_in(task: str, text: str, suffix: str) -> tuple[str, str]:
     return now, digest
 
 
+def is_shared(folder: Path) -> bool:
+    """Return whether a folder has the sticky bit of those where students hand in: nothing else there is believed."""
+    return bool(folder.stat().st_mode & stat.S_ISVTX)
+
+
 def submissions_in(folder: Path, store: Path) -> list[Submission]:
     """Return each user's latest script in a folder where scripts are handed in; [] for any other folder.
 

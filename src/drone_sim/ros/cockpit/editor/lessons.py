@@ -103,9 +103,8 @@ class Lessons:
         """Return content type and content of a lesson's picture, by its path in the package; None if there is none."""
         if not _PICTURE.fullmatch(path):
             return None
-        _, top, name, *_ = path.split("/")
-        is_of_task = top == "tasks" and name in tasks.names()
-        file = tasks.folder_of(name) / Path(path).name if is_of_task else self._package / path[1:]
+        of_task = tasks.folders().get(path.split("/")[2]) if path.startswith("/tasks/") else None
+        file = of_task / Path(path).name if of_task else self._package / path[1:]
         try:
             return "image/png", read_bytes(file, _MAX_SIZE)
         except (OSError, ValueError):
@@ -126,9 +125,9 @@ class Lessons:
     def _tasks(self) -> Iterator[Lesson]:
         """Yield the tasks in the order of the table in tasks/README.md, the easiest first, then those without a row."""
         rows = {row[0]: row[1:] for row in _TASK_ROW.findall(_read(self._package / "tasks/README.md"))}
-        known = tasks.names()
-        for name in [*(name for name in rows if name in known), *(name for name in known if name not in rows)]:
-            text = _read(tasks.folder_of(name) / "README.md")
+        known = tasks.folders()
+        for name in [*(name for name in rows if name in known), *(name for name in sorted(known) if name not in rows)]:
+            text = _read(known[name] / "README.md")
             title = text.partition("\n")[0].removeprefix("# ").strip() or name
             script, described = f"tasks/{name}.py", rows.get(name, ("", "", ""))
             yield Lesson(f"tasks/{name}", title, text, f"tasks/{name}", script, "", *described)

@@ -289,7 +289,7 @@ def _stages(folder: Path) -> dict[str, Path]:
 
 def _starts(last_stage: Path) -> dict[str, Path]:
     """Return the starting script of each task: its start.py, or the tutorial's last stage."""
-    own = {name: tasks.folder_of(name) / _START for name in tasks.names()}
+    own = {name: folder / _START for name, folder in sorted(tasks.folders().items())}
     starts = {f"{name}.py": file if file.is_file() else last_stage for name, file in own.items()}
     return {name: file for name, file in starts.items() if file.is_file()}
 
