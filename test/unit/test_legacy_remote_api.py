@@ -27,7 +27,7 @@ from legacy_client import (
 from drone_sim.remote.legacy import session
 from drone_sim.remote.legacy.server import LegacyServer
 from drone_sim.remote.legacy.wire import Packets
-from drone_sim.remote.servers import RemoteApiServers
+from drone_sim.remote.remote_api import start_server
 from drone_sim.run import parameters
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
@@ -716,7 +716,7 @@ def test_both_remote_apis_are_served_at_once(stage):
     from remote_client import Client as OtherClient
 
     values = parameters.load({"remote_api": {"serve": True, "port": 0, "legacy_port": 0}})
-    servers = RemoteApiServers(values.remote_api, stage.player)
+    servers = start_server(values.remote_api, stage.player)
     try:
         assert servers.address.endswith(" (simxStart)")
         old, new = Client(servers.legacy.port, servers.wait), OtherClient(servers.zeromq)
@@ -738,7 +738,7 @@ def test_both_remote_apis_are_served_at_once(stage):
 def test_a_port_that_is_taken_is_one_line(stage):
     taken = {"serve": True, "port": 0, "legacy_port": stage.server.port}
     with pytest.raises(OSError, match=f"remote_api: cannot listen on 127.0.0.1:{stage.server.port}: "):
-        RemoteApiServers(parameters.load({"remote_api": taken}).remote_api, stage.player)
+        start_server(parameters.load({"remote_api": taken}).remote_api, stage.player)
     with pytest.raises(OSError, match=r"remote_api: cannot listen on nowhere\.invalid:0: "):
         LegacyServer(stage.player, "nowhere.invalid", 0)
     assert LegacyServer(stage.player, "*", 0).close() is None

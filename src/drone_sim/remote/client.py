@@ -1,28 +1,37 @@
-"""A remote client: the functions that it may call, and the resources that it owns in the simulation."""
+"""A remote client: its host, the functions that it may call, and the resources that it owns in the simulation."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
+from drone_sim.hosting.child_scripts import services
+from drone_sim.mechanics.frames import Vector
 from drone_sim.message_text import near_names
 from drone_sim.remote.control import ClientControl, MovedObjects
 from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task, Watched, name_of
-from drone_sim.remote.host import ClientHost
 from drone_sim.remote.messages import ClientRequest
 from drone_sim.run.player import Player
+from drone_sim.run.simulation import Simulation
 from drone_sim.run.stepping import Diverged
 from drone_sim.scripting import script_log
 from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.calls import Api, Function, contents, explain, functions_of
-from drone_sim.scripting.api.control import Wait
+from drone_sim.scripting.api.control import Turns, Wait
+from drone_sim.scripting.api.host import Readable, SceneServices
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
+from drone_sim.scripting.api.registry import Attachment, Scripts
+from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.api.service_servers import ServiceRequest
 from drone_sim.scripting.api.types import Name
 from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.time_limit import TimeLimit
+from drone_sim.vehicles.quadricopter_objects import DRONE
+from drone_sim.vehicles.vehicle import Vehicle
 
 _FUNCTION_SUFFIX = "@func"  # of an argument that names a function of the client
 _RETURN_BYTES = ("getStringSignal", "getVisionSensorImg", "getVisionSensorDepth", "packTable", "readCustomDataBlock")
@@ -170,6 +179,68 @@ class Client:
                 yield Call(name, [message])
             elif not message.is_abandoned:
                 message.answer((yield Call(name, [message.content])))
+
+
+class ClientHost:
+    """Host of remote clients. Names without a suffix mean the first vehicle's objects, as in its script."""
+
+    def __init__(self, simulation: Simulation):
+        """Use the simulation's current context; to be created again with every topology version."""
+        self.context = replace(simulation.context, scripts=_ScriptsForClients(simulation.context.scripts))
+        self._operations = simulation.operations
+        self._vehicles = list(simulation.vehicles.values())
+
+    def services(self) -> SceneServices:
+        """Return the services of the scene, without a time limit for calls."""
+        return services(self._vehicles, self.context, self._operations, TimeLimit(0.0), Turns())
+
+    @property
+    def sensors(self) -> Mapping[str, Readable]:
+        """The sensors of all vehicles."""
+        return {name: sensor for vehicle in self._vehicles for name, sensor in vehicle.instruments.by_object.items()}
+
+    @property
+    def own_script(self) -> str:
+        """Name of the object with the script that `sim.handle_self` means: the first vehicle's."""
+        return self._vehicles[0].object_name if self._vehicles else DRONE
+
+    def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
+        """Apply a force (N, world) at a point (m, shape's frame) and a torque (N m) in the next step."""
+        self._of(shape).propulsion.add_force(shape, force, torque, offset)
+
+    def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
+        """Remove the forces or torques, or both, added to a shape since the last step."""
+        self._of(shape).propulsion.drop_forces(shape, forces, torques)
+
+    def turn_joint(self, joint: str, angle: float | None) -> float:
+        """Set the angle (rad) of a propeller's blades, unless None; return it."""
+        return self._of(joint).propulsion.blades.turn(joint, angle)
+
+    def _of(self, name: str) -> Vehicle:
+        """Return the vehicle that an object belongs to, by its suffix; the first one for an object of the scene.
+
+        Raises ValueError if there is no vehicle.
+        """
+        if not self._vehicles:
+            raise ValueError(f"'{name}' is not a part of a vehicle, and the scene has no vehicle")
+        return next((item for item in self._vehicles if item.suffix and name.endswith(item.suffix)), self._vehicles[0])
+
+
+class _ScriptsForClients(Scripts):
+    """The scripts of a simulation, called by a client instead of a script."""
+
+    are_own = False
+
+    _NO_CALLER = Attachment(-1, "", {}, is_law=False)
+
+    def __init__(self, scripts: Scripts):
+        self.__dict__ = scripts.__dict__
+
+    def is_own(self, _caller: Attachment, _callee: Attachment) -> bool:
+        return False
+
+    def call(self, _caller: Attachment, callee: Attachment, call: Callable[[Script], Any]) -> Any:
+        return super().call(self._NO_CALLER, callee, call)
 
 
 def one_line(name: str, function: Function, arguments: Sequence[Any], error: Exception) -> str:

@@ -8,7 +8,7 @@ import struct
 from case import Case
 from hypothesis import strategies as st
 
-from drone_sim.remote.legacy.functions import FUNCTIONS
+from drone_sim.remote.legacy.commands import FUNCTIONS
 from kinds.scripts import OBJECTS
 from kinds.values import ODD_TEXTS, mutated
 

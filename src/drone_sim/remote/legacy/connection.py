@@ -26,7 +26,7 @@ class Connection:
         self.name = name
         self.ended = False  # whether the client has closed it
         self._peer = peer
-        self._packets = Packets()
+        self.packets = Packets()
         self._out = memoryview(b"")
         peer.setblocking(False)
         peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -58,15 +58,11 @@ class Connection:
         except OSError:
             received = b""
         self.ended = not received
-        self._packets.add(received)
-
-    def take(self) -> bytes | None:
-        """Return the next message, None if it is incomplete. Raises ValueError for an invalid message."""
-        return self._packets.take()
+        self.packets.add(received)
 
     def send(self, message: bytes) -> None:
         """Send a reply, as far as the socket accepts it."""
-        self._out = memoryview(self._packets.of(message))
+        self._out = memoryview(self.packets.of(message))
         self.flush()
 
     def flush(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from drone_sim.remote.client import one_line
@@ -61,38 +61,6 @@ class Request:
     def refused(self, why: str) -> Refused:
         """Return the exception to raise, with the function's name in front of `why`."""
         return Refused(f"{self.name}: {why}")
-
-
-# Returns the data of the reply; None if there is no reply yet.
-HandlerFunction = Callable[[Request], bytes | None]
-
-
-class Handler(NamedTuple):
-    """A function of the client, and its handler."""
-
-    name: str
-    do: HandlerFunction
-
-
-Table = dict[int, Handler]  # by command code
-
-
-def direct(function: str, encode: Callable[[Any], bytes], layout: str = "", name: str = "") -> Handler:
-    """Return the handler of a command that is one call of the script API.
-
-    Arguments are the command's key, then the numbers in its data with a struct `layout`; `encode` writes the result.
-    Without a `name`, the client's function has the API's name, with the prefix simx.
-    """
-
-    def call(request: Request) -> bytes:
-        return encode(request.sim(function, *request.key, *(request.take(layout) if layout else ())))
-
-    return Handler(name or f"simx{function[0].upper()}{function[1:]}", call)
-
-
-def nothing(_returned: Any) -> bytes:
-    """Return the empty reply of a function without a result."""
-    return b""
 
 
 def floats(*values: float) -> bytes:

@@ -82,7 +82,7 @@ class LegacyServer(RemoteApi):
 
     @property
     def holds(self) -> bool:
-        return any(guest.session.holds for guest in self._guests.values())
+        return any(guest.session.stepping.holds for guest in self._guests.values())
 
     @property
     def has_work(self) -> bool:
@@ -155,10 +155,9 @@ class LegacyServer(RemoteApi):
         client = Client(self._player, self._moved, None, self._others, self._clock, self._watched)
         name = f"the remote API's client {connection.name}"
         session = Session(name, client, self._player, self._selected, self._clock)
-        port = connection.port
         wanted = self._player.simulation.context.remote_ports.wanted
-        session.synchronous(wanted.get(port, False))
-        guest = self._guests[connection.fileno()] = _Guest(connection, session, self._clock(), port)
+        session.synchronous(wanted.get(connection.port, False))
+        guest = self._guests[connection.fileno()] = _Guest(connection, session, self._clock(), connection.port)
         self._epoll.register(connection.fileno(), guest.events)
 
     def _disconnect(self, guest: _Guest, why: str = "") -> None:
@@ -219,7 +218,7 @@ class LegacyServer(RemoteApi):
         if guest.task or guest.connection.has_to_write:
             return
         try:
-            message = guest.connection.take()
+            message = guest.connection.packets.take()
         except ValueError as error:
             self._disconnect(guest, str(error))
             return

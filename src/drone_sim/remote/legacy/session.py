@@ -13,9 +13,8 @@ from drone_sim.message_text import encodable, printable
 from drone_sim.remote.client import Client
 from drone_sim.remote.conversation import Task, Until
 from drone_sim.remote.legacy import wire
-from drone_sim.remote.legacy.functions import served
-from drone_sim.remote.legacy.request import HandlerFunction, Refused, Request, RequestContext, ints, text
-from drone_sim.remote.legacy.scripts import TAKE_STRING
+from drone_sim.remote.legacy.commands import TAKE_STRING, HandlerFunction, handler_of
+from drone_sim.remote.legacy.request import Refused, Request, RequestContext, ints, text
 from drone_sim.remote.legacy.wire import Answer, Command
 from drone_sim.run.player import Player
 from drone_sim.scripting import script_log
@@ -60,6 +59,7 @@ class Session:
         self.name = name
         self.is_over = False  # whether the client has ended it
         self._client, self._player, self._clock = client, player, clock
+        self.stepping = client.stepping
         self._selected = selected
         self._context = RequestContext({}, selected)
         self._streams: dict[tuple[int, bytes], _Stream] = {}
@@ -68,15 +68,10 @@ class Session:
         self._logged: set[str] = set()
         self._size = 0  # bytes of the reply so far
 
-    @property
-    def holds(self) -> bool:
-        """Whether the next step has to wait for this client to trigger it."""
-        return self._client.stepping.holds
-
     def synchronous(self, on: bool) -> None:
         """Switch synchronous mode, in which the simulation steps only when this client triggers it."""
-        if on != bool(self._client.stepping.level):
-            self._client.stepping.set(on)
+        if on != bool(self.stepping.level):
+            self.stepping.set(on)
 
     def leave(self) -> None:
         """Release the simulation, and remove the client's streams, drawings and the like."""
@@ -107,10 +102,10 @@ class Session:
 
     def _step(self) -> Task:
         """Let the simulation take a step, if it is playing in synchronous mode; return after it."""
-        simulation, stepping = self._player.simulation, self._client.stepping
-        if self._player.playing and stepping.level:
+        simulation = self._player.simulation
+        if self._player.playing and self.stepping.level:
             before = simulation.run, simulation.steps
-            yield stepping.wait(Until(lambda: (simulation.run, simulation.steps) != before))
+            yield self.stepping.wait(Until(lambda: (simulation.run, simulation.steps) != before))
 
     # ---- commands
 
@@ -143,7 +138,7 @@ class Session:
             return Answer(command, b"")
         if command.code in (_SYNCHRONOUS, _FREE, _NEXT, _ERRORS, _GOODBYE):
             return Answer(command, self._execute_session_command(command.code))
-        function = served(command.code)
+        function = handler_of(command.code)
         request = Request(function.name, command, self._context)
         if command.mode not in (wire.STREAMING, wire.STREAMING_SPLIT):
             return self._call(command, request, function.do)
