@@ -18,7 +18,7 @@ from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.scripting.api import listing
 from drone_sim.scripting.api.calls import Api, Function, contents
 from drone_sim.scripting.api.constants import bare
-from drone_sim.scripting.api.control import Call, Steps, Turns, Wait, waits
+from drone_sim.scripting.api.control import Action, Call, Steps, Turns, Wait, waits
 from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.scripts import ScriptFunctions
 from drone_sim.scripting.api.threads import Threads
@@ -101,11 +101,8 @@ class ApiStubs:
 
     # ---- phases
 
-    def begin(self, phase: str, answers: Answers) -> None:
-        """Start a phase with the results of its expected reads."""
-        self._begin(phase, 0, answers)
-
-    def _begin(self, phase: str, number: int, answers: Answers) -> None:
+    def begin(self, phase: str, answers: Answers, number: int = 0) -> None:
+        """Start segment `number` of a phase with the results of its expected reads."""
         values, places = answers
         reads = self._expected.get((phase, number), _NOTHING).reads
         known = {read: value for read, value in zip(reads, values) if value is not Ellipsis}
@@ -253,7 +250,7 @@ class ApiStubs:
             raise
         phase, number = segment.phase, segment.number + 1
         self.end()
-        self._begin(phase, number, answers)
+        self.begin(phase, answers, number)
         return result
 
     def _send(self, name: str, arguments: Any, named: Any, segment: int) -> tuple[Any, Answers]:
@@ -262,34 +259,22 @@ class ApiStubs:
         item = ["call", name, segment, by_name, *map(marked, arguments)]
         return self._call_outside(lambda: self._link.request(item))  # type: ignore[no-any-return]
 
-    # ---- waits
-
     def _waiting_stub(self, name: str) -> Function:
         def call(*arguments: Any, **named: Any) -> Wait:
-            return _RemoteWait(self._request(name, arguments, named), self._step)
+            number, result = self._request(name, arguments, named), []  # of a wait in the simulation's process
+
+            def steps() -> Steps:
+                answer = None
+                while True:
+                    kind, *rest = self._request("wait", (number, answer), {})
+                    if kind == "over":
+                        result.append(rest[0])
+                        return
+                    answer = yield Call(rest[0], list(rest[1])) if kind == "call" else None
+
+            return Action(steps(), lambda: result[0])
 
         return call
-
-    def _step(self, number: int, answer: Any) -> Any:
-        return self._request("wait", (number, answer), {})
-
-
-class _RemoteWait(Wait):
-    """A wait in the simulation's process."""
-
-    def __init__(self, number: int, step: Callable[[int, Any], Any]):
-        super().__init__(lambda: False)
-        self._number, self._step, self._value = number, step, None
-        self.value = lambda: self._value
-
-    def __iter__(self) -> Steps:
-        answer = None
-        while True:
-            kind, *rest = self._step(self._number, answer)
-            if kind == "over":
-                self._value = rest[0]
-                return
-            answer = yield Call(rest[0], list(rest[1])) if kind == "call" else None
 
 
 def _form(name: str, arguments: tuple[Any, ...]) -> Any:

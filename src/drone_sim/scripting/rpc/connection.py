@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import marshal
 import socket
 import struct
@@ -95,7 +96,7 @@ class ScriptConnection:
         self.processor = processor
         self.permit: Permit = _all_permitted
         self.items: deque[list[Any]] = deque()  # received and not yet handled
-        self._numbers = 0
+        self.numbers = itertools.count(1)  # of the scripts in the script's process
         self.why_closed = ""  # a line of text; '' while open
         self.is_gone = False  # whether the script's process has ended or does not receive
         self.objects: ObjectTree | None = None
@@ -111,11 +112,6 @@ class ScriptConnection:
         """
         self.objects, self.is_quiet = objects, is_quiet
         self.permit = permit or _all_permitted
-
-    def new_number(self) -> int:
-        """Return a number that identifies another script in the script's process."""
-        self._numbers += 1
-        return self._numbers
 
     def close(self, why: str) -> None:
         """Close the channel; later calls fail with `why`."""

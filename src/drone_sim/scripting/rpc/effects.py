@@ -14,17 +14,10 @@ KINDS = (PLACES, MOTION, PARAMETERS, SIGNALS, TIME, NAMES)
 
 # Pure functions of their arguments, which are called in the script's process.
 OWN_CLASSES: tuple[type, ...] = (Matrices, Poses, Bits, Packing, Tables)
-OWN_THREADS = [
-    "setThreadSwitchTiming",
-    "setThreadAutomaticSwitch",
-    "getThreadAutomaticSwitch",
-    "setStepping",
-    "acquireLock",
-    "releaseLock",
-    "getThreadId",
-    "setThreadResumeLocation",
-    "delegateChildScriptExecution",
-]
+OWN_THREADS = (
+    *("setThreadSwitchTiming", "setThreadAutomaticSwitch", "getThreadAutomaticSwitch", "setStepping", "acquireLock"),
+    *("releaseLock", "getThreadId", "setThreadResumeLocation", "delegateChildScriptExecution"),
+)
 MAX_FUNCTIONS = 100_000  # that a script may pass to the simulation
 MAX_READS = 200  # reads of a segment, handles of a segment, and segments, that a script may announce
 OWN_LOG = ("addLog", "addStatusbarMessage")

@@ -136,8 +136,8 @@ class ScriptWorker:
         try:
             result = script.do(command, arguments, answers)
         except ScriptError as error:
-            place = [error.phase, error.path, error.line, error.reason]
-            self._queued.append(["failed", script.is_threaded, *map(_sent, place)])
+            place = str(error.phase), str(error.path), int(error.line), str(error.reason)
+            self._queued.append(["failed", script.is_threaded, *place])
             return False
         self._queued.append(["end", script.is_threaded, self.marked(result)])
         return True
@@ -184,10 +184,6 @@ class _LoadedScript:
 
     def _restore(self, number: int) -> None:
         self._snapshots[number]()
-
-
-def _sent(value: Any) -> Any:
-    return value if isinstance(value, int) else str(value)
 
 
 def prepared() -> ScriptWorker:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import inspect
+import itertools
+import logging
 from collections.abc import Callable, Mapping
 from time import monotonic
 from typing import Any, NoReturn
@@ -20,14 +22,16 @@ from drone_sim.scripting.breakpoints import Scope
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.rpc import effects, values
 from drone_sim.scripting.rpc.connection import Disconnected, ScriptConnection
-from drone_sim.scripting.rpc.expected_reads import ExpectedReads
-from drone_sim.scripting.rpc.places import Place
+from drone_sim.scripting.rpc.places import Place, place_of
 from drone_sim.scripting.rpc.values import ALL_PLAIN, PLAIN, InvalidMessage, ScriptFunction, kind_of
 from drone_sim.scripting.time_limit import TimeLimit
 
+_LOG = logging.getLogger(__name__)
 GRACE = 5.0  # s beyond the time limit, which the script's process should enforce itself
 _MAX_WAITS = 1000
-_MAX_TEXT = 1000  # characters of an error text
+_MAX_TEXT = 1000  # characters of an error text, and of the name of a phase
+_POSE_FUNCTION = f"sim.{effects.PLACED[-1]}"  # reads the complete pose of an object
+_NO_READS: tuple[list[Any], list[int]] = ([], [])
 
 
 class ConnectionClosed(ScriptError):
@@ -40,7 +44,7 @@ class ScriptProxy(Script):
     def __init__(self, connection: ScriptConnection, path: str, modules: Mapping[str, Api], limit: TimeLimit):
         """Load the script file at `path` with the API `modules`, in the process of `connection`. Raises ScriptError."""
         self._connection, self._path = connection, path
-        self._number = connection.new_number()  # identifies the script in its process
+        self._number = next(connection.numbers)  # identifies the script in its process
         self._modules, self._limit = modules, limit
         self._functions = {
             f"{name}.{key}": function for name, api in modules.items() for key, function in contents(api)[1].items()
@@ -186,7 +190,11 @@ class ScriptProxy(Script):
                 elif kind == "end":
                     return self._returned(phase, item)
                 elif kind == "failed":
-                    self._failed(item)
+                    if len(item) != 6 or [type(field) for field in item[2:]] != [str, str, int, str]:
+                        raise InvalidMessage("malformed failure")
+                    _, threaded, name, path, line, reason = item
+                    self._thread_is_alive = threaded is True
+                    raise ScriptError(name[:_MAX_TEXT], path[:_MAX_TEXT], line, reason)
                 else:
                     raise InvalidMessage(f"unknown reply '{kind:.20}'")
         finally:
@@ -200,13 +208,6 @@ class ScriptProxy(Script):
         if self._failure is not None:
             raise ScriptError(phase, self._path, 0, self._explained(*self._failure))
         return None if item[2] is None else self._value(item[2])
-
-    def _failed(self, item: list[Any]) -> NoReturn:
-        if len(item) != 6 or [type(field) for field in item[2:]] != [str, str, int, str]:
-            raise InvalidMessage("malformed failure")
-        _, threaded, phase, path, line, reason = item
-        self._thread_is_alive = threaded is True
-        raise ScriptError(phase[:_MAX_TEXT], path[:_MAX_TEXT], line, reason)
 
     # ---- requests of the script
 
@@ -238,7 +239,7 @@ class ScriptProxy(Script):
             if self._failure is not None:
                 (item[1], failure), self._failure = self._failure, None
                 raise failure
-            result = self._called(item[1], item[4:], _named_arguments(item[3]))
+            result = self._called(item[1], item[4:], item[3])
             answer: tuple[Any, ...] = "is", values.outgoing(self._waits.kept(result)), self._reads(phase, item[2])
         except (InvalidMessage, ConnectionClosed):
             raise
@@ -248,24 +249,31 @@ class ScriptProxy(Script):
         self._deadline += monotonic() - began
         self._connection.send(answer)
 
-    def _called(self, name: Any, arguments: list[Any], named: Mapping[str, Any]) -> Any:
+    def _called(self, name: Any, arguments: list[Any], named: list[Any]) -> Any:
+        """Return the result of a call; `named` are pairs of names and arguments."""
+        if not all(type(pair) is list and len(pair) == 2 and type(pair[0]) is str for pair in named):
+            raise InvalidMessage("malformed named arguments")
         function = self._functions.get(name) if type(name) is str else None
-        in_order = arguments if ALL_PLAIN(map(type, arguments)) else [self._value(value) for value in arguments]
-        by_name = {key: self._value(value) for key, value in named.items()} if named else named
+        positional = arguments if ALL_PLAIN(map(type, arguments)) else [self._value(value) for value in arguments]
+        by_name = {key: self._value(value) for key, value in named}
         if name == "wait":
-            return self._waits.step(*in_order)
+            return self._waits.step(*positional)
         if function is None:
             raise InvalidMessage("unknown function of the API")
-        on_result = self._connection.permit(name, _in_order(function, in_order, by_name))
-        result = function(*in_order, **by_name)
+        in_order = positional
+        if by_name:  # arguments that do not fit are reported by the function itself
+            others = [*inspect.signature(function).parameters][len(positional) :]
+            in_order = [*positional, *(by_name.get(name) for name in others)]
+        on_result = self._connection.permit(name, in_order)
+        result = function(*positional, **by_name)
         if on_result is not None:
             on_result(result)
         return result
 
     def _value(self, value: Any) -> Any:
-        return values.unmarked(value, self._function_there)
+        return values.unmarked(value, self._script_function)
 
-    def _function_there(self, number: int) -> ScriptFunction:
+    def _script_function(self, number: int) -> ScriptFunction:
         if number not in self._handed:
             if len(self._handed) >= effects.MAX_FUNCTIONS:
                 raise InvalidMessage("too many functions")
@@ -284,24 +292,65 @@ class ScriptProxy(Script):
         return self._expected.results_of(phase, segment)
 
 
-def _named_arguments(pairs: list[Any]) -> dict[str, Any]:
-    """Return arguments by name. Raises InvalidMessage."""
-    if not all(type(pair) is list and len(pair) == 2 and type(pair[0]) is str for pair in pairs):
-        raise InvalidMessage("malformed named arguments")
-    return dict(pairs)
-
-
-def _in_order(function: Function, positional: list[Any], by_name: Mapping[str, Any]) -> list[Any]:
-    """Return a call's arguments in order; the function itself reports arguments that do not fit."""
-    if not by_name:
-        return positional
-    names = [*inspect.signature(function).parameters]
-    return [*positional, *(by_name.get(name) for name in names[len(positional) :])]
-
-
 def _text(error: Exception) -> str:
     text = error.args[0] if isinstance(error, KeyError) and error.args else error
     return str(text)[:_MAX_TEXT]
+
+
+class ExpectedReads:
+    """The expected reads of a script, by phase and segment."""
+
+    def __init__(self, connection: ScriptConnection, functions: Mapping[str, Function], value: Callable[[Any], Any]):
+        """Create empty lists; `functions` are the script's API, `value` decodes an argument."""
+        self._connection, self._functions, self._value = connection, functions, value
+        self._expected: dict[tuple[str, int], tuple[list[tuple[Function, list[Any]]], list[int]]] = {}
+
+    def note(self, item: list[Any]) -> None:
+        """Store the reads that the script announces for a segment of a phase. Raises InvalidMessage."""
+        if [type(field) for field in item[1:]] != [str, int, list, list]:
+            raise InvalidMessage("malformed list of reads")
+        if max(len(item[3]), len(item[4]), len(self._expected)) > effects.MAX_READS:
+            raise InvalidMessage("too many reads")
+        if not all(type(handle) is int for handle in item[4]):
+            raise InvalidMessage("handles must be integers")
+        reads = [self._read(read) for read in item[3]]
+        handles = [handle for handle in item[4] if self._is_permitted(_POSE_FUNCTION, [handle])]
+        self._expected[item[1][:_MAX_TEXT], item[2]] = reads, handles
+
+    def _read(self, read: Any) -> tuple[Function, list[Any]]:
+        if type(read) is not list or not read or type(read[0]) is not str:
+            raise InvalidMessage("not a read")
+        name = read[0]
+        if name not in effects.READS or name not in self._functions:
+            raise InvalidMessage("not a read")
+        arguments = [self._value(value) for value in read[1:]]
+        return (self._functions[name] if self._is_permitted(name, arguments) else _refused), arguments
+
+    def _is_permitted(self, name: str, arguments: list[Any]) -> bool:
+        try:
+            self._connection.permit(name, arguments)
+        except ValueError:
+            return False
+        return True
+
+    def results_of(self, phase: str, segment: int) -> tuple[list[Any], list[Place]]:
+        """Return the results of the expected reads (Ellipsis if a read fails), and poses of objects."""
+        reads, handles = self._expected.get((phase, segment), _NO_READS)
+        results = []
+        for function, arguments in reads:
+            try:
+                results.append(values.outgoing(function(*arguments)))
+            except Exception:  # raised again if the script makes the call
+                _LOG.debug("an expected read failed:", exc_info=True)
+                results.append(...)
+        objects = self._connection.objects
+        if objects is None:
+            return results, []
+        return results, [place for handle in handles if (place := place_of(objects, handle)) is not None]
+
+
+def _refused(*_: Any) -> NoReturn:
+    raise ValueError("the script may not read this")
 
 
 class PendingWaits:
@@ -309,7 +358,7 @@ class PendingWaits:
 
     def __init__(self) -> None:
         self._waits: dict[int, tuple[Any, Wait]] = {}
-        self._last = 0
+        self._numbers = itertools.count(1)
 
     def kept(self, value: Any) -> Any:
         """Return `value`, or for a Wait the number that it is stored under. Raises ValueError for too many waits."""
@@ -317,9 +366,9 @@ class PendingWaits:
             return value
         if len(self._waits) >= _MAX_WAITS:
             raise ValueError(f"at most {_MAX_WAITS} coroutines of a script may wait at once")
-        self._last += 1
-        self._waits[self._last] = iter(value), value
-        return self._last
+        number = next(self._numbers)
+        self._waits[number] = iter(value), value
+        return number
 
     def step(self, number: Any = None, answer: Any = None, *_: Any) -> Any:
         """Advance a wait: return ("wait",), ("call", function, arguments) or ("over", value).

@@ -10,7 +10,7 @@ are JSON, which contains nothing but data. A JSON object is a mark, identified b
 from __future__ import annotations
 
 import base64
-import binascii
+import functools
 import json
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Mapping
@@ -126,13 +126,7 @@ def incoming(value: Any, function: Callable[[int], Any], functions: Callable[[in
     return (functions if mark == "functions" else function)(rest[0])
 
 
-_classes: dict[tuple[str, tuple[str, ...]], Any] = {}
-
-
-def _class_of(name: str, names: tuple[str, ...]) -> Any:
-    if (name, names) not in _classes:
-        _classes[name, names] = namedtuple(name, names)
-    return _classes[name, names]
+_class_of = functools.cache(namedtuple)
 
 
 # ---- from the script
@@ -212,23 +206,21 @@ def unmarked(value: Any, function: Callable[[int], Any], depth: int = 0) -> Any:
         raise InvalidMessage("values nested too deeply")
     if kind is list:
         return value if ALL_PLAIN(map(type, value)) else [unmarked(item, function, depth + 1) for item in value]
-    mark, inner = _mark(value)
+    mark = next(iter(value), "")
+    inner: Any = value.get(mark)
+    content = type(inner)
+    if len(value) != 1 or content is not _MARKS.get(mark):
+        raise InvalidMessage("unknown mark")
     if mark == "b":
-        return _bytes(inner)
+        try:
+            return base64.b64decode(inner, validate=True)
+        except ValueError:
+            raise InvalidMessage("not base64") from None
     if mark == "f":
         return function(inner)
     if mark == "t":
         return tuple([unmarked(item, function, depth + 1) for item in inner])
     return _mapping(mark, inner, function, depth)
-
-
-def _mark(value: dict[str, Any]) -> tuple[str, Any]:
-    """Return a mark and its content. Raises InvalidMessage."""
-    if len(value) == 1:
-        ((mark, inner),) = value.items()
-        if type(inner) is _MARKS.get(mark):
-            return mark, inner
-    raise InvalidMessage("unknown mark")
 
 
 def _mapping(mark: str, pairs: list[Any], function: Callable[[int], Any], depth: int) -> Any:
@@ -243,10 +235,3 @@ def _mapping(mark: str, pairs: list[Any], function: Callable[[int], Any], depth:
     if not all(type(key) is str and key.isidentifier() and not key.startswith("_") for key, _ in decoded):
         raise InvalidMessage("unknown field")
     return SimpleNamespace(**dict(decoded))
-
-
-def _bytes(text: str) -> bytes:
-    try:
-        return base64.b64decode(text, validate=True)
-    except (binascii.Error, ValueError):
-        raise InvalidMessage("not base64") from None
