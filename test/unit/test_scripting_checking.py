@@ -3,7 +3,7 @@
 import pytest
 
 from drone_sim.files.resources import package_path
-from drone_sim.scripting.checking.worker import Checker
+from drone_sim.scripting.checking import Checker
 
 PACKAGE = package_path()
 

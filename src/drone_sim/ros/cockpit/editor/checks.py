@@ -10,7 +10,7 @@ import sys
 import threading
 from typing import Any
 
-from drone_sim.scripting.checking.findings import LARGEST, Finding
+from drone_sim.scripting.checking import LARGEST, Finding
 
 _TIMEOUT = 5.0  # s for a check
 _FIRST_TIMEOUT = 30.0  # s for the first one, which imports the API
@@ -42,7 +42,7 @@ class TextChecker:
         """Return the process's reply, one line; '' if it did not reply in time."""
         is_first = self._process is None
         if self._process is None:
-            command = [sys.executable, "-m", "drone_sim.scripting.checking.worker"]
+            command = [sys.executable, "-m", "drone_sim.scripting.checking"]
             self._process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
             )
