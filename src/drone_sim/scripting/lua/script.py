@@ -28,7 +28,6 @@ from drone_sim.scripting.lua import functions, state
 from drone_sim.scripting.lua.helpers import LuaHelpers
 from drone_sim.scripting.lua.source import LuaSource, mixed_forms
 from drone_sim.scripting.lua.thread import MOST_ABANDONED, Abandoned, Executor, LuaThread, SameThread, count_abandoned
-from drone_sim.scripting.lua.variables import read_rows
 from drone_sim.scripting.time_limit import Labels, TimeLimit
 
 _LOG = logging.getLogger(__name__)  # for messages about scripts, not from scripts
@@ -196,7 +195,7 @@ class LuaScript(Script):
             self._run("breakpoints", self._lua["break_at"], *places[:_MOST_PLACES])
 
     def variables(self) -> list[Scope]:
-        return [] if self._end else read_rows(self._run("variables", self._lua["variables"]))
+        return [] if self._end else state.read_rows(self._run("variables", self._lua["variables"]))
 
     def _save(self) -> Callable[[], None]:
         snapshot = self._run("snapshot", self._lua.get("save_state"))

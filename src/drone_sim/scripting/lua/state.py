@@ -16,9 +16,16 @@ from typing import Any
 from drone_sim.scripting import script_log
 from drone_sim.scripting.api.constants import CALL_TYPES
 from drone_sim.scripting.api.control import CALLS_PER_MS, DEFAULT_MS, LONGEST_MS, NO_THREAD, SHORTEST_MS
-from drone_sim.scripting.breakpoints import Breakpoints
+from drone_sim.scripting.breakpoints import (
+    LONGEST_NAME,
+    LONGEST_VALUE,
+    MOST_INSIDE,
+    MOST_ROWS,
+    Breakpoints,
+    Row,
+    Scope,
+)
 from drone_sim.scripting.errors import LONGEST_MESSAGE
-from drone_sim.scripting.lua import variables
 from drone_sim.scripting.lua.helpers import LuaHelpers
 from drone_sim.scripting.lua.thread import Executor, SameThread
 from drone_sim.scripting.lua.values import Values
@@ -27,24 +34,13 @@ from drone_sim.scripting.time_limit import TimeLimit
 
 OLDEST = "lua51"  # the version in V-REP 3.x
 _NEWEST_FIRST = ("lua55", "lua54", "lua53", "lua52", OLDEST)
-_FILES = (
-    "limits",
-    "shortcuts",
-    "threads",
-    "values",
-    "code",
-    "snapshots",
-    "calls",
-    "globals",
-    "matrix",
-    "files",
-    "variables",
-)  # each uses the ones before it
+_FILES = ("limits", "threads", "values", "code", "calls", "globals", "matrix", "files", "variables")  # in this order
 MIB = 1024 * 1024
 MEMORY = 256 * MIB  # bytes that a script may use
 _CAP = MEMORY + 256 * MIB  # at which allocations fail; larger, because lupa's own allocations must not fail
 _MUCH = 32 * MIB
 
+_END_OF_FIELD, _END_OF_ROW = "\x1f", "\x1e"
 Reader = Callable[[bytes], tuple[bool, bytes, bytes]]  # by name: whether it exists, text, chunk name
 TIME, OVER_MEMORY, MUCH_MEMORY = 1, 2, -1  # why Lua stops a script, or checks it more often (limits.lua)
 
@@ -152,7 +148,12 @@ class LuaState:
             "module": self._reader(helpers.read),
             "file": self._reader(helpers.read_file),
             "data": self._reader(helpers.read_data),
-            **variables.bridge(breakpoints, helpers.path, self._known_names),
+            "most_rows": MOST_ROWS,
+            "most_inside": MOST_INSIDE,
+            "longest_value": LONGEST_VALUE,
+            "reached": functools.partial(_reach, breakpoints, helpers),
+            "is_first": lambda: breakpoints.reached is None,
+            "known": self._known_names,
         }
         table = self.runtime.table_from({key.encode(): value for key, value in bridge.items()})
         self.sandbox: Any = self.runtime.table()
@@ -190,6 +191,39 @@ class LuaState:
 
     def _reader(self, read: Reader) -> Reader:
         return lambda name: (False, b"stopped", b"") if self.executor.closed else read(name)
+
+
+# ---- variables and breakpoints, as variables.lua reports them
+
+
+def read_rows(text: bytes) -> list[Scope]:
+    """Return the scopes encoded in a text, with their rows sorted by name, because Lua's order is random."""
+    scopes: list[Scope] = []
+    inside: list[Row] = []
+    for row in reversed(text.decode("utf-8", "replace").split(_END_OF_ROW)):
+        depth, name, kind, value = (*row.split(_END_OF_FIELD), "", "", "", "")[:4]
+        if depth == "2":
+            inside.append(Row(name[:LONGEST_NAME], kind, value))
+        elif depth == "1":
+            scopes = scopes or [Scope("", [])]
+            scopes[-1].rows.append(Row(name[:LONGEST_NAME], kind, value, tuple(sorted(inside, key=_sort_key))))
+            inside = []
+        elif depth == "0":
+            scopes = [*(scopes or [Scope("", [])])]
+            scopes[-1] = Scope(name, sorted(scopes[-1].rows))
+            scopes.append(Scope("", []))
+    return scopes[:-1][::-1]
+
+
+def _sort_key(row: Row) -> tuple[bool, float, str]:
+    """Return a sort key: first the indices of lists, by number, then names."""
+    number = row.name[1:-1] if row.name[:1] == "[" else ""
+    is_number = number.lstrip("-").isdigit()
+    return not is_number, float(number) if is_number else 0.0, row.name
+
+
+def _reach(breakpoints: Breakpoints, helpers: LuaHelpers, chunk: bytes, line: int, rows: bytes) -> None:
+    breakpoints.reach(helpers.path(chunk.decode("utf-8", "replace")), int(line), lambda: read_rows(rows))
 
 
 @functools.cache

@@ -113,13 +113,11 @@ class LuaThread:
             self._execute_request()
         while not self._has_ended(min(max(_POLL, self._limit.left()), threading.TIMEOUT_MAX)):
             if self._limit.exceeded():
-                self._wait_beyond(self._cpu_time() + _GRACE)
+                last = self._cpu_time() + _GRACE
+                while not self._has_ended(_POLL):
+                    if self._cpu_time() > last or self._limit.left() < -_PATIENCE:
+                        self._abandon()
                 return
-
-    def _wait_beyond(self, last: float) -> None:
-        while not self._has_ended(_POLL):
-            if self._cpu_time() > last or self._limit.left() < -_PATIENCE:
-                self._abandon()
 
     def _cpu_time(self) -> float:
         """Return the CPU time (s) of the thread; 0 if it is unknown."""

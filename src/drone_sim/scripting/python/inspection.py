@@ -1,4 +1,4 @@
-"""Variables of a Python script in readable form, without calling any code of the script.
+"""Breakpoints of Python scripts, and variables in readable form, without calling any code of the script.
 
 No method of a script's class is called, neither `__repr__` nor a property. Only the type is shown of a value that would
 need them. The size of the result is always limited.
@@ -9,12 +9,12 @@ from __future__ import annotations
 import itertools
 import sys
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from types import BuiltinFunctionType, FrameType, FunctionType, GetSetDescriptorType, MethodType, ModuleType
 from typing import Any
 
 from drone_sim.scripting.api.calls import Api
-from drone_sim.scripting.breakpoints import LONGEST_NAME, LONGEST_VALUE, MOST_INSIDE, MOST_ROWS, Row, Scope
+from drone_sim.scripting.breakpoints import LONGEST_NAME, LONGEST_VALUE, MOST_INSIDE, MOST_ROWS, Breakpoints, Row, Scope
 
 _FEW = 13  # values shown in a line
 _LONG = 256  # bits of the largest number that is shown
@@ -24,6 +24,43 @@ _UNINTERESTING = (ModuleType, FunctionType, BuiltinFunctionType, MethodType, typ
 # Attributes of a class itself, whatever its metaclass returns for them.
 _name_of, _classes_of = type.__dict__["__name__"].__get__, type.__dict__["__mro__"].__get__
 _names_in = type.__dict__["__dict__"].__get__
+_set_trace, _get_trace = sys.settrace, sys.gettrace  # before process.py replaces them
+
+
+class LineTracer:
+    """Detects reached breakpoints, by a trace function that Python calls for each line."""
+
+    def __init__(self, breakpoints: Breakpoints):
+        """`breakpoints` may change later."""
+        self._breakpoints = breakpoints
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a function, and trace it with all functions that it calls. Raises its exceptions."""
+        before = _get_trace()
+        _set_trace(self._on_call)
+        try:
+            return function(*arguments)
+        finally:
+            _set_trace(before)
+
+    def resume(self) -> None:
+        """Trace a thread that starts or resumes; to be called in its greenlet."""
+        _set_trace(None)  # since 3.13, only frames that run when tracing is switched on are traced
+        _set_trace(self._on_call)
+        frame: FrameType | None = sys._getframe()
+        while frame is not None:
+            if self._breakpoints.lines(frame.f_code.co_filename):
+                frame.f_trace = self._on_line
+            frame = frame.f_back
+
+    def _on_call(self, frame: FrameType, _event: str, _argument: Any) -> Any:
+        return self._on_line if self._breakpoints.lines(frame.f_code.co_filename) else None
+
+    def _on_line(self, frame: FrameType, event: str, _argument: Any) -> Any:
+        file = frame.f_code.co_filename
+        if event == "line" and frame.f_lineno in self._breakpoints.lines(file):
+            self._breakpoints.reach(file, frame.f_lineno, lambda: variables_at(frame))
+        return self._on_line
 
 
 def variables(script: Mapping[str, Any]) -> list[Scope]:
@@ -51,7 +88,10 @@ def _rows(values: Mapping[Any, Any]) -> list[Row]:
     """Return the rows of variables, without functions, classes and modules."""
     own = ((name, value) for name, value in values.items() if type(name) is str and name[:2] != "__")
     shown = ((name, value) for name, value in own if not issubclass(type(value), _UNINTERESTING))
-    return [_row(name, value, _inside(value)) for name, value in itertools.islice(shown, MOST_ROWS)]
+    return [
+        _row(name, value, tuple(_row(*item) for item in itertools.islice(_items(value), MOST_INSIDE)))
+        for name, value in itertools.islice(shown, MOST_ROWS)
+    ]
 
 
 def _row(name: str, value: Any, inside: tuple[Row, ...] = ()) -> Row:
@@ -62,13 +102,8 @@ def _type_name(value: Any) -> str:
     return str(_name_of(type(value)))[:LONGEST_NAME]
 
 
-def _inside(value: Any) -> tuple[Row, ...]:
-    """Return the values inside a value, one level deep."""
-    items = itertools.islice(_items(value), MOST_INSIDE)
-    return tuple(_row(name, item) for name, item in items)
-
-
 def _items(value: Any) -> Iterator[tuple[str, Any]]:
+    """Return the values inside a value, one level deep."""
     kind = type(value)
     if issubclass(kind, dict):
         return ((shown(key) or _type_name(key), item) for key, item in dict.items(value))

@@ -24,9 +24,9 @@ from drone_sim.scripting.breakpoints import Breakpoints, Scope
 from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.phase_names import FUNCTIONS, THREADS
 from drone_sim.scripting.python.helpers import Helpers
+from drone_sim.scripting.python.inspection import LineTracer
 from drone_sim.scripting.python.inspection import variables as variables_of
 from drone_sim.scripting.python.process import Forks, end_copy, process_kept
-from drone_sim.scripting.python.tracing import LineTracer
 from drone_sim.scripting.script_log import THREAD_GOES_ON, say, shown
 from drone_sim.scripting.time_limit import Labels, ScriptStopped, TimeLimit
 

@@ -13,7 +13,7 @@ import greenlet
 
 from drone_sim.scripting.api.calls import Api, contents
 from drone_sim.scripting.api.control import Turns
-from drone_sim.scripting.python.tracing import LineTracer
+from drone_sim.scripting.python.inspection import LineTracer
 from drone_sim.scripting.time_limit import ScriptStopped
 
 _abandoned: list[greenlet.greenlet] = []  # that did not end; referenced, because Python resumes them to free them
