@@ -11,16 +11,18 @@ Restore = Callable[[], None]
 _CONTAINERS = (list, dict, set, deque)
 
 
-def saved(owner: object, *names: str) -> Restore:
+def saved(owner: object, *names: str, deep: bool = False) -> Restore:
     """Return a function that gives the attributes `names` of `owner` the values back that they have now.
 
     Lists, dicts, sets and deques are copied, but not their items. Other values must be replaced, not changed in place.
+    `deep`: everything is copied.
     """
-    values = {name: _copy_of_container(getattr(owner, name)) for name in names}
+    copied = copy.deepcopy if deep else _copy_of_container
+    values = {name: copied(getattr(owner, name)) for name in names}
 
     def restore() -> None:
         for name, value in values.items():
-            setattr(owner, name, _copy_of_container(value))
+            setattr(owner, name, copied(value))
 
     return restore
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import copy
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.path import Path
+from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
@@ -34,14 +35,9 @@ class CustomData:
         """Remove all values, as at the beginning of a run."""
         self.values.clear()
 
-    def save_state(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that restores the present values."""
-        kept = copy.deepcopy(self.values)
-
-        def restore() -> None:
-            self.values = copy.deepcopy(kept)
-
-        return restore
+        return saved(self, "values", deep=True)
 
     def set(self, handle: int, name: str, value: Any) -> None:
         """Store a value, or remove it if `value` is None or ''. Raises WrongValue, ValueError."""
@@ -88,9 +84,8 @@ class CustomDataFunctions:
         A path of the scene has its points under PATH, and under PATHCTRLPTS: 7 doubles each.
         """
         value = self._data.values.get((self._target(handle), _CUSTOM + tag))
-        return self._path_data(handle) if value is None and tag in _PATHS else value
-
-    def _path_data(self, handle: int) -> bytes | None:
+        if value is not None or tag not in _PATHS:
+            return value
         path = self._objects[handle] if handle >= 0 else None
         return struct.pack(f"<{len(path.table)}d", *path.table) if isinstance(path, Path) else None
 

@@ -1,4 +1,4 @@
-"""`sim`: dynamics of objects, and parameters of objects (getObjectInt32Param and others).
+"""`sim`: dynamics and parameters of objects (getObjectInt32Param and others), and masses of the scene's shapes.
 
 As in V-REP 3.x, a motor that is on runs at the target velocity without control, and to the target position with
 control.
@@ -9,9 +9,12 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Mapping
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
 
 from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import IDENTITY, Matrix
 from drone_sim.mechanics.inertia import Inertia, turned
 from drone_sim.mechanics.joint import KINEMATIC, PASSIVE, POSITION, VELOCITY, Joint
 from drone_sim.mechanics.object_collections import members
@@ -21,16 +24,24 @@ from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.sensors import EVERYTHING, Detector
-from drone_sim.scripting.api.types import Handle, Number, Numbers, TwelveNumbers, WrongValue, numbers
+from drone_sim.scripting.api.types import Handle, Number, Numbers, ThreeNumbers, TwelveNumbers, WrongValue, numbers
 from drone_sim.scripting.api.vision import Eye
+from drone_sim.shapes.mass import principal
 
 Getters = Mapping[str, Callable[[], float]]
 Setters = Mapping[str, Callable[[float], None]]
-_NONE = Inertia((0.0,) * 9, frames.IDENTITY)
+_NO_INERTIA = Inertia((0.0,) * 9, IDENTITY)
 _EVERYTHING = (CONSTANTS["handle_all"], CONSTANTS["handle_scene"])
 _COLOR_CODED = 2  # render mode in which colours are handles
 _INTEGER = ("objintparam_", "shapeintparam_", "jointintparam_", "visionintparam_", "proxintparam_")
 _FLOAT = ("objfloatparam_", "shapefloatparam_", "jointfloatparam_", "visionfloatparam_")
+_LEAST_MASS = _LEAST_MOMENT = 1e-7  # kg; m² (moment divided by mass); as in V-REP
+_NO_PRIMITIVE = CONSTANTS["primitiveshape_none"]
+_COMPOUND, _PURE, _CONVEX = 1, 2, 4  # bits from getShapeGeomInfo
+_PRIMITIVES = {
+    word: CONSTANTS[f"primitiveshape_{vreps}"]
+    for word, vreps in (("box", "cuboid"), ("sphere", "spheroid"), ("cylinder", "cylinder"), ("capsule", "capsule"))
+}
 
 
 @runtime_checkable
@@ -126,7 +137,7 @@ class Dynamics(Functions):
         They are in the frame of `transform`, or the world frame without one. If the dynamics does not move the shape,
         mass and inertia are zero.
         """
-        inertia = self._inertia(handle) or _NONE
+        inertia = self._inertia(handle) or _NO_INERTIA
         place = frames.multiply(self._objects[handle].matrix(), inertia.frame)
         if transform is not None:
             place = frames.multiply(frames.invert(numbers(transform, 12)), place)
@@ -194,14 +205,14 @@ class Dynamics(Functions):
     @sim("345")
     def getObjectFloatParameter(self, handle: Handle, parameter: int) -> tuple[int, float]:
         """Return 1 and the value of getObjectFloatParam; 0 and 0 for an unknown parameter."""
-        found, velocities = self._objects[handle], self._context.velocities
+        found, velocities, operations = self._objects[handle], self._context.velocities, self._services.operations
         known: dict[str, Callable[[], float]] = {
             "shapefloatparam_mass": lambda: self.getShapeMass(handle),
             "objfloatparam_abs_x_velocity": lambda: velocities.velocity(handle)[0][0],
             "objfloatparam_abs_y_velocity": lambda: velocities.velocity(handle)[0][1],
             "objfloatparam_abs_z_velocity": lambda: velocities.velocity(handle)[0][2],
             "objfloatparam_abs_rot_velocity": lambda: math.hypot(*velocities.rotation(handle)),
-            "objfloatparam_size_factor": lambda: self._factor(handle),
+            "objfloatparam_size_factor": lambda: operations.factors(handle)[0] if operations is not None else 1.0,
             **(self._corners(handle) if isinstance(found, Freezable) else {}),
             **readable(found),
         }
@@ -237,9 +248,6 @@ class Dynamics(Functions):
             for end, factor in ends.items()
             for axis, name in enumerate("xyz")
         }
-
-    def _factor(self, handle: int) -> float:
-        return self._services.operations.factors(handle)[0] if self._services.operations is not None else 1.0
 
     def _set(self, function: str, handle: int, kinds: tuple[str, ...], parameter: int, value: float) -> int:
         found, names = self._objects[handle], _names(kinds, parameter)
@@ -285,3 +293,90 @@ def _names(kinds: tuple[str, ...], parameter: int) -> list[str]:
         known = [name for name in CONSTANTS if name.startswith(kinds)]
         raise ValueError(f"{parameter:g} is not a parameter of an object; {near_names(kinds[0], known)}")
     return found
+
+
+# ---- masses of the scene's shapes
+
+
+class ShapeMasses(Functions):
+    """Mass, inertia and geometry of the scene's shapes."""
+
+    @sim("345")
+    def setShapeMassAndInertia(
+        self,
+        handle: Handle,
+        mass: Number,
+        inertiaMatrix: Numbers,
+        centerOfMass: ThreeNumbers,
+        transform: TwelveNumbers | None = None,
+    ) -> int:
+        """Set mass (kg), inertia about the center of mass (kg m², 9 numbers), and center of mass (m) of a shape.
+
+        Both are in the frame of `transform`, or the world frame without one (3.x). A static shape stays static. Return
+        1.
+        """
+        (kilograms,) = numbers((mass,), 1)
+        place = IDENTITY if transform is None else numbers(transform, 12)
+        frame = frames.multiply(frames.invert(self._objects[handle].matrix()), place)
+        self._set(handle, max(kilograms, _LEAST_MASS), inertiaMatrix, _moved(frame, numbers(centerOfMass, 3)))
+        return 1
+
+    @sim("45")
+    def setShapeInertia(self, handle: Handle, inertiaMatrix: Numbers, transform: TwelveNumbers) -> int:
+        """Set the inertia (kg m², 9 numbers) of a shape, in a frame whose origin is the center of mass.
+
+        `transform` is that frame in the shape's frame (4.x). Return 1.
+        """
+        mass = float(getattr(self._objects[handle], "mass", 0.0))
+        if not mass:
+            raise ValueError(f"'{self._objects[handle].name}' has no mass of its own: give it one with setShapeMass")
+        self._set(handle, mass, inertiaMatrix, numbers(transform, 12))
+        return 1
+
+    def _set(self, handle: int, mass: float, tensor: Numbers, frame: Matrix) -> None:
+        operations = self._services.operations
+        if operations is None:
+            raise ValueError("there is no scene")
+        xx, xy, xz, _, yy, yz, _, _, zz = numbers(tensor, 9)  # only the upper triangle counts, as in V-REP
+        inertia = Inertia((xx, xy, xz, xy, yy, yz, xz, yz, zz), IDENTITY)
+        found = principal(turned(inertia, frame), np.array(frames.position(frame)))
+        entry = {
+            "moments": [max(moment, _LEAST_MOMENT * mass) for moment in found.moments],
+            "position": list(frames.position(found.frame)),
+            "rpy": list(frames.to_rpy(found.frame)),
+        }
+        change = operations.change
+        self._services.outside(lambda: change(int(handle), mass=mass, inertia=entry))
+
+    @sim("345")
+    def getShapeGeomInfo(self, handle: Handle) -> tuple[int, int, list[float]]:
+        """Return the geometry of a shape: bits, the kind, its full sizes along x, y and z (m), and 0.
+
+        Bits: 1 compound, 2 made of primitives, 4 convex. The kind is sim.primitiveshape_cuboid, _spheroid, _cylinder or
+        _capsule; for compounds, meshes and the shapes of vehicles, it is _none, and the sizes are 0.
+        """
+        found = self._objects[handle]
+        if found.kind != "shape":
+            raise WrongValue(f"'{found.name}' is not a shape")
+        operations = self._services.operations
+        forms = operations.forms(int(handle)) if operations is not None else []
+        bits = _PURE if forms and all(word in _PRIMITIVES for word, _ in forms) else 0
+        if len(forms) != 1:
+            return (bits | _COMPOUND if forms else 0), _NO_PRIMITIVE, [0.0] * 4
+        ((word, size),) = forms
+        if not bits:
+            return 0, _NO_PRIMITIVE, [0.0] * 4
+        return bits | _CONVEX, _PRIMITIVES[word], [*_extents(word, size), 0.0]
+
+
+def _moved(frame: Matrix, place: Any) -> Matrix:
+    """Return a frame with its origin moved to a place in it."""
+    x, y, z = frames.transform(frame, place)
+    return (*frame[:3], x, *frame[4:7], y, *frame[8:11], z)
+
+
+def _extents(word: str, size: tuple[float, ...]) -> list[float]:
+    if word == "box":
+        return list(size)
+    across = 2 * size[0]
+    return [across, across, {"sphere": across, "cylinder": size[-1], "capsule": size[-1] + across}[word]]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable
 from typing import Any
 
+from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.types import Handle, Name, Number, WrongValue, numbers
 
@@ -58,14 +58,9 @@ class Graphs:
         """Return the latest value of each stream that has one, by the stream's name."""
         return {name: value for _, name, value in self._streams.values() if value is not None}
 
-    def save_state(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that restores the present streams."""
-        kept = copy.copy(self._streams)
-
-        def restore() -> None:
-            self._streams = copy.copy(kept)
-
-        return restore
+        return saved(self, "_streams")
 
 
 class GraphFunctions:

@@ -14,7 +14,6 @@ from drone_sim.mechanics.inertia import Inertia
 from drone_sim.mechanics.object_collections import Collections
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.velocity_meter import VelocityMeter
-from drone_sim.scripting.api.broadcasts import Broadcasts
 from drone_sim.scripting.api.control import Control, Turns
 from drone_sim.scripting.api.custom_data import CustomData
 from drone_sim.scripting.api.distances import MeasureDistance
@@ -23,7 +22,7 @@ from drone_sim.scripting.api.graphs import Graphs
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.remote_ports import RemotePorts
-from drone_sim.scripting.api.signals import Signals, Tubes
+from drone_sim.scripting.api.signals import Broadcasts, Signals, Tubes
 from drone_sim.scripting.api.types import WrongValue
 from drone_sim.scripting.api.windows import Windows
 from drone_sim.scripting.breakpoints import Breakpoints

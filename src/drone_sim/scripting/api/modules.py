@@ -9,13 +9,13 @@ arguments and the expected arguments.
 from __future__ import annotations
 
 from drone_sim.mechanics.clock import Clock
-from drone_sim.mechanics.saved_state import Restore, in_turn
+from drone_sim.mechanics.saved_state import in_turn
 from drone_sim.scripting.api.calls import Api, functions_of
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.custom_data import CustomDataFunctions
 from drone_sim.scripting.api.distances import DistanceFunctions
 from drone_sim.scripting.api.drawings import DrawingFunctions
-from drone_sim.scripting.api.dynamics import Dynamics
+from drone_sim.scripting.api.dynamics import Dynamics, ShapeMasses
 from drone_sim.scripting.api.graphs import GraphFunctions
 from drone_sim.scripting.api.host import Host, SceneServices
 from drone_sim.scripting.api.ignored import PLUGINS, Ignored
@@ -35,7 +35,6 @@ from drone_sim.scripting.api.ros_functions import RosFunctions, ServiceFunctions
 from drone_sim.scripting.api.scene_objects import SceneObjects, Shapes
 from drone_sim.scripting.api.scripts import ScriptCalls, ScriptFunctions
 from drone_sim.scripting.api.sensors import ProximitySensors, Sensors
-from drone_sim.scripting.api.shape_masses import ShapeMasses
 from drone_sim.scripting.api.signals import SignalFunctions, TubeFunctions
 from drone_sim.scripting.api.simulation import SimulationFunctions
 from drone_sim.scripting.api.threads import Threads
@@ -89,13 +88,11 @@ def make_sim(host: Host, services: SceneServices) -> Api:
         OlderRemotePortFunctions(RemotePortFunctions(context.remote_ports, ignored)),
     )
     return Api(
-        "sim", {**ignored.functions("sim"), **functions_of(*parts)}, CONSTANTS, lambda: _both(names, trajectories)
+        "sim",
+        {**ignored.functions("sim"), **functions_of(*parts)},
+        CONSTANTS,
+        lambda: in_turn(names.save_state(), trajectories.save_state()),
     )
-
-
-def _both(names: NameFunctions, trajectories: TrajectoryFunctions) -> Restore:
-    """Return a function that restores the values that a script has set in both."""
-    return in_turn(names.save_state(), trajectories.save_state())
 
 
 def make_sim_ros(bus: MessageBus, clock: Clock) -> Api:

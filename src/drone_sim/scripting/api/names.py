@@ -13,11 +13,12 @@ was part of its object, so `.` is the model. In the drone's script, both mean th
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from drone_sim.mechanics.object_names import NO_SUFFIX, plain, split, suffixed
 from drone_sim.mechanics.object_tree import WORLD, ObjectTree
+from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.message_text import near_names
 from drone_sim.scripting.api import object_paths
 from drone_sim.scripting.api.calls import sim
@@ -117,14 +118,9 @@ class NameFunctions:
         """Set the suffix that is added to names without one, -1 for none."""
         self.suffix = max(NO_SUFFIX, int(numbers((suffix,), 1)[0]))
 
-    def save_state(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that restores the suffix that setNameSuffix has set."""
-        kept = self.suffix
-
-        def restore() -> None:
-            self.suffix = kept
-
-        return restore
+        return saved(self, "suffix")
 
 
 def find(objects: ObjectTree, name: str, own: str, suffix: int) -> int:

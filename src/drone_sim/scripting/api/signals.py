@@ -1,12 +1,13 @@
-"""`sim`: signals and tubes, which transfer data between scripts."""
+"""Data between scripts: `sim`'s signals and tubes, and the broadcasts of wireless.py."""
 
 from __future__ import annotations
 
-import copy
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.types import (
     MOST_BYTES,
@@ -25,6 +26,7 @@ _LONGEST_NAME = 200  # characters
 _LARGEST = 2**31 - 1
 _MOST_ENDS = 1000  # open ends of tubes
 _LONGEST = 1000  # packets waiting at one end
+_MOST_BROADCASTS = 10_000  # waiting ones
 
 
 class Signals:
@@ -85,14 +87,9 @@ class Signals:
         for kind, values in others._values.items():
             self._values[kind] = {**values, **self._values[kind]}
 
-    def save_state(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that restores the present signals."""
-        kept = copy.deepcopy(self._values)
-
-        def restore() -> None:
-            self._values = copy.deepcopy(kept)
-
-        return restore
+        return saved(self, "_values", deep=True)
 
 
 class SignalFunctions:
@@ -192,14 +189,9 @@ class Tubes:
         self._ends.clear()
         self._last_handle = 0
 
-    def save_state(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that restores the present tubes and their packets."""
-        kept, last = copy.deepcopy(self._ends), self._last_handle
-
-        def restore() -> None:
-            self._ends, self._last_handle = copy.deepcopy(kept), last
-
-        return restore
+        return saved(self, "_ends", "_last_handle", deep=True)
 
 
 class TubeFunctions:
@@ -247,3 +239,47 @@ class TubeFunctions:
         """Return and remove the oldest string that waits at this end; nothing if there is none."""
         waiting = self._tubes.waiting(handle)
         return waiting.popleft() if waiting else None
+
+
+@dataclass(frozen=True)
+class Broadcast:
+    """Data from a script to another, or to sim.handle_all, _tree or _chain, which can be received until a time in s."""
+
+    sender: int
+    target: int
+    header: int
+    name: str
+    data: Text
+    antenna: int
+    radius: float  # m
+    angles: tuple[float, float]  # rad, vertical and horizontal
+    until: float
+    received_by: set[int] = field(default_factory=set)
+
+
+class Broadcasts:
+    """The broadcasts that can still be received."""
+
+    def __init__(self) -> None:
+        self.sent: list[Broadcast] = []
+
+    def clear(self) -> None:
+        """Remove all, as at the beginning of a run."""
+        self.sent = []
+
+    def send(self, broadcast: Broadcast) -> None:
+        """Send data. Raises ValueError if too many are waiting."""
+        size = sum(len(item.data) for item in (broadcast, *self.sent))
+        if len(self.sent) >= _MOST_BROADCASTS or size > MOST_BYTES:
+            limits = f"{_MOST_BROADCASTS} messages or {MOST_BYTES} bytes"
+            raise ValueError(f"more than {limits} are waiting: let them persist for a shorter time")
+        self.sent.append(broadcast)
+
+    def waiting(self, time: float) -> list[Broadcast]:
+        """Return the broadcasts that can be received at a simulated time, oldest first; remove the others."""
+        self.sent = [broadcast for broadcast in self.sent if time <= broadcast.until]
+        return self.sent
+
+    def save_state(self) -> Restore:
+        """Return a function that restores the present broadcasts."""
+        return saved(self, "sent", deep=True)

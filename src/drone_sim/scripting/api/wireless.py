@@ -8,11 +8,11 @@ from collections.abc import Iterator
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix
-from drone_sim.scripting.api.broadcasts import Broadcast
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.registry import Attachment
+from drone_sim.scripting.api.signals import Broadcast
 from drone_sim.scripting.api.types import Handle, Name, Number, Text, WrongValue, numbers
 
 _SELF, _WORLD, _ALL, _TREE, _CHAIN = (CONSTANTS[f"handle_{key}"] for key in ("self", "default", "all", "tree", "chain"))
