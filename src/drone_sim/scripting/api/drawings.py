@@ -131,8 +131,9 @@ class Drawings:
         item = tuple(item[: _NUMBERS[drawn.kind]])
         if drawn.frame is not None and not drawn.local:
             item = _moved(frames.invert(drawn.frame()), item, len(item) == 6 and drawn.kind != "lines")
-        full = not drawn.cyclic and len(drawn.items) == drawn.items.maxlen
-        if not full and not self._has_neighbour(drawn, item):
+        if not drawn.cyclic and len(drawn.items) == drawn.items.maxlen:
+            return
+        if not drawn.tolerance or all(math.dist(other[:3], item[:3]) >= drawn.tolerance for other in drawn.items):
             drawn.items.append(item)
 
     def remove(self, handle: int) -> None:
@@ -163,10 +164,6 @@ class Drawings:
         if handle not in self.objects:
             raise ValueError(f"there is no drawing object with the handle {handle}")
         return self.objects[handle]
-
-    @staticmethod
-    def _has_neighbour(drawn: DrawingObject, item: Item) -> bool:
-        return drawn.tolerance > 0 and any(math.dist(other[:3], item[:3]) < drawn.tolerance for other in drawn.items)
 
 
 def _moved(matrix: Matrix, item: Item, has_normal: bool) -> Item:

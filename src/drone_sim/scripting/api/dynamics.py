@@ -334,9 +334,6 @@ class ShapeMasses(Functions):
         return 1
 
     def _set(self, handle: int, mass: float, tensor: Numbers, frame: Matrix) -> None:
-        operations = self._services.operations
-        if operations is None:
-            raise ValueError("there is no scene")
         xx, xy, xz, _, yy, yz, _, _, zz = numbers(tensor, 9)  # only the upper triangle counts, as in V-REP
         inertia = Inertia((xx, xy, xz, xy, yy, yz, xz, yz, zz), IDENTITY)
         found = principal(turned(inertia, frame), np.array(frames.position(frame)))
@@ -345,8 +342,7 @@ class ShapeMasses(Functions):
             "position": list(frames.position(found.frame)),
             "rpy": list(frames.to_rpy(found.frame)),
         }
-        change = operations.change
-        self._services.outside(lambda: change(int(handle), mass=mass, inertia=entry))
+        self._do(lambda scene: scene.change(int(handle), mass=mass, inertia=entry))
 
     @sim("345")
     def getShapeGeomInfo(self, handle: Handle) -> tuple[int, int, list[float]]:

@@ -28,6 +28,7 @@ from drone_sim.scripting.api.windows import Windows
 from drone_sim.scripting.breakpoints import Breakpoints
 
 _Kind = TypeVar("_Kind")
+_Value = TypeVar("_Value")
 _MOST_NAMES = 20  # in a message
 Caller = Callable[[Callable[[], Any]], Any]
 
@@ -197,6 +198,18 @@ class Functions:
         """
         self._host, self._services, self._ignored = host, services, ignored
         self._context, self._objects = host.context, host.context.objects
+
+    def _do(self, action: Callable[[Operations], _Value]) -> _Value:
+        """Return the result of an action on the scene, outside the script's time limit. Raises ValueError."""
+        operations = self._services.operations
+        if operations is None:
+            raise ValueError("there is no scene")
+        result: _Value = self._services.outside(lambda: action(operations))
+        return result
+
+    def _add(self, name: str, **keys: Any) -> int:
+        """Add an entry of a scene file with a free name and an alias; return the object's handle."""
+        return self._do(lambda scene: scene.add([{"name": scene.free_name(name), "alias": name, **keys}])[0])
 
     def _found(self, handle: int, kind: type[_Kind], called: str) -> _Kind:
         """Return the object with a handle, if it has a type.

@@ -83,19 +83,12 @@ def for_editors() -> dict[str, Any]:
     modules = apis()
     rows = [
         [
-            module,
-            name,
-            flat_name(module, name),
-            generations,
-            arguments_of(function),
-            _sentence(function),
-            page,
-            is_ignored(function),
+            *(module, name, flat_name(module, name), generations, arguments_of(function)),
+            *(_sentence(function), _page(module, name, generations), is_ignored(function)),
         ]
         for module, api in modules.items()
         for declaration, function in declared(api)
         for name, generations in declaration.names.items()
-        for page in [_page(module, name, generations)]
     ]
     return {"functions": sorted(rows), "constants": dict(sorted(contents(modules["sim"])[2].items()))}
 

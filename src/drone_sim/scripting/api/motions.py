@@ -25,32 +25,14 @@ from drone_sim.scripting.api.unknown import PLUGINS
 ABORTED = 2  # result of a step if the script's callback has returned true
 _MOST = 1000  # motions of one script
 _AT_ONCE = {"maxVel": 9999.0, "maxAccel": 99999.0, "maxJerk": 9999999.0}  # with a step of 10 s, as in CoppeliaSim
+# Arguments before 4.6.
 _CONFIG = (
-    "flags",
-    "pos",
-    "vel",
-    "accel",
-    "maxVel",
-    "maxAccel",
-    "maxJerk",
-    "targetPos",
-    "targetVel",
-    "callback",
-    "auxData",
-    "cyclicJoints",
-    "timeStep",
+    *("flags", "pos", "vel", "accel", "maxVel", "maxAccel", "maxJerk", "targetPos", "targetVel"),
+    *("callback", "auxData", "cyclicJoints", "timeStep"),
 )
 _POSE = (
-    "flags",
-    "pose",
-    "maxVel",
-    "maxAccel",
-    "maxJerk",
-    "targetPose",
-    "callback",
-    "auxData",
-    "metric",
-    "timeStep",
+    *("flags", "pose", "maxVel", "maxAccel", "maxJerk", "targetPose"),
+    *("callback", "auxData", "metric", "timeStep"),
 )
 Parameters = dict[str, Any]
 
@@ -81,12 +63,11 @@ class Motion:
         self.data["timeLeft"] = max(0.0, self._trajectory.elapsed - self._trajectory.duration)
         if self._callback is None:
             self._move(self.data)
-        elif (yield Call(self._callback, self._callback_arguments())):
-            return ABORTED
+        else:
+            legacy = [self.data.get(name) for name in (*self._legacy, "auxData")]
+            if (yield Call(self._callback, legacy if self._legacy else [dict(self.data)])):
+                return ABORTED
         return int(self._trajectory.is_over)
-
-    def _callback_arguments(self) -> list[Any]:
-        return [self.data.get(name) for name in (*self._legacy, "auxData")] if self._legacy else [dict(self.data)]
 
 
 class MotionFunctions(Functions):
@@ -139,10 +120,10 @@ class MotionFunctions(Functions):
         if "pos" not in parameters:
             parameters["pos"] = [joint.value for joint in joints]
         start = _numbers(parameters, "pos", len(joints) or None)
-        target = [
-            _nearest_target(*one)
-            for one in zip(_numbers(parameters, "targetPos", len(start)), start, _cyclic(parameters, start))
-        ]
+        target = _numbers(parameters, "targetPos", len(start))
+        for index, is_cyclic in zip(range(len(start)), _cyclic(parameters, start)):
+            if is_cyclic:  # the equivalent position in the shorter direction
+                target[index] = start[index] + math.remainder(target[index] - start[index], math.tau)
         return Motion(
             self._trajectory(parameters, start, target),
             self._time_step(parameters),
@@ -327,11 +308,6 @@ def _cyclic(parameters: Parameters, start: Sequence[float]) -> Sequence[bool]:
     if not isinstance(found, Sequence) or len(found) < len(start):
         raise WrongValue(f"`cyclicJoints`: {len(start)} values must be given")
     return found
-
-
-def _nearest_target(target: float, start: float, is_cyclic: bool) -> float:
-    """Return a joint's target; for a cyclic joint, the equivalent one in the shorter direction."""
-    return start + math.remainder(target - start, math.tau) if is_cyclic else target
 
 
 def _matrix_of(parameters: Parameters, name: str) -> frames.Matrix:

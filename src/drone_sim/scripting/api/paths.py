@@ -14,7 +14,7 @@ from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.path import Path, nearest
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.host import Functions, Operations
+from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.types import Handle, Number, Numbers, ThreeNumbers, WrongValue, numbers
 
 _MOST = 1_000_000  # numbers of a table
@@ -77,7 +77,6 @@ class Paths(Functions):
         measure of its length (sim.distcalcmethod_...); floatParams[1] and [2] are the lengths of a turn (m/rad) and of
         a pause; indices from 0.
         """
-        operations = self._operations()
         if not isinstance(ctrlPts, Sequence):
             return self._empty_path(ctrlPts, options or None, subdiv if isinstance(subdiv, Sequence) else None)
         (smooth,), count = numbers((smoothness,), 1), int(subdiv)
@@ -88,12 +87,12 @@ class Paths(Functions):
         entry: dict[str, Any] = {"points": [pose[:3] for pose in poses], "closed": closed}
         if not int(options) & _LOOKS_ALONG:
             entry["turns"] = [pose[3:] for pose in poses]
-        return self._add(operations, kind="path", **entry)
+        return self._add("Path", kind="path", **entry)
 
     def _empty_path(self, attributes: int, whole: Sequence[float] | None, real: Sequence[float] | None) -> int:
         bits = int(attributes) if attributes != _DEFAULT else _USUAL
         entry: dict[str, Any] = {"closed": bool(bits & _PROPERTY["closed"]), "flat": bool(bits & _PROPERTY["flat"])}
-        entry["orientation"] = _orientation(bits)
+        entry["orientation"] = (X_UP if bits & _X_UP else AUTOMATIC) if bits & _PROPERTY["automatic"] else OWN
         if whole is not None:
             method = int(numbers(whole, 3)[1])
             if method not in range(len(COUNTS)):
@@ -101,17 +100,7 @@ class Paths(Functions):
             entry["counts"] = [*COUNTS][method]
         if real is not None:
             _, entry["metres_per_radian"], entry["metres_per_pause"] = numbers(real, 3)
-        return self._add(self._operations(), kind="curved_path", control_points=[], **entry)
-
-    def _operations(self) -> Operations:
-        if self._services.operations is None:
-            raise ValueError("there is no scene")
-        return self._services.operations
-
-    def _add(self, operations: Operations, **keys: Any) -> int:
-        entry = {"name": operations.free_name("Path"), "alias": "Path", **keys}
-        handle: int = self._services.outside(lambda: operations.add([entry])[0])
-        return handle
+        return self._add("Path", kind="curved_path", control_points=[], **entry)
 
     @sim("34")
     def insertPathCtrlPoints(self, handle: Handle, options: int, startIndex: int, ptCnt: int, ptData: Numbers) -> int:
@@ -145,8 +134,8 @@ class Paths(Functions):
         return 1
 
     def _change(self, handle: int, **values: Any) -> None:
-        operations, along = self._operations(), self._path(handle).position_along
-        self._services.outside(lambda: operations.change(int(handle), along=along, **values))
+        along = self._path(handle).position_along
+        self._do(lambda scene: scene.change(int(handle), along=along, **values))
 
     def _curved(self, handle: int) -> ControlledPath:
         return self._found(handle, ControlledPath, "a curved path")
@@ -223,12 +212,6 @@ def _points(path: Sequence[float], dof: int) -> list[tuple[float, ...]]:
         raise WrongValue(f"expected a table with {count} numbers for each point, not {len(path)} in all")
     flat = numbers(path, len(path))
     return [flat[first : first + count] for first in range(0, len(flat), count)]
-
-
-def _orientation(bits: int) -> str:
-    if not bits & _PROPERTY["automatic"]:
-        return OWN
-    return X_UP if bits & _X_UP else AUTOMATIC
 
 
 def _control_point(values: Sequence[float], is_flat: bool) -> dict[str, Any]:

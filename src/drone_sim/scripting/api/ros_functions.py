@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from drone_sim.mechanics.clock import Clock
-from drone_sim.scripting.api.backend import Backend, Image
+from drone_sim.scripting.api.backend import Image
 from drone_sim.scripting.api.calls import simROS
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.types import Callback, Handle, Name, WrongValue, refuse_if_too_large
@@ -213,7 +213,9 @@ class RosFunctions:
         """
         name, kind = self._client(handle)
         refuse_if_too_large(request)
-        return self._ros().call_service(name, kind, request or {})
+        if self._bus.backend is None:
+            raise ValueError("this flight runs without ROS, so there are no services")
+        return self._bus.backend.call_service(name, kind, request or {})
 
     @simROS()
     def shutdownServiceClient(self, handle: Handle) -> None:
@@ -230,11 +232,6 @@ class RosFunctions:
         if handle not in self._clients:
             raise ValueError(f"there is no service client with the handle {handle}")
         return self._clients[handle]
-
-    def _ros(self) -> Backend:
-        if self._bus.backend is None:
-            raise ValueError("this flight runs without ROS, so there are no services")
-        return self._bus.backend
 
 
 def _add_kind(word: str, kind: type[Any]) -> None:

@@ -5,16 +5,15 @@ Stopping the simulation undoes these changes. The shapes of vehicles, and the fl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import atan2
-from typing import Any, TypeVar
+from typing import Any
 
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS, bare
-from drone_sim.scripting.api.host import Operations, SceneServices
+from drone_sim.scripting.api.host import Functions, Operations
 from drone_sim.scripting.api.types import Handle, Name, Number, Numbers, SevenNumbers, ThreeNumbers, WrongValue, numbers
 
-_Value = TypeVar("_Value")
 _DENSITY = 1000.0  # kg/m³, for shapes without a given mass
 _RESPONDABLE, _STATIC = 8, 16  # options of createPureShape
 _PERSPECTIVE = 2  # an option of createVisionSensor
@@ -31,22 +30,8 @@ _VOLUMES = {
 }
 
 
-class SceneObjects:
+class SceneObjects(Functions):
     """Objects of the scene: creating, copying, naming and removing them; models in files."""
-
-    def __init__(self, services: SceneServices):
-        """`services` has the operations on the scene."""
-        self._operations, self._outside = services.operations, services.outside
-
-    def _do(self, action: Callable[[Operations], _Value]) -> _Value:
-        operations = self._operations
-        if operations is None:
-            raise ValueError("there is no scene")
-        result: _Value = self._outside(lambda: action(operations))  # the script's time limit cannot interrupt it
-        return result
-
-    def _add(self, name: str, **keys: Any) -> int:
-        return self._do(lambda scene: scene.add([{"name": scene.free_name(name), "alias": name, **keys}])[0])
 
     # ---- shapes
 
@@ -237,12 +222,8 @@ class SceneObjects:
         return 1
 
 
-class Shapes:
+class Shapes(Functions):
     """Shapes of the scene: their colors, masses, sizes and groups."""
-
-    def __init__(self, services: SceneServices):
-        """`services` has the operations on the scene."""
-        self._do = SceneObjects(services)._do
 
     @sim("345")
     def setShapeColor(self, handle: Handle, _colorName: Any, colorComponent: int, rgbData: Numbers) -> int:

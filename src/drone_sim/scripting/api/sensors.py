@@ -15,7 +15,7 @@ from drone_sim.mechanics.object_collections import members
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.host import Functions, Readable
+from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.types import Handle, Number, WrongValue
 
 _NOT_YET, _NOTHING, _DETECTED = -1, 0, 1  # detection states of CoppeliaSim
@@ -49,14 +49,11 @@ class Sensors(Functions):
 
         The stamp in its `header` is the simulated time in s of the measurement.
         """
-        return self._sensor(handle).read()
-
-    def _sensor(self, handle: int) -> Readable:
         name = self._objects[handle].name
         if name not in self._host.sensors:
             known = ", ".join(self._host.sensors) or "none"
             raise WrongValue(f"'{name}' is not a sensor that measures numbers; known are {known}")
-        return self._host.sensors[name]
+        return self._host.sensors[name].read()
 
 
 class FoundObject(Protocol):

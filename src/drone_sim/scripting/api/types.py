@@ -89,12 +89,8 @@ def refuse_if_too_large(
         count += len(inner)
         if count > MOST_VALUES:
             raise ValueError(f"more than {MOST_VALUES} values are too many")
-        waiting.extend((item, depth + 1) for item in _not_plain(inner))
-
-
-def _not_plain(values: list[Any]) -> list[Any]:
-    """Return the values that are not plain; fast if there are none, as in images with millions of values."""
-    return [] if _PLAIN.issuperset(map(type, values)) else [value for value in values if type(value) not in _PLAIN]
+        if not _PLAIN.issuperset(map(type, inner)):  # fast for images with millions of values
+            waiting.extend((item, depth + 1) for item in inner if type(item) not in _PLAIN)
 
 
 def _inner(value: Any, fields: Fields) -> list[Any] | None:
