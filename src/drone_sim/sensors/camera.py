@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -74,17 +74,11 @@ class Camera(Sensor):
         if not self._photography.is_perfect:
             return self._photography.take(self.intrinsics, self._light)
         requested, self._truth = self._truth, None
-        if requested is None:
+        truth = requested and self._vision.truth(self.intrinsics, self._matrix(), self._moment)
+        if requested is None or truth is None:
             return self._vision.picture(kind, self.intrinsics, self._matrix())
-        return self._take_with_outputs(requested.drawn)
-
-    def _take_with_outputs(self, names: Sequence[str]) -> np.ndarray:
-        """Render a colour image together with outputs, which `truth` then finds ready."""
-        truth = self._vision.truth(self.intrinsics, self._matrix(), self._moment)
-        if truth is None:
-            return self._vision.picture(COLOR, self.intrinsics, self._matrix())
         with self._vision.taking():
-            truth.want((COLOR, *names))
+            truth.want((COLOR, *requested.drawn))  # which `truth` then finds ready
         self._drawn = self._vision.changes, self.pose(), truth
         return truth.output(COLOR)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from drone_sim.config.types import Location, ParameterError
 from drone_sim.sensors.camera_parameters import MAX_PIXELS, CameraParameters
@@ -21,13 +21,13 @@ RESERVED_TOPICS = (
 
 def check_sensors(cameras: Mapping[str, CameraParameters], sensors: Mapping[str, SensorParameters]) -> None:
     """Raise ParameterError if two sensors claim one object, topic or frame, or one claims a topic of the vehicle."""
-    _check_cameras(cameras)
-    topics = {topic: "the drone's own topic" for topic in RESERVED_TOPICS}
-    objects: dict[str, str] = {}
-    for kind, group in (("cameras", cameras), ("sensors", sensors)):
-        for name, sensor in group.items():
-            _claim_object(objects, (kind, name), sensor.object or name)
-            _claim_topics(topics, (kind, name), sensor.topic, sensor.topics())
+    pixels = sum(camera.width * camera.height for camera in cameras.values())
+    if pixels > MAX_PIXELS:
+        raise ParameterError(f"{pixels} pixels in total; at most {MAX_PIXELS} are allowed", ("cameras",))
+    for name, camera in cameras.items():
+        if camera.near >= camera.far:
+            raise ParameterError(f"must be less than far = {camera.far}", ("cameras", name, "near"), str(camera.near))
+    _check_names(cameras, sensors)
     _check_frames(cameras, sensors)
 
 
@@ -43,33 +43,25 @@ def check_rates(sensors: Mapping[str, SensorParameters], sub_step: float, above:
             raise error.below(*above, "sensors", name) from None
 
 
-def _check_cameras(cameras: Mapping[str, CameraParameters]) -> None:
-    pixels = sum(camera.width * camera.height for camera in cameras.values())
-    if pixels > MAX_PIXELS:
-        raise ParameterError(f"{pixels} pixels in total; at most {MAX_PIXELS} are allowed", ("cameras",))
-    for name, camera in cameras.items():
-        if camera.near >= camera.far:
-            raise ParameterError(f"must be less than far = {camera.far}", ("cameras", name, "near"), str(camera.near))
-
-
-def _claim_object(taken: dict[str, str], keys: tuple[str, str], name: str) -> None:
-    path = "/".join(keys)
-    if name in taken:
-        raise ParameterError(f"is the object of {taken[name]} already", (*keys, "object"), f"'{name}'")
-    taken[name] = path
-
-
-def _claim_topics(taken: dict[str, str], keys: tuple[str, str], base: str, topics: Iterable[tuple[str, str]]) -> None:
-    path = "/".join(keys)
-    for topic, content in topics:
-        if topic in taken:
-            raise ParameterError(
-                f"its {content} would be {topic}, which is {taken[topic]}; "
-                "give it a namespace of its own, such as rear/image",
-                (*keys, "topic"),
-                f"'{base}'",
-            )
-        taken[topic] = f"the {content} of {path}"
+def _check_names(cameras: Mapping[str, CameraParameters], sensors: Mapping[str, SensorParameters]) -> None:
+    """Raise ParameterError if an object or a topic would be that of two sensors, or of the vehicle."""
+    topics = {topic: "the drone's own topic" for topic in RESERVED_TOPICS}
+    objects: dict[str, str] = {}
+    for kind, group in (("cameras", cameras), ("sensors", sensors)):
+        for name, sensor in group.items():
+            path, found = f"{kind}/{name}", sensor.object or name
+            if found in objects:
+                raise ParameterError(f"is the object of {objects[found]} already", (kind, name, "object"), f"'{found}'")
+            objects[found] = path
+            for topic, content in sensor.topics():
+                if topic in topics:
+                    raise ParameterError(
+                        f"its {content} would be {topic}, which is {topics[topic]}; "
+                        "give it a namespace of its own, such as rear/image",
+                        (kind, name, "topic"),
+                        f"'{sensor.topic}'",
+                    )
+                topics[topic] = f"the {content} of {path}"
 
 
 def _check_frames(cameras: Mapping[str, CameraParameters], sensors: Mapping[str, SensorParameters]) -> None:

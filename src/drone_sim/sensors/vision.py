@@ -104,12 +104,10 @@ class Vision:
 
         `shown` as for `picture`. Raises ValueError without OpenGL.
         """
-        self._open()
-        if self._renderer is None:
+        renderer = self._prepared()
+        if renderer is None:
             raise ValueError("an image of the object of each pixel needs OpenGL, but EGL is not available")
-        self._rotate_blades()
-        self._renderer.set_visuals(self._subject.visuals())
-        drawn = self._renderer.render_outputs(("instance",), intrinsics, pose, self._poses(shown), instances=numbers)
+        drawn = renderer.render_outputs(("instance",), intrinsics, pose, self._poses(shown), instances=numbers)
         return drawn["instance"]
 
     def light(self, lens: Intrinsics, pose: np.ndarray, velocity: np.ndarray, shutter: Shutter) -> np.ndarray:
@@ -136,23 +134,17 @@ class Vision:
         """Count an image and its rendering time, unless it fails; yield the renderer, None without OpenGL."""
         self._open()
         start = time.perf_counter()
-        self._rotate_blades()
-        if self._renderer is not None:
-            self._renderer.set_visuals(self._subject.visuals())
-        yield self._renderer
+        yield self._prepared()
         self.pictures += 1
         self.seconds += time.perf_counter() - start
 
     def truth(self, intrinsics: Intrinsics, pose: np.ndarray, before: FrameState | None) -> PictureTruth | None:
         """Return the ground truth of the image from `pose`, with the flow since `before`; None without OpenGL."""
-        self._open()
-        renderer = self._renderer
+        renderer = self._prepared()
         if renderer is None:
             return None
-        self._rotate_blades()
         visuals, poses = self._subject.visuals(), np.array(self._subject.visual_poses())
         numbered = Numbered.of(self._identify())
-        renderer.set_visuals(visuals)
         since = before if before is not None and len(before.poses) == len(poses) else FrameState(pose, poses)
 
         def draw(names: Sequence[str]) -> Mapping[str, np.ndarray]:
@@ -178,6 +170,14 @@ class Vision:
         if self._renderer is not None:
             return self._renderer.description
         return TINY if self._fallback else ""
+
+    def _prepared(self) -> Renderer | None:
+        """Return the renderer with the present visuals and rotated blades, None without OpenGL."""
+        self._open()
+        self._rotate_blades()
+        if self._renderer is not None:
+            self._renderer.set_visuals(self._subject.visuals())
+        return self._renderer
 
     def _open(self) -> None:
         if self._renderer is not None or self._fallback:

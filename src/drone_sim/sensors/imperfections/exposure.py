@@ -1,4 +1,4 @@
-"""Exposure time and gain of the image sensor, fixed or automatic.
+"""Exposure time and gain of the image sensor, fixed or automatic; and the time of a rolling shutter (render.shutter).
 
     light' = light · time / reference · 10^(gain / 20)
 
@@ -26,6 +26,18 @@ _GREY = 0.18
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
 _MIN_LUMINANCE = 1e-4  # minimum mean luminance; avoids a division by 0
 _MIN_TIME = 1e-6  # s
+
+
+class ShutterParameters(Imperfection):
+    """Timing of a rolling shutter, which exposes the rows of an image one after another."""
+
+    readout: Annotated[Finite, Within(0, 1), Unit("s")] = Field(
+        default=0.0, description="from the first row to the last; 0: all rows at once"
+    )
+
+    @property
+    def is_on(self) -> bool:
+        return self.readout > 0
 
 
 class ExposureParameters(Imperfection):
