@@ -196,7 +196,6 @@ class ClientHost:
 
     @property
     def sensors(self) -> Mapping[str, Readable]:
-        """The sensors of all vehicles."""
         return {name: sensor for vehicle in self._vehicles for name, sensor in vehicle.instruments.by_object.items()}
 
     @property
@@ -205,15 +204,12 @@ class ClientHost:
         return self._vehicles[0].object_name if self._vehicles else DRONE
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
-        """Apply a force (N, world) at a point (m, shape's frame) and a torque (N m) in the next step."""
         self._of(shape).propulsion.add_force(shape, force, torque, offset)
 
     def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
-        """Remove the forces or torques, or both, added to a shape since the last step."""
         self._of(shape).propulsion.drop_forces(shape, forces, torques)
 
     def turn_joint(self, joint: str, angle: float | None) -> float:
-        """Set the angle (rad) of a propeller's blades, unless None; return it."""
         return self._of(joint).propulsion.blades.turn(joint, angle)
 
     def _of(self, name: str) -> Vehicle:

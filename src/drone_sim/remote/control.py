@@ -43,7 +43,6 @@ class MovedObjects:
     """
 
     def __init__(self, simulation: Simulation):
-        """Record the changes of `simulation`."""
         self._simulation = simulation
         self._topology_version = -1
         self._initial: Arrangements = {}

@@ -39,7 +39,6 @@ Watched = Callable[[str, Function], Function]  # returns the function to call in
 
 
 def unwatched(_name: str, function: Function) -> Function:
-    """Return `function` unchanged."""
     return function
 
 
@@ -47,7 +46,6 @@ class ClientFunction:
     """A function of a client, represented by its name; it is called at the client's next request."""
 
     def __init__(self, name: str):
-        """`name` is the client's name of the function."""
         self.name = name
 
     def __call__(self, *_values: Any) -> Any:
@@ -69,7 +67,6 @@ class Stepping:
     """A client's control of the steps. As in CoppeliaSim, stepping must be switched off as often as on."""
 
     def __init__(self) -> None:
-        """Start without holding the simulation."""
         self.level = 0
         self.locks = 0
         self._waits: list[Until] = []

@@ -47,7 +47,6 @@ class RemoteApiServers(RemoteApi):
     """
 
     def __init__(self, zeromq: RemoteApiServer, legacy: LegacyServer):
-        """Serve the clients of both servers."""
         self.zeromq, self.legacy = zeromq, legacy
         self.address = f"{zeromq.address} (ZeroMQ) and on {legacy.address} (simxStart)"
         zeromq.watch(legacy.fileno())

@@ -43,7 +43,6 @@ class Finding(NamedTuple):
 
 
 def not_defined(name: str, known: Collection[str]) -> str:
-    """Return the message for an undefined name."""
     near = difflib.get_close_matches(name, sorted(known), cutoff=_NEAR)
     return f"'{name}' is not defined{'; near names are ' if near else ''}{', '.join(near)}"
 
@@ -232,7 +231,6 @@ class Checker:
     """Checks scripts against the names in the API."""
 
     def __init__(self) -> None:
-        """Collect the names in the API."""
         modules = apis()
         self._known = {name: {*contents(api)[1], *contents(api)[2]} for name, api in modules.items()}
         flat = {flat_name(name, function) for name, api in modules.items() for function in contents(api)[1]}
@@ -252,7 +250,6 @@ class Checker:
 
 
 def main() -> None:
-    """Answer requests until the input ends."""
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     checker = Checker()
     for line in sys.stdin:

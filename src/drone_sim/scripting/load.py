@@ -52,7 +52,6 @@ def script_path(script: str) -> str:
 
 @functools.cache  # called several times for every flight
 def _built_in() -> dict[str, str]:
-    """Return the paths of the built-in scripts, by name."""
     return {path.stem: str(path) for path in BUILT_IN.glob("*") if path.suffix in _ENDINGS and path.stem != "__init__"}
 
 

@@ -66,7 +66,6 @@ class Labels(dict[str, int]):
     """Numbers of a script's phases, which tell another process which phase runs."""
 
     def __init__(self, path: str, limit: TimeLimit):
-        """Create numbers for the script at `path`."""
         super().__init__()
         self._path, self._limit = path, limit
 
@@ -126,7 +125,6 @@ class TimeLimit:
         self._firing = threading.Lock()
 
     def __str__(self) -> str:
-        """Return the error message for an exceeded limit."""
         return f"stopped after {self.seconds:g} s without returning (script_time_limit)"
 
     def start(self) -> None:

@@ -72,7 +72,6 @@ class Battery(Instrument):
     parameters: BatteryParameters
 
     def __init__(self, parameters: BatteryParameters, mounting: Mounting):
-        """Create it; call `reset` before `look`."""
         super().__init__(parameters, mounting)
         self._noise = self.make_noise(parameters.noise, 1)
         self._charge = 0.0  # Ah

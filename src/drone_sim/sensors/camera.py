@@ -22,8 +22,6 @@ from drone_sim.sensors.vision import Vision
 
 
 class CameraMounting(NamedTuple):
-    """The connection of a camera to its vehicle."""
-
     name: str  # unique, such as drone/front; seeds the noise
     pose: Callable[[], Matrix]  # transform world-from-optical
     velocity: Callable[[], tuple[Vector, Vector]]  # of the optical frame, linear (m/s) and angular (rad/s), world
@@ -34,7 +32,6 @@ class Camera(Sensor):
     """A vision sensor. Its period counts simulation steps; it renders only if a viewer wants the image."""
 
     def __init__(self, parameters: CameraParameters, mounting: CameraMounting, vision: Vision):
-        """`vision` renders its images."""
         super().__init__(parameters.every)
         self.kind = parameters.kind
         self._photography = Photography(mounting.name, mounting.clock)

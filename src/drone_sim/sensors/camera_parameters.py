@@ -66,7 +66,6 @@ class CameraParameters(Imperfections):
         return self
 
     def intrinsics(self) -> Intrinsics:
-        """Return the camera model."""
         fields = self.width, self.height, self.horizontal_fov, self.near, self.far
         if self.lens is None:
             return Intrinsics(*fields, baseline=self.baseline)

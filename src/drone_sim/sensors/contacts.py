@@ -49,7 +49,6 @@ class Contacts(Instrument):
     """Reads the contacts after every sub-step."""
 
     def __init__(self, parameters: ContactsParameters, mounting: Mounting):
-        """Create it; call `reset` before `look`."""
         super().__init__(parameters, mounting)
         self.outputs = (
             Output("", "visualization_msgs/MarkerArray", self._markers),

@@ -92,7 +92,6 @@ class Fix(Instrument):
     parameters: FixParameters
 
     def __init__(self, parameters: FixParameters, mounting: Mounting):
-        """Create it; call `reset` before `look`."""
         super().__init__(parameters, mounting)
         self._horizontal = self.make_noise(parameters.noise.horizontal, 2)
         self._vertical = self.make_noise(parameters.noise.vertical, 1)

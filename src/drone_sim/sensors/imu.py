@@ -72,7 +72,6 @@ class Imu(Instrument):
     parameters: ImuParameters
 
     def __init__(self, parameters: ImuParameters, mounting: Mounting):
-        """Create it; call `reset` before `look`."""
         super().__init__(parameters, mounting)
         noise = parameters.noise
         self._rate_noise = self.make_noise(noise.angular_velocity, 3)

@@ -29,7 +29,6 @@ class MagneticField(Instrument):
     parameters: MagneticFieldParameters
 
     def __init__(self, parameters: MagneticFieldParameters, mounting: Mounting):
-        """Create it; call `reset` before `look`."""
         super().__init__(parameters, mounting)
         self._noise = self.make_noise(parameters.noise, 3)
         self.outputs = (Output("", "sensor_msgs/MagneticField", self._message),)

@@ -69,7 +69,6 @@ class Pressure(Instrument):
     parameters: PressureParameters
 
     def __init__(self, parameters: PressureParameters, mounting: Mounting):
-        """Create it; call `reset` before `look`."""
         super().__init__(parameters, mounting)
         self._noise = self.make_noise(parameters.noise, 1)
         self.outputs = (

@@ -60,7 +60,6 @@ class Range(Instrument):
     parameters: RangeParameters
 
     def __init__(self, parameters: RangeParameters, mounting: Mounting):
-        """Create it; call `reset` before `look`."""
         super().__init__(parameters, mounting)
         self._noise = self.make_noise(parameters.noise, 1)
         self.outputs = (Output("", "sensor_msgs/Range", self._message),)

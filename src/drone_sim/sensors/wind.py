@@ -29,7 +29,6 @@ class Wind(Instrument):
     parameters: WindParameters
 
     def __init__(self, parameters: WindParameters, mounting: Mounting):
-        """Create it; call `reset` before `look`."""
         super().__init__(parameters, mounting)
         self._noise = self.make_noise(parameters.noise, 3)
         self.outputs = (Output("", "geometry_msgs/Vector3Stamped", self._message),)

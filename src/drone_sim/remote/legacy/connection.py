@@ -22,7 +22,6 @@ class Connection:
     """A client's socket; while a reply has not been sent completely, no further requests are read."""
 
     def __init__(self, peer: socket.socket, name: str):
-        """Use the connected socket `peer`; `name` is for the log."""
         self.name = name
         self.ended = False  # whether the client has closed it
         self._peer = peer
@@ -35,7 +34,6 @@ class Connection:
             peer.setsockopt(socket.IPPROTO_TCP, option, value)
 
     def fileno(self) -> int:
-        """Return the socket's file descriptor."""
         return self._peer.fileno()
 
     @property

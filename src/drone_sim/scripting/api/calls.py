@@ -55,7 +55,6 @@ class Module:
     """Decorator factory that declares functions of one API module, by an attribute `declaration`."""
 
     def __init__(self, name: str):
-        """`name` is the module's name for scripts."""
         self._name = name
 
     def __call__(self, generations: str = "345", **others: str) -> Callable[[_Method], _Method]:

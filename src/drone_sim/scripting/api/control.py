@@ -24,7 +24,6 @@ class Control:
         self.clear()
 
     def clear(self) -> None:
-        """Remove all requests, as at the beginning of a run."""
         self.asked = ""  # STOP, PAUSE or ''
         self.is_stopping = False  # while threads have their last turns
         self.is_ending = False  # while cleanup is called
@@ -127,7 +126,6 @@ class Turns:
         self._most = int(DEFAULT_MS * CALLS_PER_MS)
 
     def begin(self) -> None:
-        """Start a turn."""
         self._called = 0
 
     def wait_for(self, wait: Wait, function: str, call: Callable[[Call], Any]) -> Any:
@@ -154,7 +152,6 @@ class Turns:
 
     @property
     def is_automatic(self) -> bool:
-        """Whether the thread is switched automatically."""
         return not self._forbidden
 
     def set_automatic(self, allowed: bool | int) -> int:

@@ -32,11 +32,9 @@ class CustomData:
         self.values: dict[tuple[int, str], Any] = {}
 
     def clear(self) -> None:
-        """Remove all values, as at the beginning of a run."""
         self.values.clear()
 
     def save_state(self) -> Restore:
-        """Return a function that restores the present values."""
         return saved(self, "values", deep=True)
 
     def set(self, handle: int, name: str, value: Any) -> None:
@@ -57,7 +55,6 @@ class CustomData:
         self.values[handle, name] = copy.deepcopy(value)
 
     def names(self, handle: int) -> list[str]:
-        """Return the names of an object's values."""
         return [name for owner, name in self.values if owner == handle]
 
 
@@ -65,7 +62,6 @@ class CustomDataFunctions:
     """Custom data: named strings and tables of objects, and properties (4.7)."""
 
     def __init__(self, objects: ObjectTree, data: CustomData):
-        """`data` are the values stored in the `objects`."""
         self._objects = objects
         self._data = data
 

@@ -143,7 +143,6 @@ class Drawings:
         self.changes += 1
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that restores the present drawing objects."""
         kept, last = _copied(self.objects), self._last_handle
 
         def restore() -> None:
@@ -155,7 +154,6 @@ class Drawings:
         return restore
 
     def clear(self) -> None:
-        """Remove every object, as at the beginning of a run."""
         self._last_handle = 0
         self.objects.clear()
         self.changes += 1

@@ -20,7 +20,6 @@ class Graphs:
         self.clear()
 
     def clear(self) -> None:
-        """Remove all streams."""
         self._streams: dict[int, tuple[int, str, float | None]] = {}
 
     def add(self, handle: int, graph: int, name: str) -> int:
@@ -59,7 +58,6 @@ class Graphs:
         return {name: value for _, name, value in self._streams.values() if value is not None}
 
     def save_state(self) -> Restore:
-        """Return a function that restores the present streams."""
         return saved(self, "_streams")
 
 

@@ -190,7 +190,6 @@ class ImageFilters(Functions):
     # ---- images
 
     def save_state(self) -> Restore:
-        """Return a function that restores the present images."""
         return saved(self, "_images")
 
     def _handle(self, handle: int) -> int:

@@ -70,7 +70,6 @@ def is_ignored(function: Any) -> bool:
 
 
 def first_paragraph(doc: str) -> str:
-    """Return the first paragraph of a docstring, on one line."""
     return " ".join(doc.split("\n\n")[0].split())
 
 

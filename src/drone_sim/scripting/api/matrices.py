@@ -215,11 +215,9 @@ class Poses:
 
 
 def from_pose(pose: SevenNumbers) -> Matrix:
-    """Return the transform of a pose."""
     values = numbers(pose, 7)
     return frames.from_quaternion(values[:3], unit(values[3:]))
 
 
 def to_pose(matrix: Sequence[float]) -> list[float]:
-    """Return the pose of a transform."""
     return [*frames.position(matrix), *frames.to_quaternion(matrix)]

@@ -166,7 +166,6 @@ class MessageBus:
 
     @property
     def is_subscribed(self) -> bool:
-        """Whether there is any subscription."""
         return len(self._subscriptions) > 0
 
     def post(self, topic: str, message: Any) -> None:
@@ -256,7 +255,6 @@ class OwnTopic:
         self._messages, self._topic = messages, topic
 
     def publish(self, message: Any) -> None:
-        """Store a message."""
         self._messages[self._topic] = message
 
     def subscribers(self) -> int:
@@ -264,7 +262,6 @@ class OwnTopic:
         return 1
 
     def shutdown(self) -> None:
-        """Remove the message."""
         self._messages.pop(self._topic, None)
 
 
@@ -286,7 +283,6 @@ class Subscriptions:
         self._new_callbacks: list[Callback] = []
 
     def __len__(self) -> int:
-        """Return the number of subscriptions."""
         return len(self._by_handle)
 
     def same(self, topic: str, kind: str, callback: Callback) -> int | None:
@@ -320,7 +316,6 @@ class Subscriptions:
         subscription.end()
 
     def close(self) -> None:
-        """End all subscriptions."""
         self._new_callbacks = []
         for handle in list(self._by_handle):
             self.end(handle)

@@ -36,7 +36,6 @@ class NameFunctions:
     A name without a suffix means the copy of the model that the script belongs to."""
 
     def __init__(self, host: Host):
-        """`host` is the object that the script is attached to."""
         self._objects = host.context.objects
         self._host = host  # its object may be renamed
         self.suffix = split(host.own_script)[1]  # added to names without a suffix

@@ -27,7 +27,6 @@ _Fits = Callable[[SceneObject, str], bool]
 
 
 def is_path(name: str) -> bool:
-    """Return whether a name is a path."""
     return "/" in name or name in (".", "..", ":", "::")
 
 
@@ -69,10 +68,7 @@ def _has_alias(item: SceneObject, name: str) -> bool:
 
 
 class _Search:
-    """Search for the objects of one path."""
-
     def __init__(self, objects: ObjectTree, fits: _Fits):
-        """`fits` returns whether an object has a name."""
         self._children: dict[SceneObject | None, list[SceneObject]] = defaultdict(list)
         for item in map(objects.__getitem__, objects):
             self._children[item.parent].append(item)

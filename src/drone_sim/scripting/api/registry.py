@@ -86,7 +86,6 @@ class Scripts:
             del self._by_handle[removed.handle]
 
     def rename(self, name: str, new: str) -> None:
-        """Change the name of a script's object."""
         renamed = self._by_name[new] = self._by_name.pop(name)
         renamed.name = new
 
@@ -95,7 +94,6 @@ class Scripts:
         return iter(self._by_handle.values())
 
     def __contains__(self, name: str) -> bool:
-        """Return whether a script is attached to an object."""
         return name in self._by_name
 
     def get(self, handle: int) -> Attachment | None:

@@ -25,7 +25,6 @@ class RemotePorts:
         self.clear()
 
     def clear(self) -> None:
-        """Remove all requests, as at the beginning of a run."""
         self.wanted: dict[int, bool] = {}  # by port: whether its clients trigger the steps from the start
         self.connected: Collection[int] = ()  # ports
 
@@ -75,7 +74,6 @@ class OlderRemotePortFunctions:
     """Ports for clients of V-REP's legacy remote API (3.x names)."""
 
     def __init__(self, functions: RemotePortFunctions):
-        """`functions` are those that these names stand for."""
         self._functions = functions
 
     @sim("3")

@@ -23,7 +23,6 @@ class TopicFunctions:
     """Topics, with or without ROS."""
 
     def __init__(self, bus: MessageBus):
-        """`bus` has the script's subscriptions and publications."""
         self._bus = bus
 
     @simROS()
@@ -93,7 +92,6 @@ class ServiceFunctions:
     """Services that a script offers to others, with or without ROS."""
 
     def __init__(self, bus: MessageBus):
-        """`bus` has the services that the script offers."""
         self._bus = bus
 
     @simROS()

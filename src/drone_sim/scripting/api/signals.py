@@ -36,7 +36,6 @@ class Signals:
         self.clear()
 
     def clear(self) -> None:
-        """Remove all signals."""
         self._values: dict[type[Any], dict[str, Any]] = {float: {}, int: {}, str: {}}
 
     def get(self, kind: type[Any], name: str) -> Any:
@@ -53,7 +52,6 @@ class Signals:
         return None if all(value is None for value in found) else found
 
     def names(self) -> list[str]:
-        """Return the names of all signals."""
         return [name for values in self._values.values() for name in values]
 
     def numbers(self) -> dict[str, float]:
@@ -88,7 +86,6 @@ class Signals:
             self._values[kind] = {**values, **self._values[kind]}
 
     def save_state(self) -> Restore:
-        """Return a function that restores the present signals."""
         return saved(self, "_values", deep=True)
 
 
@@ -96,7 +93,6 @@ class SignalFunctions:
     """Signals: named values that scripts share."""
 
     def __init__(self, signals: Signals):
-        """`signals` are those of the simulation."""
         self._signals = signals
 
     @sim("345", setDoubleSignal="345")
@@ -169,7 +165,6 @@ class Tubes:
         del self._ends[handle]
 
     def __iter__(self) -> Iterator[int]:
-        """Return an iterator over the handles of open ends."""
         return iter(self._ends)
 
     def waiting(self, handle: int) -> deque[Any]:
@@ -185,12 +180,10 @@ class Tubes:
         return next((end.waiting for number, end in self._ends.items() if end.tube == tube and number != handle), None)
 
     def clear(self) -> None:
-        """Close all tubes, as at the beginning of a run."""
         self._ends.clear()
         self._last_handle = 0
 
     def save_state(self) -> Restore:
-        """Return a function that restores the present tubes and their packets."""
         return saved(self, "_ends", "_last_handle", deep=True)
 
 
@@ -198,7 +191,6 @@ class TubeFunctions:
     """Tubes: two-way connections between two scripts, which sensors of V-REP 3.x use."""
 
     def __init__(self, tubes: Tubes):
-        """`tubes` are those of the simulation."""
         self._tubes = tubes
 
     @sim("345")
@@ -264,7 +256,6 @@ class Broadcasts:
         self.sent: list[Broadcast] = []
 
     def clear(self) -> None:
-        """Remove all, as at the beginning of a run."""
         self.sent = []
 
     def send(self, broadcast: Broadcast) -> None:
@@ -281,5 +272,4 @@ class Broadcasts:
         return self.sent
 
     def save_state(self) -> Restore:
-        """Return a function that restores the present broadcasts."""
         return saved(self, "sent", deep=True)

@@ -24,7 +24,6 @@ class SimulationFunctions(Functions):
     """The simulation: its state and time, and parameters of the simulator."""
 
     def __init__(self, host: Host, services: SceneServices, ignored: Ignored):
-        """Create it; the arguments are those of Functions."""
         super().__init__(host, services, ignored)
         self._random = random.Random(1)  # constant seed, so that every flight is the same
         self._values: dict[str, dict[int, Any]] = {

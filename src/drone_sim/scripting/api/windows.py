@@ -64,7 +64,6 @@ class Windows:
     """The open windows of a run, by handle. `changes` is a counter from which viewers notice changes."""
 
     def __init__(self) -> None:
-        """Create it without windows, and without viewers."""
         self.readers: set[Callable[[], bool]] = set()  # viewers; each returns whether it can answer dialogs now
         self.views: dict[int, View] = {}
         self.dialogs: dict[int, Dialog] = {}
@@ -74,7 +73,6 @@ class Windows:
     # ---- for scripts
 
     def add_view(self, handle: int) -> None:
-        """Open an empty view."""
         self._put(self.views, handle, View())
 
     def aim(self, handle: int, sensor: str, label: str) -> None:
@@ -83,7 +81,6 @@ class Windows:
         self.changes += 1
 
     def add_dialog(self, handle: int, dialog: Dialog) -> None:
-        """Open a dialog."""
         dialog.title, dialog.text = dialog.title[:_TITLE], dialog.text[:_TEXT]
         if dialog.typed is not None:
             dialog.typed = dialog.typed[:_TEXT]
@@ -106,7 +103,6 @@ class Windows:
         console.lines.extend(line[:_LINE] for line in (before + first, *others))
 
     def show_console(self, handle: int, shown: bool) -> None:
-        """Show or hide a console."""
         self.consoles[handle].shown = shown
         self.changes += 1
 
@@ -165,11 +161,9 @@ class Windows:
     # ---- runs and snapshots
 
     def clear(self) -> None:
-        """Close all windows, as at the beginning of a run."""
         self._replace({}, {}, {})
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that restores the present windows."""
         kept = copy.deepcopy((self.views, self.dialogs, self.consoles))
         return lambda: self._replace(*copy.deepcopy(kept))
 

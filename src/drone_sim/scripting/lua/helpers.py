@@ -23,7 +23,6 @@ class LuaHelpers:
     """Reads files for a script: regular files of limited size in its own folder or below it."""
 
     def __init__(self, script: str):
-        """`script` is its path."""
         self.chunk = self._chunk(Path(script).name)
         self._paths = {self.chunk: script}
         self._folder = Path(script).parent

@@ -54,11 +54,6 @@ def _newest_first() -> list[str]:
     return dialects
 
 
-def newest() -> str:
-    """Return the newest Lua version that lupa contains. Raises ImportError if there is none."""
-    return _newest_first()[0]
-
-
 def dialect_for(text: bytes, flat: bool) -> str:
     """Return the Lua version for a script: 5.1 if it uses `flat` names, otherwise the newest that can compile it.
 

@@ -31,7 +31,6 @@ class LineTracer:
     """Detects reached breakpoints, by a trace function that Python calls for each line."""
 
     def __init__(self, breakpoints: Breakpoints):
-        """`breakpoints` may change later."""
         self._breakpoints = breakpoints
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:

@@ -45,7 +45,6 @@ class Variables:
 
     @reprlib.recursive_repr()
     def __repr__(self) -> str:
-        """Return it with its attributes."""
         return f"self({', '.join(f'{name}={value!r}' for name, value in vars(self).items())})"
 
 

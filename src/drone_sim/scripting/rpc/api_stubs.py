@@ -71,15 +71,12 @@ class Segment:
         self.changed: set[str] = set()  # kinds of data that may differ from those at its beginning
 
     def forget(self, kind: str) -> None:
-        """Discard all known results of a kind."""
         if kind not in self.changed:
             self.changed.add(kind)
             self.known = {read: value for read, value in self.known.items() if effects.READS[read[0]] != kind}
 
 
 class ApiStubs:
-    """The API modules of a script."""
-
     def __init__(self, link: SimulationLink, call_outside: Callable[[Callable[[], Any]], Any], turns: Turns):
         """`link` leads to the simulation; `call_outside` calls a blocking function outside the script's time limit.
 

@@ -47,8 +47,6 @@ class _Frame(SceneObject):
 
 
 class _Tree(ObjectTree):
-    """The objects whose poses are known."""
-
     def __init__(self) -> None:
         super().__init__()
         self.known: dict[int, _Frame] = {}
@@ -62,7 +60,6 @@ class Places:
     """The poses known in the current phase."""
 
     def __init__(self) -> None:
-        """Create it without poses."""
         self._frames: dict[int, _Frame] = {}
         self._tree = _Tree()
         self._objects = Objects.__new__(Objects)
@@ -74,7 +71,6 @@ class Places:
         return function
 
     def take(self, places: Iterable[Place]) -> None:
-        """Replace all known poses by `places`."""
         known: dict[int, _Frame] = {}
         for handle, matrix, under, root, is_mark in places:
             frame = self._frames.get(handle)
@@ -90,7 +86,6 @@ class Places:
         return handle in known and (frame == WORLD or frame in known)
 
     def is_mark(self, handle: Any) -> bool:
-        """Return whether an object is known to be a mark."""
         frame = self._tree.known.get(handle)
         return frame is not None and frame.is_mark
 

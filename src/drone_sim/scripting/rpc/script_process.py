@@ -50,7 +50,6 @@ class ScriptWorker:
         self._requests = 0  # in the current call
 
     def open(self, channel: Channel, path: str) -> None:
-        """Set the message channel and the script's file."""
         self._channel, self.path = channel, path
 
     # ---- messages
@@ -144,8 +143,6 @@ class ScriptWorker:
 
 
 class _LoadedScript:
-    """A script with its stubs of the API."""
-
     def __init__(self, worker: ScriptWorker):
         self._worker = worker
         self._limit, self._turns = TimeLimit(0.0), Turns()

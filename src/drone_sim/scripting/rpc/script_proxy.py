@@ -39,8 +39,6 @@ class ConnectionClosed(ScriptError):
 
 
 class ScriptProxy(Script):
-    """A script in another process."""
-
     def __init__(self, connection: ScriptConnection, path: str, modules: Mapping[str, Api], limit: TimeLimit):
         """Load the script file at `path` with the API `modules`, in the process of `connection`. Raises ScriptError."""
         self._connection, self._path = connection, path
@@ -174,7 +172,6 @@ class ScriptProxy(Script):
         raise ConnectionClosed(phase, self._path, 0, why) from None
 
     def _until_end(self, phase: str) -> Any:
-        """Handle the script's items until it has returned."""
         self._failure, outer = None, self._failure
         connection, items = self._connection, self._connection.items
         try:

@@ -78,7 +78,6 @@ class ExposureParameters(Imperfection):
         return time, max(1.0, brightness * self.reference / time)
 
     def apply(self, light: np.ndarray, shot: Shot) -> np.ndarray:
-        """Return the light scaled by exposure time and gain."""
         light *= np.float32((shot.exposure / self.reference if shot.exposure else 1.0) * shot.gain)
         return light
 

@@ -32,7 +32,6 @@ class Photography:
         self._exposure = ExposureControl()
 
     def change(self, parameters: Imperfections) -> None:
-        """Set the imperfections."""
         self._parameters = parameters
         imperfections: list[Imperfection] = [getattr(parameters, name) for name in Imperfections.model_fields]
         self._imperfections = [imperfection for imperfection in imperfections if imperfection.is_on]
