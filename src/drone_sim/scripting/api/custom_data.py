@@ -13,10 +13,9 @@ from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.types import MOST_BYTES, Handle, Name, WrongValue, refuse_if_too_large, written
+from drone_sim.scripting.api.types import MOST_BYTES, Handle, Name, WrongValue, check_name, refuse_if_too_large, written
 
 _MOST = 10_000  # values of all objects
-_LONGEST_NAME = 200  # characters
 _SCENE, _APP = CONSTANTS["handle_scene"], CONSTANTS["handle_app"]
 _CUSTOM = "customData."
 _PATHS = ("PATH", "PATHCTRLPTS")  # tags that CoppeliaSim itself uses
@@ -39,10 +38,7 @@ class CustomData:
 
     def set(self, handle: int, name: str, value: Any) -> None:
         """Store a value, or remove it if `value` is None or ''. Raises WrongValue, ValueError."""
-        if not isinstance(name, str):
-            raise WrongValue("the name of a value must be a string")
-        if len(name) > _LONGEST_NAME:
-            raise ValueError(f"the name of a value has at most {_LONGEST_NAME} characters, not {len(name)}")
+        check_name(name, "a value")
         refuse_if_too_large(value)
         if value is None or (isinstance(value, (str, bytes)) and not value):
             self.values.pop((handle, name), None)

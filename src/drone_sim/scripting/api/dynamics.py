@@ -17,13 +17,12 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix
 from drone_sim.mechanics.inertia import Inertia, turned
 from drone_sim.mechanics.joint import KINEMATIC, PASSIVE, POSITION, VELOCITY, Joint
-from drone_sim.mechanics.object_collections import members
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.host import Functions
-from drone_sim.scripting.api.sensors import EVERYTHING, Detector
+from drone_sim.scripting.api.sensors import Detector
 from drone_sim.scripting.api.types import Handle, Number, Numbers, ThreeNumbers, TwelveNumbers, WrongValue, numbers
 from drone_sim.scripting.api.vision import Eye
 from drone_sim.shapes.mass import principal
@@ -268,8 +267,7 @@ class Dynamics(Functions):
         return 1
 
     def _look_for(self, sensor: Detector | Eye, entity: int) -> None:
-        if entity != EVERYTHING:
-            members(entity, self._objects, self._context.collections)  # raises ValueError if it does not exist
+        self._names_of(entity)  # raises ValueError if it does not exist
         sensor.entity = entity
 
 

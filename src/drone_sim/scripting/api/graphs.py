@@ -7,10 +7,9 @@ from typing import Any
 
 from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.scripting.api.calls import sim
-from drone_sim.scripting.api.types import Handle, Name, Number, WrongValue, numbers
+from drone_sim.scripting.api.types import Handle, Name, Number, check_name, numbers
 
 _MOST = 1000  # streams
-_LONGEST_NAME = 200  # characters
 
 
 class Graphs:
@@ -24,10 +23,7 @@ class Graphs:
 
     def add(self, handle: int, graph: int, name: str) -> int:
         """Add a stream to a graph, unless the graph has one with this name; return its handle. Raises ValueError."""
-        if not isinstance(name, str):
-            raise WrongValue("the name of a stream must be a string")
-        if len(name) > _LONGEST_NAME:
-            raise ValueError(f"the name of a stream must have at most {_LONGEST_NAME} characters, not {len(name)}")
+        check_name(name, "a stream")
         existing = next((key for key, stream in self._streams.items() if stream[:2] == (graph, name)), None)
         if existing is not None:
             return existing

@@ -11,9 +11,10 @@ import numpy as np
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.inertia import Inertia
-from drone_sim.mechanics.object_collections import Collections
+from drone_sim.mechanics.object_collections import Collections, members
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.velocity_meter import VelocityMeter
+from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.control import Control, Turns
 from drone_sim.scripting.api.custom_data import CustomData
 from drone_sim.scripting.api.distances import MeasureDistance
@@ -30,6 +31,7 @@ from drone_sim.scripting.breakpoints import Breakpoints
 _Kind = TypeVar("_Kind")
 _Value = TypeVar("_Value")
 _MOST_NAMES = 20  # in a message
+_EVERYTHING = CONSTANTS["handle_all"]
 Caller = Callable[[Callable[[], Any]], Any]
 
 
@@ -219,5 +221,16 @@ class Functions:
         item = self._objects[handle]
         if isinstance(item, kind):
             return item
-        known = [other.name for other in map(self._objects.__getitem__, self._objects) if isinstance(other, kind)]
+        known = [other.name for other in self._all(kind)]
         raise WrongValue(f"'{item.name}' is not {called}; there are: {', '.join(known[:_MOST_NAMES]) or 'none'}")
+
+    def _all(self, kind: Any) -> list[Any]:
+        """Return all objects of a type."""
+        return [item for item in map(self._objects.__getitem__, self._objects) if isinstance(item, kind)]
+
+    def _names_of(self, entity: int) -> set[str] | None:
+        """Return all names of an object, or of those in a collection; None for sim.handle_all. Raises ValueError."""
+        if entity == _EVERYTHING:
+            return None
+        handles = members(entity, self._objects, self._context.collections)
+        return {name for handle in handles for name in self._objects[handle].names}

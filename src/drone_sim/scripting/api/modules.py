@@ -23,7 +23,7 @@ from drone_sim.scripting.api.image_filters import ImageFilters
 from drone_sim.scripting.api.joints import JointFunctions
 from drone_sim.scripting.api.matrices import Matrices, Poses
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.motions import MotionFunctions
+from drone_sim.scripting.api.motions import MotionFunctions, TrajectoryFunctions
 from drone_sim.scripting.api.names import NameFunctions
 from drone_sim.scripting.api.object_collections import CollectionFunctions
 from drone_sim.scripting.api.objects import ObjectKinds, Objects
@@ -38,7 +38,6 @@ from drone_sim.scripting.api.sensors import ProximitySensors, Sensors
 from drone_sim.scripting.api.signals import SignalFunctions, TubeFunctions
 from drone_sim.scripting.api.simulation import SimulationFunctions
 from drone_sim.scripting.api.threads import Threads
-from drone_sim.scripting.api.trajectories import TrajectoryFunctions
 from drone_sim.scripting.api.vision import VisionSensors
 from drone_sim.scripting.api.windows import Dialogs, Views
 from drone_sim.scripting.api.wireless import Wireless

@@ -1,7 +1,8 @@
-"""`sim`: motions with limited velocity, acceleration and jerk, in threads (4.x).
+"""`sim`: trajectories that a script follows itself (Reflexxes, 3.x; Ruckig, 4.3), and motions in threads (4.x).
 
-In every step, the script's callback is called with the state of the motion; without a callback, the joints or the
-object are moved. A motion ends in the step in which it reaches its exact end, or as soon as the callback returns true.
+Both have limited velocity, acceleration and jerk. In every step of a motion, the script's callback is called with its
+state; without a callback, the joints or the object are moved. A motion ends in the step in which it reaches its exact
+end, or as soon as the callback returns true.
 """
 
 from __future__ import annotations
@@ -13,17 +14,21 @@ from typing import Any
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.joint import KINEMATIC, SPHERICAL, Joint
-from drone_sim.mechanics.trajectory import PHASE, Limits, State, Trajectory
+from drone_sim.mechanics.saved_state import Restore
+from drone_sim.mechanics.trajectory import NONE, PHASE, TIME, Limits, State, Trajectory
 from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.control import Action, Call, Steps, Wait
 from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.matrices import axis_and_angle, between, from_pose, to_pose
-from drone_sim.scripting.api.trajectories import LEAST_ACCELERATION, LEAST_VELOCITY, synchronization
-from drone_sim.scripting.api.types import WrongValue, numbers
+from drone_sim.scripting.api.types import Handle, Number, Numbers, WrongValue, numbers
 from drone_sim.scripting.api.unknown import PLUGINS
 
 ABORTED = 2  # result of a step if the script's callback has returned true
-_MOST = 1000  # motions of one script
+_MOST_MOTIONS = 1000  # of one script
+_MOST_TRAJECTORIES = 1000  # of one script
+_SYNCHRONIZATION = (PHASE, TIME, PHASE, NONE)  # by the two lowest bits of the flags
+_LEAST_VELOCITY, _LEAST_ACCELERATION = CONSTANTS["ruckig_minvel"], CONSTANTS["ruckig_minaccel"]
 _AT_ONCE = {"maxVel": 9999.0, "maxAccel": 99999.0, "maxJerk": 9999999.0}  # with a step of 10 s, as in CoppeliaSim
 # Arguments before 4.6.
 _CONFIG = (
@@ -35,6 +40,135 @@ _POSE = (
     *("callback", "auxData", "metric", "timeStep"),
 )
 Parameters = dict[str, Any]
+
+
+def _synchronization(flags: int, default: str) -> str:
+    """Return how degrees of freedom are synchronized; `default` if the flags are -1."""
+    return default if flags < 0 else _SYNCHRONIZATION[int(flags) & 3]
+
+
+class TrajectoryFunctions:
+    """Trajectories with limited velocity, acceleration and jerk, which a script follows itself."""
+
+    def __init__(self) -> None:
+        self._trajectories: dict[int, Trajectory] = {}
+        self._handles = itertools.count(1)
+
+    @sim("5", rmlPos="45", RMLPos="3")
+    def ruckigPos(
+        self,
+        dofs: int,
+        _smallestTimeStep: Number,
+        flags: int,
+        currentPosVelAccel: Numbers,
+        maxVelAccelJerk: Numbers,
+        selection: Sequence[bool],
+        targetPosVel: Numbers,
+    ) -> int:
+        """Start a trajectory of `dofs` degrees of freedom to positions and velocities; return its handle.
+
+        Each list has `dofs` numbers of the first quantity, then of the next. `flags`: sim.ruckig_phasesync, _timesync
+        (-1) or _nosync, and _minvel, _minaccel if minima follow in maxVelAccelJerk.
+        """
+        least = [bool(flags >= 0 and int(flags) & bit) for bit in (_LEAST_VELOCITY, _LEAST_ACCELERATION)]
+        count = _count(dofs)
+        largest = _quantities("maxVelAccelJerk", maxVelAccelJerk, count, 3 + sum(least))
+        minima = iter(largest[3:])
+        limits = Limits(*largest[:3], *(next(minima) if is_given else None for is_given in least))
+        position, velocity = _quantities("targetPosVel", targetPosVel, count, 2)
+        start = State(*_quantities("currentPosVelAccel", currentPosVelAccel, count, 3))
+        sync = _synchronization(flags, TIME)
+        return self._add(Trajectory(start, position, velocity, limits, sync, _selected(selection, count)))
+
+    @sim("5", rmlVel="45", RMLVel="3")
+    def ruckigVel(
+        self,
+        dofs: int,
+        _smallestTimeStep: Number,
+        flags: int,
+        currentPosVelAccel: Numbers,
+        maxAccelJerk: Numbers,
+        selection: Sequence[bool],
+        targetVel: Numbers,
+    ) -> int:
+        """Start a trajectory of `dofs` degrees of freedom to velocities, like ruckigPos; return its handle."""
+        least = bool(flags >= 0 and int(flags) & _LEAST_ACCELERATION)
+        count = _count(dofs)
+        acceleration, jerk, *minima = _quantities("maxAccelJerk", maxAccelJerk, count, 2 + least)
+        (velocity,) = _quantities("targetVel", targetVel, count, 1)
+        limits = Limits([float("inf")] * count, acceleration, jerk, None, *minima)
+        start = State(*_quantities("currentPosVelAccel", currentPosVelAccel, count, 3))
+        sync = _synchronization(flags, TIME)
+        return self._add(Trajectory(start, None, velocity, limits, sync, _selected(selection, count)))
+
+    @sim("5", rmlStep="45", RMLStep="3")
+    def ruckigStep(self, handle: Handle, timeStep: Number) -> tuple[int, list[float], float]:
+        """Advance a trajectory by a time in s; return 0, or 1 at its end, the state, and the time left in s.
+
+        The state is positions, velocities and accelerations, in one list.
+        """
+        trajectory, (seconds,) = self._trajectory(handle), numbers((timeStep,), 1)
+        if seconds <= 0:
+            raise WrongValue("the time step must be greater than 0")
+        state = trajectory.advance(seconds)
+        return (
+            int(trajectory.is_over),
+            [value for quantity in state for value in quantity],
+            trajectory.duration - trajectory.elapsed,
+        )
+
+    @sim("5", rmlRemove="45", RMLRemove="3")
+    def ruckigRemove(self, handle: Handle) -> None:
+        """Remove a trajectory."""
+        self._trajectory(handle)
+        del self._trajectories[handle]
+
+    def save_state(self) -> Restore:
+        """Return a function that restores the present trajectories and their elapsed times."""
+        kept = {handle: (trajectory, trajectory.elapsed) for handle, trajectory in self._trajectories.items()}
+
+        def restore() -> None:
+            self._trajectories = {handle: trajectory for handle, (trajectory, _) in kept.items()}
+            for trajectory, elapsed in kept.values():
+                trajectory.elapsed = elapsed
+
+        return restore
+
+    def _add(self, trajectory: Trajectory) -> int:
+        if len(self._trajectories) >= _MOST_TRAJECTORIES:
+            raise ValueError(f"a script may have at most {_MOST_TRAJECTORIES} trajectories: remove some")
+        handle = next(self._handles)
+        self._trajectories[handle] = trajectory
+        return handle
+
+    def _trajectory(self, handle: int) -> Trajectory:
+        if handle not in self._trajectories:
+            raise ValueError(f"there is no trajectory with the handle {handle}")
+        return self._trajectories[handle]
+
+
+def _count(dofs: int) -> int:
+    if not isinstance(dofs, (int, float)) or not 0 < dofs <= 100:
+        raise WrongValue("expected 1 to 100 degrees of freedom")
+    return int(dofs)
+
+
+def _quantities(name: str, values: Any, count: int, quantities: int) -> list[list[float]]:
+    """Return a list of `count` numbers for each quantity; surplus numbers are ignored, as in V-REP."""
+    total = count * quantities
+    if not isinstance(values, Sequence) or len(values) < total:
+        raise WrongValue(f"{name} must have {total} numbers")
+    found = numbers(values[:total], total)
+    return [list(found[first : first + count]) for first in range(0, total, count)]
+
+
+def _selected(selection: Any, count: int) -> list[bool]:
+    if not isinstance(selection, Sequence) or len(selection) < count:
+        raise WrongValue(f"selection must have {count} values")
+    return [bool(value) for value in selection[:count]]
+
+
+# ---- motions
 
 
 class Motion:
@@ -215,8 +349,8 @@ class MotionFunctions(Functions):
         return Action(steps(), lambda: value(motion.data))
 
     def _begin(self, motion: Motion) -> dict[str, Any]:
-        if len(self._motions) >= _MOST:
-            raise ValueError(f"a script may have at most {_MOST} motions: clean some up")
+        if len(self._motions) >= _MOST_MOTIONS:
+            raise ValueError(f"a script may have at most {_MOST_MOTIONS} motions: clean some up")
         handle = next(self._handles)
         self._motions[handle] = motion
         return {**motion.data, "ruckigObj": handle}
@@ -241,11 +375,11 @@ class MotionFunctions(Functions):
             velocity,
             acceleration,
             jerk,
-            _least(parameters, "minVel", "maxVel", count, bits & LEAST_VELOCITY),
-            _least(parameters, "minAccel", "maxAccel", count, bits & LEAST_ACCELERATION),
+            _least(parameters, "minVel", "maxVel", count, bits & _LEAST_VELOCITY),
+            _least(parameters, "minAccel", "maxAccel", count, bits & _LEAST_ACCELERATION),
         )
         target = _numbers(parameters, "targetVel", count, still)
-        return Trajectory(state, goal, target, limits, synchronization(flags, PHASE))
+        return Trajectory(state, goal, target, limits, _synchronization(flags, PHASE))
 
     def _time_step(self, parameters: Parameters) -> float:
         (seconds,) = numbers((parameters.get("timeStep") or self._context.clock.time_step,), 1)

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 from drone_sim.mechanics.frames import Vector
-from drone_sim.mechanics.object_collections import members
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
@@ -93,8 +92,7 @@ class ProximitySensors(Functions):
         """Like readProximitySensor; for sim.handle_all and _all_except_explicit, return the nearest detection."""
         if handle not in EVERY_SENSOR:
             return self.readProximitySensor(handle)
-        sensors = [item for item in map(self._objects.__getitem__, self._objects) if isinstance(item, Detector)]
-        detections = [found for found in map(self._detected, sensors) if found is not None]
+        detections = [found for found in map(self._detected, self._all(Detector)) if found is not None]
         return self._detection(min(detections, key=lambda found: found.distance, default=None))
 
     @sim("345")
@@ -121,13 +119,8 @@ class ProximitySensors(Functions):
 
     def _detected(self, sensor: Detector, entity: int | None = None) -> FoundObject | None:
         """Return the detected object of an entity; None means the entity that the sensor is set to detect."""
-        entity = sensor.entity if entity is None else entity
-        if entity == EVERYTHING:
-            found: FoundObject | None = sensor.detect()
-            return found
-        detectable = members(entity, self._objects, self._context.collections)
-        names = {name for handle in detectable for name in self._objects[handle].names}
-        found = sensor.detect(names.__contains__)
+        names = self._names_of(sensor.entity if entity is None else entity)
+        found: FoundObject | None = sensor.detect() if names is None else sensor.detect(names.__contains__)
         return found
 
     def _detection(self, found: FoundObject | None) -> _Detection:
@@ -152,10 +145,7 @@ class ProximitySensors(Functions):
 
     def _known(self) -> str:
         ranges = [name for name, sensor in self._host.sensors.items() if hasattr(sensor, "detected")]
-        items = map(self._objects.__getitem__, self._objects)
-        return (
-            f"there are: {', '.join([*ranges, *(item.name for item in items if isinstance(item, Detector))]) or 'none'}"
-        )
+        return f"there are: {', '.join([*ranges, *(item.name for item in self._all(Detector))]) or 'none'}"
 
 
 def _none(state: int) -> _Detection:

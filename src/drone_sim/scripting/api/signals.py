@@ -16,13 +16,13 @@ from drone_sim.scripting.api.types import (
     Number,
     Text,
     WrongValue,
+    check_name,
     numbers,
     refuse_if_too_large,
     written,
 )
 
 _MOST = 10_000  # signals of a kind
-_LONGEST_NAME = 200  # characters
 _LARGEST = 2**31 - 1
 _MOST_ENDS = 1000  # open ends of tubes
 _LONGEST = 1000  # packets waiting at one end
@@ -60,10 +60,7 @@ class Signals:
 
     def set(self, kind: type[Any], name: str, value: Any) -> None:
         """Set a signal. Raises WrongValue, and ValueError for too many signals or too long strings."""
-        if not isinstance(name, str):
-            raise WrongValue("the name of a signal must be a string")
-        if len(name) > _LONGEST_NAME:
-            raise ValueError(f"the name of a signal must have at most {_LONGEST_NAME} characters, not {len(name)}")
+        check_name(name, "a signal")
         values = self._values[kind]
         if kind is str:
             size = sum(map(len, values.values())) - len(values.get(name, "")) + len(value)

@@ -23,6 +23,7 @@ Callback = str | Callable[[Any], Any]
 DEEPEST = 16  # levels of nested tables, lists and mappings
 MOST_VALUES = 3 * 2048 * 2048  # in one call or message, as in the largest picture of a vision sensor
 MOST_BYTES = 64 * 1024 * 1024  # of all strings in it
+_LONGEST_NAME = 200  # characters
 
 _PLAIN = frozenset((float, int, bool, type(None)))
 _STRINGS = (str, bytes, bytearray, memoryview)
@@ -38,6 +39,14 @@ def written(value: Any) -> Any:
     if type(value) in (int, float):
         return str(value) if type(value) is int else f"{value:.14g}"
     return value
+
+
+def check_name(name: Any, owner: str) -> None:
+    """Raise WrongValue if a name is not a string, ValueError if it is too long; `owner` is for the message."""
+    if not isinstance(name, str):
+        raise WrongValue(f"the name of {owner} must be a string")
+    if len(name) > _LONGEST_NAME:
+        raise ValueError(f"the name of {owner} must have at most {_LONGEST_NAME} characters, not {len(name)}")
 
 
 def numbers(values: Sequence[float], count: int) -> tuple[float, ...]:

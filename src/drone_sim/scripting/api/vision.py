@@ -14,11 +14,10 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from drone_sim.mechanics.object_collections import members
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CODED, GREYSCALE, METRES, bare, has
 from drone_sim.scripting.api.host import Functions
-from drone_sim.scripting.api.sensors import EVERY_SENSOR, EVERYTHING
+from drone_sim.scripting.api.sensors import EVERY_SENSOR
 from drone_sim.scripting.api.types import Handle, Number, WrongValue, numbers
 
 # A state, then packets. An empty tuple is a documented packet that the sensor does not have; in Lua, it is nil.
@@ -126,8 +125,7 @@ class VisionSensors(Functions):
         """Like readVisionSensor; for sim.handle_all and _all_except_explicit, count the sensors that trigger."""
         if handle not in EVERY_SENSOR:
             return self.readVisionSensor(handle)
-        sensors = (item for item in map(self._objects.__getitem__, self._objects) if isinstance(item, Eye))
-        return sum(sensor.detected.trigger for sensor in sensors), (), ()
+        return sum(sensor.detected.trigger for sensor in self._all(Eye)), (), ()
 
     @sim("345")
     def readVisionSensor(self, handle: Handle) -> VisionReading:
@@ -148,7 +146,7 @@ class VisionSensors(Functions):
 
         The numbers are those of readVisionSensor for this picture. Unlike in V-REP, the sensor's script is not called.
         """
-        only = self._names(entity)
+        only = self._names_of(entity)
         is_seen = np.isfinite(self._picture(handle, "depth", only)).any()
         return int(is_seen), self._statistics(handle, only), ()
 
@@ -158,20 +156,13 @@ class VisionSensors(Functions):
 
         The bottom row is first. Pixels that do not show it have the depth 1; all others are its mask.
         """
-        only = self._names(entity)
+        only = self._names_of(entity)
         if returnImage:
             picture: Any = self._colors(handle, only=only)[::-1] / np.float32(255)
         else:
             picture = self._depths(bare(handle), only=only)
         values: list[float] = picture.ravel().tolist()
         return values
-
-    def _names(self, entity: int) -> set[str] | None:
-        """Return the names of the objects of an entity, None for all."""
-        if entity == EVERYTHING:
-            return None
-        found = members(entity, self._objects, self._context.collections)
-        return {name for member in found for name in self._objects[member].names}
 
     def _statistics(self, handle: int, only: Collection[str] | None = None) -> list[float]:
         """Return the first packet of readVisionSensor for a picture."""
@@ -217,11 +208,10 @@ class VisionSensors(Functions):
         """Return a picture of a kind ('': the kind that the sensor is for); `only`: names of the visible objects."""
         found, pictures = self._objects[bare(handle)], self._services.pictures
         if isinstance(found, Eye) and only is None:
-            only = self._names(found.entity)
+            only = self._names_of(found.entity)
         take = found.picture if isinstance(found, Eye) else pictures.get(found.name)
         if take is None:
-            eyes = [item.name for item in map(self._objects.__getitem__, self._objects) if isinstance(item, Eye)]
-            known = ", ".join([*pictures, *eyes]) or "none"
+            known = ", ".join([*pictures, *(item.name for item in self._all(Eye))]) or "none"
             raise WrongValue(f"'{found.name}' is not a vision sensor; there are: {known}")
         # Without the script's time limit, because the first picture compiles shaders.
         arguments = (kind, only) if only is not None else (kind,) if kind else ()

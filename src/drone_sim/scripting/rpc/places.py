@@ -46,28 +46,19 @@ class _Frame(SceneObject):
         return self.local if self.under is None else self.under
 
 
-class _Tree(ObjectTree):
-    def __init__(self) -> None:
-        super().__init__()
-        self.known: dict[int, _Frame] = {}
-
-    def take(self, known: dict[int, _Frame]) -> None:
-        self.known = known
-        self._objects = known  # type: ignore[assignment]
-
-
 class Places:
     """The poses known in the current phase."""
 
     def __init__(self) -> None:
-        self._frames: dict[int, _Frame] = {}
-        self._tree = _Tree()
-        self._objects = Objects.__new__(Objects)
-        self._objects._objects = self._tree
+        self._frames: dict[int, _Frame] = {}  # of this and earlier phases
+        self._known: dict[int, _Frame] = {}
+        self._tree = ObjectTree()
+        self._functions = Objects.__new__(Objects)
+        self._functions._objects = self._tree
 
     def function(self, name: str) -> Callable[..., Any]:
         """Return a function of the API that uses these poses."""
-        function: Callable[..., Any] = getattr(self._objects, name)
+        function: Callable[..., Any] = getattr(self._functions, name)
         return function
 
     def take(self, places: Iterable[Place]) -> None:
@@ -78,24 +69,22 @@ class Places:
                 frame = self._frames[handle] = _Frame()
             frame.local, frame.under, frame.root, frame.is_mark = matrix, under, root, is_mark
             known[handle] = frame
-        self._tree.take(known)
+        self._known = self._tree._objects = known  # type: ignore[assignment]
 
     def knows(self, handle: Any, frame: Any) -> bool:
         """Return whether the pose of an object relative to another object, or to the world, is known."""
-        known = self._tree.known
-        return handle in known and (frame == WORLD or frame in known)
+        return handle in self._known and (frame == WORLD or frame in self._known)
 
     def is_mark(self, handle: Any) -> bool:
-        frame = self._tree.known.get(handle)
+        frame = self._known.get(handle)
         return frame is not None and frame.is_mark
 
     def forget_below(self, mark: int) -> None:
         """Discard the poses of a mark's descendants."""
-        known = self._tree.known
-        for handle in [key for key, frame in known.items() if frame.root == mark and key != mark]:
-            del known[handle]
+        for handle in [key for key, frame in self._known.items() if frame.root == mark and key != mark]:
+            del self._known[handle]
 
     def is_apart(self, handle: int, mark: int) -> bool:
         """Return whether an object is known, and is neither this mark nor a descendant of it."""
-        frame = self._tree.known.get(handle)
+        frame = self._known.get(handle)
         return frame is not None and frame.root != mark
