@@ -104,75 +104,32 @@ class Host(Protocol):
 class Operations(Protocol):
     """Operations on the objects of the scene, with handles, and with the keys and values of scene files.
 
-    A Protocol because its implementation, `scene.operations`, is in a package above this one. An operation that is not
-    possible raises ValueError and changes nothing.
+    A Protocol because the implementation, `scene.operations`, is in a package above this one; it documents them. An
+    operation that is not possible raises ValueError and changes nothing.
     """
 
-    def add(self, items: Sequence[Mapping[str, Any]]) -> list[int]:
-        """Add entries as in a scene file; return the handles of the new objects."""
-
-    def add_mesh(self, name: str, vertices: Sequence[float], indices: Sequence[int]) -> int:
-        """Add a shape of triangles: coordinates of vertices (m), three indices for each triangle; return its handle."""
-
-    def remove(self, handles: Sequence[int]) -> None:
-        """Remove objects; their children stay."""
-
-    def copy(self, handles: Sequence[int]) -> list[int]:
-        """Add copies of objects, which may be children of each other; return their handles."""
-
-    def model(self, handle: int) -> list[int]:
-        """Return an object and its descendants."""
-
-    def free_name(self, wanted: str) -> str:
-        """Return an unused name: the wanted one, or that with a number."""
-
-    def rename(self, handle: int, name: str) -> None:
-        """Change the name of an object to an unused one."""
-
-    def set_alias(self, handle: int, alias: str) -> None:
-        """Change the alias of an object; other objects may have the same alias."""
-
-    def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None:
-        """Hang an object on another, -1 for none."""
-
-    def link(self, handle: int, other: int) -> None:
-        """Link two dummies in place of their present links; -1 for `other` only ends the link."""
-
-    def linked(self, handle: int) -> int:
-        """Return the handle of the dummy that a dummy is linked to, -1 if it has no link."""
-
-    def change(self, handle: int, **values: Any) -> None:
-        """Set values of keys in the object's entry."""
-
-    def paint(self, handle: int, rgba: Sequence[float | None]) -> None:
-        """Set the color of a shape; a component that is None does not change."""
-
-    def color(self, handle: int) -> tuple[float, ...]:
-        """Return the color of a shape's first part."""
-
-    def scale(self, handles: Sequence[int], factors: Sequence[float], positions: bool = False) -> None:
-        """Scale objects by factors along x, y and z; `positions`: also their distances from their parents."""
-
-    def factors(self, handle: int) -> tuple[float, float, float]:
-        """Return by which factors an object was scaled along x, y and z."""
-
-    def box(self, handle: int) -> tuple[Vector, Vector]:
-        """Return size and centre (m) of the box around a shape, along its own axes."""
-
-    def forms(self, handle: int) -> list[tuple[str, tuple[float, ...]]]:
-        """Return kind and size of each part of a shape, as in a scene file; [] for another object."""
-
-    def group(self, handles: Sequence[int]) -> int:
-        """Combine shapes into a rigid one; return its handle."""
-
-    def ungroup(self, handle: int) -> list[int]:
-        """Make each part of a shape a shape; return their handles."""
-
-    def load_model(self, name: str) -> int:
-        """Add the objects of a file; return the handle of the first one."""
-
-    def save_model(self, handle: int, name: str) -> None:
-        """Write an object and its descendants to a file."""
+    def add(self, items: Sequence[Mapping[str, Any]]) -> list[int]: ...
+    def add_mesh(self, name: str, vertices: Sequence[float], indices: Sequence[int]) -> int: ...
+    def remove(self, handles: Sequence[int]) -> None: ...
+    def copy(self, handles: Sequence[int]) -> list[int]: ...
+    def model(self, handle: int) -> list[int]: ...
+    def free_name(self, wanted: str) -> str: ...
+    def rename(self, handle: int, name: str) -> None: ...
+    def set_alias(self, handle: int, alias: str) -> None: ...
+    def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None: ...
+    def link(self, handle: int, other: int) -> None: ...
+    def linked(self, handle: int) -> int: ...
+    def change(self, handle: int, **values: Any) -> None: ...
+    def paint(self, handle: int, rgba: Sequence[float | None]) -> None: ...
+    def color(self, handle: int) -> tuple[float, ...]: ...
+    def scale(self, handles: Sequence[int], factors: Sequence[float], positions: bool = False) -> None: ...
+    def factors(self, handle: int) -> tuple[float, float, float]: ...
+    def box(self, handle: int) -> tuple[Vector, Vector]: ...
+    def forms(self, handle: int) -> list[tuple[str, tuple[float, ...]]]: ...
+    def group(self, handles: Sequence[int]) -> int: ...
+    def ungroup(self, handle: int) -> list[int]: ...
+    def load_model(self, name: str) -> int: ...
+    def save_model(self, handle: int, name: str) -> None: ...
 
 
 @dataclass(frozen=True)

@@ -38,14 +38,9 @@ NO_ANSWERS: Answers = ([], [])
 class SimulationLink(Protocol):
     """Connection to the simulation. A Protocol because the implementation, script_process, imports this module."""
 
-    def request(self, item: list[Any]) -> tuple[Any, Answers]:
-        """Send an item; return its result and the results of the expected reads. Raises the error received."""
-
-    def queue(self, item: list[Any]) -> None:
-        """Queue an item for the next message."""
-
-    def marked(self, value: Any) -> Any:
-        """Return a value encoded for a message."""
+    def request(self, item: list[Any]) -> tuple[Any, Answers]: ...
+    def queue(self, item: list[Any]) -> None: ...
+    def marked(self, value: Any) -> Any: ...
 
 
 class Expected(NamedTuple):
