@@ -71,7 +71,7 @@ def _parameter(function: str, encode: Callable[[Any], bytes]) -> Handler:
 
 
 def _select(request: Request) -> bytes:
-    request.context.selected[:] = request.handles()
+    request.selected[:] = request.handles()
     return b""
 
 
@@ -102,7 +102,7 @@ _OBJECTS: Table = {
     ),
     0x1028: direct("removeObject"),
     0x1037: direct("removeModel"),
-    0x0006: Handler("simxGetObjectSelection", lambda request: counted(request.context.selected)),
+    0x0006: Handler("simxGetObjectSelection", lambda request: counted(request.selected)),
     0x102F: Handler("simxSetObjectSelection", _select),
     0x0009: direct("createDummy", ints, "f13x"),  # its size, then colors
     # Joints.

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import Any
 
-from drone_sim.remote.client import one_line
+from drone_sim.remote.client import Client, one_line
 from drone_sim.remote.legacy.wire import Command
-from drone_sim.scripting.api.calls import Function
 
 _MAX_FLOAT = 3.4028234663852886e38  # largest finite single-precision number
 
@@ -18,29 +17,20 @@ class Refused(Exception):
     """A command cannot be executed; the one-line reason, '' if it is not worth reporting."""
 
 
-class RequestContext(NamedTuple):
-    """What a client's commands can access: functions of the script API by name, such as sim.getObject, and a selection.
-
-    The selection is only a list, of the objects that clients have selected.
-    """
-
-    functions: Mapping[str, Function]
-    selected: list[int]
-
-
 class Request:
     """A command; handlers read its key and data, and call functions of the script API."""
 
-    def __init__(self, name: str, command: Command, context: RequestContext):
-        """`name` is the client's function, such as simxGetObjectHandle."""
+    def __init__(self, name: str, command: Command, client: Client, selected: list[int]):
+        """`name` is the client's function, such as simxGetObjectHandle; `selected`: handles that clients selected."""
         self.name = name
         self.key: Any = command.key
         self.data = command.data
-        self.context = context
+        self.selected = selected
+        self._client = client
 
     def sim(self, function: str, *arguments: Any) -> Any:
         """Call a function of `sim`. Raises Refused."""
-        method = self.context.functions[f"sim.{function}"]
+        method = self._client.functions()[f"sim.{function}"]
         try:
             return method(*arguments)
         except Exception as error:

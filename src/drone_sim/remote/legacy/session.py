@@ -14,7 +14,7 @@ from drone_sim.remote.client import Client
 from drone_sim.remote.conversation import Task, Until
 from drone_sim.remote.legacy import wire
 from drone_sim.remote.legacy.commands import TAKE_STRING, HandlerFunction, handler_of
-from drone_sim.remote.legacy.request import Refused, Request, RequestContext, ints, text
+from drone_sim.remote.legacy.request import Refused, Request, ints, text
 from drone_sim.remote.legacy.wire import Answer, Command
 from drone_sim.run.player import Player
 from drone_sim.scripting import script_log
@@ -61,7 +61,6 @@ class Session:
         self._client, self._player, self._clock = client, player, clock
         self.stepping = client.stepping
         self._selected = selected
-        self._context = RequestContext({}, selected)
         self._streams: dict[tuple[int, bytes], _Stream] = {}
         self._split: dict[tuple[int, bytes], bytearray] = {}
         self._errors: deque[str] = deque(maxlen=_MAX_ERRORS)
@@ -89,11 +88,9 @@ class Session:
                 continue
             if complete.code == _NEXT:
                 yield from self._step()
-            self._update_functions()
             answer = self._execute(complete)
             if answer is not None:
                 answers.append(answer)
-        self._update_functions()
         answers += self._stream_replies()
         script_log.end_call()
         return wire.write(request, answers, self._stamp())
@@ -108,13 +105,6 @@ class Session:
             yield self.stepping.wait(Until(lambda: (simulation.run, simulation.steps) != before))
 
     # ---- commands
-
-    def _update_functions(self) -> None:
-        functions = self._client.functions()
-        if functions is not self._context.functions:
-            self._context = RequestContext(functions, self._selected)
-            for stream in self._streams.values():
-                stream.request.context = self._context
 
     def _put_together(self, command: Command) -> Command | None:
         """Return a command with all of its data, None if parts are missing."""
@@ -139,7 +129,7 @@ class Session:
         if command.code in (_SYNCHRONOUS, _FREE, _NEXT, _ERRORS, _GOODBYE):
             return Answer(command, self._execute_session_command(command.code))
         function = handler_of(command.code)
-        request = Request(function.name, command, self._context)
+        request = Request(function.name, command, self._client, self._selected)
         if command.mode not in (wire.STREAMING, wire.STREAMING_SPLIT):
             return self._call(command, request, function.do)
         if key not in self._streams and len(self._streams) >= _MAX_STREAMS:
