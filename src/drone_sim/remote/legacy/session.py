@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import logging
 import math
-import time
 import zlib
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from drone_sim.message_text import encodable, printable
 from drone_sim.remote.client import Client
@@ -30,13 +30,15 @@ _IDLE_INTERVAL = 0.05  # s between executions of streaming commands while the si
 _WORD, _SIGN = 0xFFFFFFFF, 0x80000000
 
 
+@dataclass
 class _Stream:
     """A command that is executed repeatedly."""
 
-    def __init__(self, command: Command, request: Request, do: HandlerFunction):
-        self.command, self.request, self.do = command, request, do
-        self.step = (-1, -1)  # run and step of the last execution
-        self.last = -math.inf  # s, time of the last execution
+    command: Command
+    request: Request
+    do: HandlerFunction
+    step: tuple[int, int] = (-1, -1)  # run and step of the last execution
+    last: float = -math.inf  # s, time of the last execution
 
     def is_due(self, step: tuple[int, int], now: float) -> bool:
         """Return whether the result may have changed, by the step and the real time (s)."""
@@ -47,14 +49,7 @@ class _Stream:
 class Session:
     """The session of one client. Only the simulation's thread calls it."""
 
-    def __init__(
-        self,
-        name: str,
-        client: Client,
-        player: Player,
-        selected: list[int],
-        clock: Callable[[], float] = time.monotonic,
-    ):
+    def __init__(self, name: str, client: Client, player: Player, selected: list[int], clock: Callable[[], float]):
         """`name` is for the log, `client` has the functions; `selected` contains the objects selected by clients."""
         self.name = name
         self.is_over = False  # whether the client has ended it
@@ -108,7 +103,7 @@ class Session:
 
     def _put_together(self, command: Command) -> Command | None:
         """Return a command with all of its data, None if parts are missing."""
-        if command.is_whole:
+        if not command.shift and len(command.data) == command.whole:
             return command
         key = command.code, command.raw_key
         data = self._split.setdefault(key, bytearray())

@@ -51,11 +51,6 @@ class Command(NamedTuple):
     shift: int = 0
     whole: int = 0
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether `data` is all of its data."""
-        return self.shift == 0 and len(self.data) == self.whole
-
 
 class Message(NamedTuple):
     """A client's message: its number, when it was sent (ms of the client's clock), and its commands."""

@@ -16,15 +16,7 @@ from typing import Any
 from drone_sim.scripting import script_log
 from drone_sim.scripting.api.constants import CALL_TYPES
 from drone_sim.scripting.api.control import CALLS_PER_MS, DEFAULT_MS, LONGEST_MS, NO_THREAD, SHORTEST_MS
-from drone_sim.scripting.breakpoints import (
-    LONGEST_NAME,
-    LONGEST_VALUE,
-    MOST_INSIDE,
-    MOST_ROWS,
-    Breakpoints,
-    Row,
-    Scope,
-)
+from drone_sim.scripting.breakpoints import LONGEST_NAME, LONGEST_VALUE, MOST_INSIDE, MOST_ROWS, Breakpoints, Row, Scope
 from drone_sim.scripting.errors import LONGEST_MESSAGE
 from drone_sim.scripting.lua.helpers import LuaHelpers
 from drone_sim.scripting.lua.thread import Executor, SameThread
