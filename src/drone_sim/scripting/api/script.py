@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
+from drone_sim.scripting.api.calls import Api, save_state
 from drone_sim.scripting.api.service_servers import Unanswered
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.breakpoints import Scope
@@ -25,6 +26,7 @@ class Script(ABC):
     is_empty = False
     flat_names: Collection[str] = ()  # functions that it calls by their V-REP 3.x names
     failure: ScriptError | None = None  # the error after which an isolated script is not called any more
+    _modules: Mapping[str, Api]
     _is_isolated = False
     _calls = 0  # that have not returned
 
@@ -106,13 +108,15 @@ class Script(ABC):
         """Return its variables in readable form; none if it cannot be called any more."""
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that restores the current values of the script's variables."""
-        failure, restore_script = self.failure, self._save() if self.failure is None else None
+        """Return a function that restores the current values of the script's variables, and of its API modules."""
+        failure, parts = self.failure, []
+        if failure is None:
+            parts = [self._save(), *save_state(self._modules.values())]
 
         def restore() -> None:
             self.failure = failure
-            if restore_script is not None:
-                restore_script()
+            for restore_part in parts:
+                restore_part()
 
         return restore
 

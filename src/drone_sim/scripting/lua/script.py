@@ -17,7 +17,7 @@ from typing import Any
 
 from drone_sim.message_text import near_names
 from drone_sim.scripting import phase_names, script_log
-from drone_sim.scripting.api.calls import Api, save_state
+from drone_sim.scripting.api.calls import Api
 from drone_sim.scripting.api.constants import CONSTANTS, PHASES
 from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.api.types import Callback
@@ -199,14 +199,11 @@ class LuaScript(Script):
 
     def _save(self) -> Callable[[], None]:
         snapshot = self._run("snapshot", self._lua.get("save_state"))
-        restoring = save_state(self._modules.values())
 
         def restore() -> None:
             if self._has_thread() or self._has_coroutines:
                 script_log.say(script_log.THREAD_GOES_ON.format(self._path))
             self._run("restore", self._lua.get("restore"), snapshot)
-            for restore_module in restoring:
-                restore_module()
 
         return restore
 

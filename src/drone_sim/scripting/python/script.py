@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from drone_sim.message_text import near_names
 from drone_sim.scripting import phase_names, script_log
-from drone_sim.scripting.api.calls import Api, Function, UnknownName, contents, mistake, save_state
+from drone_sim.scripting.api.calls import Api, Function, UnknownName, contents, mistake
 from drone_sim.scripting.api.control import Call, NoThread, Turns, waits
 from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.api.types import Callback
@@ -207,15 +207,12 @@ class PythonScript(Script):
 
         Values that cannot be copied (open files, modules, API objects) stay as they are.
         """
-        restoring = save_state(self._modules.values())
         restore_variables = self._run("snapshot", self._save_variables)
 
         def restore() -> None:
             if self._has_thread():
                 script_log.say(THREAD_GOES_ON.format(self._path))
             self._run("restore", restore_variables)
-            for restore_module in restoring:
-                restore_module()
 
         return restore
 

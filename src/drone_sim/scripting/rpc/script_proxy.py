@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from time import monotonic
 from typing import Any, NoReturn
 
-from drone_sim.scripting.api.calls import Api, Function, contents, mistake, save_state
+from drone_sim.scripting.api.calls import Api, Function, contents, mistake
 from drone_sim.scripting.api.control import Wait
 from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.api.types import Callback
@@ -110,12 +110,10 @@ class ScriptProxy(Script):
         return []
 
     def _save(self) -> Callable[[], None]:
-        number, restoring = self._do("save", []), save_state(self._modules.values())
+        number = self._do("save", [])
 
         def restore() -> None:
             self._do("restore", [number])
-            for restore_module in restoring:
-                restore_module()
 
         return restore
 
