@@ -258,7 +258,8 @@ class Dynamics(Functions):
             known["proxintparam_entity_to_detect"] = lambda entity: self._look_for(found, int(entity))
         if isinstance(found, Eye):
             known["visionintparam_entity_to_render"] = lambda entity: self._look_for(found, int(entity))
-            known["visionintparam_render_mode"] = functools.partial(_render, found)
+            # All other modes render the same picture.
+            known["visionintparam_render_mode"] = lambda mode: setattr(found, "color_coded", mode == _COLOR_CODED)
         for name in names:
             if name in known:
                 known[name](*numbers((value,), 1))
@@ -269,10 +270,6 @@ class Dynamics(Functions):
     def _look_for(self, sensor: Detector | Eye, entity: int) -> None:
         self._names_of(entity)  # raises ValueError if it does not exist
         sensor.entity = entity
-
-
-def _render(sensor: Eye, mode: float) -> None:
-    sensor.color_coded = mode == _COLOR_CODED  # all other modes render the same picture
 
 
 def _carrier(found: SceneObject | None) -> SceneObject | None:

@@ -10,8 +10,7 @@ from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.control import PAUSE, STOP
-from drone_sim.scripting.api.host import Functions, Host, SceneServices
-from drone_sim.scripting.api.ignored import Ignored
+from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.types import Number, numbers
 
 VERSION, REVISION = 40600, 0  # of the CoppeliaSim whose API is the most similar
@@ -23,8 +22,8 @@ _PLUGINS = ("RosInterface", "ROSInterface", "ROS", "simROS", "CustomUI", "simUI"
 class SimulationFunctions(Functions):
     """The simulation: its state and time, and parameters of the simulator."""
 
-    def __init__(self, host: Host, services: SceneServices, ignored: Ignored):
-        super().__init__(host, services, ignored)
+    def __init__(self, *arguments: Any):
+        super().__init__(*arguments)
         self._random = random.Random(1)  # constant seed, so that every flight is the same
         self._values: dict[str, dict[int, Any]] = {
             "intparam": _by_number(

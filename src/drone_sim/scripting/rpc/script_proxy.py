@@ -111,11 +111,7 @@ class ScriptProxy(Script):
 
     def _save(self) -> Callable[[], None]:
         number = self._do("save", [])
-
-        def restore() -> None:
-            self._do("restore", [number])
-
-        return restore
+        return lambda: self._do("restore", [number])
 
     def close(self) -> None:
         if not self._connection.why_closed:
