@@ -140,10 +140,12 @@ class ResultStore:
             return found
         with open(self._file, encoding="utf-8", errors="replace") as file:
             while line := file.readline(_MAX_LINE):
-                key, result = _parse_line(line)
-                if result is None or key not in wanted:
+                try:
+                    values = json.loads(line)
+                    key, result = str(values["key"]), Result.from_json(values["result"])
+                except (ValueError, KeyError, TypeError, RecursionError):  # incomplete, or in another format
                     continue
-                if not (tables and result.flown) or self.table(key) is not None:
+                if key in wanted and (not (tables and result.flown) or self.table(key) is not None):
                     found[key] = result
         return found
 
@@ -196,12 +198,3 @@ def remove_old_results(folder: Path, days: float) -> None:
         with contextlib.suppress(OSError):
             if path.stat().st_mtime < oldest:
                 remove(path, within=folder)
-
-
-def _parse_line(line: str) -> tuple[str, Result | None]:
-    """Return key and result of a line; the result is None if the line is incomplete or not in our format."""
-    try:
-        values: dict[str, Any] = json.loads(line)
-        return str(values["key"]), Result.from_json(values["result"])
-    except (ValueError, KeyError, TypeError, RecursionError):
-        return "", None
