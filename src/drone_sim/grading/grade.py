@@ -16,7 +16,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from drone_sim.files import writing
-from drone_sim.grading import evidence, tasks, verify
+from drone_sim.grading import autograder, evidence, tasks, verify
 from drone_sim.grading import plan as plans
 from drone_sim.grading.arguments import (
     WRONG,
@@ -28,7 +28,6 @@ from drone_sim.grading.arguments import (
     run_all,
     status_of,
 )
-from drone_sim.grading.autograder import archive as autograder
 from drone_sim.grading.jobs import files
 from drone_sim.grading.jobs.files import Unreadable, submission_path
 from drone_sim.grading.jobs.job import Job, archives_folder, contents_of, key_of

@@ -86,8 +86,8 @@ class Flyer:
             if reply.get("result") is not None and not reply["is_gone"]:
                 result = Result.from_json(reply["result"])
                 folder = os.path.dirname(job.script)
-                error = result.error and result.error.replace(f"{HANDED_IN}{folder}", folder)
-                result = replace(result, script=job.script, error=error)
+                line = result.error and result.error.replace(f"{HANDED_IN}{folder}", folder)
+                result = replace(result, script=job.script, error=line)
                 return JobResult(job, result, rows if result.flown else b"")
             reason = end or reply.get("lost") or "ended its process before the flight was over"
             break

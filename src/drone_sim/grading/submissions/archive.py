@@ -16,7 +16,6 @@ from pathlib import Path, PurePosixPath
 from drone_sim.files.containment import path_below, remove
 from drone_sim.files.resources import MEBIBYTE
 from drone_sim.grading.jobs.files import MAX_SIZE
-from drone_sim.grading.submissions.submission import Refused
 from drone_sim.message_text import shown
 
 _MAX_FILES = 1000  # in a part
@@ -33,6 +32,10 @@ _ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, Ru
 Parts = tuple[str, ...]
 Arrange = Callable[[Sequence[Parts]], list[tuple[str, Parts]]]
 _Member = tuple[zipfile.ZipInfo, Parts]
+
+
+class Refused(ValueError):
+    """A submission cannot be graded; one line says why. Other submissions can."""
 
 
 def unpack(path: Path, store: Path, arrange: Arrange) -> tuple[Path, dict[str, str]]:
@@ -91,7 +94,10 @@ def _unpack_parts(archive: zipfile.ZipFile, folder: Path, arrange: Arrange, room
             if _size(members) > room:
                 raise Refused(f"is {_size(members) // MEBIBYTE} MiB, more than is left of the limit for one zip")
             for info, inside in members:
-                _write(archive, info, path_below(folder, part, *inside))
+                member = path_below(folder, part, *inside)
+                member.parent.mkdir(parents=True, exist_ok=True)
+                with archive.open(info) as file, open(member, "xb") as output:  # an error for a second file of a name
+                    output.write(file.read(info.file_size + 1))
             room -= _size(members)
         except (*_ZIP_ERRORS, OSError) as error:
             if isinstance(error, OSError) and error.errno not in _BAD_NAME_ERRORS:
@@ -146,12 +152,6 @@ def _fault(info: zipfile.ZipInfo, path: Parts) -> str:
 def _size(members: Sequence[_Member]) -> int:
     """Return the largest size of a part in bytes: zipfile reads no more of a file than its declared size."""
     return sum(info.file_size for info, _ in members)
-
-
-def _write(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with archive.open(info) as file, open(path, "xb") as output:  # raises an error for a second file with that name
-        output.write(file.read(info.file_size + 1))
 
 
 def _error_text(error: Exception) -> str:

@@ -8,8 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from drone_sim.grading.jobs.files import Unreadable, is_child_script
-from drone_sim.grading.submissions import archive, exports, handed_in
-from drone_sim.grading.submissions.submission import Person, Refused, Submission
+from drone_sim.grading.submissions import archive, handed_in
+from drone_sim.grading.submissions.archive import Refused
+from drone_sim.grading.submissions.submission import (
+    Submission,
+    people_in,
+    people_of,
+    read_table,
+    split_into_submissions,
+)
 from drone_sim.message_text import shown
 
 _SCRIPT_SUFFIXES = (".py", ".lua")
@@ -28,7 +35,7 @@ def submissions_of(argument: str, store: Path) -> list[Submission]:
     """
     path = Path(argument)
     if path.suffix.lower() == ".csv":
-        submissions = [_resolve_script(submission, store) for submission in exports.read_table(path)]
+        submissions = [_resolve_script(submission, store) for submission in read_table(path)]
     elif path.suffix.lower() == ".zip":
         submissions = _in_class_zip(path, store)
     elif path.is_dir() and path.suffix not in _SCRIPT_SUFFIXES:
@@ -48,24 +55,24 @@ def submissions_of(argument: str, store: Path) -> list[Submission]:
 
 def _in_class_zip(path: Path, store: Path) -> list[Submission]:
     try:
-        folder, refused = archive.unpack(path, store, exports.split_into_submissions)
+        folder, refused = archive.unpack(path, store, split_into_submissions)
     except Refused as error:
         raise ValueError(f"{shown(str(path))}: {error}") from None
-    people = exports.people_in(folder)
+    people = people_in(folder)
     refused_submissions = [
-        Submission(str(folder / part if part else path), people.get(part, _moodle_people(part)), reason)
+        Submission(str(folder / part if part else path), people.get(part, people_of(part)), reason)
         for part, reason in refused.items()
     ]
     return sorted([*_in_folder(folder, store), *refused_submissions], key=lambda submission: submission.script)
 
 
 def _in_folder(folder: Path, store: Path) -> list[Submission]:
-    people_by_name = exports.people_in(folder)
+    people_by_name = people_in(folder)
     entries = [path for path in sorted(folder.iterdir()) if not path.name.startswith(_IGNORED)]
     files = [path for path in entries if path.suffix in _SCRIPT_SUFFIXES and _may_be_child_script(path)]
     submissions = []
     for entry in entries:
-        people = people_by_name.get(entry.name, _moodle_people(entry.name))
+        people = people_by_name.get(entry.name, people_of(entry.name))
         if entry in files:
             submissions.append(Submission(str(entry), people))
         elif (entry.is_dir() and entry.suffix not in _SCRIPT_SUFFIXES) or entry.suffix.lower() == ".zip":
@@ -75,11 +82,6 @@ def _in_folder(folder: Path, store: Path) -> list[Submission]:
             if not submission.error or people or not files:  # else it may be a folder of the scripts beside it
                 submissions.append(submission)
     return submissions
-
-
-def _moodle_people(name: str) -> tuple[Person, ...]:
-    person = exports.person_of(name)
-    return () if person is None else (person,)
 
 
 def _may_be_child_script(path: Path) -> bool:
