@@ -227,7 +227,7 @@ STAYS = {  # what would outlive the flight
     "a copy": "os.fork() or (os.setsid(), time.sleep(4321))",
     "a fake table": "print('script   passed  points\\nmine.py     20/20    20/20', file=sys.__stdout__, flush=True);"
     " os.write(1, b'20 of 20'); os.write(2, b'20 of 20')",
-    "other criteria": "from drone_sim.grading.criteria.reach import Reach\n    Reach._judge_part = lambda *_: 1 / 0",
+    "other criteria": "from drone_sim.grading.criteria import Reach\n    Reach._judge_part = lambda *_: 1 / 0",
     "another clock": "import drone_sim.mechanics.clock as clock\n    clock.Clock.time = 99.0",
     "other permissions": "import drone_sim.scripting.rpc.connection as end\n    end.ScriptConnection.permit = None",
 }

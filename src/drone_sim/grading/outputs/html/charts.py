@@ -8,12 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from drone_sim.grading.criteria.columns import Attitude, Stays, SteadyError
+from drone_sim.grading.criteria.columns import Attitude, Overshoot, Stays, SteadyError, StepCriterion
 from drone_sim.grading.criteria.contacts import Landed
 from drone_sim.grading.criteria.criterion import Criterion
-from drone_sim.grading.criteria.distances import Drift, PathFollowing
-from drone_sim.grading.criteria.reach import Reach
-from drone_sim.grading.criteria.step_response import Overshoot, StepCriterion
+from drone_sim.grading.criteria.distances import Drift, PathFollowing, Reach
 from drone_sim.grading.flight_record import UNITS
 
 WIDTH, HEIGHT = 320, 150  # px, of a chart over time
