@@ -4,8 +4,9 @@ import json
 
 import pytest
 
-from drone_sim.grading import evidence, grade
+from drone_sim.grading import grade
 from drone_sim.grading import plan as plans
+from drone_sim.grading.outputs import as_json
 
 PLAN = """
 duration: 0.2
@@ -80,16 +81,16 @@ def test_what_is_no_file_of_results_gets_a_line(tmp_path, capsys, text):
 
 def test_hashes_are_of_contents(graded, tmp_path):
     plan = plans.read(graded / "hold.yaml")
-    before = evidence.hashes_of(plan, str(graded / "my.py"))
-    assert set(before) == {"plan", "config", "script", "package"} and evidence.hashes_of(plan, "") != before
+    before = as_json.hashes_of(plan, str(graded / "my.py"))
+    assert set(before) == {"plan", "config", "script", "package"} and as_json.hashes_of(plan, "") != before
     (tmp_path / "my.py").write_bytes((graded / "my.py").read_bytes())
-    assert evidence.hashes_of(plan, str(tmp_path / "my.py")) == before
+    assert as_json.hashes_of(plan, str(tmp_path / "my.py")) == before
     (tmp_path / "my.py").write_text("def sysCall_init():\n    return\n")
-    after = evidence.hashes_of(plan, str(tmp_path / "my.py"))
+    after = as_json.hashes_of(plan, str(tmp_path / "my.py"))
     assert {name for name in before if before[name] != after[name]} == {"script"}
 
 
 def test_a_key_that_could_be_guessed_is_refused(tmp_path):
     (tmp_path / "key").write_bytes(b"1234")
     with pytest.raises(ValueError, match="holds 4 bytes; it must hold at least 16"):
-        evidence.read_key(str(tmp_path / "key"), "--key")
+        as_json.read_key(str(tmp_path / "key"), "--key")

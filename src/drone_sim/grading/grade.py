@@ -16,7 +16,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from drone_sim.files import writing
-from drone_sim.grading import autograder, evidence, tasks, verify
+from drone_sim.grading import autograder, tasks, verify
 from drone_sim.grading import plan as plans
 from drone_sim.grading.arguments import (
     WRONG,
@@ -85,7 +85,7 @@ class _Grading:
         self._submissions, self._names = list(jobs), names_of(jobs)
         self._jobs = [job for some in jobs.values() for job in some]
         _check_outputs(options, len(jobs))
-        self._key = evidence.read_key(options.key, "--key") if options.key else None
+        self._key = as_json.read_key(options.key, "--key") if options.key else None
         self._runner = Runner(PROGRAM, options, self._plan, tables=bool(options.html))
         self._results: dict[Job, Result] = {}
 
@@ -166,7 +166,7 @@ def seeds_of(count: int, secret: str | None) -> list[int]:
     """
     if secret is None:
         return list(range(count))
-    key = evidence.read_key(secret, "--secret")
+    key = as_json.read_key(secret, "--secret")
     numbers = (int.from_bytes(hmac.digest(key, b"seed %d" % index, "sha256"), "big") for index in itertools.count())
     seeds: dict[int, None] = {}
     while len(seeds) < count:

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from drone_sim.grading import evidence
 from drone_sim.grading import plan as plans
 from drone_sim.grading.arguments import GradingParser, is_sandboxed, status_of
 from drone_sim.grading.flight import ungraded_result
@@ -44,7 +43,7 @@ def main(arguments: Sequence[str], watchdog: Watchdog | None = None) -> int:
 
 def _verify(options: argparse.Namespace) -> int:
     content = _read(options.verify)
-    if options.key and not evidence.is_signed(content, evidence.read_key(options.key, "--key")):
+    if options.key and not as_json.is_signed(content, as_json.read_key(options.key, "--key")):
         print(f"{options.verify}: is not signed by {options.key}, or was changed since", file=sys.stderr)
         return DIFFERENT
     plan = plans.read(content["plan"]["path"])
@@ -82,7 +81,7 @@ def _read(path: str) -> dict[str, Any]:
 def _changed_files(plan: Plan, content: Mapping[str, Any]) -> Iterator[str]:
     """Yield a line for each hash that has changed since the file was written."""
     for script in content["scripts"]:
-        hashes = evidence.hashes_of(plan, script["script"])
+        hashes = as_json.hashes_of(plan, script["script"])
         for name, old_hash in script.get("hashes", {}).items():
             if hashes.get(name) != old_hash:
                 yield f"{script['script'] or 'the built-in script'}: not what it was: {name}"

@@ -1,4 +1,4 @@
-"""Charts of a result card: what was flown beside what a criterion allows, in pixels, for the template of the card."""
+"""Charts of a result card, in pixels (what was flown beside what a criterion allows), and the scene that they show."""
 
 from __future__ import annotations
 
@@ -13,6 +13,12 @@ from drone_sim.grading.criteria.contacts import Landed
 from drone_sim.grading.criteria.criterion import Criterion
 from drone_sim.grading.criteria.distances import Drift, PathFollowing, Reach
 from drone_sim.grading.flight_record import UNITS
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import Matrix
+from drone_sim.scene.object_parameters import ObjectParameters
+from drone_sim.scene.scene_parameters import SceneParameters
+from drone_sim.shapes.compound import Part, parts_of
+from drone_sim.shapes.shape import DrawnShape
 
 WIDTH, HEIGHT = 320, 150  # px, of a chart over time
 SIDE = 240  # px, of a chart from above
@@ -21,6 +27,9 @@ _ROOM = 0.12  # of the range, free at both ends
 _SMALLEST = 0.5  # m, half of a side from above
 _MAX_POINTS = 400  # of a curve
 _BASE = (0, 1, 3, 2)  # corners of a box's lower side, see scene_of
+_DEFAULT_SIDE = 0.2  # m, of the box of a shape that only PyBullet can measure
+_MAX_DEPTH = 32  # parents of an object that are followed
+_DIGITS = 4
 
 Columns = Mapping[str, np.ndarray]
 Point = tuple[float, float]
@@ -140,7 +149,9 @@ def _over_time(bounds: Bounds, criterion: Criterion, columns: Columns, at: float
         return None
     times, values = columns["t"][rows], columns[bounds.of][rows]
     marked = [value for value in bounds[1:] if value is not None]
-    low, high = _with_room(min(*values, *marked), max(*values, *marked))
+    low, high = min(*values, *marked), max(*values, *marked)
+    room = _ROOM * (high - low) or 0.5
+    low, high = low - room, high + room
 
     def place(time: float, value: float) -> Point:
         share = (time - times[0]) / (times[-1] - times[0])
@@ -201,11 +212,6 @@ def _from_above(ground: Ground, columns: Columns, scene: Mapping[str, Any], at: 
     )
 
 
-def _with_room(low: float, high: float) -> tuple[float, float]:
-    room = _ROOM * (high - low) or 0.5
-    return low - room, high + room
-
-
 def _at(time: float, times: np.ndarray, values: np.ndarray) -> Point:
     """Return a time within `times`, and the value then."""
     time = float(np.clip(time, times[0], times[-1]))
@@ -218,3 +224,54 @@ def _points(points: Any) -> str:
 
 def _color(color: Sequence[float]) -> str:
     return f"rgb({' '.join(str(round(255 * part)) for part in color)})"
+
+
+# ---- scene
+
+
+def scene_of(scene: SceneParameters) -> dict[str, Any]:
+    """Return the floor's side (m), and the bounding box of every visible shape at its start pose.
+
+    A box has the `name` that scripts use, the unique name of its `object`, `corners` (8 points, m, world; bit 0, 1, 2
+    of the index is the side along x, y, z) and a `color` (0 to 1).
+    """
+    entries = {entry.name: entry for entry in scene.objects if entry.name}
+    boxes = []
+    for entry in scene.objects:
+        if not (isinstance(entry, ObjectParameters) and entry.visible):
+            continue
+        matrix, parent = entry.local, entry.parent
+        for _ in range(_MAX_DEPTH):
+            if parent not in entries:
+                break
+            matrix = frames.multiply(entries[parent].local, matrix)
+            parent = entries[parent].parent
+        names = {"name": entry.shown, "object": entry.name}
+        boxes += [{**names, **_box(part, matrix)} for part in parts_of(entry.to_shape(), entry.color)]
+    return {"floor": scene.floor.size, "boxes": boxes}
+
+
+def _box(part: Part, world: Matrix) -> dict[str, Any]:
+    matrix = frames.multiply(world, part.local)
+    low, high = _bounds(part)
+    corners = [
+        frames.transform(matrix, [(high if index >> axis & 1 else low)[axis] for axis in range(3)])
+        for index in range(8)
+    ]
+    return {
+        "corners": [[round(float(value), _DIGITS) for value in corner] for corner in corners],
+        "color": [round(float(value), 3) for value in part.color[:3]],
+    }
+
+
+def _bounds(part: Part) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and the highest coordinates (3,) of a shape in its frame, in m."""
+    try:
+        surfaces = list(part.shape.triangles()) if isinstance(part.shape, DrawnShape) else []
+    except (OSError, ValueError):  # the flight has reported it
+        surfaces = []
+    corners = [surface.corners.reshape(-1, 3) for surface in surfaces if len(surface.corners)]
+    if not corners:
+        return np.full(3, -_DEFAULT_SIDE / 2), np.full(3, _DEFAULT_SIDE / 2)
+    points = np.concatenate(corners)
+    return points.min(axis=0), points.max(axis=0)

@@ -27,8 +27,7 @@ import numpy as np
 from drone_sim.files import writing
 from drone_sim.files.containment import remove
 from drone_sim.grading.flight_record import columns_of
-from drone_sim.grading.outputs.html.charts import Chart, chart_of
-from drone_sim.grading.outputs.html.scene import scene_of
+from drone_sim.grading.outputs.html.charts import Chart, chart_of, scene_of
 from drone_sim.grading.outputs.script_results import (
     ScriptResults,
     flight_label,
@@ -90,13 +89,6 @@ class SimilarPage(NamedTuple):
     share: float
     pages: tuple[ScriptPage, ScriptPage]
     lines: tuple[list[tuple[str, bool]], list[tuple[str, bool]]]  # of each script, and whether both have it
-
-
-class Bar(NamedTuple):
-    """A bar of the distribution of points."""
-
-    label: str
-    scripts: int
 
 
 def check(folder: str | Path) -> None:
@@ -161,12 +153,12 @@ def _write_shared_files(folder: Path) -> None:
         _write(folder / name, (_HERE / "files" / name).read_text(encoding="utf-8"))
 
 
-def _distribution(scripts: Sequence[ScriptResults]) -> list[Bar]:
-    """Return the distribution of the points of a class, in tenths of the possible points."""
+def _distribution(scripts: Sequence[ScriptResults]) -> list[tuple[str, int]]:
+    """Return the label and the number of scripts of each tenth of the possible points."""
     possible = max((script.of for script in scripts), default=0.0) or 1.0
     tenths = [min(_BARS - 1, int(_BARS * script.points / possible)) for script in scripts]
     bounds = [format_points(possible * tenth / _BARS) for tenth in range(_BARS + 1)]
-    return [Bar(f"{bounds[tenth]} to {bounds[tenth + 1]}", tenths.count(tenth)) for tenth in range(_BARS)]
+    return [(f"{bounds[tenth]} to {bounds[tenth + 1]}", tenths.count(tenth)) for tenth in range(_BARS)]
 
 
 def _similar_pages(plan: Plan, pages: Sequence[ScriptPage], sources: Mapping[str, str]) -> list[SimilarPage]:
@@ -174,18 +166,13 @@ def _similar_pages(plan: Plan, pages: Sequence[ScriptPage], sources: Mapping[str
     similar_pages = []
     for number, pair in enumerate(find_similar(sources, provided_sources(plan)), start=1):
         both = pair.first, pair.second
-        lines = [
-            [(text, line in marked) for line, text in enumerate(_lines(sources[name]), start=1)]
-            for name, marked in zip(both, pair.lines)
-        ]
+        lines = []
+        for name, marked in zip(both, pair.lines):
+            texts = sources[name].removesuffix("\n").split("\n")  # as in find_similar: a form feed ends no line
+            lines.append([(text.removesuffix("\r"), line in marked) for line, text in enumerate(texts, start=1)])
         first, second = (by_name[name] for name in both)
         similar_pages.append(SimilarPage(f"similar/{number}.html", pair.share, (first, second), (lines[0], lines[1])))
     return similar_pages
-
-
-def _lines(source: str) -> list[str]:
-    """Return the lines of a script, numbered as in find_similar: a form feed does not end a line."""
-    return [line.removesuffix("\r") for line in source.removesuffix("\n").split("\n")]
 
 
 class _FlightWriter:
