@@ -12,7 +12,7 @@ from drone_sim.grading import plan as plans
 from drone_sim.grading.jobs import sandbox, settings
 from drone_sim.grading.jobs.flyer import Flyer
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
-from drone_sim.grading.scene_values import SceneValues
+from drone_sim.grading.ownership import SceneValues
 from drone_sim.message_text import printable
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation

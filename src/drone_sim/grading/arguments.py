@@ -112,24 +112,22 @@ class Runner:
                     yield job, stored[job.key].of_script(job.script)
                 else:
                     new_jobs.append(job)
-            yield from self._fly_and_store(new_jobs, bar)
-
-    def _fly_and_store(self, jobs: Sequence[Job], bar: tqdm) -> Iterator[tuple[Job, Result]]:
-        if not jobs:
-            return
-        if self._fly is None:
-            workers = min(self._options.jobs, len(jobs))
-            self._fly = self._open.enter_context(pool.open_pool(self._flight_options, workers, self._options.scheduler))
-        for flight in self._fly(jobs):
-            try:
-                self.store.add(flight)
-            except OSError as error:  # such as a full disk: the other flights go on
-                if self.all_stored:
-                    reason = printable(format_error(error))
-                    tqdm.write(f"{self._program}: {reason}: not all results are kept", file=sys.stderr)
-                self.all_stored = False
-            bar.update()
-            yield flight.job, flight.result
+            if not new_jobs:
+                return
+            if self._fly is None:
+                workers = min(self._options.jobs, len(new_jobs))
+                opened = pool.open_pool(self._flight_options, workers, self._options.scheduler)
+                self._fly = self._open.enter_context(opened)
+            for flight in self._fly(new_jobs):
+                try:
+                    self.store.add(flight)
+                except OSError as error:  # such as a full disk: the other flights go on
+                    if self.all_stored:
+                        reason = printable(format_error(error))
+                        tqdm.write(f"{self._program}: {reason}: not all results are kept", file=sys.stderr)
+                    self.all_stored = False
+                bar.update()
+                yield flight.job, flight.result
 
 
 @contextlib.contextmanager

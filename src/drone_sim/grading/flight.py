@@ -21,7 +21,6 @@ from drone_sim.grading.result import Result, result_of
 from drone_sim.grading.rules import Rules, ScriptWatch
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import first_step
-from drone_sim.run.parameters import Parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.run.simulation_setup import own_script
 from drone_sim.scripting import load
@@ -84,28 +83,47 @@ class Flight:
         self._plan, self._seed, self._changes = plan, seed, changes or {}
         parameters = plan.parameters(seed, "" if script == "" else None, changes)
         self._script = plan.script_of(script) or parameters.script
-        _check_flown(parameters, self._script)
+        own = {vehicle.name: own_script(vehicle, parameters) for vehicle in parameters.fleet}
+        if self._script and own and all(own.values()):
+            named = ", ".join(f"vehicles/{name}/script: {path}" for name, path in own.items())
+            reason = f"the scene names {named}; remove one of these keys"
+            raise ParameterError(f"no vehicle would fly {self._script}: {reason}")
         self._timeline = plan.timeline_of(parameters)
         self._steps = first_step(plan.duration, parameters.time_step)
         backend = OfflineBackend(plan.topics_of(parameters))
-        watch = ScriptWatch()
+        self._watch, self._connection = ScriptWatch(), connection
         self._simulation = Simulation(
             parameters,
             script=self._script,
             backend=backend if backend.topics else None,
             started=False,
-            load_script=_script_loader(connection, self._script, watch),
+            load_script=self._load_script,
         )
-        backend.clock, backend.is_scene = lambda: self._simulation.time, lambda: watch.is_scene
+        backend.clock, backend.is_scene = lambda: self._simulation.time, lambda: self._watch.is_scene
         try:
             self._recorder = FlightRecorder(plan, self._simulation, backend)
             self._permissions = Permissions(plan, self._simulation, self._script, self._recorder.goals)
-            self._rules = Rules(plan, self._simulation, watch)
+            self._rules = Rules(plan, self._simulation, self._watch)
             if connection is not None:
                 connection.begin(self._simulation.context.objects, self._is_quiet, self._permissions)
         except BaseException:
             self._simulation.close()
             raise
+
+    def _load_script(
+        self,
+        path: str,
+        modules: Mapping[str, Api],
+        limit: TimeLimit,
+        turns: Turns,
+        breakpoints: Breakpoints | None = None,
+    ) -> load.Script:
+        """Load the submission through the connection, if there is one, and other scripts in this process."""
+        is_scene = path != self._script
+        if not is_scene and self._connection is not None:
+            return self._watch.wrap(ScriptProxy(self._connection, path, modules, limit), is_scene)
+        loaded = self._watch.run(is_scene, load.load, path, modules, limit, turns, breakpoints)
+        return self._watch.wrap(loaded, is_scene)
 
     def grade(self) -> Result:
         """Fly, and return the result. Call this once."""
@@ -162,32 +180,9 @@ def write_table(rows: np.ndarray, file: IO[str]) -> None:
         recording.write_row(row)
 
 
-def _check_flown(parameters: Parameters, script: str) -> None:
-    """Raise ParameterError if no vehicle flies the script, because the scene names another one for each."""
-    own = {vehicle.name: own_script(vehicle, parameters) for vehicle in parameters.fleet}
-    if script and own and all(own.values()):
-        named = ", ".join(f"vehicles/{name}/script: {path}" for name, path in own.items())
-        raise ParameterError(f"no vehicle would fly {script}: the scene names {named}; remove one of these keys")
-
-
 def script_seed(seed: int) -> int:
     """Return the seed of Python's and NumPy's global generators in scripts, which does not reveal `seed`."""
     return int.from_bytes(hashlib.sha256(b"what scripts draw, %d" % seed).digest()[:8], "little")
-
-
-def _script_loader(connection: ScriptConnection | None, submission: str, watch: ScriptWatch) -> load.Loader:
-    """Return a function that loads the submission through the connection, if there is one, and other scripts here."""
-
-    def load_script(
-        path: str, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns, breakpoints: Breakpoints | None = None
-    ) -> load.Script:
-        is_scene = path != submission
-        if not is_scene and connection is not None:
-            return watch.wrap(ScriptProxy(connection, path, modules, limit), is_scene)
-        loaded = watch.run(is_scene, load.load, path, modules, limit, turns, breakpoints)
-        return watch.wrap(loaded, is_scene)
-
-    return load_script
 
 
 def _error_of(action: Callable[[], None]) -> str | None:

@@ -19,23 +19,19 @@ _Trial = tuple[tuple[Any, ...], float | None]  # a value for each key, and a fig
 
 def save(path: str, title: str, keys: Sequence[str], trials: Sequence[_Trial], label: str) -> None:
     """Plot the trials' figures, named `label`, over one or two parameters. Raises OSError."""
-    figure = Figure(figsize=(7, 5), layout="constrained")
-    axes = figure.subplots()
+    drawing = Figure(figsize=(7, 5), layout="constrained")
+    axes = drawing.subplots()
     if len(keys) == 1:
-        _draw_curve(axes, keys[0], trials, label)
+        points = sorted((values[0], np.nan if figure is None else figure) for values, figure in trials)
+        axes.plot(*zip(*points), "o-")
+        axes.set_xlabel(keys[0])
+        axes.set_ylabel(label)
+        axes.grid(alpha=0.3)
     else:
-        _draw_map(figure, axes, keys, trials, label)
+        _draw_map(drawing, axes, keys, trials, label)
     axes.set_title(title)
     with writing.replacing(path, binary=True) as file:
-        figure.savefig(file, format=Path(path).suffix[1:], dpi=120)
-
-
-def _draw_curve(axes: Any, key: str, trials: Sequence[_Trial], label: str) -> None:
-    points = sorted((values[0], np.nan if figure is None else figure) for values, figure in trials)
-    axes.plot(*zip(*points), "o-")
-    axes.set_xlabel(key)
-    axes.set_ylabel(label)
-    axes.grid(alpha=0.3)
+        drawing.savefig(file, format=Path(path).suffix[1:], dpi=120)
 
 
 def _draw_map(figure: Any, axes: Any, keys: Sequence[str], trials: Sequence[_Trial], label: str) -> None:

@@ -13,8 +13,7 @@ import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from typing import TYPE_CHECKING, Any
 
-from drone_sim.grading.own_objects import OwnObjects
-from drone_sim.grading.scene_values import SceneValues
+from drone_sim.grading.ownership import OwnObjects, SceneValues
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.message_text import MAX_NAME, printable
 from drone_sim.remote.control import ClientControl

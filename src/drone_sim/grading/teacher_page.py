@@ -42,10 +42,14 @@ class Course:
     def tasks(self) -> list[dict[str, Any]]:
         """Return name, times of the hand-ins by student, and state of the last run of each task with a folder."""
         names = [name for name in tasks.names() if (self._handed_in / name).is_dir()]
-        return [{"name": name, "times": self._times(name), **self._state(name)} for name in names]
-
-    def _times(self, task: str) -> dict[str, str]:
-        return dict(sorted(handed_in.times_in(self._handed_in / task).items()))
+        return [
+            {
+                "name": name,
+                "times": dict(sorted(handed_in.times_in(self._handed_in / name).items())),
+                **self._state(name),
+            }
+            for name in names
+        ]
 
     def grade(self, task: str) -> None:
         """Begin to grade what was handed in for a task, unless that is being done. Raises ValueError."""

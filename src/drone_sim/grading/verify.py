@@ -7,7 +7,7 @@ import contextlib
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,8 +47,12 @@ def _verify(options: argparse.Namespace) -> int:
         print(f"{options.verify}: is not signed by {options.key}, or was changed since", file=sys.stderr)
         return DIFFERENT
     plan = plans.read(content["plan"]["path"])
-    for line in _changed_files(plan, content):
-        print(f"{PROGRAM}: {printable(line)}", file=sys.stderr)
+    for script in content["scripts"]:
+        hashes = as_json.hashes_of(plan, script["script"])
+        for name, old_hash in script.get("hashes", {}).items():
+            if hashes.get(name) != old_hash:
+                label = printable(script["script"]) or "the built-in script"
+                print(f"{PROGRAM}: {label}: not what it was: {printable(name)}", file=sys.stderr)
     results = [Result.from_json(result) for result in content["results"]]
     new_results = _fly_again(plan, results, options)
     different = 0
@@ -76,15 +80,6 @@ def _read(path: str) -> dict[str, Any]:
     except ValueError as error:
         raise ValueError(str(error) or f"{path}: is not a file that grade --json has written") from None
     return dict(content)
-
-
-def _changed_files(plan: Plan, content: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a line for each hash that has changed since the file was written."""
-    for script in content["scripts"]:
-        hashes = as_json.hashes_of(plan, script["script"])
-        for name, old_hash in script.get("hashes", {}).items():
-            if hashes.get(name) != old_hash:
-                yield f"{script['script'] or 'the built-in script'}: not what it was: {name}"
 
 
 def _fly_again(plan: Plan, results: Sequence[Result], options: argparse.Namespace) -> dict[tuple[str, int], Result]:

@@ -82,18 +82,14 @@ def _script_lines(scripts: Sequence[ScriptResults], width: int, paint: _Paint) -
     heads, *starts = align_columns([("script", "passed", "points", "worst (seed)"), *rows], left=1)
     lines = [paint(_cut(f"{heads}  failed in (flights)", width), _BOLD)]
     for script, start in zip(scripts, starts):
-        line = _cut(f"{start}  {_failures(script)}".rstrip(), width)
+        criteria = ", ".join(f"{printable(name)} {count}" for name, count in script.failures)
+        failures = "; ".join(filter(None, (*map(printable, script.errors[:1]), criteria)))
+        line = _cut(f"{start}  {failures}".rstrip(), width)
         lines.append(paint.verdict(line, script.has_passed))
     if len(scripts) > 1:
         passed = sum(script.has_passed for script in scripts)
         lines.append(f"{passed} of {len(scripts)} scripts passed every flight")
     return lines
-
-
-def _failures(script: ScriptResults) -> str:
-    """Return the first error, and the failed criteria, the most frequent first."""
-    criteria = ", ".join(f"{printable(name)} {count}" for name, count in script.failures)
-    return "; ".join(filter(None, (*map(printable, script.errors[:1]), criteria)))
 
 
 def _flight_lines(script: ScriptResults, width: int, paint: _Paint) -> list[str]:
