@@ -158,9 +158,8 @@ class _Sweep:
             new_trials = self._fly(points, quiet=True)
             trials.extend(new_trials)
             best = min(trials, key=lambda trial: trial.cost(self._options.smallest))
-            values = ", ".join(
-                f"{parameter.name} = {_format_cell(value)}" for parameter, value in zip(self._ranges, best.values)
-            )
+            named = zip((parameter.name for parameter in self._ranges), best.values)
+            values = ", ".join(f"{name} = {_format_cell(value)}" for name, value in named)
             points_of = f"{best.points:.4g} of {best.of:.4g} points"
             print(f"{PROGRAM}: {len(trials)} tried; best so far {points_of} with {values}", file=sys.stderr, flush=True)
             return [trial.cost(self._options.smallest) for trial in new_trials]
@@ -282,27 +281,24 @@ def _full_key(key: str, known: Sequence[str]) -> str:
 
 
 def _parse_values(text: str, values: str) -> Sequence[Any]:
-    if ":" in values:
-        return _evenly_spaced(text, values.split(":"))
+    """Return the values A,B,..., or COUNT values from START to STOP, including both."""
+    if ":" not in values:
+        try:
+            parsed = [yaml_files.parse(word) for word in values.split(",")]
+        except yaml_files.YamlError as error:
+            raise RangeError(f"--param {shown(text)}: {error}") from None
+        if any(isinstance(value, (dict, list)) or value is None for value in parsed) or len(parsed) > _MAX_VALUES:
+            raise RangeError(f"--param {shown(text)}: {_FORM}")
+        return parsed
     try:
-        parsed = [yaml_files.parse(word) for word in values.split(",")]
-    except yaml_files.YamlError as error:
-        raise RangeError(f"--param {shown(text)}: {error}") from None
-    if any(isinstance(value, (dict, list)) or value is None for value in parsed) or len(parsed) > _MAX_VALUES:
-        raise RangeError(f"--param {shown(text)}: {_FORM}")
-    return parsed
-
-
-def _evenly_spaced(text: str, parts: Sequence[str]) -> list[float]:
-    """Return COUNT values from START to STOP, including both."""
-    try:
-        start, stop, count = float(parts[0]), float(parts[1]), int(parts[2])
-        is_valid = len(parts) == 3 and math.isfinite(start) and math.isfinite(stop) and 1 <= count <= _MAX_VALUES
-    except (ValueError, IndexError):
+        start, stop, number = values.split(":")
+        low, high, count = float(start), float(stop), int(number)
+        is_valid = math.isfinite(low) and math.isfinite(high) and 1 <= count <= _MAX_VALUES
+    except ValueError:
         is_valid = False
     if not is_valid:
         raise RangeError(f"--param {shown(text)}: {_FORM}; COUNT is from 1 to {_MAX_VALUES}")
-    return [float(f"{value:.12g}") for value in np.linspace(start, stop, count)]  # 0.3, not 0.30000000000000004
+    return [float(f"{value:.12g}") for value in np.linspace(low, high, count)]  # 0.3, not 0.30000000000000004
 
 
 def _format_cell(cell: Any) -> str:
