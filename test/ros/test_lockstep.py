@@ -23,7 +23,6 @@ from std_srvs.srv import SetBool, Trigger
 
 from drone_sim.files.resources import package_path
 from drone_sim.grading import plan as plans
-from drone_sim.ros.grading import seeds
 from drone_sim.ros.grading.grade_live import grade
 from drone_sim.ros.grading.simulator import GradedSimulator, Mismatch
 
@@ -319,7 +318,7 @@ class Lockstep(unittest.TestCase):
             with self.flying(COMMANDS, nodes=[(NODES / "reacting.py",)]) as (simulator, _, _):
                 simulator.wait_for("in step with")
                 results.append(grade(plan, 1, "reacting", "drone_sim", HANGS)[0])
-                with mock.patch.object(seeds, "timeline_file", lambda _plan: str(other)):
+                with mock.patch("drone_sim.ros.grading.grade_live.timeline_file", lambda _plan: str(other)):
                     replaced, _ = grade(plan, 1, "reacting", "drone_sim", HANGS)
                 with mock.patch.object(GradedSimulator, "start", start_twice):
                     restarted, _ = grade(plan, 1, "reacting", "drone_sim", HANGS)

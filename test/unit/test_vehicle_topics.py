@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 from drone_sim.grading import plan as plans
-from drone_sim.ros.grading import seeds
+from drone_sim.ros.grading.simulator import scene_file
 from drone_sim.ros.vehicle import vehicle_topics
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
@@ -48,7 +48,7 @@ def _fleet(monkeypatch, tmp_path):
 def test_a_vehicle_that_begins_elsewhere_keeps_its_topics(fleet, tmp_path):
     simulation, (topics,) = fleet._simulation, fleet._topics.values()
     (tmp_path / "plan.yaml").write_text(PLAN)
-    simulation.load_scene(seeds.scene_file(plans.read(tmp_path / "plan.yaml"), 3))
+    simulation.load_scene(scene_file(plans.read(tmp_path / "plan.yaml"), 3))
     fleet.follow()
     assert simulation.drone.parameters.position != parameters.load().drone.position
     assert (topics.is_open, topics.vehicle) == (True, simulation.drone)

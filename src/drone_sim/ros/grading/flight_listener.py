@@ -55,7 +55,6 @@ class FlightListener:
 
     def _subscribe_for_criteria(self, plan: Plan, parameters: Parameters) -> None:
         vehicles = [vehicle.name for vehicle in parameters.fleet]
-        self._topics: dict[str, str] = {}  # full names of topics of unknown type, by their names in the plan
         for criterion in plan.criteria:
             if criterion.signals and not isinstance(getattr(criterion, "equals", 0), (int, float)):
                 reason = "only signals that are numbers can be received; publish other values on a topic"
@@ -65,19 +64,15 @@ class FlightListener:
             for name in criterion.object_names:
                 self._subscribe(f"/{name}/odom", Odometry, partial(self._on_other_odometry, name))
             if criterion.needs_contacts:
-                self._subscribe(self._contacts_topic(criterion.label, parameters), MarkerArray, self._on_contacts)
+                own = next(vehicle for vehicle in parameters.fleet if vehicle.name == self._vehicle)
+                topics = [sensor.topic for sensor in own.sensors.values() if sensor.kind == "contacts"]
+                if not topics:
+                    where = "such as that of config/sensors.yaml, in the plan's config and the simulator's"
+                    raise Mismatch(f"criterion {criterion.label}: needs the sensor `contacts`, {where}")
+                self._subscribe(f"/{self._vehicle}/{topics[0]}", MarkerArray, self._on_contacts)
             if criterion.needs_states:
                 self._subscribe(f"/{self._vehicle}/state", String, lambda message: self._add_value("", message.data))
-        self._topics = plan.topics_of(parameters)
-
-    def _contacts_topic(self, criterion: str, parameters: Parameters) -> str:
-        """Return the topic of the vehicle's contacts sensor. Raises Mismatch."""
-        own = next(vehicle for vehicle in parameters.fleet if vehicle.name == self._vehicle)
-        for sensor in own.sensors.values():
-            if sensor.kind == "contacts":
-                return f"/{self._vehicle}/{sensor.topic}"
-        where = "such as that of config/sensors.yaml, in the plan's config and the simulator's"
-        raise Mismatch(f"criterion {criterion}: needs the sensor `contacts`, {where}")
+        self._topics = plan.topics_of(parameters)  # of unknown type, until they are advertised
 
     def _subscribe(self, topic: str, kind: type, callback: Callable[[Any], None], from_any_node: bool = False) -> None:
         """Subscribe to a topic; unless `from_any_node`, messages of other nodes than the simulator are forged."""

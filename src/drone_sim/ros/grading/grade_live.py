@@ -35,9 +35,8 @@ from drone_sim.grading.result import Result, result_of
 from drone_sim.ros.core.launch_parameters import from_shell
 from drone_sim.ros.core.shutdown import end_on_signals
 from drone_sim.ros.core.startup import init_node, status_of_node
-from drone_sim.ros.grading import seeds
 from drone_sim.ros.grading.flight_listener import FlightListener, LiveRules
-from drone_sim.ros.grading.simulator import GradedSimulator, Mismatch, lookup
+from drone_sim.ros.grading.simulator import GradedSimulator, Mismatch, lookup, scene_file, timeline_file
 from drone_sim.ros.grading.timeline_sender import TimelineSender, moves_vehicle, steps_late
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene_parameters import find_files_beside
@@ -149,7 +148,7 @@ class _LiveFlight:
     def __init__(self, plan: Plan, seed: int, simulator: GradedSimulator, parameters: Parameters):
         """Advertise and subscribe. Raises Mismatch."""
         self._simulator, self._plan = simulator, plan
-        self._duration, self._scene = plan.duration, seeds.scene_file(plan, seed)
+        self._duration, self._scene = plan.duration, scene_file(plan, seed)
         self._over = threading.Event()
         lockstep = parameters.lockstep
         wait = max(lockstep.timeout, lockstep.start_timeout) if plan.lockstep else 0.0
@@ -161,7 +160,7 @@ class _LiveFlight:
             vehicle.position for vehicle in wanted.fleet if vehicle.name == plan.vehicle_of(wanted)
         )
         self._timeline = plan.timeline_of(wanted)
-        self._timeline_file = seeds.timeline_file(plan) if plan.lockstep else ""
+        self._timeline_file = timeline_file(plan) if plan.lockstep else ""
         self._digest = self._timeline.digest if plan.lockstep else ""
         # In lockstep the simulator itself executes the timeline, because a message could arrive a step later.
         self._sender = TimelineSender([] if plan.lockstep else self._timeline.entries, parameters, simulator.node)

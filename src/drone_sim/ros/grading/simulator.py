@@ -1,10 +1,11 @@
-"""The simulator's node during a graded flight: whether it fits the plan, its start and stop."""
+"""The simulator's node during a graded flight: whether it fits the plan, its start and stop, and the files for it."""
 
 from __future__ import annotations
 
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import rosgraph
@@ -14,6 +15,9 @@ from dynamic_reconfigure.msg import Config
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import String
 
+from drone_sim.files import writing
+from drone_sim.files.resources import cache_path
+from drone_sim.files.yaml_writing import dump
 from drone_sim.grading.plan import Plan
 from drone_sim.message_text import shown
 from drone_sim.ros.core.launch_parameters import parameters_of, use_sim_time
@@ -24,18 +28,8 @@ _POLL_INTERVAL = 0.05  # s of real time
 _MAX_DIFFERENCES = 3  # in a message
 # Parameters that a plan does not set, or that are set in another way.
 _IGNORED = (
-    *(
-        "profile",
-        "config",
-        "gui",
-        "script",
-        "script_time_limit",
-        "real_time_factor",
-        "remote_api",
-        "scene_file",
-        "samples",
-    ),
-    *("lockstep", "step_count", "timeline_file"),
+    *("profile", "config", "gui", "script", "script_time_limit", "real_time_factor", "remote_api", "scene_file"),
+    *("samples", "lockstep", "step_count", "timeline_file"),
 )
 _STOPPED = "stopped"
 _SCRIPT_ERROR = "script error: "
@@ -166,3 +160,39 @@ def _differences(wanted: Any, running: Any, above: tuple[str, ...]) -> Iterator[
                 yield from _differences(wanted.get(key), running.get(key), (*above, str(key)))
     elif wanted != running:
         yield f"{'/'.join(above)} = {shown(running)}, the plan's is {shown(wanted)}"
+
+
+# ---- files for the simulator
+
+
+def scene_file(plan: Plan, seed: int) -> str:
+    """Return a scene file with the start conditions of a seed; for seed 0 the plan's own. Raises OSError."""
+    if not seed:
+        return plan.parameters().scene_file
+    parameters = plan.parameters(seed)
+    values = parameters.model_dump(
+        mode="json", include={"scene", "weather", "physics", "time_step", "sub_step", "gravity"}
+    )
+    own = parameters.in_scene_file.get("vehicles") or {}  # a vehicle with a script of its own keeps it
+    vehicles = {
+        vehicle.name: {
+            **vehicle.model_dump(mode="json", exclude={"name", "script"}),
+            **{key: value for key, value in own.get(vehicle.name, {}).items() if key == "script"},
+        }
+        for vehicle in parameters.fleet
+    }
+    content = {**values.pop("scene"), **values, "vehicles": vehicles}
+    return _write(f"{plan.name}-{seed}.yaml", content)
+
+
+def timeline_file(plan: Plan) -> str:
+    """Return a file with the timeline of a plan, '' if it has none. Raises OSError."""
+    return _write(f"{plan.name}-timeline.yaml", plan.timeline) if plan.timeline else ""
+
+
+def _write(name: str, content: Any) -> str:
+    folder = cache_path() / "grading" / "seeds"
+    folder.mkdir(parents=True, exist_ok=True)
+    path = Path(folder, name)  # is not removed, because the simulator may be restarted with it
+    writing.write(path, dump(content))
+    return str(path)

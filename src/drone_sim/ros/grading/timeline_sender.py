@@ -25,14 +25,7 @@ from drone_sim.files.yaml_writing import dump
 from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.frames import from_rpy, to_quaternion
 from drone_sim.mechanics.state import Pose, Twist
-from drone_sim.offline.timeline import (
-    CHANGES,
-    Entry,
-    ObjectMove,
-    ScriptRequest,
-    Timeline,
-    first_step,
-)
+from drone_sim.offline.timeline import CHANGES, Entry, ObjectMove, ScriptRequest, Timeline, first_step
 from drone_sim.ros.core.message_conversion import WORLD_FRAME, twist
 from drone_sim.ros.grading.simulator import Mismatch
 from drone_sim.run.parameters import Parameters
