@@ -8,8 +8,7 @@ import pytest
 from drone_sim.config.types import ParameterError
 from drone_sim.ros.tools import gamepad
 from drone_sim.ros.tools.commands import Command
-from drone_sim.ros.tools.gamepad import Gamepad, JoyState
-from drone_sim.ros.tools.joy_commands import JoyCommands, load_joy
+from drone_sim.ros.tools.gamepad import Gamepad, JoyCommands, JoyState, load_joy
 
 BUTTON, AXIS, INITIAL = 1, 2, 0x80
 LB, A, Y, BACK = 4, 0, 3, 6

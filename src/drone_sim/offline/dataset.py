@@ -24,6 +24,7 @@ from drone_sim.sensors.truth import described
 
 _FOLDERS = ("color", "instances", "truth")
 _ANNOTATIONS = "annotations.json"
+_COPIED = ("number", "name", "full", "occlusion", "truncation", "position", "orientation", "size")  # keys of an object
 
 
 class Dataset:
@@ -59,18 +60,14 @@ class Dataset:
         file = f"color/{name}.png"
         self._images.append({"id": number, "file_name": file, "width": width, "height": height, "time": round(time, 6)})
         for detection in objects:
-            self._annotations.append(self._annotation(number, mask, detection))
-
-    def _annotation(self, image: int, mask: np.ndarray, detection: Mapping[str, Any]) -> dict[str, Any]:
-        left, top, right, bottom = detection["visible"]
-        category = self._categories.setdefault(detection["category"], len(self._categories) + 1)
-        copied = ("number", "name", "full", "occlusion", "truncation", "position", "orientation", "size")
-        return {
-            "id": len(self._annotations) + 1, "image_id": image, "category_id": category, "iscrowd": 0,
-            "bbox": [left + 0.5, top + 0.5, right - left, bottom - top],  # 0 is the first pixel's border
-            "area": detection["pixels"], "segmentation": run_lengths(mask == detection["number"]),
-            **{key: detection[key] for key in copied},
-        }  # fmt: skip
+            left, top, right, bottom = detection["visible"]
+            category = self._categories.setdefault(detection["category"], len(self._categories) + 1)
+            self._annotations.append({
+                "id": len(self._annotations) + 1, "image_id": number, "category_id": category, "iscrowd": 0,
+                "bbox": [left + 0.5, top + 0.5, right - left, bottom - top],  # 0 is the first pixel's border
+                "area": detection["pixels"], "segmentation": run_lengths(mask == detection["number"]),
+                **{key: detection[key] for key in _COPIED},
+            })  # fmt: skip
 
     def finish(self) -> None:
         """Write the annotations. Raises OSError."""

@@ -124,7 +124,9 @@ def _run(options: argparse.Namespace, watchdog: Watchdog | None) -> int:
         print(f"wrote {name}: {writer}", flush=True)
     plot_status = 0
     if options.plot and recording.rows:
-        plot_status = status_of("fly", lambda: _draw(options.plot, recording, timeline.of(vehicle)))
+        from drone_sim.offline import plot
+
+        plot_status = status_of("fly", lambda: plot.save(options.plot, recording, timeline.of(vehicle)))
     return status or close_status or plot_status
 
 
@@ -140,12 +142,6 @@ def _check_outputs(options: argparse.Namespace, steps: int) -> None:
         writing.check_writable(output)
     if options.truth:
         dataset.check(options.truth)
-
-
-def _draw(path: str, recording: Recording, timeline: Timeline) -> None:
-    from drone_sim.offline import plot
-
-    plot.save(path, recording, timeline)
 
 
 def _check_names(options: argparse.Namespace) -> None:

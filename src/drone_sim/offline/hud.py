@@ -45,7 +45,8 @@ def draw(picture: np.ndarray, flight: HudState) -> None:
     for part in (picture[:strip], picture[-strip:]):
         part[:] = (part * _STRIP_BRIGHTNESS).astype(np.uint8)
     _write(picture[:strip], flight.state, f"t {flight.time:.2f} s")
-    attitude = "roll {:+.0f}  pitch {:+.0f}  yaw {:+.0f} deg".format(*map(_degrees, flight[4:7]))
+    degrees = (round(math.degrees(angle)) + 0.0 for angle in flight[4:7])  # + 0.0 turns -0 into 0
+    attitude = "roll {:+.0f}  pitch {:+.0f}  yaw {:+.0f} deg".format(*degrees)
     _write(picture[-strip:], f"height {flight.height:.2f} m  speed {flight.speed:.2f} m/s", attitude)
     _horizon(dial(picture), flight)
 
@@ -61,10 +62,6 @@ def dial(picture: np.ndarray) -> np.ndarray:
 
 def _strip(picture: np.ndarray) -> int:
     return max(_MIN_STRIP, round(len(picture) * _STRIP))
-
-
-def _degrees(angle: float) -> float:
-    return round(math.degrees(angle)) + 0.0  # + 0.0 turns -0 into 0
 
 
 def _write(strip: np.ndarray, left: str, right: str) -> None:

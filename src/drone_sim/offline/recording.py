@@ -72,7 +72,8 @@ class Recording:
 
     def write_row(self, row: Iterable[float]) -> None:
         """Write a row to the file only. Raises OutputError if the disk is full."""
-        self._write(map(_shortest, row))
+        # The shortest texts from which the same numbers are read back exactly.
+        self._write(repr(float(value)).removesuffix(".0") for value in row)
 
     def matrix(self, index: int) -> Matrix:
         """Return a row's transform from base_link to the world."""
@@ -85,11 +86,6 @@ class Recording:
                 self._file.write(",".join(fields) + "\n")  # a single call, so that Ctrl-C leaves no incomplete row
             except OSError as error:
                 raise OutputError(error.errno, error.strerror) from None
-
-
-def _shortest(value: float) -> str:
-    """Return the shortest text from which the same float is read back exactly."""
-    return repr(float(value)).removesuffix(".0")
 
 
 class SensorSeries(NamedTuple):

@@ -158,11 +158,8 @@ class CameraRecorder:
         """Add the camera's image of the last step, if it took one. Raises OSError."""
         if self._camera.image is not None:
             row = (simulation.time, *(number for part in self._vehicle.body.state for number in part))
-            state = self._state(simulation)
+            state = doing(self._vehicle) if simulation.running else "stopped"
             self._video.add(to_color(self._camera.image), hud.HudState.of(row, state))
-
-    def _state(self, simulation: Simulation) -> str:
-        return doing(self._vehicle) if simulation.running else "stopped"
 
     def __str__(self) -> str:
         """Return the video's size, length and format as text."""

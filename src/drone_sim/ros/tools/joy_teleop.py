@@ -22,8 +22,7 @@ from drone_sim.ros.core.launch_parameters import from_shell
 from drone_sim.ros.core.shutdown import run_tool
 from drone_sim.ros.tools import gamepad
 from drone_sim.ros.tools.commands import Command
-from drone_sim.ros.tools.gamepad import Gamepad, JoyState
-from drone_sim.ros.tools.joy_commands import JoyCommands, JoyParameters, load_joy
+from drone_sim.ros.tools.gamepad import Gamepad, JoyCommands, JoyParameters, JoyState, load_joy
 from drone_sim.ros.tools.teleop import Teleop
 
 _NAME = "joy_teleop"
