@@ -30,8 +30,6 @@ _MAX_JOBS = 1024
 
 
 class GradingParser(Parser):
-    """Argument parser with the exit status WRONG."""
-
     wrong = WRONG
 
 

@@ -109,7 +109,6 @@ class FlightRecorder:
 
     @property
     def is_over(self) -> bool:
-        """Whether a script has stopped the simulation."""
         return self._simulation.context.control.asked == STOP
 
     def _collect_contacts(self, count: int) -> None:
@@ -194,21 +193,18 @@ class OfflineBackend:
         return OfflinePublisher({}, topic, lambda: True)
 
     def time(self) -> float:
-        """Return the time in s for the stamps of messages."""
         return self.clock()
 
     def send_transforms(self, transforms: Sequence[Mapping[str, Any]]) -> None:
         """Do nothing."""
 
     def parameter(self, name: str) -> Any:
-        """Return a parameter that a script has set, or None."""
         return self._parameters.get(name)
 
     def set_parameter(self, name: str, value: Any) -> None:
         self._parameters[name] = value
 
     def delete_parameter(self, name: str) -> None:
-        """Delete a parameter if it exists."""
         self._parameters.pop(name, None)
 
     def serve(self, name: str, kind: str, ask: Ask) -> Callable[[], None]:

@@ -71,8 +71,6 @@ def _write_autograder(options: argparse.Namespace) -> int:
 
 
 class _Grading:
-    """One run of the program."""
-
     def __init__(self, options: argparse.Namespace, watchdog: Watchdog | None):
         """Read and check the plan, the submissions and the options. Raises the errors that status_of reports."""
         self._options = options
@@ -90,7 +88,6 @@ class _Grading:
         self._results: dict[Job, Result] = {}
 
     def run(self) -> int:
-        """Fly all jobs, write the outputs, and return the exit status."""
         try:
             with self._runner:
                 self._fly()

@@ -114,7 +114,6 @@ class Plan(Checked):
 
     @property
     def path(self) -> Path:
-        """The absolute path of the plan's file."""
         return Path(self._path)
 
     @property
@@ -169,7 +168,6 @@ class Plan(Checked):
         return parameters_module.load(merged(own, changes))
 
     def vehicle_of(self, parameters: Parameters) -> str:
-        """Return the name of the vehicle that is graded."""
         return self.vehicle or parameters.first.name
 
     def topics_of(self, parameters: Parameters) -> dict[str, str]:

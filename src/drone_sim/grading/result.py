@@ -10,8 +10,6 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one criterion."""
-
     name: str
     kind: str
     passed: bool

@@ -37,7 +37,6 @@ class ScriptWatch:
         return cast(Script, _WatchedScript(script, functools.partial(self.run, is_scene)))
 
     def run(self, is_scene: bool, action: Callable[..., _Value], *arguments: Any) -> _Value:
-        """Run an action of a script, and return its value."""
         was_scene = self.is_scene
         self._switch(is_scene)
         try:

@@ -65,8 +65,6 @@ def main(arguments: Sequence[str] | None = None, watchdog: Watchdog | None = Non
 
 
 class _Sweep:
-    """One run of the program."""
-
     def __init__(self, options: argparse.Namespace, watchdog: Watchdog | None):
         """Read and check the plan, the script and the options. Raises the errors that status_of reports."""
         self._options = options
@@ -81,7 +79,6 @@ class _Sweep:
         self._runner = Runner(PROGRAM, options, self._plan)
 
     def run(self) -> int:
-        """Fly all trials, write the outputs, and return the exit status."""
         with self._runner:
             if self._options.optimize:
                 trials = self._optimize()
@@ -264,7 +261,6 @@ def ranges_of(texts: Sequence[str]) -> list[ParameterRange]:
 
 
 def _changes(ranges: Sequence[ParameterRange], values: Sequence[Any]) -> dict[str, Any]:
-    """Return a nested mapping with a value for the key of each range."""
     return nested(zip((parameter.key for parameter in ranges), values))
 
 

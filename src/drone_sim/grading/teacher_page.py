@@ -66,7 +66,6 @@ class Course:
         self._runs[task] = process, folder
 
     def close(self) -> None:
-        """End all runs."""
         for process, _ in self._runs.values():
             process.terminate()
 

@@ -80,7 +80,6 @@ class Dataset:
         writing.write(self._folder / _ANNOTATIONS, json.dumps(content))
 
     def __str__(self) -> str:
-        """Return the numbers of images and annotations as text."""
         return f"{len(self._images)} pictures, {len(self._annotations)} annotations"
 
 
@@ -150,7 +149,6 @@ class TruthRecorder:
         self._dataset.add(simulation.time, picture, truth.output("instance"), described(truth.seen()), arrays)
 
     def __str__(self) -> str:
-        """Return the dataset's size as text."""
         return str(self._dataset)
 
 

@@ -22,8 +22,6 @@ _SHOWN_PITCH = math.radians(45)  # rad, at the horizon's rim
 
 
 class HudState(NamedTuple):
-    """The displayed state."""
-
     time: float  # s
     state: str  # one word
     height: float  # m

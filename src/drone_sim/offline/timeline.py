@@ -80,8 +80,6 @@ class ObjectMove(NamedTuple):
 
 @dataclass(frozen=True)
 class ParameterChange:
-    """New values of some parameters."""
-
     changes: Mapping[str, Any]
 
     def checked(self, _parameters: EquipmentParameters) -> ParameterChange:
@@ -169,7 +167,6 @@ class Timeline:
         return Timeline([entry for entry in self.entries if entry.vehicle in ("", vehicle)], self._time_step)
 
     def is_due(self, step: int) -> bool:
-        """Return whether an entry is due in a step."""
         return step in self._due
 
     def apply(self, step: int, vehicles: Mapping[str, Vehicle]) -> None:
@@ -266,8 +263,6 @@ class _GotoModel(_PoseModel):
 
 
 def _request_model(topic: str) -> type[_Model]:
-    """Return the model of a request without parameters."""
-
     class RequestModel(_Model):
         def checked(self, _parameters: EquipmentParameters) -> ScriptRequest:
             return ScriptRequest(topic)

@@ -85,7 +85,6 @@ class Video:
             raise OSError(0, f"only {written} of {self.pictures} pictures were written; is the disk full?")
 
     def __str__(self) -> str:
-        """Return size, length and format as text."""
         width, height = self.size
         return f"{width} x {height}, {self.pictures} pictures, {self.pictures / self.rate:.2f} s, H.264"
 
@@ -145,8 +144,6 @@ def rate_of(camera: CameraParameters, time_step: float) -> float:
 
 
 class CameraRecorder:
-    """Adds each new image of a camera to a video."""
-
     def __init__(self, video: Video, simulation: Simulation, vehicle: str, camera: str):
         """Enable a camera of a vehicle, and record its images in `video`."""
         self._video = video
@@ -162,7 +159,6 @@ class CameraRecorder:
             self._video.add(to_color(self._camera.image), hud.HudState.of(row, state))
 
     def __str__(self) -> str:
-        """Return the video's size, length and format as text."""
         return str(self._video)
 
 

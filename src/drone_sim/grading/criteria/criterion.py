@@ -116,7 +116,6 @@ class Criterion(Checked):
 
     @property
     def label(self) -> str:
-        """The name, or the kind if there is no name."""
         return self.name or self.kind
 
     @property

@@ -100,7 +100,6 @@ class Flyer:
         self._scripts.disconnect()
 
     def close(self) -> None:
-        """Stop both servers, and any flight in progress."""
         self._judge.close()
         self._scripts.close()
 

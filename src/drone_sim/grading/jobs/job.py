@@ -109,7 +109,6 @@ def version() -> str:
 
 
 def default_folder() -> Path:
-    """Return the default folder of results, in the user's cache."""
     return cache_path() / "grading"
 
 
@@ -175,7 +174,6 @@ class ResultStore:
         self._is_at_line_start = True
 
     def table(self, key: str) -> Path | None:
-        """Return the path of a flight's table, or None."""
         path = self._tables / f"{key}.csv"
         return path if path.is_file() else None
 
@@ -187,7 +185,6 @@ class ResultStore:
 
 
 def count_results(folder: Path) -> int:
-    """Return the number of results that are stored in a folder."""
     return sum(bool(line.strip()) for file in folder.glob("*.jsonl") for line in file.read_bytes().splitlines())
 
 

@@ -176,12 +176,10 @@ class LimitedProcess:
         raise RuntimeError("a script's processes cannot be killed")
 
     def output(self, name: str) -> bytes:
-        """Return the bytes that the process has written to an output."""
         return bytes(self._outputs[name])
 
     @property
     def end(self) -> str:
-        """How the process ended, in one line."""
         if self._exceeded:
             return self._exceeded
         number = -os.waitstatus_to_exitcode(self._status)

@@ -137,7 +137,6 @@ class _Flyers:
         self._lock = threading.Lock()
 
     def of_thread(self, options: FlightOptions) -> Flyer:
-        """Return the flyer of the calling thread."""
         arguments, local = (options.limits, options.sandboxed), self._local
         if getattr(local, "arguments", None) != arguments or local.flyer not in self._all:
             local.arguments, local.flyer = arguments, Flyer(*arguments)
@@ -146,7 +145,6 @@ class _Flyers:
         return local.flyer
 
     def stop(self) -> None:
-        """Cancel the flights of all threads."""
         for flyer in self._all:
             flyer.stop()
 

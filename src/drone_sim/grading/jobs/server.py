@@ -27,8 +27,6 @@ _IDLE = 120.0  # s
 
 
 class Requests:
-    """The requests of the program's client."""
-
     def __init__(self) -> None:
         """Move the connection from standard input, which becomes /dev/null, to another descriptor."""
         hide_memory()
@@ -63,6 +61,5 @@ class Requests:
         return self._connection.recv_bytes()
 
     def reply(self, *parts: bytes) -> None:
-        """Send the reply to the last request."""
         for part in parts:
             self._connection.send_bytes(part)

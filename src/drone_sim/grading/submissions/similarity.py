@@ -116,7 +116,6 @@ def _hashes(name: str, text: str) -> dict[int, Lines]:
 
 
 def _tokens(text: str, language: str) -> Iterator[tuple[str, int]]:
-    """Yield the tokens of a program, each with its line."""
     line = 1
     for match in _TOKENS[language].finditer(text):
         kind, token = match.lastgroup or "other", match[0]

@@ -78,7 +78,6 @@ def _time_limit(seconds: float) -> Iterator[None]:
 
 
 def main() -> int:
-    """Print the lines and return the exit status."""
     parser = Parser(prog="doctor", description=__doc__, epilog=_EPILOG)
     parser.add_argument("--quick", action="store_true", help="skip packages, pictures and the test flight")
     arguments = [argument for argument in sys.argv[1:] if ":=" not in argument]  # those are roslaunch's

@@ -100,7 +100,6 @@ class FlightListener:
         return all(subscriber.get_num_connections() for subscriber in self._subscribers)
 
     def clear(self) -> None:
-        """Discard the recorded data."""
         with self._lock:
             self._forged: dict[tuple[str, str], str] = {}  # by topic and node
             self.went_back = False  # the time went back: another client has restarted the simulation

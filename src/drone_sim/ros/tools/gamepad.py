@@ -56,8 +56,6 @@ def list_devices() -> list[str]:
 
 
 class Gamepad:
-    """An open gamepad."""
-
     def __init__(self, device: str):
         """Open `device`, such as /dev/input/js0. Raises OSError."""
         self.device = device
@@ -127,8 +125,6 @@ class ButtonParameters(Checked):
 
 
 class JoyParameters(Checked):
-    """Parameters of config/joy.yaml."""
-
     device: FileName
     dead_man: Annotated[int, Within(0, 255)]
     axes: AxesParameters

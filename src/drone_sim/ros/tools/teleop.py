@@ -108,7 +108,6 @@ class Teleop:
 
     @property
     def topic(self) -> str:
-        """The resolved topic of the commands."""
         return str(self._publisher.resolved_name)
 
     def send(self, command: Command) -> bool:

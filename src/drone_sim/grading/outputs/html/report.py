@@ -74,8 +74,6 @@ class FlightEntry(NamedTuple):
 
 
 class ScriptPage(NamedTuple):
-    """A script's page."""
-
     file: str
     script: ScriptResults
     flights: tuple[FlightEntry, ...]
@@ -83,8 +81,6 @@ class ScriptPage(NamedTuple):
 
 
 class SimilarPage(NamedTuple):
-    """The page of two similar scripts."""
-
     file: str
     share: float
     pages: tuple[ScriptPage, ScriptPage]
