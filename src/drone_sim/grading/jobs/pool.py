@@ -58,7 +58,7 @@ def open_pool(options: FlightOptions, workers: int = 1, scheduler: str = "") -> 
         with contextlib.closing(Flyer(options.limits, options.sandboxed)) as flyer:
             yield lambda jobs: (flyer.fly(job, options.tables) for job in jobs)
     else:
-        with _FLYERS, ThreadPoolExecutor(workers) as executor:
+        with contextlib.closing(_FLYERS), ThreadPoolExecutor(workers) as executor:
             try:
                 yield lambda jobs: _fly_in_batches(jobs, options, executor, workers)
             finally:
@@ -148,10 +148,7 @@ class _Flyers:
         for flyer in self._all:
             flyer.stop()
 
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, *_exception: object) -> None:
+    def close(self) -> None:
         """Close all flyers; no thread may fly any more."""
         with self._lock:
             while self._all:

@@ -92,30 +92,13 @@ def _unique_labels(scripts: Sequence[str]) -> dict[str, str]:
     return labels
 
 
-@dataclass(frozen=True)
-class CriterionResults:
-    """The number of flights in which a criterion passed."""
-
-    name: str
-    kind: str
-    allowed: str
-    of: float
-    passed: int
-    flights: int
-
-
-def group_by_criterion(results: Iterable[Result]) -> list[CriterionResults]:
-    """Return the results of each criterion, in the order of the plan."""
+def group_by_criterion(results: Iterable[Result]) -> dict[str, list[Outcome]]:
+    """Return the outcomes of each criterion in all flights, in the order of the plan."""
     outcomes: dict[str, list[Outcome]] = {}
     for result in results:
         for name, outcome in named_outcomes(result):
             outcomes.setdefault(name, []).append(outcome)
-    return [
-        CriterionResults(
-            name, some[0].kind, some[0].allowed, some[0].of, sum(outcome.passed for outcome in some), len(some)
-        )
-        for name, some in outcomes.items()
-    ]
+    return outcomes
 
 
 def named_outcomes(result: Result) -> list[tuple[str, Outcome]]:

@@ -26,20 +26,20 @@ Check = Callable[[], Iterable[Line]]
 def run_checks(thorough: bool = True) -> Iterator[Line]:
     """Yield the lines of all checks, each as soon as it is known; `thorough` adds slow checks. Main thread only."""
     master = Master()
-    checks: list[tuple[str, Check, float]] = [
+    for what, check, seconds in (
         ("Python", environment.python, _TIMEOUT),
         ("ROS", environment.ros, _TIMEOUT),
         *([("packages", packages.packages, packages.TIMEOUT + _TIMEOUT)] if thorough else []),
         ("host names", environment.host_names, _TIMEOUT),
         ("host names", environment.remote_master, _TIMEOUT),
         ("master", master.connection, _TIMEOUT),
-        ("clock", master.clocks, _TIMEOUT),
-        ("nodes", master.dead_nodes, _TIMEOUT),
-        ("commands", master.commands, _TIMEOUT),
-        ("simulator", lambda: simulator(master), _TIMEOUT),
-    ]
-    for what, check, seconds in checks:
+    ):
         yield from run_check(what, check, seconds)
+    if master.is_connected:
+        yield from run_check("clock", master.clocks, _TIMEOUT)
+        yield from run_check("nodes", master.dead_nodes, _TIMEOUT)
+        yield from run_check("commands", master.commands, _TIMEOUT)
+        yield from run_check("simulator", lambda: simulator(master), _TIMEOUT)
 
 
 class _CheckTimeout(Exception):

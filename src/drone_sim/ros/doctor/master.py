@@ -24,7 +24,7 @@ Graph = dict[str, list[str]]  # nodes by topic, or by service
 
 
 class Master:
-    """Checks of the shell's master. Without a connection to it, all checks but that of the connection yield nothing."""
+    """Checks of the shell's master; all but `connection` need a connection to it."""
 
     def __init__(self) -> None:
         self.uri = os.environ.get("ROS_MASTER_URI", MASTER)
@@ -61,8 +61,6 @@ class Master:
 
     def clocks(self) -> Iterator[Line]:
         """Check that the publishers of /clock fit to /use_sim_time."""
-        if not self.is_connected:
-            return
         try:
             is_simulated = call(self.uri, "getParam", "/use_sim_time") is True
         except FAILURES:
@@ -85,8 +83,6 @@ class Master:
 
     def dead_nodes(self) -> Iterator[Line]:
         """Yield a line with the registered nodes that do not answer."""
-        if not self.is_connected:
-            return
         nodes, alive = self.nodes(), set()
 
         def ask(node: str) -> None:
@@ -120,8 +116,6 @@ class Master:
 
 def simulator(master: Master) -> Iterator[Line]:
     """Yield the lines that the simulators publish on /diagnostics."""
-    if not master.is_connected:
-        return
     nodes = sorted({node for name, nodes in master.services.items() if name.endswith("/save_scene") for node in nodes})
     if not nodes:
         yield Line(HINT, "simulator", "none is running: `roslaunch drone_sim drone.launch` starts one")
