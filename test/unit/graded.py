@@ -3,7 +3,7 @@
 import math
 
 from drone_sim.grading import plan as plans
-from drone_sim.grading.result import Outcome, result_of
+from drone_sim.grading.result import Outcome, Result
 from drone_sim.offline.recording import Recording
 
 EVIL = "<script>alert(1)</script>&\"'\x1b[31m\x07\0\x9b\u202e\ud800"
@@ -36,7 +36,9 @@ def outcome(name, passed, value=0.5, at=1.5, of=1.0, said="it rose in 0.5 s"):
 
 def result(script="my.py", seed=0, passed=(True, True), error=None, changes=None, names=("forward", "no_contact")):
     outcomes = tuple(outcome(name, good, of=2.0 - at) for at, (name, good) in enumerate(zip(names, passed)))
-    return result_of("steps", script, seed, changes or {}, outcomes, 4.0, error, "")
+    points, possible = (sum(getattr(one, key) for one in outcomes) for key in ("points", "of"))
+    has_passed = error is None and all(one.passed for one in outcomes)
+    return Result("steps", script, seed, changes or {}, has_passed, points, possible, 4.0, error, outcomes)
 
 
 def write_table(path, seconds=4.0):

@@ -5,12 +5,13 @@ import io
 import json
 import random
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
 from graded import EVIL, PLAN, read_plan, result
 
-from drone_sim.grading.flight import ungraded_result
+from drone_sim.grading.flight import result_of
 from drone_sim.grading.outputs import as_json, gradescope, junit, marks, table
 from drone_sim.grading.outputs.script_results import group_by_script
 from drone_sim.grading.submissions.submission import Person, Submission, names_of
@@ -194,7 +195,8 @@ JUNIT = {
 
 def test_junits_file_is_as_the_schema_says(plan):
     flights = [result(seed=0), result(seed=1, passed=(True, False)), result("b.py", error=EVIL, passed=(False,))]
-    flights.append(result("c.py").with_tried(["tried to move Drone at 1.00 s (sim.setObjectPosition)"]))
+    tried = ("tried to move Drone at 1.00 s (sim.setObjectPosition)",)
+    flights.append(replace(result("c.py"), tried=tried, passed=False))
     root = ElementTree.fromstring(junit.text(plan, flights))
     assert root.tag == "testsuites" and {one.tag for one in root.iter()} == {*JUNIT}
     for one in root.iter():
@@ -225,10 +227,10 @@ def test_marks_are_as_moodle_reads_them(tmp_path):
 
 def test_the_marks_name_an_error_by_which_nothing_was_flown(plan, tmp_path):
     why = "[load] /class/b.py:1: SyntaxError: invalid syntax\x1b[31m"
-    broken = [ungraded_result(plan, "/class/b.py", seed, {}, why) for seed in range(3)]
+    broken = [result_of(plan, "/class/b.py", seed, {}, why) for seed in range(3)]
     later = [result("c.py", seed, (False, True), error="[actuation] c.py:4: boom") for seed in range(3)]
     no_script = "'d': holds no child script"
-    none = [ungraded_result(plan, "/class/d", seed, {}, no_script) for seed in range(3)]
+    none = [result_of(plan, "/class/d", seed, {}, no_script) for seed in range(3)]
     bos = Submission("/class/b.py", (Person("Bo"),))
     submissions = [bos, Submission("c.py"), Submission("/class/d", error=no_script)]
     marks.write(submissions, group_by_script([*broken, *later, *none]), tmp_path / "m.csv")

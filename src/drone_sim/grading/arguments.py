@@ -15,7 +15,7 @@ from tqdm import tqdm
 from drone_sim.command_line import SIGNALLED, Parser, format_error
 from drone_sim.command_line import status_of as status_of_action
 from drone_sim.grading import plan as plans
-from drone_sim.grading.flight import ungraded_result
+from drone_sim.grading.flight import result_of
 from drone_sim.grading.jobs import pool, sandbox, settings
 from drone_sim.grading.jobs.job import Job, ResultStore, default_folder, remove_old_results
 from drone_sim.grading.jobs.pool import FlightOptions
@@ -104,7 +104,7 @@ class Runner:
             for job in jobs:
                 if job.error:
                     bar.update()
-                    yield job, ungraded_result(self._plan, job.script, job.seed, job.changes, job.error)
+                    yield job, result_of(self._plan, job.script, job.seed, job.changes, job.error)
                 elif job.key in stored:
                     bar.update()
                     yield job, stored[job.key].of_script(job.script)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import random
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -14,10 +14,11 @@ import numpy as np
 from drone_sim.command_line import EXPECTED, format_error
 from drone_sim.config.types import ParameterError
 from drone_sim.files import writing
+from drone_sim.grading.flight_record import FlightRecord
 from drone_sim.grading.flight_recorder import FlightRecorder, OfflineBackend
 from drone_sim.grading.permissions import Permissions
 from drone_sim.grading.plan import Plan
-from drone_sim.grading.result import Result, result_of
+from drone_sim.grading.result import Result
 from drone_sim.grading.rules import Rules, ScriptWatch
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import first_step
@@ -48,7 +49,7 @@ def grade(
     try:
         flight = Flight(plan, script, seed, changes)
     except EXPECTED as error:
-        return ungraded_result(plan, script, seed, changes, format_error(error))
+        return result_of(plan, script, seed, changes, format_error(error))
     result = flight.grade()
     if table is not None:
         with writing.replacing(str(table)) as file:
@@ -56,12 +57,39 @@ def grade(
     return result
 
 
-def ungraded_result(
-    plan: Plan, script: str | None, seed: int, changes: Mapping[str, Any] | None, reason: str
+def result_of(
+    plan: Plan,
+    script: str | None,
+    seed: int,
+    changes: Mapping[str, Any] | None,
+    error: str | None,
+    record: FlightRecord | None = None,
+    tried: Sequence[str] = (),
 ) -> Result:
-    """Return the result of a flight that was not flown, or of which no row is left; `reason` is one line."""
-    outcomes = tuple(criterion.fail("nothing was flown") for criterion in plan.criteria)
-    return result_of(plan.name, plan.script_of(script), seed, changes or {}, outcomes, error=reason)
+    """Return the result of a flight; without a `record`, of one that was not flown, or of which no row is left.
+
+    It has passed if every criterion has, there was no `error` (one line), and nothing forbidden was `tried`.
+    """
+    if record is None:
+        outcomes = tuple(criterion.fail("nothing was flown") for criterion in plan.criteria)
+        flown, digest, error = 0.0, "", "nothing was flown" if error is None else error
+    else:
+        outcomes = tuple(criterion.judge(record) for criterion in plan.criteria)
+        flown, digest = record.end, table_digest(record.rows)
+    return Result(
+        plan=plan.name,
+        script=plan.script_of(script),
+        seed=seed,
+        changes=dict(changes or {}),
+        passed=error is None and not tried and all(outcome.passed for outcome in outcomes),
+        points=sum(outcome.points for outcome in outcomes),
+        of=sum(outcome.of for outcome in outcomes),
+        flown=flown,
+        error=error,
+        outcomes=outcomes,
+        digest=digest,
+        tried=tuple(tried),
+    )
 
 
 class Flight:
@@ -134,14 +162,8 @@ class Flight:
                     error = f"the scripts of {', '.join(names)} failed: the log says why"
             finally:
                 cleanup_error = _error_of(self._simulation.close)  # which runs the scripts' cleanup
-        plan, error, record = self._plan, error or cleanup_error, self._recorder.record()
-        if record is None:
-            result = ungraded_result(plan, self._script, self._seed, self._changes, error or "nothing was flown")
-        else:
-            outcomes = tuple(criterion.judge(record) for criterion in plan.criteria)
-            digest = table_digest(record.rows)
-            result = result_of(plan.name, self._script, self._seed, self._changes, outcomes, record.end, error, digest)
-        return result.with_tried(self._permissions.tried)
+        error, record = error or cleanup_error, self._recorder.record()
+        return result_of(self._plan, self._script, self._seed, self._changes, error, record, self._permissions.tried)
 
     @property
     def rows(self) -> np.ndarray:

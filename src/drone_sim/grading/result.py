@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
@@ -39,10 +39,6 @@ class Result:
     digest: str = ""  # SHA-256 of the table's numbers, as little-endian doubles; '' if nothing was flown
     tried: tuple[str, ...] = ()  # a line for each thing that the script tried and the plan does not allow
 
-    def with_tried(self, tried: Sequence[str]) -> Result:
-        """Return the result with the lines `tried`; if there are any, the flight has not passed."""
-        return replace(self, tried=tuple(tried), passed=self.passed and not tried)
-
     def of_script(self, script: str) -> Result:
         """Return the same result for a script with the same contents at another path."""
         old_folder, folder = os.path.dirname(self.script), os.path.dirname(script)
@@ -67,19 +63,3 @@ class Result:
             return cls(**{**plain, "outcomes": outcomes, "tried": tuple(values["tried"])})
         except (KeyError, TypeError) as error:
             raise ValueError(f"no result of a flight: {error}") from None
-
-
-def result_of(
-    plan: str,
-    script: str,
-    seed: int,
-    changes: Mapping[str, Any],
-    outcomes: tuple[Outcome, ...],
-    flown: float = 0.0,
-    error: str | None = None,
-    digest: str = "",
-) -> Result:
-    """Return the result of a flight, which has passed if every criterion has and there was no error."""
-    passed = error is None and all(outcome.passed for outcome in outcomes)
-    points, of = sum(outcome.points for outcome in outcomes), sum(outcome.of for outcome in outcomes)
-    return Result(plan, script, seed, dict(changes), passed, points, of, flown, error, outcomes, digest)

@@ -13,7 +13,7 @@ from typing import Any
 
 from drone_sim.grading import plan as plans
 from drone_sim.grading.arguments import GradingParser, is_sandboxed, status_of
-from drone_sim.grading.flight import ungraded_result
+from drone_sim.grading.flight import result_of
 from drone_sim.grading.jobs import pool, settings
 from drone_sim.grading.jobs.files import Unreadable, read, submission_path
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
@@ -91,7 +91,7 @@ def _fly_again(plan: Plan, results: Sequence[Result], options: argparse.Namespac
         with contextlib.suppress(Unreadable, ScriptError):
             contents[script] = contents_of(plan, submission_path(script))
     found = {
-        (result.script, result.seed): ungraded_result(plan, result.script, result.seed, {}, result.error or "")
+        (result.script, result.seed): result_of(plan, result.script, result.seed, {}, result.error or "")
         for result in results
     }
     jobs = [

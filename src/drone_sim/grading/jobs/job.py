@@ -23,7 +23,7 @@ import numpy as np
 from drone_sim.files import writing
 from drone_sim.files.containment import remove
 from drone_sim.files.resources import cache_path, package_path
-from drone_sim.grading.flight import ungraded_result
+from drone_sim.grading.flight import result_of
 from drone_sim.grading.jobs import files
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
@@ -57,7 +57,7 @@ class JobResult:
 
 def lost_flight(job: Job, plan: Plan, reason: str) -> JobResult:
     """Return the result of a job whose flight was lost; `reason` is one line."""
-    return JobResult(job, ungraded_result(plan, job.script, job.seed, job.changes, reason), is_lost=True)
+    return JobResult(job, result_of(plan, job.script, job.seed, job.changes, reason), is_lost=True)
 
 
 def key_of(contents: str, seed: int, changes: Mapping[str, Any]) -> str:

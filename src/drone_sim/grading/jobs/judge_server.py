@@ -20,7 +20,7 @@ from drone_sim.command_line import format_error
 from drone_sim.files.resources import FileCache, ReadFile
 from drone_sim.grading import permissions
 from drone_sim.grading import plan as plans
-from drone_sim.grading.flight import Flight, grade, ungraded_result, write_table
+from drone_sim.grading.flight import Flight, grade, result_of, write_table
 from drone_sim.grading.jobs.limited_process import LimitedProcess, stay_on_one_processor
 from drone_sim.grading.jobs.server import DISCONNECTED, Requests
 from drone_sim.grading.plan import Plan, PlanError
@@ -73,8 +73,13 @@ def _judge(plan: Plan, request: dict[str, Any], link: socket.socket, outputs: Ma
         flight = Flight(plan, script, seed, changes, connection)
         result = flight.grade()
         rows, is_gone = flight.rows if request["table"] else None, connection.is_gone
-    except BaseException as error:
-        result = ungraded_result(plan, script, seed, changes, _format_error(error))
+    except BaseException as error:  # also an unexpected one, such as MemoryError
+        try:
+            message = format_error(error)
+        except Exception:
+            message = ""
+        reason = f"{type(error).__name__}: {message:.300}".removesuffix(": ")
+        result = result_of(plan, script, seed, changes, reason)
     if rows is not None:
         with open(outputs["table"], "w") as file:
             write_table(rows, file)
@@ -94,15 +99,6 @@ def _read_plan(path: str) -> ReadFile:
     gc.collect()
     gc.freeze()
     return ReadFile(plan, 1, map(str, plan.files))
-
-
-def _format_error(error: BaseException) -> str:
-    """Return one line for an unexpected error of a flight, such as MemoryError."""
-    try:
-        message = format_error(error)
-    except Exception:
-        message = ""
-    return f"{type(error).__name__}: {message:.300}".removesuffix(": ")
 
 
 if __name__ == "__main__":

@@ -160,23 +160,18 @@ _FLYERS = _Flyers()
 
 def fly_batch(jobs: Sequence[Job], options: FlightOptions) -> list[JobResult]:
     """Fly a batch in a worker. Raises PoolError if the worker's files differ from those of the jobs' sender."""
-    _check_files(jobs)
+    for job in {(job.plan, job.script): job for job in jobs}.values():
+        try:
+            contents = contents_of(plans.read(job.plan), job.script)
+        except (OSError, ValueError) as error:
+            raise PoolError(f"worker on {socket.gethostname()}: {' '.join(str(error).split())}") from None
+        if key_of(contents, job.seed, job.changes) != job.key:
+            raise PoolError(
+                f"worker on {socket.gethostname()}: {job.plan}, {job.script or 'the built-in script'}, what they name, "
+                "drone_sim, Python, NumPy or PyBullet are not the same as here"
+            )
     flyer = _FLYERS.of_thread(options)
     try:
         return [flyer.fly(job, options.tables) for job in jobs]
     except Cancelled:
         return []
-
-
-def _check_files(jobs: Sequence[Job]) -> None:
-    for plan_path, script in {(job.plan, job.script) for job in jobs}:
-        job = next(one for one in jobs if (one.plan, one.script) == (plan_path, script))
-        try:
-            contents = contents_of(plans.read(plan_path), script)
-        except (OSError, ValueError) as error:
-            raise PoolError(f"worker on {socket.gethostname()}: {' '.join(str(error).split())}") from None
-        if key_of(contents, job.seed, job.changes) != job.key:
-            raise PoolError(
-                f"worker on {socket.gethostname()}: {plan_path}, {script or 'the built-in script'}, what they name, "
-                "drone_sim, Python, NumPy or PyBullet are not the same as here"
-            )

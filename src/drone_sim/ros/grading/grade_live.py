@@ -31,7 +31,7 @@ from drone_sim.grading.outputs import as_json, gradescope, junit, table
 from drone_sim.grading.outputs.html import report
 from drone_sim.grading.permissions import CHANGE, MOVE
 from drone_sim.grading.plan import Plan
-from drone_sim.grading.result import Result, result_of
+from drone_sim.grading.result import Result
 from drone_sim.ros.core.launch_parameters import from_shell
 from drone_sim.ros.core.shutdown import end_on_signals
 from drone_sim.ros.core.startup import init_node, status_of_node
@@ -119,7 +119,7 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
     script = node or parameters.script
     record = live.listener.record(plan.duration)
     if record is None:
-        return flight.ungraded_result(plan, script, seed, {}, error or "nothing was heard of the flight"), None
+        return flight.result_of(plan, script, seed, {}, error or "nothing was heard of the flight"), None
     late = steps_late(plan.timeline_of(parameters).of(plan.vehicle_of(parameters)), record.rows, parameters.time_step)
     if late and not plan.lockstep:
         rospy.logwarn(f"the timeline came up to {late} steps late: a lower real_time_factor gives it more time")
@@ -128,13 +128,8 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
         rospy.logwarn(f"grade_live has missed {missed} steps, as on a busy machine: the digest is that of the others")
     # After a restart the record has steps of two flights, between which the vehicle seems to jump.
     record, broken_rule = (record, "") if error == _RESTARTED else live.cut_at_broken_rule(record)
-    if record is None:
-        result = flight.ungraded_result(plan, script, seed, {}, broken_rule)
-    else:
-        outcomes = tuple(criterion.judge(record) for criterion in plan.criteria)
-        digest = flight.table_digest(record.rows)
-        result = result_of(plan.name, script, seed, {}, outcomes, record.end, broken_rule or error or None, digest)
-    return result.with_tried([*live.rules.tried, *live.listener.forged]), record
+    tried = [*live.rules.tried, *live.listener.forged]
+    return flight.result_of(plan, script, seed, {}, broken_rule or error or None, record, tried), record
 
 
 def missed_steps(times: np.ndarray, time_step: float) -> int:
