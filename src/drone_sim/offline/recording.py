@@ -127,24 +127,20 @@ def _rows(file: TextIO) -> list[_Row]:
         number = len(rows) + 2
         if len(rows) == MAX_ROWS:
             raise TableRefused(f"has more than {MAX_ROWS} rows")
-        rows.append(_row(line, number))
-        if number > 2 and rows[-1][0] <= rows[-2][0]:
-            raise TableRefused(f"line {number}: the time {rows[-1][0]:g} s is not after {rows[-2][0]:g} s")
+        fields = line.rstrip("\r\n").split(",")
+        if len(fields) != len(COLUMNS) or not line.endswith("\n"):
+            raise TableRefused(
+                f"line {number}: has {len(fields)} of {len(COLUMNS)} fields: it is cut off, or from another table"
+            )
+        try:
+            row = tuple(map(float, fields))
+        except ValueError as error:
+            raise TableRefused(f"line {number}: {error!s:.80}") from None
+        if not all(abs(value) < LARGEST for value in row):
+            raise TableRefused(f"line {number}: must hold numbers below {LARGEST:g}")
+        if rows and row[0] <= rows[-1][0]:
+            raise TableRefused(f"line {number}: the time {row[0]:g} s is not after {rows[-1][0]:g} s")
+        rows.append(row)
     if not rows:
         raise TableRefused("has a header but no rows")
     return rows
-
-
-def _row(line: str, number: int) -> _Row:
-    fields = line.rstrip("\r\n").split(",")
-    if len(fields) != len(COLUMNS) or not line.endswith("\n"):
-        raise TableRefused(
-            f"line {number}: has {len(fields)} of {len(COLUMNS)} fields: it is cut off, or from another table"
-        )
-    try:
-        row = tuple(map(float, fields))
-    except ValueError as error:
-        raise TableRefused(f"line {number}: {error!s:.80}") from None
-    if not all(abs(value) < LARGEST for value in row):
-        raise TableRefused(f"line {number}: must hold numbers below {LARGEST:g}")
-    return row

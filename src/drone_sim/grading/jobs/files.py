@@ -37,13 +37,16 @@ def of_plan(plan: Plan, changes: Mapping[str, Any]) -> list[Path]:
     All are regular files; the plan's own script is not among them. Names are followed inside the folder of each file
     that the plan names. Raises FileNotFoundError and ParameterError.
     """
-    excluded = _plan_script(plan)
+    excluded, cache = _plan_script(plan), cache_folder().resolve()
     found: dict[Path, None] = {}
     for path in dict.fromkeys(path.resolve() for path in (*plan.files, *_parameter_files(plan, changes))):
         if path in excluded:
             continue
-        scene_folder = _imported_scene_folder(path)
-        for file in _regular_files(scene_folder.rglob("*")) if scene_folder else _follow(path, path.parent, excluded):
+        if path.is_relative_to(cache) and path.parent != cache:  # of an imported scene
+            files = list(_regular_files((cache / path.relative_to(cache).parts[0]).rglob("*")))
+        else:
+            files = _follow(path, path.parent, excluded)
+        for file in files:
             found[file] = None
             found.update(dict.fromkeys(_package_files(file)))
     return sorted(found)
@@ -123,12 +126,6 @@ def _texts(value: Any) -> Iterator[str]:
             yield from _texts(item)
     elif hasattr(value, "__dict__"):
         yield from _texts(vars(value))
-
-
-def _imported_scene_folder(path: Path) -> Path | None:
-    """Return the folder of the imported scene that a file belongs to, or None."""
-    cache = cache_folder().resolve()
-    return cache / path.relative_to(cache).parts[0] if path.is_relative_to(cache) and path.parent != cache else None
 
 
 def _package_files(path: Path) -> Iterator[Path]:

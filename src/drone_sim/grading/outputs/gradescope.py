@@ -38,20 +38,6 @@ def content(plan: Plan, results: Sequence[Result]) -> dict[str, Any]:
     if len(scripts) != 1:
         raise ValueError(f"Gradescope's results.json must be of one script, not {len(scripts)}")
     script = scripts[0]
-    names = dict.fromkeys(name for flight in script.flights for name, _ in named_outcomes(flight))
-    return {
-        "score": script.points,
-        "output": escaped(_overview(plan, script)),
-        "output_format": _TEXT,
-        "test_output_format": _TEXT,
-        "test_name_format": _TEXT,
-        "visibility": "visible",
-        "tests": [_test(number, name, script) for number, name in enumerate(names, start=1)],
-        "extra_data": {"plan": plan.name, "flights": len(script.flights), "passed": script.passed},
-    }
-
-
-def _overview(plan: Plan, script: ScriptResults) -> str:
     lines = [
         f"{plan.title or plan.name}: {script.passed} of {len(script.flights)} flights passed, "
         f"{format_points(script.points)} of {format_points(script.of)} points"
@@ -59,7 +45,17 @@ def _overview(plan: Plan, script: ScriptResults) -> str:
     if len(script.flights) > 1:
         lines.append(f"worst: {flight_label(script.worst)}, {format_points(script.worst.points)} points")
     lines += [f"{flight_label(flight)}: error: {trouble}" for flight in script.flights for trouble in flight.troubles]
-    return "\n".join(lines)
+    names = dict.fromkeys(name for flight in script.flights for name, _ in named_outcomes(flight))
+    return {
+        "score": script.points,
+        "output": escaped("\n".join(lines)),
+        "output_format": _TEXT,
+        "test_output_format": _TEXT,
+        "test_name_format": _TEXT,
+        "visibility": "visible",
+        "tests": [_test(number, name, script) for number, name in enumerate(names, start=1)],
+        "extra_data": {"plan": plan.name, "flights": len(script.flights), "passed": script.passed},
+    }
 
 
 def _test(number: int, name: str, script: ScriptResults) -> dict[str, Any]:

@@ -27,31 +27,28 @@ def write(plan: Plan, results: Sequence[Result], path: str | Path) -> None:
 
 
 def text(plan: Plan, results: Sequence[Result]) -> str:
+    """Return the XML; each flight has a test case with its simulated duration, and one for every criterion."""
     root = Element("testsuites", name=_xml(plan.name))
     for script in group_by_script(results):
         suite = SubElement(root, "testsuite", name=_xml(f"{plan.name}: {script.label}"), skipped="0")
+        group = _xml(f"{plan.name}.{script.label.replace('.', '_')}")
         for result in script.flights:
-            _add_flight(suite, _xml(f"{plan.name}.{script.label.replace('.', '_')}"), result)
+            label = _xml(flight_label(result))
+            case = SubElement(suite, "testcase", classname=group, name=f"{label}: flight", time=f"{result.flown:.3f}")
+            if result.error:
+                SubElement(case, "error", type="flight", message=_xml(result.error)).text = _xml(result.error)
+            elif result.tried:
+                message = _xml("; ".join(result.troubles))
+                SubElement(case, "failure", type="rules", message=message).text = message
+            for name, outcome in named_outcomes(result):
+                case = SubElement(suite, "testcase", classname=group, name=f"{label}: {_xml(name)}", time="0.000")
+                if not outcome.passed:
+                    message = _xml(describe(outcome) or "failed")
+                    SubElement(case, "failure", type=_xml(outcome.kind), message=message).text = message
         _set_totals(suite, script.flown)
     _set_totals(root, sum(result.flown for result in results))
     ElementTree.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
-
-
-def _add_flight(suite: Element, group: str, result: Result) -> None:
-    """Add a test case for the flight, with its simulated duration, and one for every criterion."""
-    flight = _xml(flight_label(result))
-    case = SubElement(suite, "testcase", classname=group, name=f"{flight}: flight", time=f"{result.flown:.3f}")
-    if result.error:
-        SubElement(case, "error", type="flight", message=_xml(result.error)).text = _xml(result.error)
-    elif result.tried:
-        message = _xml("; ".join(result.troubles))
-        SubElement(case, "failure", type="rules", message=message).text = message
-    for name, outcome in named_outcomes(result):
-        case = SubElement(suite, "testcase", classname=group, name=f"{flight}: {_xml(name)}", time="0.000")
-        if not outcome.passed:
-            message = _xml(describe(outcome) or "failed")
-            SubElement(case, "failure", type=_xml(outcome.kind), message=message).text = message
 
 
 def _set_totals(element: Element, seconds: float) -> None:

@@ -86,7 +86,9 @@ class JoyTeleop:
             with contextlib.suppress(queue.Empty):
                 message = self._messages.get(timeout=seconds)
                 self._received_at = time.monotonic()
-                return [_joy_state(message)]
+                axes = (value if math.isfinite(value) else 0.0 for value in message.axes[:256])
+                limited = tuple(max(-1.0, min(1.0, value)) for value in axes)
+                return [JoyState(limited, tuple(map(bool, message.buttons[:256])))]
             return []
         select.select([self._gamepad], [], [], seconds)
         try:
@@ -132,11 +134,6 @@ class JoyTeleop:
         self._reported = ""
         self._joy_commands.disconnect()
         rospy.loginfo(f"{_NAME}: {self._gamepad.name} on {self._gamepad.device}")
-
-
-def _joy_state(message: Joy) -> JoyState:
-    axes = (value if math.isfinite(value) else 0.0 for value in message.axes[:256])
-    return JoyState(tuple(max(-1.0, min(1.0, value)) for value in axes), tuple(map(bool, message.buttons[:256])))
 
 
 def _fly(over: Callable[[], bool]) -> None:

@@ -67,7 +67,10 @@ class Screen:
     def run(self, screen: Any) -> None:
         self._screen = screen
         with contextlib.suppress(OSError, termios.error):  # the terminal is gone
-            _disable_flow_control(self._terminal)
+            # Without Ctrl-S, which would block the output, and with it the keys, while the drone flies on.
+            settings = termios.tcgetattr(self._terminal)
+            settings[_INPUT_FLAGS] &= ~termios.IXON
+            termios.tcsetattr(self._terminal, termios.TCSANOW, settings)
             self._connect()
             self._fly()
 
@@ -123,13 +126,6 @@ class Screen:
         for row, line in enumerate(lines, start=first):
             with contextlib.suppress(curses.error):  # the screen is too small for this line
                 self._screen.addnstr(row, 0, line, width - 1, attributes)  # curses cannot fill the last corner
-
-
-def _disable_flow_control(terminal: int) -> None:
-    """Disable Ctrl-S, which would block the output, and with it the keys, while the drone flies on."""
-    settings = termios.tcgetattr(terminal)
-    settings[_INPUT_FLAGS] &= ~termios.IXON
-    termios.tcsetattr(terminal, termios.TCSANOW, settings)
 
 
 def _fly(over: Callable[[], bool]) -> None:

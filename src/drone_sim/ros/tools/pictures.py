@@ -28,7 +28,15 @@ def decode(message: Image | CompressedImage) -> np.ndarray:
     Raises ValueError, in one line, for an image that cannot be shown.
     """
     if hasattr(message, "encoding"):
-        return _decode_raw(message)
+        try:
+            if message.encoding not in _DEPTH_ENCODINGS:
+                return image_messages.bgr(message)
+            depth = image_messages.pixels(message).astype(float)
+        except (ValueError, cv2.error) as error:
+            raise ValueError(f"encoding '{message.encoding[:40]}': {' '.join(str(error).split())}") from None
+        if message.encoding == "16UC1":
+            depth = np.where(depth == 0, np.nan, depth * _MILLIMETRES)
+        return depth_to_grey(depth)
     if "compressedDepth" in message.format:
         raise ValueError("compressedDepth is not shown")
     if message.data:
@@ -38,18 +46,6 @@ def decode(message: Image | CompressedImage) -> np.ndarray:
     if picture is None:
         raise ValueError(f"not a picture: format '{message.format}'")
     return picture
-
-
-def _decode_raw(message: Image) -> np.ndarray:
-    try:
-        if message.encoding not in _DEPTH_ENCODINGS:
-            return image_messages.bgr(message)
-        depth = image_messages.pixels(message).astype(float)
-    except (ValueError, cv2.error) as error:
-        raise ValueError(f"encoding '{message.encoding[:40]}': {' '.join(str(error).split())}") from None
-    if message.encoding == "16UC1":
-        depth = np.where(depth == 0, np.nan, depth * _MILLIMETRES)
-    return depth_to_grey(depth)
 
 
 def blank(text: str) -> np.ndarray:
