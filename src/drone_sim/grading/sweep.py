@@ -10,6 +10,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import fmean
 from typing import Any
 
@@ -36,6 +37,7 @@ _POPULATION_PER_PARAMETER = 5
 _MIN_POPULATION = 5  # of differential evolution
 _DIGITS = 6  # of an optimized value
 _MAX_VALUES = 10_000  # of one parameter
+_MAX_LABELLED_CELLS = 150  # of a heat map; more cells have no room for numbers
 _SCRIPT_PREFIX = "script_parameters."  # every key with this prefix is allowed
 _FORM = "must be KEY=START:STOP:COUNT or KEY=A,B,..., such as Kzref=1:10:10"
 _GetCosts = Callable[[Sequence[tuple[float, ...]]], Sequence[float]]
@@ -91,7 +93,7 @@ class _Sweep:
         if self._options.csv:
             outputs.append(lambda: self._write(trials))
         if self._options.plot:
-            outputs.append(lambda: self._draw(trials))
+            outputs.append(lambda: self._plot(trials))
         return 0 if run_all(PROGRAM, outputs) and self._runner.all_stored else WRONG
 
     def _show(self, trials: Sequence[Trial]) -> None:
@@ -110,20 +112,29 @@ class _Sweep:
         for trial in trials:
             yield [*trial.values, trial.passed, trial.flights, trial.points, trial.of, *trial.figures.values()]
 
-    def _draw(self, trials: Sequence[Trial]) -> None:
-        from drone_sim.grading import heat_map
+    def _plot(self, trials: Sequence[Trial]) -> None:
+        """Plot a curve over one parameter, or a heat map over two."""
+        from matplotlib.figure import Figure  # not pyplot, which keeps every figure
 
-        options, plan = self._options, self._plan
-        figures = [trial.figures[options.smallest] if options.smallest else trial.points for trial in trials]
-        heat_map.save(
-            options.plot,
-            plan.title or plan.name,
-            [parameter.key for parameter in self._ranges],
-            [(trial.values, figure) for trial, figure in zip(trials, figures)],
-            options.smallest or "points",
-        )
+        path, smallest, keys = self._options.plot, self._options.smallest, [one.key for one in self._ranges]
+        drawn = [(trial.values, trial.figures[smallest] if smallest else trial.points) for trial in trials]
+        figure = Figure(figsize=(7, 5), layout="constrained")
+        axes = figure.subplots()
+        if len(keys) == 1:
+            points = sorted((values[0], np.nan if height is None else height) for values, height in drawn)
+            axes.plot(*zip(*points), "o-")
+            axes.set_xlabel(keys[0])
+            axes.set_ylabel(smallest or "points")
+            axes.grid(alpha=0.3)
+        else:
+            figure.colorbar(_draw_map(axes, drawn), label=smallest or "points")
+            axes.set_ylabel(keys[0])
+            axes.set_xlabel(keys[1])
+        axes.set_title(self._plan.title or self._plan.name)
+        with writing.replacing(path, binary=True) as file:
+            figure.savefig(file, format=Path(path).suffix[1:], dpi=120)
         with on_standard_output():
-            print(f"wrote {options.plot}")
+            print(f"wrote {path}")
 
     def _check(self) -> None:
         options, names = self._options, [criterion.label for criterion in self._plan.criteria]
@@ -141,7 +152,7 @@ class _Sweep:
         for path in filter(None, (options.csv, options.plot)):
             writing.check_writable(path)
         if options.plot:
-            from drone_sim.grading import heat_map  # noqa: F401 - fails without matplotlib before anything is flown
+            import matplotlib  # noqa: F401 - fails before anything is flown
 
             if not options.plot.endswith((".png", ".svg", ".pdf")):
                 raise ValueError(f"--plot {shown(options.plot)}: must end in .png, .svg or .pdf")
@@ -178,6 +189,35 @@ class _Sweep:
             jobs.append([Job(path, self._script, seed, changes, key) for seed, key in enumerate(keys)])
         results = {job.key: result for job, result in self._runner.fly([job for some in jobs for job in some], quiet)}
         return [_trial(tuple(point), [results[job.key] for job in some]) for point, some in zip(points, jobs)]
+
+
+def _draw_map(axes: Any, trials: Sequence[tuple[tuple[Any, ...], float | None]]) -> Any:
+    """Draw a cell for every combination of a grid, or a dot for every trial of an optimisation; return the drawing."""
+    from matplotlib.ticker import MaxNLocator
+
+    rows, columns = (sorted({values[index] for values, _ in trials}) for index in (0, 1))
+    if len(rows) * len(columns) != len(trials):
+        x, y, colours = zip(*((column, row, value) for (row, column), value in trials if value is not None))
+        return axes.scatter(x, y, c=colours)
+    cells = np.full((len(rows), len(columns)), np.nan)
+    for (row, column), value in trials:
+        cells[rows.index(row), columns.index(column)] = np.nan if value is None else value
+    drawing = axes.imshow(cells, origin="lower", aspect="auto")
+    for axis, values in ((axes.yaxis, rows), (axes.xaxis, columns)):
+        axis.set_major_locator(MaxNLocator(nbins=min(12, len(values)), integer=True))
+        axis.set_major_formatter(lambda at, _, values=values: _tick_label(at, values))
+    if cells.size <= _MAX_LABELLED_CELLS:
+        middle = (np.nanmin(cells) + np.nanmax(cells)) / 2 if np.isfinite(cells).any() else 0.0
+        for (row, column), value in np.ndenumerate(cells):
+            if np.isfinite(value):
+                colour = "black" if value > middle else "white"
+                axes.text(column, row, f"{value:.3g}", ha="center", va="center", color=colour, fontsize=8)
+    return drawing
+
+
+def _tick_label(at: float, values: Sequence[Any]) -> str:
+    is_cell = at == int(at) and 0 <= at < len(values)
+    return _format_cell(values[int(at)]) if is_cell else ""
 
 
 def _minimize(get_costs: _GetCosts, bounds: Sequence[tuple[float, float]], evaluations: int, seed: int) -> None:
