@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -38,10 +39,17 @@ def add_to(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("plan", metavar="PLAN", help="the plan's file.yaml, or a task's name such as hover")
     cores = len(os.sched_getaffinity(0))
     parser.add_argument(
-        "--seeds", metavar="N", type=_whole_number(1, plans.MAX_SEEDS), help="seeds 0 to N-1 (default: the plan's)"
+        "--seeds",
+        metavar="N",
+        type=functools.partial(_whole_number, plans.MAX_SEEDS),
+        help="seeds 0 to N-1 (default: the plan's)",
     )
     parser.add_argument(
-        "--jobs", metavar="N", type=_whole_number(1, _MAX_JOBS), default=cores, help=f"flights at a time ({cores})"
+        "--jobs",
+        metavar="N",
+        type=functools.partial(_whole_number, _MAX_JOBS),
+        default=cores,
+        help=f"flights at a time ({cores})",
     )
     parser.add_argument("--scheduler", metavar="ADDRESS", default="", help="a Dask scheduler, such as tcp://host:8786")
     parser.add_argument("--results", metavar="DIR", help=f"the folder where results are saved ({default_folder()})")
@@ -54,13 +62,10 @@ def add_to(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _whole_number(low: int, high: int) -> Callable[[str], int]:
-    def parse(text: str) -> int:
-        if not (text.isascii() and text.isdigit() and len(text) < 20 and low <= int(text) <= high):
-            raise argparse.ArgumentTypeError(f"{shown(text)}: must be a whole number from {low} to {high}")
-        return int(text)
-
-    return parse
+def _whole_number(largest: int, text: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) < 20 and 1 <= int(text) <= largest):
+        raise argparse.ArgumentTypeError(f"{shown(text)}: must be a whole number from 1 to {largest}")
+    return int(text)
 
 
 def results_folder(options: argparse.Namespace) -> Path:

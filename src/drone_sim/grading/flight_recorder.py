@@ -148,10 +148,10 @@ class FlightRecorder:
         vehicle = self._simulation.vehicles.get(vehicle_name)
         if vehicle is not None:
             return (*vehicle.body.state.position, *vehicle.body.state.orientation)
-        one = self._simulation.context.objects.get(handle)
-        if one is None or vehicle_name:
+        scene_object = self._simulation.context.objects.get(handle)
+        if scene_object is None or vehicle_name:
             return _NO_POSE
-        matrix = one.matrix()
+        matrix = scene_object.matrix()
         return (*position(matrix), *to_quaternion(matrix))
 
 

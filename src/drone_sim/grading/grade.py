@@ -81,7 +81,7 @@ class _Grading:
         seeds = seeds_of(options.seeds or self._plan.seeds, options.secret)
         jobs = jobs_of(self._plan, submissions or [Submission(self._plan.default_script)], seeds)
         self._submissions, self._names = list(jobs), names_of(jobs)
-        self._jobs = [job for some in jobs.values() for job in some]
+        self._jobs = [job for flights in jobs.values() for job in flights]
         _check_outputs(options, len(jobs))
         self._key = as_json.read_key(options.key, "--key") if options.key else None
         self._runner = Runner(PROGRAM, options, self._plan, tables=bool(options.html))

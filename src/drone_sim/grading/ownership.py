@@ -88,7 +88,7 @@ def _handle_arguments() -> dict[str, tuple[tuple[int, Any], ...]]:
     for kind in (*listing.classes_of_sim(), Objects, Sensors, ImageFilters):
         for method, _, names in methods_of(kind):
             parameters = enumerate([*inspect.signature(method).parameters.values()][1:])
-            handles = tuple((index, one.default) for index, one in parameters if one.annotation == "Handle")
+            handles = tuple((index, each.default) for index, each in parameters if each.annotation == "Handle")
             handle_arguments.update(dict.fromkeys(names, handles))
     return handle_arguments
 

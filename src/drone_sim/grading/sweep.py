@@ -116,7 +116,7 @@ class _Sweep:
         """Plot a curve over one parameter, or a heat map over two."""
         from matplotlib.figure import Figure  # not pyplot, which keeps every figure
 
-        path, smallest, keys = self._options.plot, self._options.smallest, [one.key for one in self._ranges]
+        path, smallest, keys = self._options.plot, self._options.smallest, [parameter.key for parameter in self._ranges]
         drawn = [(trial.values, trial.figures[smallest] if smallest else trial.points) for trial in trials]
         figure = Figure(figsize=(7, 5), layout="constrained")
         axes = figure.subplots()
@@ -187,8 +187,10 @@ class _Sweep:
             changes, path = _changes(self._ranges, point), str(self._plan.path)
             keys = [key_of(self._contents, seed, changes) for seed in range(self._seeds)]
             jobs.append([Job(path, self._script, seed, changes, key) for seed, key in enumerate(keys)])
-        results = {job.key: result for job, result in self._runner.fly([job for some in jobs for job in some], quiet)}
-        return [_trial(tuple(point), [results[job.key] for job in some]) for point, some in zip(points, jobs)]
+        results = {
+            job.key: result for job, result in self._runner.fly([job for flights in jobs for job in flights], quiet)
+        }
+        return [_trial(tuple(point), [results[job.key] for job in flights]) for point, flights in zip(points, jobs)]
 
 
 def _draw_map(axes: Any, trials: Sequence[tuple[tuple[Any, ...], float | None]]) -> Any:

@@ -53,7 +53,7 @@ class Course:
 
     def grade(self, task: str) -> None:
         """Begin to grade what was handed in for a task, unless that is being done. Raises ValueError."""
-        if task not in [one["name"] for one in self.tasks()]:
+        if task not in [listed["name"] for listed in self.tasks()]:
             raise ValueError(f"{task[:80]!r}: cannot be handed in, so there is nothing to grade")
         if task in self._runs and self._runs[task][0].poll() is None:
             return
@@ -94,9 +94,8 @@ class TeacherPage(HubOAuthenticated, web.RequestHandler):  # type: ignore[misc]
             _TEMPLATE.read_text(encoding="utf-8")
         )
         students = [user for user in await self._users() if not user.get("admin")]
-        found = course.tasks()
         form = self.xsrf_form_html()
-        self.finish(template.render(students=students, tasks=found, form=form, prefix=_PREFIX))
+        self.finish(template.render(students=students, tasks=course.tasks(), form=form, prefix=_PREFIX))
 
     @web.authenticated
     async def post(self) -> None:

@@ -90,7 +90,7 @@ def _fly_again(plan: Plan, results: Sequence[Result], options: argparse.Namespac
     for script in {result.script for result in results}:
         with contextlib.suppress(Unreadable, ScriptError):
             contents[script] = contents_of(plan, submission_path(script))
-    found = {
+    new_results = {
         (result.script, result.seed): result_of(plan, result.script, result.seed, {}, result.error or "")
         for result in results
     }
@@ -100,5 +100,5 @@ def _fly_again(plan: Plan, results: Sequence[Result], options: argparse.Namespac
         if result.script in contents
     ]
     with pool.open_pool(flight_options, max(1, min(options.jobs, len(jobs)))) as fly:
-        found.update({(flight.job.script, flight.job.seed): flight.result for flight in fly(jobs)})
-    return found
+        new_results.update({(flight.job.script, flight.job.seed): flight.result for flight in fly(jobs)})
+    return new_results

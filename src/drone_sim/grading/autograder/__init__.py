@@ -43,7 +43,7 @@ def _package_files() -> Iterator[tuple[str, Path]]:
         raise ValueError(f"--autograder: needs a checkout of drone_sim; {root} has no {_REQUIREMENTS}")
     yield _REQUIREMENTS, root / _REQUIREMENTS
     yield "drone_sim/package.xml", root / "package.xml"
-    for path in (*_SOURCE.rglob("*"), *(one for name in _PACKAGE_FOLDERS for one in (root / name).rglob("*"))):
+    for path in (*_SOURCE.rglob("*"), *(path for name in _PACKAGE_FOLDERS for path in (root / name).rglob("*"))):
         if path.is_file() and "__pycache__" not in path.parts:
             yield f"drone_sim/{path.relative_to(root)}", path
 

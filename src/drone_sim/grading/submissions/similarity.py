@@ -91,12 +91,12 @@ def find_similar(sources: Mapping[str, str], provided: Mapping[str, str]) -> lis
 
 
 def _compare(first: str, second: str, hashes: Mapping[str, Mapping[int, Lines]]) -> Pair | None:
-    one, other = hashes[first], hashes[second]
-    common = one.keys() & other.keys()
-    if len(common) < max(_MIN_COMMON, MIN_SHARE * min(len(one), len(other))):
+    both = hashes[first], hashes[second]
+    common, shorter = both[0].keys() & both[1].keys(), min(map(len, both))
+    if len(common) < max(_MIN_COMMON, MIN_SHARE * shorter):
         return None
-    lines = [frozenset(itertools.chain(*(some[key] for key in common))) for some in (one, other)]
-    return Pair(first, second, len(common) / min(len(one), len(other)), (lines[0], lines[1]))
+    lines = [frozenset(itertools.chain(*(lines_of[key] for key in common))) for lines_of in both]
+    return Pair(first, second, len(common) / shorter, (lines[0], lines[1]))
 
 
 def _hashes(name: str, text: str) -> dict[int, Lines]:

@@ -221,7 +221,7 @@ def _hint(plan: Plan, result: Result) -> str:
         for criterion, outcome in zip(plan.criteria, result.outcomes)
         if not outcome.passed
     ]
-    return max(failed, key=lambda one: one[0])[1].hint if failed else ""
+    return max(failed, key=lambda failure: failure[0])[1].hint if failed else ""
 
 
 def _slug(label: str) -> str:
