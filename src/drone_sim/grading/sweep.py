@@ -187,9 +187,7 @@ class _Sweep:
             changes, path = _changes(self._ranges, point), str(self._plan.path)
             keys = [key_of(self._contents, seed, changes) for seed in range(self._seeds)]
             jobs.append([Job(path, self._script, seed, changes, key) for seed, key in enumerate(keys)])
-        results = {
-            job.key: result for job, result in self._runner.fly([job for flights in jobs for job in flights], quiet)
-        }
+        results = {job.key: result for job, result in self._runner.fly([*itertools.chain(*jobs)], quiet)}
         return [_trial(tuple(point), [results[job.key] for job in flights]) for point, flights in zip(points, jobs)]
 
 
