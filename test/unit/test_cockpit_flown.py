@@ -56,7 +56,7 @@ def _carried(found):
 def test_what_a_task_begins_with_flies(name, tmp_path):
     plan = plans.read(tasks.find(name))
     start = ScriptStore(tmp_path).find(f"tasks/{name}.py")
-    simulation = Simulation(plan.parameters(script=str(start.path)))
+    simulation = Simulation(plan.parameters(changes={"script": str(start.path)}))
     for _ in range(3):
         simulation.step()
     simulation.close()

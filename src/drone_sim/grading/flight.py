@@ -109,7 +109,7 @@ class Flight:
         scripts run in this process.
         """
         self._plan, self._seed, self._changes = plan, seed, changes or {}
-        parameters = plan.parameters(seed, "" if script == "" else None, changes)
+        parameters = plan.parameters(seed, {**self._changes, "script": ""} if script == "" else self._changes)
         self._script = plan.script_of(script) or parameters.script
         own = {vehicle.name: own_script(vehicle, parameters) for vehicle in parameters.fleet}
         if self._script and own and all(own.values()):

@@ -139,14 +139,12 @@ class Plan(Checked):
         """The plan's script, or that of its config, '' if there is none. Raises ParameterError."""
         return self.script_of(None) or self.parameters().script
 
-    def parameters(
-        self, seed: int = 0, script: str | None = None, changes: Mapping[str, Any] | None = None
-    ) -> Parameters:
+    def parameters(self, seed: int = 0, changes: Mapping[str, Any] | None = None) -> Parameters:
         """Return the parameters of a flight; `changes` are keys of config/drone.yaml that override the plan's.
 
-        The parameters name the `script`, which is as in `script_of`, unless that is None. Raises ParameterError.
+        Raises ParameterError.
         """
-        changes = dict(changes or {}) if script is None else {**(changes or {}), "script": self.script_of(script)}
+        changes = dict(changes or {})
         key = json.dumps(changes, sort_keys=True, default=str)
         if key not in self._cache:  # reads each file only once
             if len(self._cache) >= _MAX_CACHED:
