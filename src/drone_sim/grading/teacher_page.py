@@ -93,7 +93,10 @@ class TeacherPage(HubOAuthenticated, web.RequestHandler):  # type: ignore[misc]
         template = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(
             _TEMPLATE.read_text(encoding="utf-8")
         )
-        students = [user for user in await self._users() if not user.get("admin")]
+        headers = {"Authorization": f"token {os.environ['JUPYTERHUB_API_TOKEN']}"}
+        request = HTTPRequest(f"{os.environ['JUPYTERHUB_API_URL']}/users", headers=headers)
+        users: list[dict[str, Any]] = json.loads((await AsyncHTTPClient().fetch(request)).body)
+        students = sorted((user for user in users if not user.get("admin")), key=lambda user: str(user["name"]))
         form = self.xsrf_form_html()
         self.finish(template.render(students=students, tasks=course.tasks(), form=form, prefix=_PREFIX))
 
@@ -107,13 +110,6 @@ class TeacherPage(HubOAuthenticated, web.RequestHandler):  # type: ignore[misc]
             self.finish(str(error))
         else:
             self.redirect(_PREFIX)
-
-    async def _users(self) -> list[dict[str, Any]]:
-        headers = {"Authorization": f"token {os.environ['JUPYTERHUB_API_TOKEN']}"}
-        request = HTTPRequest(f"{os.environ['JUPYTERHUB_API_URL']}/users", headers=headers)
-        answer = await AsyncHTTPClient().fetch(request)
-        users: list[dict[str, Any]] = json.loads(answer.body)
-        return sorted(users, key=lambda user: str(user["name"]))
 
 
 class Reports(HubOAuthenticated, web.StaticFileHandler):  # type: ignore[misc]

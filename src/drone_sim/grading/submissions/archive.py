@@ -47,7 +47,11 @@ def unpack(path: Path, store: Path, arrange: Arrange) -> tuple[Path, dict[str, s
     """
     if not path.is_file():
         raise Refused("is not a regular file")
-    folder = store / f"{path.stem:.40}-{_digest(path)}"
+    digest = hashlib.sha256()
+    with open(path, "rb") as file:
+        while block := file.read(_BLOCK):
+            digest.update(block)
+    folder = store / f"{path.stem:.40}-{digest.hexdigest()[:12]}"
     store.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=store) as unfinished:
         room = max(_MIN_ROOM, _MAX_RATIO * path.stat().st_size)
@@ -67,14 +71,6 @@ def unpack_whole(path: Path, store: Path) -> Path:
     for reason in refused.values():
         raise Refused(reason)
     return folder
-
-
-def _digest(path: Path) -> str:
-    digest = hashlib.sha256()
-    with open(path, "rb") as file:
-        while block := file.read(_BLOCK):
-            digest.update(block)
-    return digest.hexdigest()[:12]
 
 
 def _unpack_parts(archive: zipfile.ZipFile, folder: Path, arrange: Arrange, room: int) -> dict[str, str]:

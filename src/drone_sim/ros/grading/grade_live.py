@@ -14,7 +14,6 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +52,8 @@ _EARLY, _LATE = 1e-6, 2.0  # s of simulated time by which a move of the timeline
 
 def main() -> int:
     """Grade; return 0 if the flight passes, else 1, after the table or one line for a user's mistake."""
-    options = _parser().parse_args(_arguments(rosgraph.myargv(sys.argv)[1:]))
+    words = [word for word in rosgraph.myargv(sys.argv)[1:] if word != "--text"]  # which rostest adds
+    options = _parser().parse_args([re.sub(f"^{re.escape(_ROSTEST_OUTPUT)}", "--rostest=", word) for word in words])
     if options.write_config:
         return status_of(_NAME, lambda: _write_config(options.plan, options.write_config))
     if not init_node(_NAME, anonymous=True, disable_signals=True):
@@ -234,12 +234,6 @@ class _LiveFlight:
             if not any(-_EARLY <= at - due <= _LATE for due in own):
                 return record.until(int(row)), message.format(f"at {at:.2f}")
         return record, ""
-
-
-def _arguments(words: Sequence[str]) -> list[str]:
-    """Return the command line with the option --rostest instead of the arguments that rostest adds."""
-    words = [word for word in words if word != "--text"]
-    return [re.sub(f"^{re.escape(_ROSTEST_OUTPUT)}", "--rostest=", word) for word in words]
 
 
 def _seed(text: str) -> int:

@@ -80,7 +80,12 @@ class Screen:
             if self._teleop.is_connected and not is_ready:
                 is_ready, self._teleop.status = True, "ready"
             self._draw()
-            for key in self._read_keys():
+            data = b""
+            if select.select([self._terminal], [], [], _PERIOD)[0]:
+                data = os.read(self._terminal, 1024)
+                if not data:
+                    raise OSError("the terminal was closed")
+            for key in self._decoder.feed(data):
                 if key == ESCAPE:
                     return
                 self._is_key_unknown = not self._teleop.press(key)
@@ -94,15 +99,6 @@ class Screen:
             time.sleep(_PERIOD / 2)
         self._teleop.status = ""
         termios.tcflush(self._terminal, termios.TCIFLUSH)
-
-    def _read_keys(self) -> list[str]:
-        """Return the keys typed within _PERIOD. Raises OSError if the terminal was closed."""
-        if not select.select([self._terminal], [], [], _PERIOD)[0]:
-            return self._decoder.feed(b"")
-        data = os.read(self._terminal, 1024)
-        if not data:
-            raise OSError("the terminal was closed")
-        return self._decoder.feed(data)
 
     def _draw(self) -> None:
         size = os.get_terminal_size(self._terminal)

@@ -180,7 +180,11 @@ class _FlightWriter:
 
     def write_page(self, number: int, script: ScriptResults, scripts: Sequence[ScriptResults]) -> ScriptPage:
         """Write the flights of a script, and return its page; `number` counts all `scripts` from 1."""
-        own = f"scripts/{number:02}-{_slug(script.label)}"
+        # The folder's name has the letters and digits of any language.
+        name = re.sub(r"\.(py|lua)$", "", unicodedata.normalize("NFC", Path(script.label).name))
+        marks = {"_", "-"} | {letter for letter in name if unicodedata.category(letter).startswith("M")}
+        letters = (letter if letter.isalnum() or letter in marks else "_" for letter in name)
+        own = f"scripts/{number:02}-{re.sub('_+', '_', ''.join(letters))[:_MAX_SLUG]}"
         (self._folder / own / "flights").mkdir(parents=True)
         flights = tuple(self._write_flight(own, str(key), result) for key, result in enumerate(script.flights))
         rank = 1 + sum(other.points > script.points for other in scripts)
@@ -222,14 +226,6 @@ def _hint(plan: Plan, result: Result) -> str:
         if not outcome.passed
     ]
     return max(failed, key=lambda failure: failure[0])[1].hint if failed else ""
-
-
-def _slug(label: str) -> str:
-    """Return a name for a folder, with the letters and digits of any language."""
-    name = re.sub(r"\.(py|lua)$", "", unicodedata.normalize("NFC", Path(label).name))
-    marks = {"_", "-"} | {letter for letter in name if unicodedata.category(letter).startswith("M")}
-    letters = (letter if letter.isalnum() or letter in marks else "_" for letter in name)
-    return re.sub("_+", "_", "".join(letters))[:_MAX_SLUG]
 
 
 def _assignment(name: str, value: Any) -> str:
