@@ -29,6 +29,7 @@ environment = {name: os.environ[name] for name in ros if name in os.environ}
 # The course's own tasks. And where students hand in: a task with a folder there has the button *Hand in*.
 environment["DRONE_SIM_TASKS"] = "/srv/drone_sim/tasks"
 environment["DRONE_SIM_HAND_IN"] = "/srv/drone_sim/handed_in"
+environment["DRONE_SIM_CLASSROOM"] = "/srv/drone_sim/classroom"  # what the teachers' page shows, and tells all
 c.Spawner.environment = environment
 
 # The teachers' page, http://THE-MACHINE:8000/services/course/, if there is a system user for it.

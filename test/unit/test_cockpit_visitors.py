@@ -1,5 +1,6 @@
 """Browsers' sockets that say something else than our page does."""
 
+import json
 import logging
 import queue
 import resource
@@ -26,11 +27,12 @@ class Served:
         self.server = PageServer("127.0.0.1", 0)
         self.token = self.server.address.partition("?token=")[2]
         held = HeldCommands(lambda _: None, lambda: 0.0)
-        self.server.begin(PageSocket(held, {"twice": _twice}, {"fail": _fail}).serve, lambda _path: None)
+        answers = {"twice": _twice, "open": lambda _: {"text": "a script"}}
+        self.server.begin(PageSocket(held, answers, {"fail": _fail}).serve, lambda _path: None)
 
-    def connect(self, protocol=SUBPROTOCOL):
+    def connect(self, protocol=SUBPROTOCOL, query=""):
         cookie = {"Cookie": f"drone_sim_{self.server.port}={self.token}"}
-        address = f"ws://127.0.0.1:{self.server.port}/"
+        address = f"ws://127.0.0.1:{self.server.port}/{query}"
         return connect(address, subprotocols=[protocol], additional_headers=cookie, max_size=None)
 
 
@@ -98,3 +100,24 @@ def test_a_gigabyte_is_refused_before_it_is_taken(served, said, parts):
     assert code == 1009 and "8388608" in why
     assert said().startswith("a browser at 127.0.0.1 is refused: frame")
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100 << 10  # KiB
+
+
+def test_a_page_that_only_watches_reads(served):
+    with served.connect(query="socket?watch") as page:
+        page.send(json.dumps({"id": 1, "ask": "open"}))
+        assert json.loads(page.recv(timeout=60)) == {"id": 1, "text": "a script"}
+
+
+@pytest.mark.parametrize(
+    "message", [{"ask": "twice", "number": 1}, {"hold": {}}, {"fail": 1}, {"fail": 1, "hold": {}}, {"ask": []}]
+)
+def test_a_page_that_only_watches_changes_nothing(served, message):
+    with served.connect(query="socket?watch") as page:
+        page.send(json.dumps({"id": 1, **message}))
+        assert "error" in json.loads(page.recv(timeout=60))
+
+
+def test_a_page_that_only_watches_reaches_no_handler_beside_a_question(served):
+    with served.connect(query="socket?watch") as page:
+        page.send(json.dumps({"id": 1, "ask": "open", "fail": 1, "hold": {}}))
+        assert json.loads(page.recv(timeout=60)) == {"id": 1, "text": "a script"}

@@ -9,6 +9,8 @@ pytest.importorskip("rospy", reason="needs ROS")
 from cockpit_page import STARTED, ready, wait_until
 from launched import launched
 
+from drone_sim.grading import classroom
+
 
 def handed_in(folder, line):
     return [file for file in folder.iterdir() if file.read_text().startswith(line)]
@@ -36,3 +38,30 @@ def test_a_changed_script_is_handed_in_and_again(cockpit, browser, tmp_path, mon
             (copy,) = handed_in(tmp_path / "hover", line)
             words = "mine/hover.py handed in", copy.stem.rpartition("+")[2]
             wait_until(page, lambda words=words: said.count() and all(word in said.inner_text() for word in words))
+
+
+def test_a_course_sees_the_drone_and_tells_its_student_a_task(cockpit, browser, tmp_path, monkeypatch):
+    monkeypatch.setenv("ROS_MASTER_URI", os.environ["ROS_MASTER_URI"])  # that of this process, afterwards
+    monkeypatch.setenv(classroom.VARIABLE, str(tmp_path))
+    (tmp_path / "reports").mkdir()
+    classroom.tell_all(tmp_path, "Let us hover.", "hover")
+    with launched() as course, browser.new_context() as context, context.new_page() as page:
+        page.add_init_script(STARTED)
+        page.goto(course.address, wait_until="commit")
+        ready(page)
+        page.get_by_text("Let us hover.").wait_for()
+        page.click("text=Open hover")
+        wait_until(page, lambda: page.input_value("#script") == "tasks/hover.py")
+        assert not page.get_by_text("Let us hover.").is_visible()
+        classroom.tell_all(tmp_path, "Well done.", "")
+        page.get_by_text("Well done.").wait_for()
+        wait_until(page, lambda: any(one["picture"] for one in classroom.reports(tmp_path).values()))
+        (report,) = classroom.reports(tmp_path).values()
+        assert (report["script"], report["scene"]) != ("", "")
+        with context.new_page() as watcher:
+            watcher.goto(page.url.split("?")[0] + "?watch", wait_until="commit")
+            ready(watcher)
+            assert not any(watcher.locator(part).is_visible() for part in ("#sim-stop", "#editor", "#rail", "#start-page"))
+            watcher.keyboard.press("Enter")  # would end the flight
+            watcher.get_by_text("watching only").wait_for()
+            wait_until(page, lambda: page.locator("#status").get_attribute("data-is") == "flying")

@@ -1,6 +1,7 @@
 // The page: the scene, held keys, the script in an editor with its text, panels, and what floats over the scene.
 import { Teleop, nameKeys } from "./teleop.js";
 import { Desk } from "./desk.js";
+import { isWatching } from "./course.js";
 import { at } from "./dom.js";
 import { Lesson } from "./lesson.js";
 import { Scripts } from "./scripts.js";
@@ -18,6 +19,8 @@ import { abilities } from "./state/words.js";
 const LINE_FEED = 10;
 
 const store = new Store();
+
+document.body.classList.toggle("watching", isWatching);
 
 function show({ lists, script, of, question }) {
   if (lists) offer(lists);

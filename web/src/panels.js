@@ -2,6 +2,7 @@
 import { Board } from "./board.js";
 import { Build } from "./edit/build.js";
 import { Cameras } from "./cameras.js";
+import { ToAll, isWatching } from "./course.js";
 import { at, icon } from "./dom.js";
 import { Log } from "./log.js";
 import { Notice } from "./notice.js";
@@ -47,10 +48,14 @@ export class Panels {
     this.board.on("vehicles", ({ now }) => (scene().vehicle = now));
     for (const button of this.places) button.onclick = () => this.showPlace(button.dataset.place);
     at("toggle").onclick = () => this.showScript(document.body.classList.contains("wide"));
-    this.showScript(!TOUCH.matches);
+    this.showScript(!TOUCH.matches && !isWatching);
     const choices = { tutorial: () => this.enter(go.tutorial), fly: () => this.showScript(false), build: () => this.showPlace("edit") };
     const gallery = { list: go.tasks, take: (...task) => this.enter(() => go.take(...task)) };
     this.start = new Start(choices, gallery, (script) => this.enter(() => open(script)));
+    new ToAll(this.board, (lesson) => {
+      at("start-page").close();
+      this.enter(() => go.take(lesson));
+    });
     this.keys();
   }
 

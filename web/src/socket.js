@@ -1,4 +1,5 @@
 // Our socket: questions with answers, and what the node tells by itself. It connects again when the node is back.
+import { isWatching } from "./course.js";
 import { SILENCE } from "./state/facts.js";
 
 const AGAIN = [1000, 1000, 2000, 4000, 8000]; // ms before each further attempt; the last one counts from then on
@@ -34,7 +35,7 @@ export class PageSocket {
 
   connect() {
     clearTimeout(this.later);
-    const socket = new WebSocket(new URL("socket", location).href.replace("http", "ws"), "drone_sim");
+    const socket = new WebSocket(new URL(isWatching ? "socket?watch" : "socket", location).href.replace("http", "ws"), "drone_sim");
     this.socket = socket;
     this.begun = performance.now();
     socket.binaryType = "arraybuffer";

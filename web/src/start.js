@@ -1,5 +1,6 @@
 // The start page: where a visitor begins, the gallery of tasks, and the way back to what was open last.
 import { at, create } from "./dom.js";
+import { isWatching } from "./course.js";
 import { bestWords } from "./graded.js";
 import { keep, kept } from "./storage.js";
 
@@ -27,7 +28,7 @@ export class Start {
     dialog.onclose = () => keep("started", true);
     at("start-close").onclick = () => dialog.close();
     at("home").onclick = () => this.show();
-    if (!kept("started", false)) this.show();
+    if (!isWatching && !kept("started", false)) this.show();
   }
 
   showTasks(on) {

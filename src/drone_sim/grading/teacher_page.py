@@ -1,7 +1,7 @@
 """A page for a course's teachers: `python -m drone_sim.grading.teacher_page FOLDER`, a service of JupyterHub.
 
-It lists the students, with links to their simulators, and what they handed in; it grades a task with one button, and
-shows the report. JupyterHub decides who may open the page (scope access:services). The service runs as a user who can
+It shows the students' drones, with links to their simulators, and what they handed in. It tells all students something,
+grades a task with one button, and shows the report. JupyterHub decides who may open the page (scope access:services). The service runs as a user who can
 read what was handed in, and writes reports below FOLDER. docs/classroom.md has the configuration.
 """
 
@@ -23,7 +23,7 @@ from jupyterhub.services.auth import HubOAuthCallbackHandler, HubOAuthenticated
 from tornado import web
 from tornado.httpclient import AsyncHTTPClient, HTTPRequest
 
-from drone_sim.grading import tasks
+from drone_sim.grading import classroom, tasks
 from drone_sim.grading.submissions import handed_in
 
 _TEMPLATE = Path(__file__).parent / "outputs" / "html" / "templates" / "teacher.html.j2"
@@ -85,7 +85,7 @@ class Course:
 
 
 class TeacherPage(HubOAuthenticated, web.RequestHandler):  # type: ignore[misc]
-    """The page; a POST with `task` grades that task."""
+    """The page. A POST with `grade` grades that task; one with `text` and `task` shows both to all students."""
 
     @web.authenticated
     async def get(self) -> None:
@@ -97,19 +97,43 @@ class TeacherPage(HubOAuthenticated, web.RequestHandler):  # type: ignore[misc]
         request = HTTPRequest(f"{os.environ['JUPYTERHUB_API_URL']}/users", headers=headers)
         users: list[dict[str, Any]] = json.loads((await AsyncHTTPClient().fetch(request)).body)
         students = sorted((user for user in users if not user.get("admin")), key=lambda user: str(user["name"]))
-        form = self.xsrf_form_html()
-        self.finish(template.render(students=students, tasks=course.tasks(), form=form, prefix=_PREFIX))
+        room = classroom.folder()
+        self.finish(
+            template.render(
+                students=students,
+                reports=classroom.reports(room) if room else {},
+                tasks=course.tasks(),
+                can_tell=room is not None,
+                told=classroom.message_to_all(room) if room else None,
+                names=tasks.names(),
+                form=self.xsrf_form_html(),
+                prefix=_PREFIX,
+            )
+        )
 
     @web.authenticated
     async def post(self) -> None:
         try:
-            self.settings["course"].grade(self.get_body_argument("task", ""))
+            if self.get_body_argument("grade", ""):
+                self.settings["course"].grade(self.get_body_argument("grade"))
+            else:
+                self._tell(self.get_body_argument("text", ""), self.get_body_argument("task", ""))
         except (OSError, ValueError) as error:
             self.set_status(400)
             self.set_header("Content-Type", "text/plain; charset=utf-8")
             self.finish(str(error))
         else:
             self.redirect(_PREFIX)
+
+    @staticmethod
+    def _tell(text: str, task: str) -> None:
+        """Raises OSError, and ValueError for a task that does not exist."""
+        if task and task not in tasks.names():
+            raise ValueError(f"{task[:80]!r}: there is no such task")
+        room = classroom.folder()
+        if room is None:
+            raise ValueError(f"{classroom.VARIABLE} has no folder that the teachers' page can write to")
+        classroom.tell_all(room, text, task)
 
 
 class Reports(HubOAuthenticated, web.StaticFileHandler):  # type: ignore[misc]

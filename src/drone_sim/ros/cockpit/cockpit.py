@@ -11,6 +11,7 @@ from typing import Any
 
 import rospy
 
+from drone_sim.ros.cockpit.classroom import Classroom
 from drone_sim.ros.cockpit.editor.backend import EditorBackend
 from drone_sim.ros.cockpit.editor.inspection import ScriptInspector
 from drone_sim.ros.cockpit.editor.lessons import Lessons
@@ -73,8 +74,9 @@ class Cockpit:
         self._pulse = Pulse(self._simulator.node, self._socket.tell)
         answers.update({**self._panel.answers, **self._windows.answers})
         server.begin(self._socket.serve, self._find)
-        for hold in (lambda: held.run(lambda: not rospy.is_shutdown()), self._hold_dragged):
-            threading.Thread(target=hold, daemon=True).start()
+        room = Classroom(self._panel.board, lambda: bool(self._socket.browsers), self._camera, editor.for_teachers)
+        for loop in (lambda: held.run(lambda: not rospy.is_shutdown()), self._hold_dragged, room.run):
+            threading.Thread(target=loop, daemon=True).start()
         self._pulse.start()
 
     def run(self) -> None:
@@ -141,6 +143,11 @@ class Cockpit:
     def _find(self, path: str) -> Content:
         content = self._meshes.find(path) or self._lessons.picture(path) or self._manual.find(path)
         return content or self._editing.picture(path) or self._report_file(path)
+
+    def _camera(self) -> str:
+        """Return the topic with the compressed pictures of the vehicle's camera; '' if there is none."""
+        of_vehicle = (one.compressed for one in self._topics.cameras if one.topic.startswith(f"/{self._commands.vehicle}/"))
+        return next(filter(None, of_vehicle), "")
 
     def _drag(self, browser: int, message: Mapping[str, Any]) -> None:
         if self._view is not None:

@@ -71,6 +71,15 @@ class EditorBackend:
         }
         return {name: _with_one_line_errors(handler) for name, handler in handlers.items()}
 
+    def for_teachers(self) -> dict[str, str]:
+        """Return the flying script and the best grades in words."""
+        try:
+            script = self._flying_script()
+        except FAILURES:
+            script = ""
+        grades = (f"{task} {points:g} of {of:g}" for task, (points, of) in self.grader.best.items())
+        return {"script": script, "grades": ", ".join(grades)}
+
     # ---- scripts
 
     def _list_scripts(self) -> dict[str, Any]:

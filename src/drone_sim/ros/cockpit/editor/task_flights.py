@@ -113,6 +113,7 @@ class Grader:
         # A page that was open while an earlier cockpit ran may ask for a grade of that one.
         self._number = secrets.randbelow(1 << 30)
         self._result: dict[str, Any] = {}
+        self.best: dict[str, tuple[float, float]] = {}  # points, and how many there are, of each task's best run
         self._folder: tempfile.TemporaryDirectory[str] | None = None  # of the last run: its results and its report
         atexit.register(self._kill)
 
@@ -138,7 +139,7 @@ class Grader:
             )
             self._number += 1
             self._result = {}
-            arguments = self._process, Path(folder)
+            arguments = task, self._process, Path(folder)
             threading.Thread(target=self._wait, args=arguments, name="grade", daemon=True).start()
             return self._number
 
@@ -158,7 +159,7 @@ class Grader:
             return None
         return find_below(Path(folder.name) / _REPORT, path.removeprefix(_REPORT_URL))
 
-    def _wait(self, process: subprocess.Popen[str], folder: Path) -> None:
+    def _wait(self, task: str, process: subprocess.Popen[str], folder: Path) -> None:
         try:
             errors = process.communicate(timeout=_TIMEOUT)[1]
         except subprocess.TimeoutExpired:
@@ -167,6 +168,9 @@ class Grader:
             errors = f"it took more than {_TIMEOUT:g} s"
         with self._lock:
             self._result = _read_result(folder, errors)
+            if not self._result["problem"]:
+                result = float(self._result["points"]), float(self._result["of"])
+                self.best[task] = max(result, self.best.get(task, result))
             self._process = None
 
     def _kill(self) -> None:

@@ -12,6 +12,7 @@ import socket
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
@@ -25,6 +26,8 @@ _LOG = logging.getLogger(__name__)
 _MAX_MESSAGES = 32  # in the queue of a browser; then the oldest are dropped
 _MAX_REQUESTS = 64  # of a browser that wait for their answers; then it is not heard until one is answered
 _MAX_UNSENT = 1 << 14  # bytes in the kernel: more would be old when a slow network has sent them, and delay pings
+# What a page that only watches may ask.
+_READS = ("graded", "lesson", "locate", "look", "models", "open", "panel", "properties", "scripts", "tree", "windows")
 _SCENE = "scene"  # name by which a browser reports that it has shown a message of the scene
 _MAX_SCENES = 2  # sent messages of the scene that are not shown yet: one can be sent while the browser shows another
 
@@ -59,13 +62,15 @@ class PageSocket:
         if own.family != socket.AF_UNIX:
             own.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _MAX_UNSENT)
         queue = SendQueue(self._scene)
+        query = urlsplit(connection.request.path).query if connection.request else ""
+        only_watches = "watch" in parse_qs(query, keep_blank_values=True)
         self._queues[browser] = asyncio.get_running_loop(), queue
         requests = asyncio.Queue[tuple[Answer, dict[str, Any]]](_MAX_REQUESTS)
         tasks = [_send_from(queue, connection), _answer(requests, connection)]
         running = [asyncio.create_task(task) for task in tasks]
         try:
             async for text in connection:
-                await self._process(browser, text, connection, requests)
+                await self._process(browser, text, connection, requests, only_watches)
         except ConnectionClosed:
             pass
         finally:
@@ -124,10 +129,11 @@ class PageSocket:
         text: str | bytes,
         connection: ServerConnection,
         requests: asyncio.Queue[tuple[Answer, dict[str, Any]]],
+        only_watches: bool,
     ) -> None:
         try:
             message = _parse(text)
-            if "hold" in message:
+            if "hold" in message and not only_watches:
                 self._held.hold(browser, read_command(message["hold"]))
                 return
             if isinstance(message.get("shown"), str):
@@ -137,11 +143,13 @@ class PageSocket:
                 self._queues[browser][1].follows_tree = message["follow_tree"] is True
                 return
             handler = next((handler for key, handler in self._handlers.items() if key in message), None)
-            if handler is not None:
+            if handler is not None and not only_watches:
                 handler(browser, message)
                 return
             name = message.get("ask")
             answer = self._answers.get(name) if isinstance(name, str) else None
+            if only_watches and name not in _READS:
+                answer = _refuse_change
             if answer is None:
                 raise ValueError(f"ask: must be one of {', '.join(self._answers)}, or hold")
         except (ValueError, RecursionError) as error:
@@ -166,6 +174,10 @@ def _finite(text: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f"{text[:20]}: is not a number in JSON, or too large")
     return value
+
+
+def _refuse_change(_message: Mapping[str, Any]) -> Mapping[str, Any]:
+    raise ValueError("you only watch: open the simulator without ?watch to change anything")
 
 
 def _reply(answer: Answer, message: Mapping[str, Any]) -> str:

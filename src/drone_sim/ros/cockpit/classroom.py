@@ -1,0 +1,68 @@
+"""The cockpit's part in a course: teachers see how its student's drone is, and the student sees what they tell all."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import rospy
+from sensor_msgs.msg import CompressedImage
+
+from drone_sim.grading import classroom
+from drone_sim.ros.cockpit.panel.board import Board
+
+_PERIOD = 5.0  # s between two reports
+_PICTURE_TIMEOUT = 1.0  # s, for a picture of the camera; there is none while the simulation is paused
+_MAX_PICTURE = 100_000  # bytes
+
+
+class Classroom:
+    """Reports to the folder of the course while a page is open, and shows the message to all on the board."""
+
+    def __init__(
+        self,
+        board: Board,
+        is_open: Callable[[], bool],
+        camera: Callable[[], str],
+        others: Callable[[], dict[str, str]],
+    ):
+        """`camera` returns the topic with JPEG pictures of the drone's camera, '' for none; `others` the other texts."""
+        self._board, self._is_open, self._camera, self._others = board, is_open, camera, others
+
+    def run(self) -> None:
+        """Report until the node ends; return at once if there is no course."""
+        room = classroom.folder()
+        if room is None:
+            return
+        path = classroom.report_path(room)
+        while not rospy.is_shutdown():
+            message = classroom.message_to_all(room)
+            self._board.show("to_all", message._asdict() if message else None)
+            if self._is_open():
+                self._report(path)
+            time.sleep(_PERIOD)
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+
+    def _report(self, path: Path) -> None:
+        status, flight = self._board.get("status", ""), self._board.get("flight", "")
+        is_told = status == "flying" and flight and not flight.startswith("unknown")
+        scene = self._board.get("scenes", {}).get("now", "")
+        texts = {"status": flight if is_told or flight == "script failed" else status, "scene": scene, **self._others()}
+        try:
+            classroom.report(path, texts, self._picture())
+        except OSError as error:
+            rospy.logwarn_throttle(600, f"the course's folder: {' '.join(str(error).split())}")
+
+    def _picture(self) -> str:
+        topic = self._camera()
+        if not topic or self._board.get("status") != "flying":
+            return ""
+        try:
+            picture = rospy.wait_for_message(topic, CompressedImage, _PICTURE_TIMEOUT).data
+        except rospy.ROSException:  # none came in time, or the node ends
+            return ""
+        return base64.b64encode(picture).decode() if len(picture) <= _MAX_PICTURE else ""
