@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything a newcomer needs: ./dev.sh setup [--all] | run [roslaunch args] | test | test-web | lint | docs |
-#   bench [NAME...] | docs-commands [--all] [PAGE...] | fuzz [CASES] | soak [MINUTES] | soak-web [MINUTES] | two-hosts [--cut SECONDS] | jupyterhub | recordings FOLDER | tasks [TASK...] | pythons [VERSION...] | deb | wheel
+#   bench [NAME...] | docs-commands [--all] [PAGE...] | fuzz [CASES] | soak [MINUTES] | soak-web [MINUTES] | two-hosts [--cut SECONDS] | jupyterhub [--load N] [--pictures FOLDER] | recordings FOLDER | tasks [TASK...] | pythons [VERSION...] | deb | wheel
 #
 # Installs what is missing (Debian 12 and 13: their own ROS 1), keeps the pip packages in .venv, and builds into
 # build/ and devel/. What is there already is left alone, so a second run takes seconds. Where another ROS 1 has
@@ -339,7 +339,7 @@ case "$command" in
     setup
     make_venv "${ALL[@]}" requirements-web.txt requirements-jupyterhub.txt
     npm install --silent --prefix "$cache/jupyterhub" configurable-http-proxy@5 >&2
-    PATH=$PATH:$cache/jupyterhub/node_modules/.bin exec .venv/bin/python test/jupyterhub/run.py ;;
+    PATH=$PATH:$cache/jupyterhub/node_modules/.bin exec .venv/bin/python test/jupyterhub/run.py "$@" ;;
   tasks) setup; PYTHONPATH=$root/src:$PYTHONPATH exec .venv/bin/python test/tasks/check.py "$@" ;;
   pythons) # shellcheck disable=SC2046 # one word each
     install_packages python3-venv $(packages)

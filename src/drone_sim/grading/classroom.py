@@ -55,7 +55,7 @@ def report(path: Path, texts: dict[str, str], picture: str) -> None:
 
 
 def reports(room: Path) -> dict[str, dict[str, str]]:
-    """Return the latest report of each user, by the name of the files' owner. Reports of ended simulators are removed."""
+    """Return the latest report of each user, by the owner of the files; remove the reports of ended simulators."""
     latest: dict[int, tuple[float, dict[str, Any]]] = {}
     for path in (room / _REPORTS).glob("*.json"):
         try:

@@ -1,8 +1,9 @@
 """A page for a course's teachers: `python -m drone_sim.grading.teacher_page FOLDER`, a service of JupyterHub.
 
 It shows the students' drones, with links to their simulators, and what they handed in. It tells all students something,
-grades a task with one button, and shows the report. JupyterHub decides who may open the page (scope access:services). The service runs as a user who can
-read what was handed in, and writes reports below FOLDER. docs/classroom.md has the configuration.
+grades a task with one button, and shows the report. JupyterHub decides who may open the page (scope access:services).
+The service runs as a user who can read what was handed in, and writes reports below FOLDER. docs/classroom.md has the
+configuration.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import rospy
 from sensor_msgs.msg import CompressedImage
 
 from drone_sim.grading import classroom
-from drone_sim.ros.cockpit.panel.board import Board
+from drone_sim.ros.cockpit.panel.board import NO_SIMULATION, Board
 
 _PERIOD = 5.0  # s between two reports
 _PICTURE_TIMEOUT = 1.0  # s, for a picture of the camera; there is none while the simulation is paused
@@ -29,7 +29,7 @@ class Classroom:
         camera: Callable[[], str],
         others: Callable[[], dict[str, str]],
     ):
-        """`camera` returns the topic with JPEG pictures of the drone's camera, '' for none; `others` the other texts."""
+        """`camera` returns the topic of the camera with JPEG pictures, '' for none; `others` returns more texts."""
         self._board, self._is_open, self._camera, self._others = board, is_open, camera, others
 
     def run(self) -> None:
@@ -41,7 +41,7 @@ class Classroom:
         while not rospy.is_shutdown():
             message = classroom.message_to_all(room)
             self._board.show("to_all", message._asdict() if message else None)
-            if self._is_open():
+            if self._is_open() and self._board.get("status", NO_SIMULATION) != NO_SIMULATION:
                 self._report(path)
             time.sleep(_PERIOD)
         with contextlib.suppress(OSError):
@@ -50,8 +50,8 @@ class Classroom:
     def _report(self, path: Path) -> None:
         status, flight = self._board.get("status", ""), self._board.get("flight", "")
         is_told = status == "flying" and flight and not flight.startswith("unknown")
-        scene = self._board.get("scenes", {}).get("now", "")
-        texts = {"status": flight if is_told or flight == "script failed" else status, "scene": scene, **self._others()}
+        status = flight if is_told or flight == "script failed" else status
+        texts = {"status": status, "scene": self._board.get("scenes", {}).get("now", ""), **self._others()}
         try:
             classroom.report(path, texts, self._picture())
         except OSError as error:

@@ -19,6 +19,7 @@ from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
 from drone_sim.ros.cockpit.editor.scene_files import NEW_SCENE, SceneList
 from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
+from drone_sim.ros.cockpit.panel.board import NO_SIMULATION
 from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows
 from drone_sim.ros.cockpit.panel.panel import Panel, SimulatorListener
 from drone_sim.ros.cockpit.panel.pulse import Pulse
@@ -146,8 +147,9 @@ class Cockpit:
 
     def _camera(self) -> str:
         """Return the topic with the compressed pictures of the vehicle's camera; '' if there is none."""
-        of_vehicle = (one.compressed for one in self._topics.cameras if one.topic.startswith(f"/{self._commands.vehicle}/"))
-        return next(filter(None, of_vehicle), "")
+        prefix = f"/{self._commands.vehicle}/"
+        compressed = [one.compressed for one in self._topics.cameras if one.topic.startswith(prefix) and one.compressed]
+        return next((topic for topic in compressed if "front" in topic), compressed[0] if compressed else "")
 
     def _drag(self, browser: int, message: Mapping[str, Any]) -> None:
         if self._view is not None:
@@ -167,7 +169,7 @@ class Cockpit:
             self._topics, scene = FoundTopics(), ""
             self._panel.board.show("master", False)
         if not self._topics.namespace:
-            self._panel.show_status("no simulation")
+            self._panel.show_status(NO_SIMULATION)
         self._panel.offer(self._topics, scene)
         self._cameras.offer(self._topics.cameras, self._topics.vehicles)
 

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from drone_sim.message_text import near_names, shown
 
+NO_SIMULATION = "no simulation"  # the status
 _MAX_LINES = 200  # of the log
 _MAX_LENGTH = 600  # characters of a line
 _Value = TypeVar("_Value")

@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Log
 from std_msgs.msg import Bool, String
 
 from drone_sim.ros.cockpit.editor.scene_files import SceneList
-from drone_sim.ros.cockpit.panel.board import Board, one_of
+from drone_sim.ros.cockpit.panel.board import NO_SIMULATION, Board, one_of
 from drone_sim.ros.cockpit.panel.plots import Plots
 from drone_sim.ros.cockpit.panel.tuning import SpeedControl, VehicleTuning
 from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
@@ -43,7 +43,7 @@ class Panel:
         self.speed = SpeedControl(self.board, simulator.node)
         self._flight: list[rospy.Subscriber] = []
         self._followed = ""
-        self.show_status("no simulation")
+        self.show_status(NO_SIMULATION)
 
     @property
     def answers(self) -> dict[str, Answer]:
