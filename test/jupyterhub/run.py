@@ -30,6 +30,7 @@ from websockets.sync.client import connect
 ROOT = Path(__file__).resolve().parents[2]
 INSIDE = "DRONE_SIM_JUPYTERHUB"
 NAMESPACES = ["unshare", "--mount", "--net", "--pid", "--fork", "--kill-child", "--mount-proc"]
+REAPER = ["sh", "-c", '"$@"; exit $?', "sh"]  # the first process of the namespace, which must reap orphans
 HOST = "127.0.0.1:8000"
 PATIENCE = 240  # s
 WARM_UP, MEASURED = 10, 20  # s, of the measurement of the load
@@ -88,7 +89,7 @@ def main():
     options = parser.parse_args()
     if INSIDE not in os.environ:
         with tempfile.TemporaryDirectory(dir="/var/tmp") as folder:
-            command = [*NAMESPACES, sys.executable, __file__, *sys.argv[1:]]
+            command = [*NAMESPACES, *REAPER, sys.executable, __file__, *sys.argv[1:]]
             return subprocess.run(command, env={**os.environ, INSIDE: folder}).returncode
     folder = Path(os.environ.pop(INSIDE))
     folder.chmod(0o755)
@@ -125,18 +126,19 @@ def try_course(hub, folder, pictures):
         student.open()
         student.fly(student.name)
         print(f"{student.name} flies")
+    teacher = Student(TEACHER)
     ann.hand_in(SOLUTION.read_text())
     ben.hand_in("def sysCall_actuation():\n    pass\n")
     failures = through_the_hub(ben, ann.name)
     failures += forge_and_grade(ben.name, ann.name)
     with ann.connect(ann.name) as page:
         Page(page)  # while it is open, the simulator reports
-        failures += teachers_page(Student(TEACHER), ann, ben)
+        failures += teachers_page(teacher, ann, ben)
         failures += in_a_browser(students, pictures)
         failures += as_system_user(ben.name, ann.name)
         missed = NEEDED - set(as_system_user(ann.name, ann.name))
     failures += [f"not tried: {name}" for name in sorted(missed)]  # the attack succeeds for the student herself
-    found, hub = kill(hub, folder, cas)
+    found, hub = kill(hub, folder, cas, teacher)
     ann.fly(ann.name)
     if not ann.stops(ann.name):
         failures.append("not tried: the end of the server")
@@ -316,29 +318,26 @@ def in_a_browser(students, pictures):
     return [] if all(told) else ["not all students are told what the teacher tells all"]
 
 
-def kill(hub, folder, student):
-    """Kill the simulator, the proxy and the hub with SIGKILL; return what is lost, and the new hub."""
+def kill(hub, folder, student, teacher):
+    """Kill hub, proxy and simulator with SIGKILL; return what is lost, and the new hub."""
     failures = []
     saved = student.saved_text()
     with student.connect(student.name) as page:
-        proxy = processes_of("root", "configurable-http-proxy")
         os.kill(hub.pid, signal.SIGKILL)
         hub.wait()
         if not still_flies(page):
             failures.append("the flight ended with the hub")
     hub = start_hub(folder)
     student.fly(student.name)
-    for pid in proxy:
-        try:
-            os.kill(pid, signal.SIGKILL)
-        except ProcessLookupError:  # the new hub has ended it, and started its own
-            continue
     for pid in processes_of("root", "configurable-http-proxy"):
         os.kill(pid, signal.SIGKILL)
     until(lambda: student.reaches(student.name))
-    for pid in processes_of(student.name, "drone_sim/simulator"):
+    killed = set(processes_of(student.name, "drone_sim/simulator"))
+    for pid in killed:
         os.kill(pid, signal.SIGKILL)
+    until(lambda: set(processes_of(student.name, "drone_sim/simulator")) - killed)
     until(lambda: student.reaches(student.name))
+    until(lambda: teacher.session.get(f"http://{HOST}/services/course/").ok)
     if student.saved_text() != saved:
         failures.append("a saved script is lost")
     return failures, hub
@@ -387,7 +386,6 @@ def processes_of(name, command=""):
     """Return the processes of a user whose command line contains `command`."""
     listed = subprocess.run(["ps", "-ww", "-o", "pid=,stat=,args=", "-u", name], capture_output=True, text=True).stdout
     rows = [line.split(maxsplit=2) for line in listed.splitlines()]
-    # Nobody reaps zombies in this namespace.
     return [int(pid) for pid, state, args in rows if not state.startswith("Z") and command in args]
 
 

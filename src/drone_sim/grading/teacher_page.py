@@ -29,6 +29,7 @@ from drone_sim.grading.submissions import handed_in
 
 _TEMPLATE = Path(__file__).parent / "outputs" / "html" / "templates" / "teacher.html.j2"
 _PREFIX = os.environ.get("JUPYTERHUB_SERVICE_PREFIX", "/")
+_PERIOD = 0.5  # s between two checks that the hub is there
 _NICENESS = 10  # the students' flights have priority
 
 
@@ -151,7 +152,8 @@ class Reports(HubOAuthenticated, web.StaticFileHandler):  # type: ignore[misc]
 
 
 async def main() -> None:
-    """Serve until JupyterHub ends the service."""
+    """Serve until JupyterHub ends the service, or itself ends: the next one starts a page of its own at this port."""
+    hub = os.getppid()
     reports = Path(sys.argv[1])
     reports.mkdir(parents=True, exist_ok=True)
     course = Course(reports)
@@ -168,7 +170,8 @@ async def main() -> None:
     address = urlsplit(os.environ["JUPYTERHUB_SERVICE_URL"])
     application.listen(address.port or 0, address.hostname or "", xheaders=True)
     try:
-        await asyncio.Event().wait()
+        while os.getppid() == hub:
+            await asyncio.sleep(_PERIOD)
     finally:
         course.close()
 
