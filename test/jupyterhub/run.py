@@ -130,12 +130,12 @@ def try_course(hub, folder, pictures):
     ann.hand_in(SOLUTION.read_text())
     ben.hand_in("def sysCall_actuation():\n    pass\n")
     failures = through_the_hub(ben, ann.name)
-    failures += forge_and_grade(ben.name, ann.name)
     with ann.connect(ann.name) as page:
         Page(page)  # while it is open, the simulator reports
         failures += teachers_page(teacher, ann, ben)
         failures += in_a_browser(students, pictures)
         failures += as_system_user(ben.name, ann.name)
+        failures += forge_and_grade(ben.name, ann.name)
         missed = NEEDED - set(as_system_user(ann.name, ann.name))
     failures += [f"not tried: {name}" for name in sorted(missed)]  # the attack succeeds for the student herself
     found, hub = kill(hub, folder, cas, teacher)

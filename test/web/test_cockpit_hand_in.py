@@ -61,7 +61,8 @@ def test_a_course_sees_the_drone_and_tells_its_student_a_task(cockpit, browser, 
         with context.new_page() as watcher:
             watcher.goto(page.url.split("?")[0] + "?watch", wait_until="commit")
             ready(watcher)
-            assert not any(watcher.locator(part).is_visible() for part in ("#sim-stop", "#editor", "#rail", "#start-page"))
+            hidden = "#sim-stop", "#editor", "#rail", "#start-page"
+            assert not any(watcher.locator(part).is_visible() for part in hidden)
             watcher.keyboard.press("Enter")  # would end the flight
             watcher.get_by_text("watching only").wait_for()
             wait_until(page, lambda: page.locator("#status").get_attribute("data-is") == "flying")

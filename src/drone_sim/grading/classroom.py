@@ -50,8 +50,12 @@ def report_path(room: Path) -> Path:
 def report(path: Path, texts: dict[str, str], picture: str) -> None:
     """Write how this user's simulator is; `texts` are those of TEXTS, `picture` a JPEG in Base64. Raises OSError."""
     content = {key: texts.get(key, "")[:_MAX_TEXT] for key in TEXTS} | {"picture": picture}
-    writing.write(path, json.dumps(content), through_links=False)
-    path.chmod(_MODE)
+    temporary = path.with_suffix(".new")
+    # At no time can other students read it.
+    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, _MODE)
+    with open(descriptor, "w", encoding="utf-8") as file:
+        json.dump(content, file)
+    temporary.replace(path)
 
 
 def reports(room: Path) -> dict[str, dict[str, str]]:
