@@ -32,8 +32,7 @@ from drone_sim.ros.cockpit.scene.frames import FrameTree
 from drone_sim.ros.cockpit.scene.markers import MarkerTopic
 from drone_sim.ros.cockpit.scene.meshes import MeshStore, as_glb
 from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL, AccessControl
-from drone_sim.ros.cockpit.server.manual import Manual
-from drone_sim.ros.cockpit.server.page_server import PageServer, page_files
+from drone_sim.ros.cockpit.server.page_server import PageServer, find_manual, page_files
 from drone_sim.ros.cockpit.server.page_socket import PageSocket
 from drone_sim.ros.cockpit.teleop import HeldCommands, read_command
 from drone_sim.ros.cockpit.topics import FoundTopics, ImageTopic, find_topics
@@ -566,8 +565,8 @@ def test_the_manual_is_served_where_it_was_built_and_nothing_beside_it(tmp_path)
     (tmp_path / "html/_static").mkdir(parents=True)
     (tmp_path / "html/_static/furo.css").write_text("p {}")
     (tmp_path / "secret.css").write_text("p {}")
-    manual = Manual(tmp_path / "html")
-    assert manual.find("/manual/_static/furo.css") == ("text/css; charset=utf-8", b"p {}")
+    folder = tmp_path / "html"
+    assert find_manual("/manual/_static/furo.css", folder) == ("text/css; charset=utf-8", b"p {}")
     for path in (
         "/manual/../secret.css",
         "/manual/_static/../../secret.css",
@@ -575,9 +574,9 @@ def test_the_manual_is_served_where_it_was_built_and_nothing_beside_it(tmp_path)
         "/manual/",
         "/manual/\0",
     ):
-        assert manual.find(path) is None
-    assert manual.find("/cockpit.js") is None
-    kind, content = Manual(tmp_path / "not_built").find("/manual/index.html")
+        assert find_manual(path, folder) is None
+    assert find_manual("/cockpit.js", folder) is None
+    kind, content = find_manual("/manual/index.html", tmp_path / "not_built")
     assert kind.startswith("text/plain") and b"./dev.sh docs" in content
 
 

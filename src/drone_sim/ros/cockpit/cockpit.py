@@ -27,8 +27,7 @@ from drone_sim.ros.cockpit.scene.meshes import MeshStore
 from drone_sim.ros.cockpit.scene.scene_state import SceneState
 from drone_sim.ros.cockpit.scene.scene_view import SceneView
 from drone_sim.ros.cockpit.server.access_control import Content
-from drone_sim.ros.cockpit.server.manual import Manual
-from drone_sim.ros.cockpit.server.page_server import PageServer
+from drone_sim.ros.cockpit.server.page_server import PageServer, find_manual
 from drone_sim.ros.cockpit.server.page_socket import PageSocket
 from drone_sim.ros.cockpit.teleop import CommandPublisher, HeldCommands
 from drone_sim.ros.cockpit.topics import FoundTopics, find_topics
@@ -52,7 +51,7 @@ class Cockpit:
         self._listener: SimulatorListener | None = None
         self._asked_master_at = 0.0
         self._commands = CommandPublisher()
-        self._state, self._meshes, self._manual = SceneState(), MeshStore(), Manual()
+        self._state, self._meshes = SceneState(), MeshStore()
         held = HeldCommands(self._commands.send)
         store, self._lessons = ScriptStore(scripts), Lessons()
         self._server = server
@@ -142,7 +141,7 @@ class Cockpit:
             self._panel.plots.rest()
 
     def _find(self, path: str) -> Content:
-        content = self._meshes.find(path) or self._lessons.picture(path) or self._manual.find(path)
+        content = self._meshes.find(path) or self._lessons.picture(path) or find_manual(path)
         return content or self._editing.picture(path) or self._report_file(path)
 
     def _camera(self) -> str:

@@ -24,7 +24,7 @@ from drone_sim.grading.plan import Plan
 from drone_sim.offline.timeline import Entry, ScriptRequest
 from drone_sim.ros.cockpit.editor.script_store import ScriptStoreError
 from drone_sim.ros.cockpit.server.access_control import Content
-from drone_sim.ros.cockpit.server.manual import find_below
+from drone_sim.ros.cockpit.server.page_server import find_below
 from drone_sim.ros.grading.timeline_sender import TimelineSender
 
 _QUEUE = 1000  # messages; none may be lost, since they are counted

@@ -106,7 +106,12 @@ class AccessControl:
         path, _, query = request.path.partition("?")
         if not _is_socket(request):
             if path == "/" and self._is_token(parse_qs(query).get("token", [""])[0]):
-                return self._accept_token(request)
+                response = _response(http.HTTPStatus.SEE_OTHER, "")
+                # An address without the token, which people can safely share; relative, because a proxy may serve the
+                # page below a prefix.
+                response.headers["Location"] = "./"
+                self._set_cookie(request, response)
+                return response
             if path == RETURN and self.return_pass is not None and is_local(connection):
                 return self._accept_return(self.return_pass, parse_qs(query), request)
         is_known = self._is_token(_cookie(request, self._name_of_cookie(request)))
@@ -120,13 +125,13 @@ class AccessControl:
         found = self._page(path)
         if found is None:
             return _response(http.HTTPStatus.NOT_FOUND, "There is no such page.")
-        return _page(*found, host, _takes_gzip(request), "'self'" if path.startswith(MANUAL) else "'none'")
-
-    def _accept_token(self, request: Request) -> Response:
-        """Set the token as a cookie, and redirect to an address without it, which people can safely share."""
-        response = _response(http.HTTPStatus.SEE_OTHER, "")
-        response.headers["Location"] = "./"  # relative, because a proxy may serve the page below a prefix
-        self._set_cookie(request, response)
+        kind, content = found
+        encodings = {item.partition(";")[0].strip() for item in request.headers.get("Accept-Encoding", "").split(",")}
+        is_compressed = "gzip" in encodings and kind.startswith(_COMPRESSED_TYPES)
+        forms = "'self'" if path.startswith(MANUAL) else "'none'"
+        response = _response(http.HTTPStatus.OK, _compress(content) if is_compressed else content, kind, host, forms)
+        if is_compressed:
+            response.headers["Content-Encoding"] = "gzip"
         return response
 
     def _accept_return(self, return_pass: ReturnPass, query: Mapping[str, list[str]], request: Request) -> Response:
@@ -189,18 +194,6 @@ def _cookie(request: Request, name: str) -> str:
     return found.value if found is not None else ""
 
 
-def _takes_gzip(request: Request) -> bool:
-    return "gzip" in (one.partition(";")[0].strip() for one in request.headers.get("Accept-Encoding", "").split(","))
-
-
-def _page(kind: str, content: bytes, host: str, takes_gzip: bool, forms: str) -> Response:
-    is_compressed = takes_gzip and kind.startswith(_COMPRESSED_TYPES)
-    response = _response(http.HTTPStatus.OK, _compress(content) if is_compressed else content, kind, host, forms)
-    if is_compressed:
-        response.headers["Content-Encoding"] = "gzip"
-    return response
-
-
 @lru_cache(maxsize=64)
 def _compress(content: bytes) -> bytes:
     return gzip.compress(content, 6, mtime=0)
@@ -235,12 +228,9 @@ class _CheckedConnection(ServerConnection):
             return await super().recv(decode)
         except ConnectionClosedError as error:
             if error.sent is not None and error.sent.code in _VIOLATIONS and not error.rcvd_then_sent:
-                self._say(error.sent.reason)
+                where = self.remote_address[0] if self.remote_address else "the proxy"
+                rospy.logwarn(f"a browser at {where} is refused: {error.sent.reason}")
             raise
-
-    def _say(self, what: str) -> None:
-        where = self.remote_address[0] if self.remote_address else "the proxy"
-        rospy.logwarn(f"a browser at {where} is refused: {what}")
 
 
 class _OneLineHandler(logging.Handler):
@@ -248,9 +238,7 @@ class _OneLineHandler(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         error = record.exc_info[1] if record.exc_info else None
-        if record.getMessage() != "opening handshake failed":  # a client that is no browser, such as a port scanner
-            rospy.logwarn(f"a browser's socket: {_one_line(error) if error else record.getMessage()}")
-
-
-def _one_line(error: BaseException) -> str:
-    return f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        if record.getMessage() == "opening handshake failed":  # a client that is no browser, such as a port scanner
+            return
+        line = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}" if error else record.getMessage()
+        rospy.logwarn(f"a browser's socket: {line}")

@@ -66,8 +66,7 @@ class PageSocket:
         only_watches = "watch" in parse_qs(query, keep_blank_values=True)
         self._queues[browser] = asyncio.get_running_loop(), queue
         requests = asyncio.Queue[tuple[Answer, dict[str, Any]]](_MAX_REQUESTS)
-        tasks = [_send_from(queue, connection), _answer(requests, connection)]
-        running = [asyncio.create_task(task) for task in tasks]
+        running = [asyncio.create_task(task) for task in (_send(queue, connection), _answer(requests, connection))]
         try:
             async for text in connection:
                 await self._process(browser, text, connection, requests, only_watches)
@@ -198,12 +197,10 @@ async def _answer(requests: asyncio.Queue[tuple[Answer, dict[str, Any]]], connec
             await connection.send(await asyncio.to_thread(_reply, *await requests.get()))
 
 
-async def _send_from(queue: SendQueue, connection: ServerConnection) -> None:
-    try:
+async def _send(queue: SendQueue, connection: ServerConnection) -> None:
+    with contextlib.suppress(ConnectionClosed):
         while True:
             await connection.send(await queue.take())
-    except ConnectionClosed:
-        return
 
 
 class SendQueue:
