@@ -28,8 +28,7 @@ from websockets.sync.client import connect
 
 from drone_sim.ros.cockpit.cockpit import Cockpit
 from drone_sim.ros.cockpit.editor.task_flights import Grader
-from drone_sim.ros.cockpit.scene.frames import FrameTree
-from drone_sim.ros.cockpit.scene.markers import MarkerTopic
+from drone_sim.ros.cockpit.scene.markers import FrameTree, MarkerTopic
 from drone_sim.ros.cockpit.scene.meshes import MeshStore, as_glb
 from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL, AccessControl
 from drone_sim.ros.cockpit.server.page_server import PageServer, find_manual, page_files

@@ -139,7 +139,9 @@ class DragControls:
         for number, marker in enumerate(visible):
             entry = entry_of(marker, self._server, lambda _: None)
             if entry is not None:
-                in_world = _multiply(pose_of(pose), pose_of(marker.pose))
+                parent, child = pose_of(pose), entry.pose
+                position = frames.transform(frames.from_quaternion(parent[:3], parent[3:]), child[:3])
+                in_world = (*position, *frames.multiply_quaternions(parent[3:], child[3:]))
                 properties = {**entry.properties, "ns": handle.name, "frame": WORLD_FRAME}
                 entries[self._server, handle.name, str(number)] = Entry(properties, {}, in_world)
         return entries
@@ -178,9 +180,3 @@ class DragControls:
         )
         with contextlib.suppress(rospy.ROSException):  # the view is being closed
             self._publish(feedback)
-
-
-def _multiply(parent: scene_state.Pose, child: scene_state.Pose) -> scene_state.Pose:
-    """Return the pose of `child`, which is relative to `parent`, in the frame of `parent`'s pose."""
-    x, y, z = frames.transform(frames.from_quaternion(parent[:3], parent[3:]), child[:3])
-    return (x, y, z, *frames.multiply_quaternions(parent[3:], child[3:]))

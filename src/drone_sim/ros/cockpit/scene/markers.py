@@ -1,4 +1,4 @@
-"""Conversion of MarkerArrays, which the simulation publishes for rviz, for the browsers.
+"""Conversion of the tf frames and MarkerArrays that the simulation publishes for rviz, for the browsers.
 
 A marker's properties are `kind`; `layer`, the topic's name; `ns`; `color` r g b a (0..1, sRGB); `scale`, m; and, for
 some kinds, `text`, `mesh` (a URL), `own` (use the mesh's own colors) and `lit` (false: the marker is not shaded). Its
@@ -15,7 +15,7 @@ import numpy as np
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_sim.ros.cockpit.scene.scene_state import AT_REST, Entry, Key, Pose
-from drone_sim.ros.core.message_conversion import xyz, xyzw
+from drone_sim.ros.core.message_conversion import WORLD_FRAME, xyz, xyzw
 
 KINDS = {
     Marker.ARROW: "arrow",
@@ -33,6 +33,45 @@ KINDS = {
 }
 _MIN_POINTS = {"strip": 2, "lines": 2, "cubes": 1, "spheres": 1, "points": 1, "triangles": 3}
 _SIZE_DECIMALS, _COLOR_DECIMALS = 3, 3  # finer differences (m; 0..1) are not visible
+
+
+class FrameTree:
+    """Latest parent and pose of each tf frame, in which markers have their poses. Thread-safe."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._frames: dict[str, tuple[str, Pose]] = {}  # parent and pose, by name
+        self._changed: set[str] = set()
+        self.has_news = threading.Event()  # set by each message
+
+    def on_transforms(self, message: Any) -> None:
+        """Store the transforms of a tfMessage."""
+        with self._lock:
+            for transform in message.transforms:
+                pose = (*xyz(transform.transform.translation), *xyzw(transform.transform.rotation))
+                self._frames[transform.child_frame_id] = transform.header.frame_id, pose
+                self._changed.add(transform.child_frame_id)
+        self.has_news.set()
+
+    def take(self) -> dict[str, tuple[str, Pose]]:
+        """Return parent ('' for the world) and pose of the frames that have changed since the last call, parents first.
+
+        A frame without a path to the world is returned once it has one.
+        """
+        with self._lock:
+            depths = {frame: self._depth(frame) for frame in self._changed}
+            ready = sorted((frame for frame in self._changed if depths[frame]), key=lambda frame: depths[frame])
+            self._changed -= set(ready)
+            changed = {frame: self._frames[frame] for frame in ready}
+            return {frame: ("" if parent == WORLD_FRAME else parent, pose) for frame, (parent, pose) in changed.items()}
+
+    def _depth(self, frame: str) -> int:
+        """Return the number of frames on the path from the world to `frame`; 0 if there is no path."""
+        for depth in range(len(self._frames) + 1):
+            if frame == WORLD_FRAME:
+                return depth
+            frame = self._frames.get(frame, ("",))[0]
+        return 0
 
 
 class MarkerTopic:

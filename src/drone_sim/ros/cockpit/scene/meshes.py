@@ -39,7 +39,8 @@ class MeshStore:
         Return None for an unreadable file, after one line in the log for each file.
         """
         try:
-            path = _path(resource)
+            url = urlsplit(resource)
+            path = Path(unquote(url.path)) if url.scheme == "file" else resolve(resource)
             state = path.stat()
             file = resource, state.st_mtime_ns, state.st_size
             if not self._is_known(file):
@@ -79,23 +80,13 @@ class MeshStore:
                 self._contents.popitem(last=False)
 
 
-def _path(resource: str) -> Path:
-    url = urlsplit(resource)
-    return Path(unquote(url.path)) if url.scheme == "file" else resolve(resource)
-
-
 def as_glb(path: Path) -> bytes:
     """Return a mesh file as glTF without metallic materials. Raises OSError, ValueError, and what trimesh raises."""
     if path.stat().st_size > _MAX_SIZE:
         raise ValueError(f"larger than {_MAX_SIZE} bytes")
     loaded = trimesh.load(path, process=False)
     scene = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene(loaded)
-    _merge_light(scene)
-    return bytes(export_glb(scene, tree_postprocessor=_set_materials))
-
-
-def _merge_light(scene: trimesh.Scene) -> None:
-    """Give textured meshes a single color: the sum of the ambient, diffuse and emissive light that rviz uses."""
+    # Textured meshes get a single color: the sum of the ambient, diffuse and emissive light that rviz uses.
     for mesh in scene.geometry.values():
         material: Any = getattr(mesh.visual, "material", None)
         image = getattr(material, "image", None)
@@ -103,6 +94,7 @@ def _merge_light(scene: trimesh.Scene) -> None:
             glow = 255 * np.asarray([*material.kwargs.get("ke", (0, 0, 0)), 0], dtype=np.float64)
             tint = np.clip(np.add(material.ambient, material.diffuse, dtype=float) + glow, 0, 255).astype(np.uint8)
             mesh.visual.material = PBRMaterial(baseColorTexture=image, baseColorFactor=tint, doubleSided=True)
+    return bytes(export_glb(scene, tree_postprocessor=_set_materials))
 
 
 def _set_materials(tree: dict[str, Any]) -> None:

@@ -62,6 +62,10 @@ class _Marker:
     changed: int  # version in which it got its properties and arrays
     moved: int = 0  # version in which it got its pose
 
+    def description(self) -> dict[str, Any]:
+        arrays = [[name, int(array.size)] for name, array in self.entry.arrays.items()]
+        return {"id": self.number, **self.entry.properties, **({"arrays": arrays} if arrays else {})}
+
 
 @dataclass
 class SceneState:
@@ -76,11 +80,7 @@ class SceneState:
     _last_number: int = 0
     _last_message: tuple[int, int, bytes] = (-2, -2, b"")  # from and to version
 
-    def change(
-        self,
-        frames: Mapping[str, tuple[str, Pose]],
-        markers: Mapping[Key, Entry | None],
-    ) -> bool:
+    def change(self, frames: Mapping[str, tuple[str, Pose]], markers: Mapping[Key, Entry | None]) -> bool:
         """Set frames and markers, as one version; return whether anything has changed.
 
         Frames have their parent ('' for the world) and pose, and come after their parents; None removes a marker.
@@ -101,11 +101,6 @@ class SceneState:
             self._frames.clear()
             self._markers.clear()
             self._gone.clear()
-
-    def keys(self) -> list[Key]:
-        """Return the keys of all markers."""
-        with self._lock:
-            return list(self._markers)
 
     def _put_frame(self, name: str, parent: str, pose: Pose) -> bool:
         parent_index = self._frames[parent].index if parent else -1
@@ -161,7 +156,7 @@ class SceneState:
             "scene": self.version,
             "whole": is_whole,
             "frames": [[frame.index, name, frame.parent] for name, frame in frames if frame.attached > since],
-            "markers": [_description(marker) for marker in changed],
+            "markers": [marker.description() for marker in changed],
             "gone": [] if is_whole else [number for when, number in self._gone if when > since],
             "moved": [frame.index for _, frame in frames],
             "placed": [marker.number for marker in placed],
@@ -170,8 +165,3 @@ class SceneState:
         arrays = [array for marker in changed for array in marker.entry.arrays.values()]
         numbers = [np.ascontiguousarray(array, dtype="<f4").tobytes() for array in (np.array(poses), *arrays)]
         return json.dumps(header, separators=(",", ":")).encode() + b"\n" + b"".join(numbers)
-
-
-def _description(marker: _Marker) -> dict[str, Any]:
-    arrays = [[name, int(array.size)] for name, array in marker.entry.arrays.items()]
-    return {"id": marker.number, **marker.entry.properties, **({"arrays": arrays} if arrays else {})}

@@ -19,9 +19,8 @@ from visualization_msgs.msg import (
 )
 
 from drone_sim.message_text import near_names, shown
-from drone_sim.ros.cockpit.scene.frames import FrameTree
 from drone_sim.ros.cockpit.scene.handles import DragControls, read_drag
-from drone_sim.ros.cockpit.scene.markers import MarkerTopic
+from drone_sim.ros.cockpit.scene.markers import FrameTree, MarkerTopic
 from drone_sim.ros.cockpit.scene.meshes import MeshStore
 from drone_sim.ros.cockpit.scene.scene_state import SceneState
 from drone_sim.ros.core.message_conversion import WORLD_FRAME
@@ -72,15 +71,15 @@ class SceneView:
         for handles in self._handles.values():
             handles.keep(browsers)
 
-    def collect(self) -> bool:
-        """Put changed frames and markers into the state; return whether there are any."""
+    def collect(self) -> None:
+        """Put changed frames and markers into the state."""
         markers = {}
         # A handle is shown once the simulation has subscribed to its feedback: earlier feedback would be lost.
         ready = [self._handles[name] for name, publisher in self._feedback.items() if publisher.get_num_connections()]
         sources: list[MarkerTopic | DragControls] = [*self._markers.values(), *ready]
         for source in sources:
             markers.update(source.take())
-        return self._state.change(self._frames.take(), markers)
+        self._state.change(self._frames.take(), markers)
 
     def drag(self, browser: int, message: Mapping[str, Any]) -> None:
         """Process a browser's message about a handle. Raises ValueError."""
@@ -94,7 +93,9 @@ class SceneView:
         vehicle, ray, newtons = read_push(message)
         if vehicle not in self._pushers:
             raise ValueError(f"push = {shown(vehicle)}: {near_names(vehicle, self._pushers)}")
-        push(self._pushers[vehicle].publish, ray, newtons)
+        direction = np.asarray(ray, dtype=float)
+        force = Vector3(*(direction / np.linalg.norm(direction) * newtons))
+        self._pushers[vehicle].publish(WrenchStamped(Header(frame_id=WORLD_FRAME), Wrench(force=force)))
 
     def meet(self, vehicles: Collection[str]) -> None:
         """Advertise pushes to these vehicles early, because the first message of a new publisher may be lost."""
@@ -124,10 +125,3 @@ def read_push(message: Mapping[str, Any]) -> tuple[str, Sequence[float], float]:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def push(publish: Callable[[WrenchStamped], None], direction: Sequence[float], newtons: float) -> None:
-    """Publish a push with a force of `newtons` in a direction (world)."""
-    vector = np.asarray(direction, dtype=float)
-    force = Vector3(*(vector / np.linalg.norm(vector) * newtons))
-    publish(WrenchStamped(Header(frame_id=WORLD_FRAME), Wrench(force=force)))
