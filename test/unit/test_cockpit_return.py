@@ -17,8 +17,8 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 from websockets.sync.client import connect
 
-from drone_sim.ros.cockpit.panel import pulse
-from drone_sim.ros.cockpit.panel.pulse import Pulse, has_ended
+from drone_sim.ros.cockpit.panel import panel
+from drone_sim.ros.cockpit.panel.panel import Pulse, has_ended
 from drone_sim.ros.cockpit.server import access_control, page_server
 from drone_sim.ros.cockpit.server import return_pass as return_pass_module
 from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL
@@ -211,8 +211,8 @@ def test_a_cockpit_that_cannot_bind_the_port_does_not_revoke_the_key(home, monke
 
 def test_the_silence_of_the_simulator_is_told_while_there_is_one(monkeypatch):
     now = [10.0]
-    monkeypatch.setattr(pulse.time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(pulse, "has_ended", lambda node: node == "/gone")
+    monkeypatch.setattr(panel.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(panel, "has_ended", lambda node: node == "/gone")
     beat = Pulse("/gone", lambda _: None)
     now[0] += 100.0
     beat.hear()
@@ -245,11 +245,11 @@ def _master(monkeypatch):
 
 
 def test_a_killed_node_has_ended_and_a_stopped_one_has_not(master, monkeypatch):
-    monkeypatch.setattr(pulse, "_TIMEOUT", 60)
+    monkeypatch.setattr(panel, "_TIMEOUT", 60)
     with socket.create_server(("127.0.0.1", 0)) as stopped:  # accepts, and does not answer
         master["/stopped"] = f"http://127.0.0.1:{stopped.getsockname()[1]}"
         with monkeypatch.context() as impatient:
-            impatient.setattr(pulse, "_TIMEOUT", 0.5)
+            impatient.setattr(panel, "_TIMEOUT", 0.5)
             assert not has_ended("/stopped")
         master["/killed"] = master["/stopped"]
     assert has_ended("/killed") and has_ended("/unknown")

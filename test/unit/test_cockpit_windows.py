@@ -17,8 +17,7 @@ from std_msgs.msg import String
 
 from drone_sim.ros.cockpit.panel import cameras as cameras_module
 from drone_sim.ros.cockpit.panel.board import Board
-from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows, camera_name, encode
-from drone_sim.ros.cockpit.panel.overlays import color_of
+from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows, camera_name, color_of, encode
 from drone_sim.ros.cockpit.server.page_socket import SendQueue
 from drone_sim.ros.cockpit.topics import ImageTopic, find_topics
 from drone_sim.ros.core import image_messages

@@ -21,8 +21,7 @@ from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
 from drone_sim.ros.cockpit.panel.board import NO_SIMULATION
 from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows
-from drone_sim.ros.cockpit.panel.panel import Panel, SimulatorListener
-from drone_sim.ros.cockpit.panel.pulse import Pulse
+from drone_sim.ros.cockpit.panel.panel import Panel, Pulse, SimulatorListener
 from drone_sim.ros.cockpit.scene.meshes import MeshStore
 from drone_sim.ros.cockpit.scene.scene_state import SceneState
 from drone_sim.ros.cockpit.scene.scene_view import SceneView
@@ -86,24 +85,18 @@ class Cockpit:
         while not rospy.is_shutdown():
             began = time.monotonic()
             self._update(began)
-            self._wait_for_step(began)
+            time.sleep(max(0.0, 0.8 * _PERIOD - (time.monotonic() - began)))
+            if self._view is not None:
+                self._view.wait(_PERIOD)  # for the next step of the simulation
+                time.sleep(_MARKER_DELAY)
         self._server.stop()
 
     def _hold_dragged(self) -> None:
         """Keep holding dragged objects; in a thread of its own, because `run` waits for the master's replies."""
         while not rospy.is_shutdown():
             time.sleep(_DRAG_PERIOD)
-            view = self._view
-            if view is not None:
+            if (view := self._view) is not None:
                 view.keep(self._socket.browsers)
-
-    def _wait_for_step(self, began: float) -> None:
-        """Wait for the next step of the simulation, and for its markers."""
-        rest = max(0.0, 0.8 * _PERIOD - (time.monotonic() - began))
-        time.sleep(rest)
-        if self._view is not None:
-            self._view.wait(_PERIOD)
-            time.sleep(_MARKER_DELAY)
 
     def _update(self, now: float) -> None:
         browsers = self._socket.browsers
@@ -125,20 +118,20 @@ class Cockpit:
 
     def _open(self, namespace: str) -> None:
         """Show another simulation, '' for none."""
-        for one in (self._view, self._listener):
-            if one is not None:
-                one.close()
-        self._view = SceneView(self._state, self._meshes, namespace) if namespace else None
+        if self._view is not None and self._listener is not None:
+            self._view.close()
+            self._listener.close()
+        self._view = self._listener = None
         self._pulse.expect(bool(namespace))
-        self._listener = None
         if namespace:
+            self._view = SceneView(self._state, self._meshes, namespace)
             self._listener = SimulatorListener(self._simulator.node, self._panel, self._socket, self._pulse.hear)
-        self._cameras.rest(not namespace)
-        self._windows.listen(bool(namespace))
-        if not namespace:
+        else:
             self._editing.subscribe(False)
             self._panel.follow("")
             self._panel.plots.rest()
+        self._cameras.rest(not namespace)
+        self._windows.listen(bool(namespace))
 
     def _find(self, path: str) -> Content:
         content = self._meshes.find(path) or self._lessons.picture(path) or find_manual(path)
@@ -161,14 +154,15 @@ class Cockpit:
     def _ask_master(self) -> None:
         try:
             below = rospy.get_namespace()  # there may be other simulators in other namespaces
-            self._topics = find_topics([one for one in rospy.get_published_topics() if one[0].startswith(below)])
+            topics = [(name, kind) for name, kind in rospy.get_published_topics() if name.startswith(below)]
+            self._topics = find_topics(topics)
             scene = NEW_SCENE if self._editing.is_new else str(self._simulator.parameter("scene_file", ""))
             self._panel.board.show("master", True)
         except FAILURES:  # the master may be started again
             self._topics, scene = FoundTopics(), ""
             self._panel.board.show("master", False)
         if not self._topics.namespace:
-            self._panel.show_status(NO_SIMULATION)
+            self._panel.board.show("status", NO_SIMULATION)
         self._panel.offer(self._topics, scene)
         self._cameras.offer(self._topics.cameras, self._topics.vehicles)
 

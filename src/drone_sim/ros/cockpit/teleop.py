@@ -1,4 +1,4 @@
-"""Keys, sticks and gamepads of the browsers, as commands to one vehicle."""
+"""Commands of the browsers' keys, sticks and gamepads to one vehicle."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from drone_sim.ros.core.message_conversion import twist
 from drone_sim.ros.tools.commands import Command
 
 _PERIOD = 0.1  # s between two commands while keys are held
-_SILENCE = 1.5  # s without a word from a browser after which its keys are released
-_FASTEST = 20.0  # m/s, rad/s; more is no speed that a page of ours asks for
+_SILENCE = 1.5  # s without a message from a browser, after which its keys are released
+_FASTEST = 20.0  # m/s, rad/s; the page requests less
 REQUESTS = ("takeoff", "land", "home", "reset")
 
 
 class HeldCommands:
-    """What the browsers' keys ask for: the command that changed last counts. Any thread may call it."""
+    """Commands of held keys: of all browsers' commands, the one that changed last counts. Thread-safe."""
 
     def __init__(self, send: Callable[[Command], None], clock: Callable[[], float] = time.monotonic):
-        """`send` takes a command to the vehicle; `clock` returns s."""
+        """`send` sends a command to the vehicle; `clock` must be monotonic (s)."""
         self._send = send
         self._clock = clock
         self._lock = threading.Lock()
-        self._held: dict[int, tuple[Command, float]] = {}  # command, and when it was last said, by browser
+        self._held: dict[int, tuple[Command, float]] = {}  # command and time of the last message, by browser
         self._sent = Command()
 
     def hold(self, browser: int, command: Command) -> None:
-        """Take what a browser's keys ask for now; it says so again while it holds them."""
+        """Set a browser's command; the browser repeats it while its keys are held."""
         with self._lock:
             before = self._held.pop(browser, (Command(), 0.0))[0]
             if command != Command():
@@ -45,10 +45,10 @@ class HeldCommands:
         self.hold(browser, Command())
 
     def repeat(self) -> None:
-        """Repeat the command in force, and release the keys of browsers that have fallen silent."""
+        """Send the present command again, and release the keys of browsers that have been silent for _SILENCE."""
         with self._lock:
             now = self._clock()
-            silent = [one for one, (_, said) in self._held.items() if now - said > _SILENCE]
+            silent = [browser for browser, (_, at) in self._held.items() if now - at > _SILENCE]
             for browser in silent:
                 del self._held[browser]
             if self._held or silent:
@@ -61,7 +61,7 @@ class HeldCommands:
             self._send(command)
 
     def run(self, is_running: Callable[[], bool]) -> None:
-        """Repeat it again and again, as long as `is_running` says so."""
+        """Call `repeat` every _PERIOD while `is_running` returns true."""
         while is_running():
             time.sleep(_PERIOD)
             self.repeat()
@@ -78,31 +78,30 @@ def read_command(given: Any) -> Command:
 
 
 class CommandPublisher:
-    """Publishes to the chosen vehicle. A topic needs a moment until its publisher is heard: `choose` comes before."""
+    """Publishes to the chosen vehicle. `choose` advertises early, because subscribers need a moment to connect."""
 
     def __init__(self, patience: float = 1.0) -> None:
         """Begin without a vehicle.
 
-        patience: s that a vehicle or a script which has just begun may take until it hears us. A browser's keys wait
-        behind its requests: longer than `_SILENCE`, and they were released meanwhile.
+        `request` waits for a subscriber for at most `patience` (s). It must be below _SILENCE: a browser's keys wait
+        behind its requests, and would be released.
         """
         self.vehicle = ""
         self._patience = patience
-        self._lock = threading.Lock()  # or one thread sends by what another has just put away
+        self._lock = threading.Lock()  # otherwise a thread may publish with an unregistered publisher
         self._command: rospy.Publisher | None = None
         self._requests: dict[str, rospy.Publisher] = {}
 
     def choose(self, vehicle: str) -> None:
-        """Tell another vehicle what to do from now on, '' for none; the last one is stopped."""
+        """Send commands to another vehicle from now on, '' for none; the last one is stopped."""
         if vehicle == self.vehicle:
             return
         self.send(Command())
         with self._lock:
             old = (self._command, *self._requests.values())
             self.vehicle, self._command, self._requests = vehicle, None, {}
-        for one in old:
-            if one is not None:
-                one.unregister()
+        for publisher in filter(None, old):
+            publisher.unregister()
         if vehicle:
             self._command = rospy.Publisher(f"/{vehicle}/cmd_vel", Twist, queue_size=1)
             self._requests = {topic: rospy.Publisher(f"/{vehicle}/{topic}", Empty, queue_size=1) for topic in REQUESTS}
@@ -114,10 +113,7 @@ class CommandPublisher:
                 self._command.publish(twist(command[:3], (0.0, 0.0, command.wz)))
 
     def request(self, topic: str) -> str:
-        """Ask for what one of `REQUESTS` does; return one line for the user.
-
-        Raises ValueError where nobody listens.
-        """
+        """Publish one of `REQUESTS`; return one line for the user. Raises ValueError without a subscriber."""
         until = time.monotonic() + self._patience
         while (publisher := self._requests.get(topic)) is None or not publisher.get_num_connections():
             if time.monotonic() >= until:

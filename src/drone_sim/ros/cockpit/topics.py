@@ -1,9 +1,9 @@
-"""What the master knows: where the simulation's topics are, vehicles, their cameras, and sensors to plot."""
+"""The simulation's topics on the master: vehicles, their cameras, and sensors to plot."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from geometry_msgs.msg import PointStamped, Vector3Stamped, WrenchStamped
@@ -18,27 +18,24 @@ _COMMANDS = ("/push", "/set_wind")  # by this page, too: no sensors
 
 
 class ImageTopic(NamedTuple):
-    """A topic of pictures, where they come compressed, '' where they do not, and whether there is truth behind them."""
+    """A topic of pictures, whatever its transports."""
 
     topic: str
-    compressed: str = ""
-    has_truth: bool = False
+    compressed: str = ""  # the topic of compressed pictures; '' if there is none
+    has_truth: bool = False  # whether ground truth is published below the topic
 
 
 class FoundTopics(NamedTuple):
-    """Namespace of what is shown ('' where there is no simulation), vehicles, all topics of pictures.
+    """The topics of one simulation."""
 
-    And the topics of sensors, with their types.
-    """
-
-    namespace: str = ""
+    namespace: str = ""  # of the markers; '' without a simulation
     vehicles: tuple[str, ...] = ()
     cameras: tuple[ImageTopic, ...] = ()
-    sensors: Mapping[str, str] = {}
+    sensors: Mapping[str, str] = {}  # topics of sensors, with their types
 
 
 def find_topics(topics: Iterable[tuple[str, str]]) -> FoundTopics:
-    """Return what is among the published topics, given with their types."""
+    """Return the simulation among the published topics, which are given with their types."""
     kinds = dict(topics)
     views = [name.removesuffix(_VIEW) for name in kinds if name.endswith(_VIEW)]
     if not views:
@@ -48,24 +45,19 @@ def find_topics(topics: Iterable[tuple[str, str]]) -> FoundTopics:
     inside = tuple(f"/{name}/" for name in own)
     measured = (name for name in sorted(kinds) if name.startswith(inside) and not name.endswith(_COMMANDS))
     sensors = {name: kinds[name] for name in measured if kinds[name] in PLOTTED}
-    return FoundTopics(sorted(views)[0], tuple(own), tuple(_cameras(kinds)), sensors)
-
-
-def _cameras(kinds: Mapping[str, str]) -> Iterator[ImageTopic]:
-    """Yield each topic of pictures once, however many transports it has."""
-    packed = {
-        name.removesuffix(_TRANSPORT): name
-        for name, kind in kinds.items()
-        if kind == _COMPRESSED and name.endswith(_TRANSPORT)
-    }
+    packed = [name for name, kind in kinds.items() if kind == _COMPRESSED and name.endswith(_TRANSPORT)]
+    compressed = {name.removesuffix(_TRANSPORT): name for name in packed}
     plain = {name for name, kind in kinds.items() if kind == _PICTURES}
-    for name in sorted(packed.keys() | plain):
-        if _TRUTH not in name:  # which is shown over the picture that it is of
-            yield ImageTopic(name, packed.get(name, ""), f"{name}{_TRUTH}boxes" in kinds)
+    cameras = tuple(
+        ImageTopic(name, compressed.get(name, ""), f"{name}{_TRUTH}boxes" in kinds)
+        for name in sorted(compressed.keys() | plain)
+        if _TRUTH not in name  # truth is shown over its picture
+    )
+    return FoundTopics(min(views), tuple(own), cameras, sensors)
 
 
 class PlottedMessage(NamedTuple):
-    """A kind of message, the names of its numbers, and what returns these."""
+    """A message type, the names of the numbers that are plotted, and a function that returns them."""
 
     message: type
     names: tuple[str, ...]

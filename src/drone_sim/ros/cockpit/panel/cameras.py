@@ -1,4 +1,4 @@
-"""Pictures of cameras in the browser, each on demand, and windows that scripts have opened."""
+"""Pictures of cameras in the browser, boxes and masks over them, and windows that scripts have opened."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import cv2
@@ -17,19 +17,21 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 
 from drone_sim.message_text import shown
-from drone_sim.ros.cockpit.panel import overlays
 from drone_sim.ros.cockpit.panel.board import Board, one_of
 from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
 from drone_sim.ros.cockpit.topics import ImageTopic
 from drone_sim.ros.core import image_messages
 
-_MAX_PICTURES = 8  # that wait for their truth
+_MAX_PICTURES = 8  # that wait for their truth; and messages of truth that wait for their picture
+_TOLERANCE = 1e-6  # s, between equal stamps
+_FLOOR = "Floor"  # its box, which is the whole picture, is not drawn
 _BUFFER = 1 << 24  # bytes; with a smaller buffer than a picture, old pictures would be shown
 _MAX_WIDTH, _MAX_DEPTH_WIDTH = 640, 320  # px; of a wider picture, only every n-th pixel is shown
 _COLORS = cv2.COLORMAP_TURBO  # near is blue, far is red
 _JPEG = (cv2.IMWRITE_JPEG_QUALITY, 80)
 _MILLIMETRES = "16UC1"  # REP-118
-_KINDS = ("views", "dialogs", "consoles")
+_WINDOWS = ("views", "dialogs", "consoles")
+BOXES, MASK = OVERLAYS = ("boxes", "mask")
 _CONNECT_TIMEOUT = 3.0  # s, for the simulation to subscribe to answers
 _MAX_LENGTH = 1 << 21  # characters of a message; the simulation's are shorter
 _NAMES = {"track": "tracking"}  # names for people, by topic
@@ -81,7 +83,7 @@ class CameraSwitches:
     def answer_overlay(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """Show or hide boxes or a mask over a camera's picture. Raises ValueError if the camera is not shown."""
         topic = one_of(message, "topic", [topic for topic in self._shown if self._sources[topic].has_truth])
-        kind = one_of(message, "overlay", overlays.KINDS)
+        kind = one_of(message, "overlay", OVERLAYS)
         with self._lock:
             self._shown[topic].switch_overlay(kind, _is_on(message))
         return {}
@@ -139,7 +141,7 @@ class _CameraListener:
         self.source = source
         self._latest: deque[Any] = deque(maxlen=_MAX_PICTURES)
         self._subscriber: rospy.Subscriber | None = None
-        self.overlay = overlays.Overlay(source.topic) if source.has_truth else None
+        self.overlay = Overlay(source.topic) if source.has_truth else None
 
     def switch_overlay(self, kind: str, on: bool) -> None:
         if self.overlay is not None:
@@ -174,6 +176,104 @@ class _CameraListener:
         return pictures[-1]
 
 
+class Overlay:
+    """Boxes and masks over a camera's picture, from the truth that a camera with `truth: true` publishes.
+
+    It subscribes to those that are shown.
+    """
+
+    def __init__(self, topic: str):
+        """`topic` is that of the camera's pictures."""
+        self._topic = topic
+        self.kinds: frozenset[str] = frozenset()
+        self._categories: dict[int, str] = {}
+        self._boxes: deque[tuple[float, list[dict[str, Any]]]] = deque(maxlen=_MAX_PICTURES)
+        self._masks: deque[tuple[float, Image]] = deque(maxlen=_MAX_PICTURES)
+        self._subscribers: dict[str, rospy.Subscriber] = {}
+
+    def listen(self, on: bool) -> None:
+        """Subscribe to the topics of `kinds` (`on`), or to none."""
+        topics: dict[str, tuple[type, Callable[[Any], None]]] = {}
+        if on and self.kinds:
+            topics["labels"] = String, self._on_labels
+        if on and BOXES in self.kinds:
+            topics["boxes"] = String, self._on_boxes
+        if on and MASK in self.kinds:
+            topics["categories"] = Image, self._on_mask
+        for name in self._subscribers.keys() - topics.keys():
+            self._subscribers.pop(name).unregister()
+        for name in topics.keys() - self._subscribers.keys():
+            options = {"queue_size": 1, "buff_size": _BUFFER}
+            self._subscribers[name] = rospy.Subscriber(f"{self._topic}/truth/{name}", *topics[name], **options)
+
+    def _on_labels(self, message: String) -> None:
+        categories = _parse(message).get("categories")
+        if isinstance(categories, Mapping):
+            self._categories = {int(key): str(name) for key, name in categories.items() if str(key).isdigit()}
+
+    def _on_boxes(self, message: String) -> None:
+        content = _parse(message)
+        if isinstance(content.get("stamp"), float) and isinstance(content.get("objects"), list):
+            boxes = [box for box in content["objects"] if isinstance(box, dict)]
+            self._boxes.append((content["stamp"], boxes))
+
+    def _on_mask(self, message: Image) -> None:
+        self._masks.append((message.header.stamp.to_sec(), message))
+
+    def has(self, stamp: float) -> bool:
+        """Return whether the messages of all `kinds` with a stamp (s) have come."""
+        messages = {BOXES: self._boxes, MASK: self._masks}
+        return all(any(abs(at - stamp) < _TOLERANCE for at, _ in [*messages[kind]]) for kind in self.kinds)
+
+    def description(self, stamp: float) -> dict[str, Any]:
+        """Return the boxes (px) and the legend that the page itself draws over the picture with a stamp (s)."""
+        colors = {name: color_of(number) for number, name in self._categories.items()}
+        boxes = _nearest(self._boxes, stamp) or [] if BOXES in self.kinds else []
+        shown = [
+            {"name": box.get("name"), "box": box.get("visible"), "color": colors.get(str(box.get("category")), "#fff")}
+            for box in boxes
+            if box.get("name") != _FLOOR
+        ]
+        mask = _nearest(self._masks, stamp) if MASK in self.kinds else None
+        numbers = np.unique(image_messages.pixels(mask)).tolist() if mask is not None else []
+        legend = [
+            {"name": self._categories[number], "color": color_of(number)}
+            for number in numbers
+            if number in self._categories
+        ]
+        return {"overlays": sorted(self.kinds), "boxes": shown, "legend": legend}
+
+    def draw(self, picture: bytes, stamp: float) -> bytes:
+        """Return a picture (JPEG or PNG) with the mask of its stamp over it, if that is shown and has come."""
+        message = _nearest(self._masks, stamp) if MASK in self.kinds else None
+        image = None if message is None else cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
+        if image is None:
+            return picture
+        mask = image_messages.pixels(message)
+        mask = cv2.resize(mask, image.shape[1::-1], interpolation=cv2.INTER_NEAREST)
+        masked = image_messages.draw_mask(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), mask)
+        return bytes(cv2.imencode(".jpg", cv2.cvtColor(masked, cv2.COLOR_RGB2BGR))[1])
+
+
+def color_of(number: int) -> str:
+    """Return the CSS color of a category's number."""
+    return "#" + "".join(f"{round(255 * channel):02x}" for channel in image_messages.mask_color(number))
+
+
+def _nearest(messages: deque[tuple[float, Any]], stamp: float) -> Any:
+    """Return the message whose stamp is nearest to `stamp`; None if there are none."""
+    return min([*messages], key=lambda message: abs(message[0] - stamp), default=(0.0, None))[1]
+
+
+def _parse(message: String) -> Mapping[str, Any]:
+    """Return the mapping in a JSON message; {} for an invalid one."""
+    try:
+        content = json.loads(message.data) if len(message.data) <= _MAX_LENGTH else None
+    except (ValueError, RecursionError):
+        content = None
+    return content if isinstance(content, Mapping) else {}
+
+
 class ScriptWindows:
     """Sends views, dialogs and consoles of scripts to the browsers; a view switches its camera on."""
 
@@ -183,7 +283,7 @@ class ScriptWindows:
         self._cameras, self._socket = cameras, socket
         self._subscriber: rospy.Subscriber | None = None
         self._publisher: rospy.Publisher | None = None
-        self._state: dict[str, Any] = {kind: [] for kind in _KINDS}
+        self._state: dict[str, Any] = {kind: [] for kind in _WINDOWS}
 
     @property
     def answers(self) -> dict[str, Answer]:
@@ -204,15 +304,12 @@ class ScriptWindows:
             self._subscriber.unregister()
             self._publisher.unregister()
             self._subscriber = self._publisher = None
-            self._show({kind: [] for kind in _KINDS})
+            self._show({kind: [] for kind in _WINDOWS})
 
     def _on_message(self, message: String) -> None:
-        try:
-            state = json.loads(message.data) if len(message.data) <= _MAX_LENGTH else None
-        except (ValueError, RecursionError):
-            state = None
-        if isinstance(state, Mapping) and all(isinstance(state.get(kind), list) for kind in _KINDS):
-            self._show({kind: [window for window in state[kind] if isinstance(window, dict)] for kind in _KINDS})
+        state = _parse(message)
+        if all(isinstance(state.get(kind), list) for kind in _WINDOWS):
+            self._show({kind: [window for window in state[kind] if isinstance(window, dict)] for kind in _WINDOWS})
 
     def _show(self, state: dict[str, Any]) -> None:
         self._state = state

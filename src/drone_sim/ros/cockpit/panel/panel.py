@@ -1,10 +1,13 @@
-"""Replies to the page's buttons and lists, and the simulator's state, which is sent to the page."""
+"""Replies to the page's buttons and lists, and the simulator's state and heartbeat, which are sent to the page."""
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from dynamic_reconfigure.msg import Config
@@ -18,6 +21,7 @@ from drone_sim.ros.cockpit.panel.tuning import SpeedControl, VehicleTuning
 from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
 from drone_sim.ros.cockpit.teleop import REQUESTS, CommandPublisher
 from drone_sim.ros.cockpit.topics import FoundTopics
+from drone_sim.ros.core import network
 from drone_sim.ros.core.simulator import FAILURES, Simulator, script_failure
 
 _LEVELS = {Log.WARN: "warning: ", Log.ERROR: "error: ", Log.FATAL: "error: "}
@@ -27,6 +31,9 @@ _CALLS: dict[str, tuple[Any, ...]] = {
     "pause": ("pause", True),
     "resume": ("pause", False),
 }
+_PULSE_PERIOD = 1.0  # s
+_SILENCE_LIMIT = 5.0  # s; while the simulator is busy, it publishes /diagnostics every 3 s only
+_TIMEOUT = 0.5  # s, for the reply of the master and of the node
 
 
 class Panel:
@@ -43,11 +50,10 @@ class Panel:
         self.speed = SpeedControl(self.board, simulator.node)
         self._flight: list[rospy.Subscriber] = []
         self._followed = ""
-        self.show_status(NO_SIMULATION)
+        self.board.show("status", NO_SIMULATION)
 
     @property
     def answers(self) -> dict[str, Answer]:
-        """The handler of each request, by its name."""
         return {
             "panel": self.board.whole,
             "call": self._call,
@@ -60,7 +66,6 @@ class Panel:
         }
 
     def _call(self, message: Mapping[str, Any]) -> dict[str, Any]:
-        """Call a service of the simulator, and return its reply."""
         done, said = self._simulator.call(*_CALLS[one_of(message, "call", list(_CALLS))])
         return {"done": done, "said": said}
 
@@ -84,10 +89,6 @@ class Panel:
 
     # ---- what is shown
 
-    def show_status(self, status: str) -> None:
-        """Show the simulator's state."""
-        self.board.show("status", status)
-
     def offer(self, found: FoundTopics, scene: str) -> None:
         """Show the available vehicles and scenes; `scene` is the value of the simulator's parameter."""
         if self._commands.vehicle not in found.vehicles:
@@ -110,20 +111,19 @@ class Panel:
         if vehicle == self._followed:
             return
         self._followed = vehicle
-        for one in self._flight:
-            one.unregister()
+        for subscriber in self._flight:
+            subscriber.unregister()
         self.board.show("flight", "")
-        self._show_hears(Bool(True))  # until the simulator publishes otherwise
+        self.board.show("hears_commands", True)  # until the simulator publishes otherwise
         self._flight = []
         if vehicle:
+            show = self.board.show
             self._flight = [
-                rospy.Subscriber(f"/{vehicle}/state", String, lambda one: self.board.show("flight", one.data[:80])),
-                rospy.Subscriber(f"/{vehicle}/hears_commands", Bool, self._show_hears),
+                rospy.Subscriber(f"/{vehicle}/state", String, lambda message: show("flight", message.data[:80])),
+                rospy.Subscriber(
+                    f"/{vehicle}/hears_commands", Bool, lambda message: show("hears_commands", message.data)
+                ),
             ]
-
-    def _show_hears(self, message: Bool) -> None:
-        """Show whether the vehicle's script listens to commands."""
-        self.board.show("hears_commands", message.data)
 
 
 class SimulatorListener:
@@ -136,23 +136,22 @@ class SimulatorListener:
         """
         self._node, self._hear = node, hear
         self._panel, self._socket = panel, socket
-        heard = (
+        subscriptions = (
             ("/rosout_agg", Log, self._on_log),
             ("/diagnostics", DiagnosticArray, self._on_diagnostics),
             (f"{node}/state", String, self._on_state),
             (f"{node}/signals", String, panel.plots.on_signals),
             (f"{node}/parameter_updates", Config, panel.speed.on_set),
         )
-        self._listening = [rospy.Subscriber(*one, queue_size=20) for one in heard]
+        self._subscribers = [rospy.Subscriber(*subscription, queue_size=20) for subscription in subscriptions]
 
     def close(self) -> None:
-        """End the subscriptions."""
-        for one in self._listening:
-            one.unregister()
+        for subscriber in self._subscribers:
+            subscriber.unregister()
 
     def _on_state(self, message: Any) -> None:
         self._hear()
-        self._panel.show_status(message.data)
+        self._panel.board.show("status", message.data)
 
     def _on_log(self, message: Any) -> None:
         if message.name != self._node:
@@ -175,3 +174,55 @@ class SimulatorListener:
         self._panel.board.show("diagnosis", sorted(said, key=lambda one: not one["wrong"]))
         values = {one.key: one.value for one in found["simulation"].values} if "simulation" in found else {}
         self._panel.board.show("pace", values.get("real-time factor", ""))
+
+
+class Pulse(threading.Thread):
+    """Heartbeat: once a second, it sends {"pulse": {"silent", "frozen", "ended"}} to every browser.
+
+    It is a daemon thread, so that a slow master does not delay it.
+    """
+
+    def __init__(self, node: str, tell: Callable[[Mapping[str, Any]], None]):
+        """Watch the simulator `node`; `tell` sends a message to all browsers."""
+        super().__init__(name="pulse", daemon=True)
+        self._node, self._tell = node, tell
+        self._heard: float | None = None  # s, monotonic; None while nothing is expected from the simulator
+
+    def expect(self, is_there: bool) -> None:
+        """Begin to expect messages from the simulator, or stop."""
+        self._heard = time.monotonic() if is_there else None
+
+    def hear(self) -> None:
+        """Note that the simulator has published something. Any thread may call it."""
+        if self._heard is not None:
+            self._heard = time.monotonic()
+
+    def run(self) -> None:
+        """Send the heartbeat until the process ends."""
+        while True:
+            time.sleep(_PULSE_PERIOD)
+            self._tell({"pulse": self.state()})
+
+    def state(self) -> dict[str, Any]:
+        """Return for how long the simulator has been silent (s), whether that is too long, and whether it has ended."""
+        heard = self._heard
+        silent = 0.0 if heard is None else time.monotonic() - heard
+        is_frozen = silent > _SILENCE_LIMIT
+        return {"silent": round(silent, 1), "frozen": is_frozen, "ended": is_frozen and has_ended(self._node)}
+
+
+def has_ended(node: str) -> bool:
+    """Return whether the process of a node has ended; the master still lists a node that was killed."""
+    try:
+        uri = network.call(rosgraph.get_master_uri(), "lookupNode", node, timeout=_TIMEOUT)
+    except ValueError:  # the master does not know it
+        return True
+    except network.FAILURES:
+        return False
+    try:
+        network.call(uri, "getPid", timeout=_TIMEOUT)
+    except ConnectionRefusedError:
+        return True
+    except network.FAILURES:  # the process is stopped, or the network is slow
+        return False
+    return False

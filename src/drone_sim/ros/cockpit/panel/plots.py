@@ -144,19 +144,11 @@ class Plots:
         charts.update({f"{SIGNAL}{name}": (f"{SIGNAL}{name}", Chart(name, "", (name,))) for name in self._signals})
         with self._lock:
             self._charts = charts
-        self._board.show(
-            "charts",
-            [
-                {
-                    "chart": name,
-                    "title": chart.title,
-                    "unit": chart.unit,
-                    "lines": list(chart.lines),
-                    "least": chart.least,
-                }
-                for name, (_, chart) in charts.items()
-            ],
-        )
+        listed = [
+            {"chart": name, "title": chart.title, "unit": chart.unit, "lines": list(chart.lines), "least": chart.least}
+            for name, (_, chart) in charts.items()
+        ]
+        self._board.show("charts", listed)
 
     # ---- messages
 
@@ -214,19 +206,13 @@ class Plots:
             if name not in self._charts:
                 return {"run": run, "rows": []}
             key, chart = self._charts[name]
-            if key in self._kinds:
-                self._subscribe(key)
+            if key in self._kinds:  # the topic of a sensor
+                subscriber, _ = self._sensors.get(key, (None, 0.0))
+                if subscriber is None:
+                    subscriber = rospy.Subscriber(key, PLOTTED[self._kinds[key]].message, self._on_sensor, key)
+                self._sensors[key] = subscriber, self._clock()
             series = self._series.setdefault(key, Series())
             return {"run": series.run, "rows": series.since(run, at, chart.columns)}
-
-    def _subscribe(self, topic: str) -> None:
-        """Subscribe to a sensor, if that is not done, and note the time of this request."""
-        if topic in self._sensors:
-            subscriber = self._sensors[topic][0]
-        else:
-            kind = PLOTTED[self._kinds[topic]].message
-            subscriber = rospy.Subscriber(topic, kind, self._on_sensor, topic)
-        self._sensors[topic] = subscriber, self._clock()
 
 
 def _is_run_and_time(value: Any) -> bool:

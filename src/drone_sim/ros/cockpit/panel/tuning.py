@@ -6,7 +6,7 @@ import ast
 import math
 import re
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import rospy
@@ -30,9 +30,7 @@ class VehicleTuning:
 
     def __init__(self, board: Board):
         self._board = board
-        self._lock = threading.Lock()
-        self._call_lock = threading.Lock()  # serializes changes
-        self._groups: list[Any] = []
+        self._lock = threading.Lock()  # serializes changes
         self._fields: dict[str, dict[str, Any]] = {}
         self._vehicle = ""
         self._subscribers: list[rospy.Subscriber] = []
@@ -44,10 +42,8 @@ class VehicleTuning:
         for subscriber in self._subscribers:
             subscriber.unregister()
         self._vehicle, self._subscribers = vehicle, []
-        with self._lock:
-            self._groups, self._fields = [], {}
         self._board.show("values", {})
-        self._show()
+        self._show([])
         if vehicle:
             self._subscribers = [
                 rospy.Subscriber(f"/{vehicle}/parameter_descriptions", ConfigDescription, self._on_description),
@@ -55,29 +51,29 @@ class VehicleTuning:
             ]
 
     def _on_description(self, message: ConfigDescription) -> None:
-        groups = decode_description(message)["groups"].values()
-        with self._lock:
-            self._groups = [(group["name"], [_field(field) for field in group["parameters"]]) for group in groups]
-            self._fields = {field["name"]: field for _, fields in self._groups for field in fields}
-        self._show()
+        self._show(decode_description(message)["groups"].values())
 
     def _on_values(self, message: Config) -> None:
         values = decode_config(message)
         values.pop("groups", None)
         self._board.show("values", values)
 
-    def _show(self) -> None:
-        with self._lock:
-            groups = [
-                {"group": _TITLES.get(name, name.capitalize()), "fields": fields} for name, fields in self._groups
-            ]
-        self._board.show("tuning", groups)
+    def _show(self, groups: Iterable[Mapping[str, Any]]) -> None:
+        titled = [
+            {
+                "group": _TITLES.get(group["name"], group["name"].capitalize()),
+                "fields": [_field(parameter) for parameter in group["parameters"]],
+            }
+            for group in groups
+        ]
+        self._fields = {field["name"]: field for group in titled for field in group["fields"]}
+        self._board.show("tuning", titled)
 
     def set(self, message: Mapping[str, Any]) -> dict[str, Any]:
         """Set a parameter as a browser requests; return its new value, and one line. Raises ValueError."""
         field = self._fields[one_of(message, "name", list(self._fields))]
         value, name = _convert(field, message.get("value")), field["name"]
-        with self._call_lock:
+        with self._lock:
             config = reconfigure(f"/{self._vehicle}", name, value)
         self._on_values(config)
         current = self._board.get("values", {}).get(name)
