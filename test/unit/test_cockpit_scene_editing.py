@@ -131,7 +131,7 @@ def test_a_saved_scene_keeps_the_script_that_was_run(editing, asked, monkeypatch
 def test_models_have_pictures_and_own_ones_are_uploaded(editing, tmp_path):
     groups = {one["name"]: one["models"] for one in editing.answers["models"]({})["groups"]}
     for one in [model for name in ("Shapes", "Arena", "Vehicles", "Sensors") for model in groups[name]]:
-        kind, content = editing.picture(f"/{one['picture']}")
+        kind, content = editing.models.picture(f"/{one['picture']}")
         assert (kind, content[:4]) == ("image/png", b"\x89PNG"), one
         assert len(content) < 8000
     content = base64.b64encode(b"solid").decode()
@@ -141,4 +141,4 @@ def test_models_have_pictures_and_own_ones_are_uploaded(editing, tmp_path):
     for name in ("../chair.stl", "chair.exe", "chair.stl"):
         with pytest.raises(ValueError, match=r"name: must|already"):
             editing.answers["upload_model"]({"name": name, "content": content})
-    assert editing.picture("/models/../gate.yaml") is None
+    assert editing.models.picture("/models/../gate.yaml") is None

@@ -16,7 +16,7 @@ from drone_sim.ros.cockpit.editor.backend import EditorBackend
 from drone_sim.ros.cockpit.editor.inspection import ScriptInspector
 from drone_sim.ros.cockpit.editor.lessons import Lessons
 from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
-from drone_sim.ros.cockpit.editor.scene_files import NEW_SCENE, SceneList
+from drone_sim.ros.cockpit.editor.scene_lists import NEW_SCENE, SceneList
 from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
 from drone_sim.ros.cockpit.panel.board import NO_SIMULATION
@@ -135,7 +135,7 @@ class Cockpit:
 
     def _find(self, path: str) -> Content:
         content = self._meshes.find(path) or self._lessons.picture(path) or find_manual(path)
-        return content or self._editing.picture(path) or self._report_file(path)
+        return content or self._editing.models.picture(path) or self._report_file(path)
 
     def _camera(self) -> str:
         """Return the topic with the compressed pictures of the vehicle's camera; '' if there is none."""

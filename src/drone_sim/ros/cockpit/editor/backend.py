@@ -36,12 +36,9 @@ class EditorBackend:
         scene: SceneEditing,
     ):
         """`simulator` flies a script in `scene`; `player` sends the timeline of its task meanwhile."""
-        self._scene = scene
-        self._store = store
-        self._lessons = lessons
-        self._simulator = simulator
+        self._store, self._lessons, self._simulator = store, lessons, simulator
+        self._player, self._scene = player, scene
         self._switcher = SceneSwitcher(simulator, scene)
-        self._player = player
         self.grader = Grader()
         self._checker = TextChecker()
 
@@ -125,10 +122,9 @@ class EditorBackend:
 
     def _poll(self, message: _Message) -> dict[str, Any]:
         """Return a script's version ('' if deleted), a digest of all names, and the name of the flying script."""
-        try:
+        flown = ""
+        with contextlib.suppress(*FAILURES):  # scripts can be edited without a ROS master
             flown = self._flying_script()
-        except FAILURES:  # scripts can be edited without a ROS master
-            flown = ""
         version = self._store.version(message.get("script"))
         return {"version": version, "digest": self._store.digest(), "flown": flown}
 
@@ -151,11 +147,9 @@ class EditorBackend:
         """Rename a script of the user's, also in the simulator's parameter if it is set there."""
         before = self._script(message)
         renamed, version = self._store.rename(before, message.get("name"))
-        try:
+        with contextlib.suppress(*FAILURES):  # scripts can be edited without a ROS master
             if self._simulator.parameter("script", "") == str(before.path):
                 self._simulator.set_parameter("script", str(renamed.path))
-        except FAILURES:  # scripts can be edited without a ROS master
-            pass
         return self._describe(renamed, version)
 
     def _delete(self, message: _Message) -> dict[str, Any]:
@@ -172,6 +166,16 @@ class EditorBackend:
         return {"script": script.name if script else ""}
 
     # ---- lessons and flights
+
+    def _find_lesson(self, message: _Message) -> Lesson | None:
+        return self._lessons.find(message.get("lesson"))
+
+    def _task(self, message: _Message, request: str) -> str:
+        """Return the task of a message's lesson. Raises ScriptStoreError if it has none."""
+        lesson = self._find_lesson(message)
+        if lesson is None or not lesson.task:
+            raise ScriptStoreError(f"{request}: needs a task; choose one above the text")
+        return lesson.task
 
     def _lesson(self, message: _Message) -> dict[str, Any]:
         """Return a lesson's text, its script (the user's own if there is one) and the scene that it flies in."""
@@ -190,9 +194,6 @@ class EditorBackend:
             "script": own[0].name if own else lesson.script,
             "flies": self._switcher.describe(lesson),
         }
-
-    def _find_lesson(self, message: _Message) -> Lesson | None:
-        return self._lessons.find(message.get("lesson"))
 
     def _run(self, message: _Message) -> dict[str, Any]:
         """Start a script from the beginning, in its lesson's scene; return the simulator's answer."""
@@ -219,17 +220,14 @@ class EditorBackend:
 
     def _grade(self, message: _Message) -> dict[str, Any]:
         """Begin to grade a script with its lesson's task; return the number of the run."""
-        lesson, script = self._find_lesson(message), self._script(message)
-        if lesson is None or not lesson.task:
-            raise ScriptStoreError("grade: needs a task; choose one above the text")
-        return {"number": self.grader.start(lesson.task, script.path)}
+        script = self._script(message)
+        return {"number": self.grader.start(self._task(message, "grade"), script.path)}
 
     def _hand_in(self, message: _Message) -> dict[str, Any]:
         """Copy a script as it is saved to the folder of the course; return time and digest of the copy."""
-        lesson, script = self._find_lesson(message), self._script(message)
-        if lesson is None or not lesson.task:
-            raise ScriptStoreError("hand in: needs a task; choose one above the text")
-        now, digest = handed_in.hand_in(lesson.task, self._store.read(script)[0], script.path.suffix)
+        script = self._script(message)
+        task = self._task(message, "hand in")
+        now, digest = handed_in.hand_in(task, self._store.read(script)[0], script.path.suffix)
         return {"time": now, "digest": digest}
 
 

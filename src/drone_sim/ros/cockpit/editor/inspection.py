@@ -57,22 +57,20 @@ class ScriptInspector:
         page = message.get("page")
         if not isinstance(page, str) or not 0 < len(page) <= 40:
             raise ValueError("inspect: needs a page, a name of at most 40 characters")
-        request = _Page(time.monotonic(), self._breakpoints(message.get("breakpoints", {})), *_flags(message))
+        breakpoints = self._breakpoints(message.get("breakpoints", {}))
+        request = _Page(time.monotonic(), breakpoints, message.get("looks") is True, message.get("live") is True)
         with self._lock:
             if page not in self._pages and len(self._pages) >= _MAX_PAGES:
                 raise ValueError(f"inspect: at most {_MAX_PAGES} pages at once")
             self._pages[page] = request
             before = self._publisher
             self._publish(_union(list(self._pages.values())))  # at once: the flight may be resumed right after
-            if self._publisher is not before:
-                self._wait_for_connection(self._publisher)
+            publisher = self._publisher
+            if publisher is not None and publisher is not before:
+                deadline = time.monotonic() + _CONNECTION_TIMEOUT
+                while not publisher.get_num_connections() and time.monotonic() < deadline:
+                    time.sleep(0.01)
             return self._names
-
-    def _wait_for_connection(self, publisher: rospy.Publisher) -> None:
-        """Wait until the simulator is connected to the publisher, at most _CONNECTION_TIMEOUT."""
-        deadline = time.monotonic() + _CONNECTION_TIMEOUT
-        while not publisher.get_num_connections() and time.monotonic() < deadline:
-            time.sleep(0.01)
 
     def _breakpoints(self, value: Any) -> _Lines:
         """Return the breakpoints of a page by file. Raises ValueError."""
@@ -135,14 +133,11 @@ class ScriptInspector:
                 self._broadcast({"variables": state})
 
     def _on_names(self, message: String) -> None:
-        names = _read(message)
-        if names is not None and all(_are_words(names.get(kind)) for kind in self._names):
+        names = _read(message) or {}
+        lists: list[Any] = [names.get(kind) for kind in self._names]
+        if all(isinstance(words, list) and all(isinstance(word, str) for word in words) for words in lists):
             with self._lock:
-                self._names = {kind: names[kind] for kind in self._names}
-
-
-def _flags(message: Mapping[str, Any]) -> tuple[bool, bool]:
-    return message.get("looks") is True, message.get("live") is True
+                self._names = dict(zip(self._names, lists))
 
 
 def _union(pages: list[_Page]) -> _Lines:
@@ -160,7 +155,3 @@ def _read(message: String) -> dict[str, Any] | None:
     except (ValueError, RecursionError):
         return None
     return state if isinstance(state, dict) else None
-
-
-def _are_words(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(word, str) for word in value)

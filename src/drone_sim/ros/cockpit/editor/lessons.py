@@ -114,9 +114,9 @@ class Lessons:
         for title, text in _split_sections(_read(self._package / _TUTORIAL)):
             script, scene = _SCRIPT.search(text), _LAUNCH.search(text)
             yield Lesson(
-                name=_anchor(title),
+                name=re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-"),  # the anchor that GitHub generates
                 title=title,
-                text=_for_the_browser(text),
+                text=_CONSOLE.sub(_command_output, _ALTERNATIVE.sub(lambda match: match[1], text)),
                 folder="docs",
                 script=f"tutorial/{script[1]}" if script else "",
                 scene=str(self._package / scene[1]) if script and scene else "",
@@ -149,20 +149,10 @@ def _split_sections(text: str) -> Iterator[tuple[str, str]]:
         yield title, "\n".join(lines)
 
 
-def _for_the_browser(text: str) -> str:
-    """Return a text for the browser: the output of commands without the commands."""
-    return _CONSOLE.sub(_command_output, _ALTERNATIVE.sub(lambda match: match[1], text))
-
-
 def _command_output(block: re.Match[str]) -> str:
     """Return a code block with the output of the commands in `block`; '' if they print nothing."""
     lines = [_FLIGHT_RESULT.sub(r"after \1:", line) for line in block[2].splitlines() if not _COMMAND.match(line)]
     return "\n".join([f"{block[1]}```text", *lines, f"{block[1]}```", ""]) if lines else ""
-
-
-def _anchor(title: str) -> str:
-    """Return the anchor of a heading, as GitHub generates it."""
-    return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
 def _read(path: Path) -> str:

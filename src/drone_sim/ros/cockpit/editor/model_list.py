@@ -7,13 +7,13 @@ from typing import Any
 
 from drone_sim.editing.library import KINDS
 from drone_sim.files.resources import package_path
+from drone_sim.ros.cockpit.editor.scene_lists import own_files
 from drone_sim.ros.cockpit.server.access_control import Content
 from drone_sim.vehicles.types import TYPES
 
 PICTURES = "config/models/pictures"
 _WEB = "/models/"
 _FOLDER = "models"  # in the folder of the user's scripts
-_MAX_MODELS = 200  # of the user's
 _Operation = dict[str, Any]
 
 
@@ -72,16 +72,15 @@ class ModelList:
             {"name": "Arena", "models": [_row(name.replace("_", " ").capitalize(), op) for name, op in arena.items()]},
             {"name": "Vehicles", "models": [_row(title, operation) for title, operation in vehicles.items()]},
             {"name": "Sensors", "models": [_row(title, operation) for title, operation in SENSORS.items()]},
-            {"name": "Yours", "models": [_row(file.name, self.operation(file), "") for file in self._own_files()]},
+            {
+                "name": "Yours",
+                "models": [_row(file.name, self.operation(file), "") for file in own_files(self.folder, KINDS)],
+            },
         ]
 
     def operation(self, file: Path) -> _Operation:
         """Return the edit operation that adds a file of the user's."""
         return {"do": "add_model", "model": str(file)}
-
-    def _own_files(self) -> list[Path]:
-        files = sorted(file for file in self.folder.glob("*") if file.suffix.lower() in KINDS and file.is_file())
-        return files[:_MAX_MODELS]
 
     def picture(self, path: str) -> Content:
         """Return the picture of one of the package's models; None for any other path."""

@@ -20,8 +20,7 @@ from drone_sim.editing.properties import properties
 from drone_sim.files import writing
 from drone_sim.files.resources import package_path
 from drone_sim.ros.cockpit.editor.model_list import ModelList
-from drone_sim.ros.cockpit.editor.recent_scenes import RecentScenes
-from drone_sim.ros.cockpit.server.access_control import Content
+from drone_sim.ros.cockpit.editor.scene_lists import RecentScenes
 from drone_sim.ros.cockpit.server.page_socket import Answer
 from drone_sim.ros.core.launch_parameters import script_from_shell
 from drone_sim.ros.core.simulator import FAILURES
@@ -53,7 +52,7 @@ class SceneEditing:
         self._lock = threading.Lock()
         self._rows: dict[int, _Message] = {}
         self._header: dict[str, Any] = {}  # of the last message: all keys except its rows
-        self._models, self._recent = ModelList(folder), RecentScenes(folder)
+        self.models, self._recent = ModelList(folder), RecentScenes(folder)
 
     def subscribe(self, wanted: bool) -> None:
         """Subscribe to the object tree while `wanted` (a browser is open); to be called repeatedly."""
@@ -138,26 +137,28 @@ class SceneEditing:
         wanted = self._vehicle()
         return next((row for row in roots if row["vehicle"] == wanted), roots[0] if roots else None)
 
-    def picture(self, path: str) -> Content:
-        """Return a model's picture by its path; None if the path is none of them."""
-        return self._models.picture(path)
-
     @property
     def answers(self) -> dict[str, Answer]:
         """The handler of each request."""
+
+        def pick(message: _Message, *keys: str) -> dict[str, Any]:
+            return {key: message[key] for key in keys if key in message}
+
         return {
             "tree": lambda _: self._tree(),
-            "edit": lambda message: self._call(_pick(message, "edit", "name", "merge")),
-            "undo": lambda message: self._call({"undo": True, **_pick(message, "merge")}),
+            "edit": lambda message: self._call(pick(message, "edit", "name", "merge")),
+            "undo": lambda message: self._call({"undo": True, **pick(message, "merge")}),
             "redo": lambda _: self._call({"redo": True}),
             "properties": lambda _: {"types": properties()},
-            "models": lambda _: {"groups": self._models.groups()},
+            "models": lambda _: {"groups": self.models.groups()},
             "upload_model": self._upload,
             "scene_files": lambda _: {**self._recent.listed(), **self._state("file", "draft")},
             "new_scene": lambda _: self._call({"new": True}),
             "open_scene": self._open,
             "save_scene": self._save,
-            "save_model": self._save_model,
+            "save_model": lambda message: self._call(
+                {"save_model": message.get("object"), "file": self._path(message)}
+            ),
             "scene_text": lambda _: self._call({"text": True}),
             "objects_text": lambda message: self._call({"text_of": message.get("objects")}),
             "write_scene_text": self._write,
@@ -185,12 +186,12 @@ class SceneEditing:
         return reply
 
     def _open(self, message: _Message) -> dict[str, Any]:
-        reply = self._call({"open": self._path(message, "file")})
+        reply = self._call({"open": self._path(message)})
         self._recent.add(reply["file"])
         return reply
 
     def _save(self, message: _Message) -> dict[str, Any]:
-        path: str | bool = self._path(message, "file") if "file" in message else True  # true: to its own file
+        path: str | bool = self._path(message) if "file" in message else True  # true: to its own file
         if isinstance(path, str):
             is_own = message.get("over") is True or path == self._state("file")["file"]
             if Path(path).exists() and not is_own:
@@ -200,14 +201,11 @@ class SceneEditing:
         self._recent.add(reply["file"])
         return reply
 
-    def _save_model(self, message: _Message) -> dict[str, Any]:
-        return self._call({"save_model": message.get("object"), "file": self._path(message, "file")})
-
-    def _path(self, message: _Message, key: str) -> str:
+    def _path(self, message: _Message) -> str:
         """Return the path of a file named by a browser: relative to the user's folder, with .yaml as default suffix."""
-        name = message.get(key)
+        name = message.get("file")
         if not isinstance(name, str) or not name.strip():
-            raise ValueError(f"{key}: must be the name of a file")
+            raise ValueError("file: must be the name of a file")
         path = Path(name) if Path(name).suffix else Path(f"{name}.yaml")
         return str(path if path.is_absolute() else self._folder / path)
 
@@ -230,13 +228,13 @@ class SceneEditing:
         if len(content) > _MAX_SIZE:
             raise ValueError(f"{name}: is larger than {_MAX_SIZE >> 20} MiB")
         try:
-            self._models.folder.mkdir(parents=True, exist_ok=True)
-            writing.write_new(self._models.folder / name, content)
+            self.models.folder.mkdir(parents=True, exist_ok=True)
+            writing.write_new(self.models.folder / name, content)
         except FileExistsError:
             raise ValueError(f"{name} is there already") from None
         except OSError as error:
             raise ValueError(str(error)) from None
-        return {"model": self._models.operation(self._models.folder / name)}
+        return {"model": self.models.operation(self.models.folder / name)}
 
 
 def _name_in_scene(script: str) -> str:
@@ -246,7 +244,3 @@ def _name_in_scene(script: str) -> str:
         return path.stem
     package = package_path()
     return f"package://drone_sim/{path.relative_to(package)}" if path.is_relative_to(package) else script
-
-
-def _pick(message: _Message, *keys: str) -> dict[str, Any]:
-    return {key: message[key] for key in keys if key in message}

@@ -1,4 +1,4 @@
-"""Scene files for the page: the list, the scene of a task, and switching between scenes."""
+"""The scene file of a lesson or task, and switching between it and the user's scene."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 from drone_sim.config.types import merged, named_in, read_yaml
 from drone_sim.files import writing
-from drone_sim.files.resources import package_path, resolve
+from drone_sim.files.resources import resolve
 from drone_sim.files.yaml_writing import dump
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.grading import plan as plans
@@ -21,22 +21,16 @@ from drone_sim.grading.plan import Plan
 from drone_sim.grading.randomization import Randomization
 from drone_sim.ros.cockpit.editor.lessons import Lesson
 from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
+from drone_sim.ros.cockpit.editor.scene_lists import NO_SCENE, scene_path
 from drone_sim.ros.core.simulator import Simulator, script_failure
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import BESIDE
 from drone_sim.vehicles.parameters import EquipmentParameters
-from drone_sim.vrep_files.model import SUFFIXES
 
 _TASK_SCENES = Path("~/.ros/drone_sim/tasks")
 _DRONE = "drone"
 _SCENE_KEYS = ("scene", *BESIDE, *EquipmentParameters.model_fields)  # of a config, that a scene file can hold
 _KEY = "scene_file"
-_NONE = "none"  # as in the launch file
-NEW_SCENE = "new scene"  # the name of one that has no file
-_MINE = "mine/"
-_SHIPPED = "config/scenes"
-_MAX_OWN = 200  # scenes of the user's
-_KINDS = {".yaml", ".yml", *SUFFIXES}
 
 
 def scene_of(plan: Plan, folder: Path | None = None) -> str:
@@ -134,14 +128,15 @@ class SceneSwitcher:
         Raises ValueError and OSError, in one line.
         """
         now = self._scene_file()
-        is_of_lesson = self._is_of_lesson(now)
         wanted = _scene(lesson)
         if wanted:
-            if not is_of_lesson:
+            if not self._is_of_lesson(now):
                 self._user_scene, self._was_modified = now, self._scene.is_modified
                 self._named_script = bool(self._scene.own_script)
-            return self._load(wanted, now, f"started in {_name(lesson, wanted)}")
-        if is_of_lesson:
+            task = lesson.task if lesson else ""
+            name = f"the scene of the task {task}" if task else wanted.rpartition("/")[2]
+            return self._load(wanted, now, f"started in {name}")
+        if self._is_of_lesson(now):
             return self._load(self._user_scene, now, f"started {self._back()}")
         return self._simulator.call("restart")
 
@@ -150,15 +145,12 @@ class SceneSwitcher:
 
         Otherwise, or if that fails, `fly` loads it from its file.
         """
-        if (
-            _scene(lesson)
-            or not self._is_of_lesson(self._scene_file())
-            or not (self._was_modified or self._named_script)
-        ):
+        is_needed = self._was_modified or self._named_script
+        if _scene(lesson) or not self._is_of_lesson(self._scene_file()) or not is_needed:
             return
         self._simulator.call("stop")
         with contextlib.suppress(ValueError):  # the draft was opened or dropped, or the file is gone
-            self._scene.reopen(_path(self._user_scene), self._was_modified)
+            self._scene.reopen(scene_path(self._user_scene), self._was_modified)
             self._lesson_scene = ""
 
     def _scene_file(self) -> str:
@@ -168,15 +160,14 @@ class SceneSwitcher:
         return bool(self._lesson_scene) and scene == self._lesson_scene
 
     def _back(self) -> str:
-        is_file = self._user_scene not in ("", _NONE)
+        file = self._user_scene if self._user_scene != NO_SCENE else ""
         if self._was_modified:
-            return f"again in {self._user_scene if is_file else 'your new scene'}, with the changes that are not saved"
-        return f"again in {self._user_scene if is_file else 'the scene of the launch'}"
+            return f"again in {file or 'your new scene'}, with the changes that are not saved"
+        return f"again in {file or 'the scene of the launch'}"
 
     def _load(self, file: str, now: str, success: str) -> tuple[bool, str]:
-        _, cleanup = self._simulator.call(
-            "stop"
-        )  # an error in the cleanup of the old script must not prevent the start
+        # An error in the cleanup of the old script must not prevent the start.
+        _, cleanup = self._simulator.call("stop")
         self._simulator.set_parameter(_KEY, file)
         done, answer = self._simulator.call("load_scene")
         if not done and script_failure(answer) is None:  # the scene could not be loaded
@@ -192,48 +183,7 @@ def plan_of(lesson: Lesson) -> Plan:
     return plans.read(tasks.find(lesson.task))
 
 
-def _name(lesson: Lesson | None, file: str) -> str:
-    return f"the scene of the task {lesson.task}" if lesson and lesson.task else file.rpartition("/")[2]
-
-
 def _scene(lesson: Lesson | None) -> str:
     if lesson is None:
         return ""
     return scene_of(plan_of(lesson)) if lesson.task else lesson.scene
-
-
-class SceneList:
-    """Names of scenes for the page, each with its value of the parameter `scene_file`."""
-
-    def __init__(self, folder: Path):
-        """`folder` is that of the user's scenes, listed after those of the package; it need not exist."""
-        self._folder = folder
-        shipped = sorted((package_path() / _SHIPPED).glob("*.yaml"))
-        # As package:// so that a simulator on another machine finds its own copy.
-        self._shipped = {file.stem: f"package://drone_sim/{_SHIPPED}/{file.name}" for file in shipped}
-
-    def names(self, current: str) -> tuple[tuple[str, ...], str]:
-        """Return all names, and the name of the scene file `current`, which is its path if it is not in the list."""
-        files = self._files()
-        path = _path(current)
-        name = next((name for name, file in files.items() if _path(file) == path), path)
-        return tuple(dict.fromkeys((*files, name))), name
-
-    def file(self, name: str) -> str:
-        """Return the value of the parameter `scene_file` for a name."""
-        return self._files().get(name, name)
-
-    def _files(self) -> dict[str, str]:
-        own = (file for file in self._folder.glob("*") if file.suffix.lower() in _KINDS and file.is_file())
-        mine = {f"{_MINE}{file.name}": str(file) for file in sorted(own)[:_MAX_OWN]}
-        return {_NONE: _NONE, **self._shipped, **mine}
-
-
-def _path(scene_file: str) -> str:
-    """Return the path of a scene file, which may be given as package:// or relative; `none` for none."""
-    if scene_file in ("", _NONE):
-        return _NONE
-    try:
-        return str(resolve(scene_file))
-    except (OSError, ValueError):
-        return scene_file

@@ -113,8 +113,18 @@ class ScriptStore:
     # ---- text
 
     def read(self, script: ScriptFile) -> tuple[str, str]:
-        """Return a script's text and its version, which changes with the file. Raises ScriptStoreError."""
-        return _read_text(script.name, script.path)
+        r"""Return a script's text, with \n as line ends, and its version, which changes with the file.
+
+        Raises ScriptStoreError.
+        """
+        version = _version_of(script.path)
+        with _naming_errors(script.name):
+            content = read_bytes(script.path, LARGEST)
+        try:
+            return content.decode("utf-8").replace("\r\n", "\n"), version
+        except UnicodeDecodeError as error:
+            line = content.count(b"\n", 0, error.start) + 1
+            raise ScriptStoreError(f"{script.name}: line {line}: is not UTF-8, so it cannot be edited here") from None
 
     def save(self, script: ScriptFile, text: str, version: str) -> tuple[ScriptFile, str] | None:
         """Write a script; a script of the package is copied to the user's folder, unless a copy with `text` exists.
@@ -263,12 +273,13 @@ class ScriptStore:
 
 def shipped_with_the_package() -> dict[str, Callable[[], dict[str, Path]]]:
     """Return for each group a function that lists the package's scripts by name."""
-    package = package_path()
+    tutorial = package_path() / "docs" / "tutorial"
     return {
         "built-in": lambda: scripts_in(BUILT_IN),
-        "tutorial": lambda: _stages(package / "docs" / "tutorial"),
-        SOLUTIONS: lambda: scripts_in(package / "docs" / "tutorial" / "solutions"),
-        "tasks": lambda: _starts(package / "docs" / "tutorial" / _LAST_STAGE),
+        # The folder also holds tools; the names of stages begin with a digit.
+        "tutorial": lambda: {name: file for name, file in scripts_in(tutorial).items() if name[0].isdigit()},
+        SOLUTIONS: lambda: scripts_in(tutorial / "solutions"),
+        "tasks": lambda: _starts(tutorial / _LAST_STAGE),
     }
 
 
@@ -280,11 +291,6 @@ def scripts_in(folder: Path) -> dict[str, Path]:
         return {}
     named = {file.name: file for file in files if file.suffix in _ENDINGS and not file.name.startswith(("_", "."))}
     return dict(list(named.items())[:_MAX_SCRIPTS])
-
-
-def _stages(folder: Path) -> dict[str, Path]:
-    """Return the tutorial's stages: files whose names begin with a digit; the folder also holds tools."""
-    return {name: path for name, path in scripts_in(folder).items() if name[0].isdigit()}
 
 
 def _starts(last_stage: Path) -> dict[str, Path]:
@@ -307,18 +313,6 @@ def _valid_name(name: Any) -> str:
     return name
 
 
-def _read_text(name: str, path: Path) -> tuple[str, str]:
-    r"""Return the text of a file, with \n as line ends, and its version. Raises ScriptStoreError."""
-    version = _version_of(path)
-    with _naming_errors(name):
-        content = read_bytes(path, LARGEST)
-    try:
-        return content.decode("utf-8").replace("\r\n", "\n"), version
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise ScriptStoreError(f"{name}: line {line}: is not UTF-8, so it cannot be edited here") from None
-
-
 def _write_text(name: str, path: Path, text: str, is_new: bool = False) -> str:
     r"""Write a file and return its version; most lines ended by \r\n stay so.
 
@@ -334,8 +328,11 @@ def _write_text(name: str, path: Path, text: str, is_new: bool = False) -> str:
         ) from None
     if len(content) > LARGEST:
         raise ScriptStoreError(f"{name}: has {len(content)} bytes; at most {LARGEST} are allowed")
-    if not is_new and _has_windows_line_ends(path):
-        text = text.replace("\n", "\r\n")
+    if not is_new:
+        with contextlib.suppress(OSError, ValueError):
+            before = read_bytes(path, LARGEST)
+            if 2 * before.count(b"\r\n") > before.count(b"\n"):
+                text = text.replace("\n", "\r\n")
     with _naming_errors(name):
         path.parent.mkdir(parents=True, exist_ok=True)
         writing.write_new(path, text) if is_new else writing.write(path, text, through_links=False)
@@ -349,14 +346,6 @@ def _version_of(path: Path) -> str:
     except (OSError, ValueError):
         return ""
     return f"{state.st_mtime_ns}-{state.st_size}-{state.st_ino}"
-
-
-def _has_windows_line_ends(path: Path) -> bool:
-    try:
-        content = read_bytes(path, LARGEST)
-    except (OSError, ValueError):
-        return False
-    return 2 * content.count(b"\r\n") > content.count(b"\n")
 
 
 @contextlib.contextmanager
