@@ -18,7 +18,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from tf2_msgs.msg import TFMessage
 
 from drone_sim.ros.node.node import Node
-from drone_sim.ros.vehicle import camera_truth
+from drone_sim.ros.vehicle import cameras
 from drone_sim.run import parameters
 
 CAMERAS = {
@@ -126,7 +126,7 @@ class Cameras(unittest.TestCase):
 
     def test_the_mask_lies_over_the_picture_of_its_stamp_while_somebody_listens(self):
         topics = ("", "/truth/categories", "/truth/overlay")
-        with mock.patch.object(camera_truth, "draw_mask", wraps=camera_truth.draw_mask) as draw_mask:
+        with mock.patch.object(cameras, "draw_mask", wraps=cameras.draw_mask) as draw_mask:
             listeners = [self.listen(f"/drone/floor/image{one}", Image) for one in topics[:2]]
             self.step_until(lambda: all(len(one.messages) > 2 for one in listeners))
             draw_mask.assert_not_called()

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import rospy
@@ -10,23 +13,79 @@ from std_msgs.msg import Header
 
 from drone_sim.config.types import ParameterError, nested
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.state import Twist
 from drone_sim.message_text import near_names
-from drone_sim.ros.core.message_conversion import BASE_LINK, fill, frame, full_name, message_class
+from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.message_conversion import BASE_LINK, fill, frame, full_name, message_class, service_class
 from drone_sim.ros.core.message_conversion import pose as pose_message
 from drone_sim.ros.core.message_conversion import twist as twist_message
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.ros.vehicle.cameras import CameraOutput
-from drone_sim.ros.vehicle.driver_services import Missing
 from drone_sim.ros.vehicle.outputs import SensorOutput
 from drone_sim.sensors.battery import Battery
 from drone_sim.sensors.imu import Imu
+from drone_sim.vehicles.commands import REQUESTS
 from drone_sim.vehicles.driver import DriverTopic, Source
+from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
 _QUEUE_SIZE = 10
 _MOVING = 0.001  # of a command: the Bebop's driver takes smaller numbers for zero
 _FULL = 100.0  # %, of a vehicle without a battery
+_SUCCESS = "success", "result"  # fields of responses that say whether it worked
+
+
+class Missing:
+    """Names of the topics and services whose message types are not in the user's workspace."""
+
+    def __init__(self) -> None:
+        self._names: dict[str, list[str]] = defaultdict(list)  # by package
+
+    @contextlib.contextmanager
+    def noted(self, kind: str | None, name: str) -> Iterator[None]:
+        """Note the topic or service if its type cannot be found: message_class and service_class raise ValueError."""
+        try:
+            yield
+        except ParameterError:  # of a field of an installed type
+            raise
+        except ValueError:
+            self._names[str(kind).partition("/")[0]].append(rospy.resolve_name(name))
+
+    def warn(self) -> None:
+        """Log one line for each package."""
+        for package, names in self._names.items():
+            rospy.logwarn(f"the package {package} is not in your workspace, so these are not there: {', '.join(names)}")
+
+
+class DriverServices:
+    """The services of one vehicle under a driver's names."""
+
+    def __init__(self, parameters: VehicleParameters, inbox: Inbox, ask: Callable[[str], None], missing: Missing):
+        """Advertise. `ask` asks the vehicle for what a topic of REQUESTS does; the thread of `inbox` calls it."""
+        self._inbox, self._ask = inbox, ask
+        self._servers = []
+        for entry in parameters.topics.values():
+            name = full_name(parameters.name, entry.topic)
+            if entry.service:
+                with missing.noted(entry.type, name):
+                    kind = service_class(str(entry.type))
+                    self._servers.append(rospy.Service(name, kind, partial(self._answer, entry, kind._response_class)))
+
+    def _answer(self, entry: DriverTopic, make_response: type, request: Any) -> Any:
+        """Do what the service says: `motors` with a request for false stops the propellers."""
+        stops = entry.takes == "motors" and not getattr(request, request.__slots__[0])
+        asked = "emergency" if stops else str(entry.takes)
+        if asked in REQUESTS:
+            self._inbox.put(lambda: self._ask(asked))
+        response = make_response()
+        for field in _SUCCESS:
+            if hasattr(response, field):
+                setattr(response, field, True)
+        return response
+
+    def close(self) -> None:
+        """End the services."""
+        for server in self._servers:
+            server.shutdown("the vehicle is gone, or its topics have changed")
 
 
 class DriverMessage:
@@ -47,16 +106,16 @@ class DriverMessage:
         self._sent: dict[str, Any] = {}
 
     def publish(self, vehicle: Vehicle, stamp: Stamp) -> None:
-        """Publish every so many steps to subscribers, or what has changed if it is latched."""
+        """Publish every `every` steps, to subscribers; if it is latched, when a value has changed."""
         self._steps += 1
         if self._steps % self._entry.every or not (self._entry.latch or self.publisher.get_num_connections()):
             return
         values = self._values(vehicle, stamp())
         if self._entry.latch:
-            said = {path: value for path, value in values.items() if not isinstance(value, Header)}
-            if said == self._sent:
+            fields = {path: value for path, value in values.items() if not isinstance(value, Header)}
+            if fields == self._sent:
                 return
-            self._sent = said
+            self._sent = fields
         self.publisher.publish(self._message(values))
 
     def _message(self, values: Mapping[str, Any]) -> Any:
@@ -73,19 +132,16 @@ class DriverMessage:
             return Header(stamp=stamp, frame_id=self._header_frame)
         if source.quantity == "child_frame":
             return self._frame
-        if source.quantity == "state":
-            return self._state(vehicle)
+        if source.quantity == "state":  # the driver's word or number; `hovering` is flying without a command
+            states, state, command = self._entry.states, str(vehicle.flight_state), vehicle.commands.now
+            if state == "flying" and "hovering" in states:
+                is_still = max(map(abs, (*command.linear, *command.angular))) < _MOVING
+                state = "hovering" if is_still else state
+            return states.get(state, states.get("other", state))
         value = _QUANTITIES[source.quantity](vehicle)
         if source.part:
             value = getattr(value, source.part)
         return value * source.factor if isinstance(value, float) else value
-
-    def _state(self, vehicle: Vehicle) -> int | str:
-        """Return the driver's word or number for the flight state; `hovering` is flying without a command."""
-        states, state = self._entry.states, str(vehicle.flight_state)
-        if state == "flying" and "hovering" in states and max(map(abs, (*_flat(vehicle.commands.now),))) < _MOVING:
-            state = "hovering"
-        return states.get(state, states.get("other", state))
 
 
 def _slot_type(kind: type, path: str) -> str:
@@ -97,11 +153,6 @@ def _slot_type(kind: type, path: str) -> str:
             raise ValueError(f"{message._type} has no field '{name}'; it has {', '.join(types)}")
         slots, message = types[name], getattr(message, name)
     return slots
-
-
-def _flat(command: Twist) -> Iterator[float]:
-    yield from command.linear
-    yield from command.angular
 
 
 def _twist(vehicle: Vehicle, world_from_frame: frames.Matrix) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import rospy
 from diagnostic_msgs.msg import KeyValue
@@ -13,13 +13,12 @@ from std_msgs.msg import Empty
 
 from drone_sim.config.errors import changed
 from drone_sim.config.types import ParameterError
-from drone_sim.forces.weather import WeatherParameters
 from drone_sim.grading.permissions import CHANGE, MOVE, PUSH
 from drone_sim.mechanics.state import Pose
 from drone_sim.ros.core.inbox import Gate, Inbox, open_gate
 from drone_sim.ros.core.message_conversion import full_name, message_class, xyz
 from drone_sim.ros.core.validation import check_changes, check_frame, intervention, read_changes, read_pose, sender
-from drone_sim.ros.vehicle.driver_services import DriverServices, Missing
+from drone_sim.ros.vehicle.driver_topics import DriverServices, Missing
 from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
@@ -41,18 +40,7 @@ _INTERVENTIONS = {  # changes of the world, which a graded flight may forbid
     **dict.fromkeys(("weather", "set_wind", "faults"), CHANGE),
 }
 _Job = Callable[[Vehicle], Any]
-_Reader = tuple[type, Callable[[Any], _Job]]  # the type of a topic's messages, and what reads them
-
-
-class _Limits(NamedTuple):
-    """Limits for the callbacks, which must not read the simulation: it runs in another thread."""
-
-    vehicle: VehicleParameters
-    weather: WeatherParameters
-
-
-def _is_zero(twist: TwistMessage) -> bool:
-    return not any((*xyz(twist.linear), *xyz(twist.angular)))
+_Reader = tuple[type, Callable[[Any], _Job]]  # the type of a topic's messages, and their reader
 
 
 class VehicleInputs:
@@ -65,7 +53,8 @@ class VehicleInputs:
         """
         self._simulation, self._gate = simulation, gate
         self._name, self._inbox = parameters.name, inbox
-        self._limits = _Limits(parameters, simulation.parameters.weather)
+        # Copies of the limits, because callbacks must not read the simulation: it runs in another thread.
+        self._parameters, self._weather_limits = parameters, simulation.parameters.weather
         self.log = CommandLog(senders=self._commanders)
         own: dict[str, _Reader] = {
             _COMMAND: (TwistMessage, self._twist),
@@ -108,38 +97,16 @@ class VehicleInputs:
         if vehicle is not None:
             vehicle.ask(topic)
 
-    def _subscribe(self, topic: str, what: str, kind: type, read: Callable[[Any], _Job]) -> None:
-        """Subscribe to a topic; `what` is the name of ours that has its meaning."""
-        name, queue = full_name(self._name, topic), _QUEUES.get(what, 1 if self._gate is open_gate else _GATED_QUEUE)
-        take = self._gate(name, self._taking(what, read, name))
-        subscriber = rospy.Subscriber(name, kind, take, queue_size=queue, tcp_nodelay=True)
-        self._subscribers.append(subscriber)
-        if what in (_COMMAND, _STAMPED_COMMAND):
-            self._commands.append(subscriber)
+    def _subscribe(self, topic: str, meaning: str, kind: type, read: Callable[[Any], _Job]) -> None:
+        """Subscribe to a topic: queue the job of each valid message, and log why another one is refused.
 
-    def _commanders(self) -> list[str]:
-        """Return the nodes that are connected to cmd_vel, or to cmd_vel_stamped."""
-        return sorted({each.callerid_pub for topic in self._commands for each in topic.impl.connections})
-
-    def follow(self, vehicle: Vehicle) -> None:
-        """Use the limits of this vehicle from now on; it was tuned, or replaces the last one."""
-        self._limits = _Limits(vehicle.parameters, self._simulation.parameters.weather)
-
-    def close(self) -> None:
-        """Unregister the topics."""
-        for subscriber in self._subscribers:
-            subscriber.unregister()
-        self._services.close()
-
-    def _taking(self, topic: str, read: Callable[[Any], _Job], name: str) -> Callable[[Any], None]:
-        """Return a callback that queues the job of a valid message, and logs why another one is refused.
-
-        `topic` is the name of ours that has its meaning, `name` its full name.
+        `meaning` is the name of our topic with this meaning.
         """
-        is_command = topic in (_COMMAND, _STAMPED_COMMAND)
-        kept = ", the last valid one is kept" if is_command else ""
-        logged = _COMMAND if is_command else topic
-        throttle, action = Throttle(_WARNING_PERIOD), _INTERVENTIONS.get(topic)
+        name = full_name(self._name, topic)
+        is_command = meaning in (_COMMAND, _STAMPED_COMMAND)
+        consequence = ", the last valid one is kept" if is_command else ""
+        logged = _COMMAND if is_command else meaning
+        throttle, action = Throttle(_WARNING_PERIOD), _INTERVENTIONS.get(meaning)
 
         def take(message: Any) -> None:
             try:
@@ -147,9 +114,10 @@ class VehicleInputs:
             except (checks.Refused, ParameterError) as error:
                 refuse(message, error)
                 return
-            self.log.take(logged, sender(message), is_command and _is_zero(getattr(message, "twist", message)))
-            done = intervention(action, self._name, name, message) if action else None
-            self._inbox.put(lambda: execute(job, message), done)
+            twist = getattr(message, "twist", message)
+            self.log.take(logged, sender(message), is_command and not any((*xyz(twist.linear), *xyz(twist.angular))))
+            change = intervention(action, self._name, name, message) if action else None
+            self._inbox.put(lambda: execute(job, message), change)
 
         def execute(job: _Job, message: Any) -> None:
             vehicle = self._simulation.vehicles.get(self._name)  # may have been removed or replaced since the check
@@ -161,27 +129,45 @@ class VehicleInputs:
 
         def refuse(message: Any, error: ValueError) -> None:
             why = error.text if isinstance(error, ParameterError) else str(error)
-            self.log.refuse(logged, sender(message), why, topic)
+            self.log.refuse(logged, sender(message), why, meaning)
             if throttle.passes():
-                rospy.logwarn(f"{topic} refused{kept}: {why}")
+                rospy.logwarn(f"{meaning} refused{consequence}: {why}")
 
-        return take
+        queue = _QUEUES.get(meaning, 1 if self._gate is open_gate else _GATED_QUEUE)
+        subscriber = rospy.Subscriber(name, kind, self._gate(name, take), queue_size=queue, tcp_nodelay=True)
+        self._subscribers.append(subscriber)
+        if is_command:
+            self._commands.append(subscriber)
+
+    def _commanders(self) -> list[str]:
+        """Return the nodes that publish cmd_vel or cmd_vel_stamped."""
+        return sorted({each.callerid_pub for topic in self._commands for each in topic.impl.connections})
+
+    def follow(self, vehicle: Vehicle) -> None:
+        """Use the limits of this vehicle from now on; it was tuned, or replaces the last one."""
+        self._parameters, self._weather_limits = vehicle.parameters, self._simulation.parameters.weather
+
+    def close(self) -> None:
+        """Unregister the topics."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        self._services.close()
 
     # ---- readers of messages: each returns a job, or raises Refused
 
     def _twist(self, message: TwistMessage, entry: DriverTopic | None = None) -> _Job:
         """Read a velocity, or what the numbers mean on a driver's topic."""
-        linear, angular, meaning = xyz(message.linear), xyz(message.angular), self._limits.vehicle.cmd_vel_meaning
+        linear, angular, meaning = xyz(message.linear), xyz(message.angular), self._parameters.cmd_vel_meaning
         if entry is not None:
             linear, angular = meaning.converted(linear, angular)
         elif meaning.means == "tilt":
             angular = (0.0, 0.0, angular[2])
-        twist = checks.twist(linear, angular, self._limits.vehicle)
+        twist = checks.twist(linear, angular, self._parameters)
         return lambda vehicle: vehicle.commands.receive(twist)
 
     def _posing(self, act: Callable[[Vehicle, Pose], Any]) -> Callable[[PoseStamped], _Job]:
         def read(message: PoseStamped) -> _Job:
-            pose = read_pose(message.header.frame_id, message.pose, self._limits.vehicle)
+            pose = read_pose(message.header.frame_id, message.pose, self._parameters)
             return lambda vehicle: act(vehicle, pose)
 
         return read
@@ -192,28 +178,28 @@ class VehicleInputs:
 
     def _pose_estimate(self, message: PoseWithCovarianceStamped) -> _Job:
         """Move to rviz's 2D Pose Estimate, x, y and yaw, at the same height."""
-        (x, y, _), turn = read_pose(message.header.frame_id, message.pose.pose, self._limits.vehicle)
+        (x, y, _), turn = read_pose(message.header.frame_id, message.pose.pose, self._parameters)
         return lambda vehicle: vehicle.body.move(Pose((x, y, vehicle.body.state.position[2]), turn))
 
     def _push(self, message: WrenchStamped) -> _Job:
         check_frame(message.header.frame_id)
         force, torque = xyz(message.wrench.force), xyz(message.wrench.torque)
-        push = checks.push(force, torque, self._limits.vehicle)
+        push = checks.push(force, torque, self._parameters)
         return lambda vehicle: vehicle.pushes.add(push)
 
     def _wind(self, message: Vector3Stamped) -> _Job:
         """Set the steady wind for all vehicles; gusts stay as they are."""
         check_frame(message.header.frame_id)
         changes = {"wind": xyz(message.vector)}
-        check_changes(changes, self._limits.weather)
+        check_changes(changes, self._weather_limits)
         return lambda vehicle: vehicle.context.change_weather(changes)
 
     def _weather(self, message: KeyValue) -> _Job:
-        changes = read_changes(message, self._limits.weather)
+        changes = read_changes(message, self._weather_limits)
         return lambda vehicle: vehicle.context.change_weather(changes)
 
     def _faults(self, message: KeyValue) -> _Job:
-        parameters = self._limits.vehicle
+        parameters = self._parameters
         changes = read_changes(message, parameters.faults)
         parameters.model_copy(update={"faults": changed(parameters.faults, changes)}).check_faults()
         return lambda vehicle: vehicle.change_faults(changes)

@@ -66,15 +66,12 @@ class VehicleOutputs:
         script_state = str(vehicle.flight_state)
         if script_state != self._script_state or self._state_throttle.passes():
             self._script_state = script_state
-            self._publish_flight_state(doing(vehicle), hears_commands(vehicle))
-
-    def _publish_flight_state(self, state: str, hears: bool) -> None:
-        """Publish the flight state, and whether the script listens to commands, if they have changed."""
-        before, self._published = self._published, (state, hears)
-        if state != before[0]:
-            self._flight_state.publish(state)
-        if hears != before[1] or not before[0]:
-            self._hears_commands.publish(hears)
+            before, self._published = self._published, (doing(vehicle), hears_commands(vehicle))
+            state, hears = self._published
+            if state != before[0]:
+                self._flight_state.publish(state)
+            if hears != before[1] or not before[0]:
+                self._hears_commands.publish(hears)
 
     def publish_joints(self, vehicle: Vehicle, stamp: Callable[[], rospy.Time]) -> None:
         """Publish the angles of the propellers' blades, at the rate of a display."""
