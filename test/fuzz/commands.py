@@ -10,7 +10,7 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, Wre
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.rviz.vehicle_handles import VehicleHandles
+from drone_sim.ros.rviz.handles import VehicleHandles
 from drone_sim.ros.vehicle.inputs import VehicleInputs
 from drone_sim.run.simulation import Simulation
 

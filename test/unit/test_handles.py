@@ -10,7 +10,7 @@ from visualization_msgs.msg import InteractiveMarkerFeedback
 
 from drone_sim.forces.pushes import Push
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.rviz import vehicle_handles
+from drone_sim.ros.rviz import handles
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
@@ -18,9 +18,9 @@ from drone_sim.run.simulation import Simulation
 @pytest.fixture
 def dragged(monkeypatch):
     """Return a simulation, and the inbox in which a drag to x = 2 m waits."""
-    monkeypatch.setattr(vehicle_handles, "MarkerServer", mock.MagicMock())
+    monkeypatch.setattr(handles, "MarkerServer", mock.MagicMock())
     simulation, inbox = Simulation(parameters.load({"script": ""})), Inbox()
-    shown = vehicle_handles.VehicleHandles(simulation, inbox)
+    shown = handles.VehicleHandles(simulation, inbox)
     feedback = InteractiveMarkerFeedback(event_type=InteractiveMarkerFeedback.POSE_UPDATE, marker_name="Drone")
     feedback.pose.position.x, feedback.pose.position.z, feedback.pose.orientation.w = 2.0, 1.0, 1.0
     shown._on_feedback(feedback)
@@ -68,9 +68,9 @@ class Hand:
 
 @pytest.fixture(name="hand")
 def _hand(monkeypatch):
-    monkeypatch.setattr(vehicle_handles, "MarkerServer", mock.MagicMock())
+    monkeypatch.setattr(handles, "MarkerServer", mock.MagicMock())
     simulation, inbox = Simulation(parameters.load({"script": "", "weather": {"wind": [5, 0, 0]}})), Inbox()
-    yield Hand(vehicle_handles.VehicleHandles(simulation, inbox), simulation, inbox)
+    yield Hand(handles.VehicleHandles(simulation, inbox), simulation, inbox)
     simulation.close()
 
 

@@ -6,7 +6,7 @@ pytest.importorskip("visualization_msgs", reason="needs ROS")
 
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
-from drone_sim.ros.rviz.marker_server import TIMEOUT, HeldHandles
+from drone_sim.ros.rviz.handles import TIMEOUT, HeldHandles
 
 TAKEN, HELD, LET_GO = (
     InteractiveMarkerFeedback.MOUSE_DOWN,

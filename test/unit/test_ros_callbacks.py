@@ -21,7 +21,7 @@ from visualization_msgs.msg import InteractiveMarkerFeedback
 from drone_sim.ros.core import message_conversion
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.node import diagnostics, scene_editing, services
-from drone_sim.ros.rviz import object_handles, vehicle_handles
+from drone_sim.ros.rviz import handles
 from drone_sim.ros.vehicle import cameras
 from drone_sim.ros.vehicle.inputs import VehicleInputs
 from drone_sim.run import parameters
@@ -57,8 +57,7 @@ def callbacks(monkeypatch):
         return mock.MagicMock()
 
     monkeypatch.setattr(rospy, "Subscriber", subscriber)
-    for module in (vehicle_handles, object_handles):
-        monkeypatch.setattr(module, "MarkerServer", mock.MagicMock())
+    monkeypatch.setattr(handles, "MarkerServer", mock.MagicMock())
     return found
 
 
@@ -130,17 +129,17 @@ def test_a_refusal_names_the_topic_of_the_command(simulation, callbacks, caplog,
     assert f"{topic} refused, the last valid one is kept: " in caplog.text
 
 
-@pytest.mark.parametrize("made", [vehicle_handles.VehicleHandles, object_handles.ObjectHandles])
+@pytest.mark.parametrize("made", [handles.VehicleHandles, handles.ObjectHandles])
 def test_a_handle_is_dragged_without_the_simulation(simulation, callbacks, made):
     inbox = Inbox()
-    handles = made(simulation, inbox)
+    shown = made(simulation, inbox)
     for event in ("MOUSE_DOWN", "POSE_UPDATE", "MOUSE_UP"):
         feedback = InteractiveMarkerFeedback(marker_name="Drone", client_id="rviz")
         feedback.event_type = getattr(InteractiveMarkerFeedback, event)
         feedback.pose.position.x, feedback.pose.position.z, feedback.pose.orientation.w = 2.0, 1.0, 1.0
-        in_another_thread(handles._on_feedback, feedback)
+        in_another_thread(shown._on_feedback, feedback)
     inbox.run_jobs()
-    is_moved = made is vehicle_handles.VehicleHandles
+    is_moved = made is handles.VehicleHandles
     assert simulation.drone.body.state.position[0] == pytest.approx(2.0 if is_moved else 0.0, abs=1e-3)
 
 

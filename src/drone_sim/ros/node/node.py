@@ -39,12 +39,10 @@ from drone_sim.ros.node.windows import WindowTopics
 from drone_sim.ros.rviz.drawing_markers import DrawingMarkers
 from drone_sim.ros.rviz.flight_markers import CommandMarkers, HeightMarkers, PathMarkers, StateText
 from drone_sim.ros.rviz.force_markers import ForceMarkers
+from drone_sim.ros.rviz.handles import ObjectHandles, VehicleHandles
 from drone_sim.ros.rviz.marker_topics import namespace
-from drone_sim.ros.rviz.object_handles import ObjectHandles
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
-from drone_sim.ros.rviz.scene_markers import SceneMarkers, VehicleMarkers
-from drone_sim.ros.rviz.surroundings_markers import SurroundingsMarkers
-from drone_sim.ros.rviz.vehicle_handles import VehicleHandles
+from drone_sim.ros.rviz.scene_markers import SceneMarkers, SurroundingsMarkers, VehicleMarkers
 from drone_sim.ros.vehicle.script_backend import RosBackend
 from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.ros.vehicle.vehicle_topics import FleetTopics

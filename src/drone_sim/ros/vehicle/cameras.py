@@ -292,15 +292,17 @@ def _markers(objects: list[Detection], header: Header) -> MarkerArray:
     return MarkerArray(made)
 
 
+def _number_of(detection: Detection) -> list[Any]:
+    return [ObjectHypothesisWithPose(id=detection.number, score=1.0)]
+
+
 def _detections(objects: list[Detection], header: Header) -> Any:
     made = []
     for detection in objects:
         left, top, right, bottom = detection.visible
         box = BoundingBox2D(size_x=right - left, size_y=bottom - top)
         box.center.x, box.center.y = (left + right) / 2, (top + bottom) / 2
-        made.append(
-            Detection2D(header=header, bbox=box, results=[ObjectHypothesisWithPose(id=detection.number, score=1.0)])
-        )
+        made.append(Detection2D(header=header, bbox=box, results=_number_of(detection)))
     return Detection2DArray(header=header, detections=made)
 
 
@@ -308,7 +310,5 @@ def _detections_3d(objects: list[Detection], header: Header) -> Any:
     made = []
     for detection in objects:
         box = BoundingBox3D(center=_pose(detection), size=Vector3(*detection.size))
-        made.append(
-            Detection3D(header=header, bbox=box, results=[ObjectHypothesisWithPose(id=detection.number, score=1.0)])
-        )
+        made.append(Detection3D(header=header, bbox=box, results=_number_of(detection)))
     return Detection3DArray(header=header, detections=made)
