@@ -42,7 +42,7 @@ def test_streams_are_bounded_and_a_wrong_handle_gets_one_line():
 
 def test_numbers_are_told_after_each_step_while_somebody_listens(monkeypatch):
     rospy = pytest.importorskip("rospy", reason="needs ROS")
-    from drone_sim.ros.node.signals import SignalTopic
+    from drone_sim.ros.node.inspection import SignalTopic
 
     published, listeners = [], [0]
 

@@ -26,14 +26,12 @@ from drone_sim.ros.core.publishing import StepTime
 from drone_sim.ros.core.shutdown import Shutdown
 from drone_sim.ros.core.startup import MASTER_FAILURES, init_node, release_name, status_of_node
 from drone_sim.ros.node.diagnostics import Diagnostics
-from drone_sim.ros.node.inspection import InspectionTopics
+from drone_sim.ros.node.inspection import InspectionTopics, SignalTopic
 from drone_sim.ros.node.interventions import Interventions
 from drone_sim.ros.node.lockstep import Lockstep
-from drone_sim.ros.node.object_poses import ObjectPoses
-from drone_sim.ros.node.run_timeline import RunTimeline
+from drone_sim.ros.node.run_timeline import RunTimeline, subscribe_object_poses
 from drone_sim.ros.node.scene_editing import SceneEditing
 from drone_sim.ros.node.services import Services
-from drone_sim.ros.node.signals import SignalTopic
 from drone_sim.ros.node.start_checks import check_launch_arguments, check_others
 from drone_sim.ros.node.windows import WindowTopics
 from drone_sim.ros.rviz.drawing_markers import DrawingMarkers
@@ -106,7 +104,7 @@ class Node:
         self._editing = SceneEditing(self.player, self._inbox, self._services)
         self._windows = WindowTopics(self.simulation, self._inbox)
         self._signals = SignalTopic(self.simulation)
-        self._object_poses = ObjectPoses(self.simulation, self._inbox)
+        subscribe_object_poses(self.simulation, self._inbox)
         self._inspection = InspectionTopics(self.player, self._inbox)
         self._meshes = RvizMeshes()
         self._rviz = (  # each publishes only to subscribers

@@ -1,20 +1,28 @@
-"""The timeline of the parameter `timeline_file`: commands and events that every run executes at their steps."""
+"""The timeline of `timeline_file`, which every run executes, and ~set_object_pose, by which a client executes one."""
 
 from __future__ import annotations
 
 import contextlib
 
 import rospy
+from geometry_msgs.msg import TransformStamped
 
+from drone_sim.grading.permissions import MOVE
+from drone_sim.mechanics.frames import to_rpy
 from drone_sim.offline import timeline as timelines
-from drone_sim.offline.timeline import Timeline, TimelineError
+from drone_sim.offline.timeline import ObjectMove, Timeline, TimelineError
+from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.core.launch_parameters import from_shell
+from drone_sim.ros.core.message_conversion import xyz, xyzw
 from drone_sim.ros.core.startup import MASTER_FAILURES
+from drone_sim.ros.core.validation import check_frame, intervention
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.vehicles import checks
 
 _FILE = "~timeline_file"
+_NO_ROTATION = (0.0,) * 4  # the quaternion of a message in which it is not set
 
 
 class RunTimeline:
@@ -45,3 +53,33 @@ class RunTimeline:
     def summary(self) -> str:
         """The digest of the timeline, to be added to the answer of a start; '' without entries."""
         return f"; timeline {self._timeline.digest}" if self._timeline.entries else ""
+
+
+def subscribe_object_poses(simulation: Simulation, inbox: Inbox) -> None:
+    """Subscribe to ~set_object_pose: it moves an object of the scene before the next step, which runs jobs of `inbox`.
+
+    `child_frame_id` is the object's name. Without a rotation in the message, the object keeps its own.
+    """
+
+    def take(message: TransformStamped) -> None:
+        name = message.child_frame_id
+        try:
+            check_frame(message.header.frame_id)
+            position, rotation = xyz(message.transform.translation), xyzw(message.transform.rotation)
+            parameters, is_turned = simulation.parameters, rotation != _NO_ROTATION
+            pose = checks.pose(
+                position, rotation if is_turned else (0, 0, 0, 1), parameters, -parameters.position_limit
+            )
+        except checks.Refused as refused:
+            rospy.logwarn_throttle(1, f"set_object_pose of '{name}' refused: {refused}")
+            return
+        move = ObjectMove(name, pose.position, to_rpy(pose.matrix) if is_turned else None)
+        inbox.put(lambda: put(move), intervention(MOVE, name, "~set_object_pose", message))
+
+    def put(move: ObjectMove) -> None:
+        try:
+            move.apply(simulation.context.objects)
+        except ValueError as error:
+            rospy.logwarn_throttle(1, f"set_object_pose of '{move.name}' refused: {error}")
+
+    rospy.Subscriber("~set_object_pose", TransformStamped, take, queue_size=100, tcp_nodelay=True)

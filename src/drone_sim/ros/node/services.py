@@ -50,19 +50,15 @@ class Services:
         `player` reads `timeline` at each start. `follow` updates the topics after vehicles were added or removed;
         `restored` is called after a restore.
         """
-        self._restored = restored
-        self._timeline = timeline
-        self._player = player
-        self._inbox = inbox
-        self._follow = follow
+        self._player, self._timeline, self._inbox = player, timeline, inbox
+        self._follow, self._restored = follow, restored
         self._vehicles = VehiclesParameter()
         self._vehicles.write(player.simulation.parameters)
         self._snapshot: Snapshot | None = None
         self._launch_script = rospy.get_param("~script", "")
         # The scene of the config, if the parameter scene_file did not replace it.
         self._config_scene = "" if scene_parameter() else player.simulation.parameters.scene_file
-        jobs = ("start", "stop", "restart", "load_scene", "set_vehicles", "snapshot", "restore")
-        for name in jobs:
+        for name in ("start", "stop", "restart", "load_scene", "set_vehicles", "snapshot", "restore"):
             rospy.Service(f"~{name}", Trigger, partial(self._answer, name, getattr(self, name)))
         rospy.Service("~step", Trigger, self._answer_step)
         rospy.Service(
@@ -134,9 +130,7 @@ class Services:
         return self._report_start(f"{started} in {file or 'the scene of the parameters'}")
 
     def _report_start(self, started: str) -> str:
-        self._vehicles.write(
-            self._player.simulation.parameters
-        )  # the scene was read again, and may have other vehicles
+        self._vehicles.write(self._player.simulation.parameters)  # the scene that was read may have other vehicles
         return f"{started}{self._timeline.summary}"
 
     def _read_script(self) -> None:
@@ -152,7 +146,7 @@ class Services:
 
     def set_vehicles(self) -> str:
         """Fly the vehicles in the parameter `vehicles`; those that already fly continue."""
-        added, removed = self._player.simulation.set_vehicles(self._vehicles.read())
+        added, removed = self._player.simulation.set_vehicles(rospy.get_param(_VEHICLES, {}))
         self._follow()
         changes = [f"{', '.join(names)} {verb}" for names, verb in ((added, "added"), (removed, "removed")) if names]
         return "; ".join(changes) or "no vehicle was added or removed"
@@ -207,12 +201,8 @@ class VehiclesParameter:
         try:
             self._write(_sendable(parameters.vehicle_entries) or self._given)
         except (TypeError, OverflowError) as error:  # of XML-RPC: such as a seed of more than 32 bits
-            rospy.logwarn(
-                f"the parameter {rospy.resolve_name(_VEHICLES)} cannot be set to the vehicles of the scene: {error}"
-            )
-
-    def read(self) -> Any:
-        return rospy.get_param(_VEHICLES, {})
+            name = rospy.resolve_name(_VEHICLES)
+            rospy.logwarn(f"the parameter {name} cannot be set to the vehicles of the scene: {error}")
 
     def close(self) -> None:
         """Restore the value of the launch, because the next simulator of this name may have other vehicles."""
