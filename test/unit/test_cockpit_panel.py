@@ -14,7 +14,7 @@ from drone_sim.hosting.tunable import tunables
 from drone_sim.ros.cockpit.editor.scene_lists import SceneList
 from drone_sim.ros.cockpit.panel import tuning as tuning_module
 from drone_sim.ros.cockpit.panel.board import Board
-from drone_sim.ros.cockpit.panel.panel import Panel, SimulatorListener
+from drone_sim.ros.cockpit.panel.panel import Panel
 from drone_sim.ros.cockpit.panel.tuning import SpeedControl, VehicleTuning
 from drone_sim.ros.cockpit.topics import FoundTopics
 from drone_sim.ros.vehicle.tuning_server import described
@@ -184,20 +184,20 @@ def test_what_there_is_not_is_refused_in_one_line(panel, ask, message):
 
 def test_what_the_simulation_says_is_shown_as_text(panel, told, monkeypatch):
     monkeypatch.setattr("rospy.Subscriber", lambda *_, **__: None)
-    socket = type("Socket", (), {"tell": lambda _self, message: told.append(message)})()
     heard = []
-    listener = SimulatorListener("/drone_sim", panel, socket, lambda: heard.append(True))
-    listener._on_log(Log(name="/other", msg="not ours"))
-    listener._on_log(Log(name="/drone_sim", msg=HOSTILE, level=Log.WARN))
+    monkeypatch.setattr(panel.pulse, "hear", lambda: heard.append(True))
+    panel.listen(True)
+    panel._on_log(Log(name="/other", msg="not ours"))
+    panel._on_log(Log(name="/drone_sim", msg=HOSTILE, level=Log.WARN))
     assert panel.board.whole({})["lines"] == [f"warning: {HOSTILE}"]
-    listener._on_log(Log(name="/drone_sim", msg="[actuation] /a.py:3: ZeroDivisionError", level=Log.ERROR))
+    panel._on_log(Log(name="/drone_sim", msg="[actuation] /a.py:3: ZeroDivisionError", level=Log.ERROR))
     assert told[-1]["failure"]["line"] == 3
     found = [
         DiagnosticStatus(0, "drone_sim: simulation", "flying", "", [KeyValue("real-time factor", "0.98")]),
         DiagnosticStatus(1, "drone_sim: vehicle drone", "upside down", "", []),
         DiagnosticStatus(2, "another: node", "broken", "", []),
     ]
-    listener._on_diagnostics(DiagnosticArray(status=found))
+    panel._on_diagnostics(DiagnosticArray(status=found))
     assert panel.board.get("pace") == "0.98"
     assert len(heard) == 3, "what other nodes say is no sign of life"
     assert panel.board.get("diagnosis") == [

@@ -21,7 +21,7 @@ from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
 from drone_sim.ros.cockpit.panel.board import NO_SIMULATION
 from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows
-from drone_sim.ros.cockpit.panel.panel import Panel, Pulse, SimulatorListener
+from drone_sim.ros.cockpit.panel.panel import Panel
 from drone_sim.ros.cockpit.scene.meshes import MeshStore
 from drone_sim.ros.cockpit.scene.scene_state import SceneState
 from drone_sim.ros.cockpit.scene.scene_view import SceneView
@@ -47,7 +47,6 @@ class Cockpit:
         self._simulator = Simulator(simulator)
         self._topics = FoundTopics()
         self._view: SceneView | None = None
-        self._listener: SimulatorListener | None = None
         self._asked_master_at = 0.0
         self._commands = CommandPublisher()
         self._state, self._meshes = SceneState(), MeshStore()
@@ -70,13 +69,12 @@ class Cockpit:
         self._panel = Panel(self._simulator, self._commands, SceneList(scripts), self._socket.tell)
         self._cameras = CameraSwitches(self._panel.board, self._socket)
         self._windows = ScriptWindows(self._simulator.node, self._cameras, self._socket)
-        self._pulse = Pulse(self._simulator.node, self._socket.tell)
         answers.update({**self._panel.answers, **self._windows.answers})
         server.begin(self._socket.serve, self._find)
         room = Classroom(self._panel.board, lambda: bool(self._socket.browsers), self._camera, editor.for_teachers)
         for loop in (lambda: held.run(lambda: not rospy.is_shutdown()), self._hold_dragged, room.run):
             threading.Thread(target=loop, daemon=True).start()
-        self._pulse.start()
+        self._panel.pulse.start()
 
     def run(self) -> None:
         """Update the browsers until the node ends."""
@@ -118,15 +116,11 @@ class Cockpit:
 
     def _open(self, namespace: str) -> None:
         """Show another simulation, '' for none."""
-        if self._view is not None and self._listener is not None:
+        if self._view is not None:
             self._view.close()
-            self._listener.close()
-        self._view = self._listener = None
-        self._pulse.expect(bool(namespace))
-        if namespace:
-            self._view = SceneView(self._state, self._meshes, namespace)
-            self._listener = SimulatorListener(self._simulator.node, self._panel, self._socket, self._pulse.hear)
-        else:
+        self._view = SceneView(self._state, self._meshes, namespace) if namespace else None
+        self._panel.listen(bool(namespace))
+        if not namespace:
             self._editing.subscribe(False)
             self._panel.follow("")
             self._panel.plots.rest()

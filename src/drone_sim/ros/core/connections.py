@@ -22,7 +22,6 @@ def subscribers_of(topic: str) -> list[Any]:
 
 
 def received_topics() -> list[str]:
-    """Return the topics that this node subscribes to."""
     return [topic for topic, _ in get_topic_manager().get_subscriptions()]
 
 

@@ -59,7 +59,6 @@ class MasterWatch(threading.Thread):
         self._pid = self._poll()
 
     def run(self) -> None:
-        """Poll until the node shuts down."""
         is_lost = False
         rospy.on_shutdown(self._done.set)
         while not self._done.wait(_PERIOD):

@@ -39,7 +39,6 @@ class Shutdown:
         rospy.core.add_shutdown_hook(lambda _reason: self._closed.set())  # this hook runs last, after topics are closed
 
     def is_requested(self) -> bool:
-        """Return whether the node must end."""
         return self._is_requested or bool(rospy.is_shutdown())
 
     def complete(self) -> None:

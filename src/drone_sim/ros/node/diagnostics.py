@@ -52,7 +52,6 @@ class Diagnostics(threading.Thread):
         self._ended.set()
 
     def run(self) -> None:
-        """Publish until it is closed."""
         while not self._ended.wait(PERIOD):
             if not self._publisher.get_num_connections():
                 continue

@@ -66,7 +66,6 @@ class InspectionTopics:
         self._breakpoints = rospy.Subscriber("~breakpoints", String, self._on_breakpoints, queue_size=10)
 
     def update(self) -> None:
-        """Publish changes if there are subscribers."""
         if self._simulation.breakpoints and not self._breakpoints.get_num_connections():
             self._simulation.set_breakpoints({})  # their author has disconnected
         if self._variables.has_subscribers:

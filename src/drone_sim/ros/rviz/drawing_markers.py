@@ -38,7 +38,6 @@ class DrawingMarkers:
         self._publisher = rospy.Publisher(f"{drone}/drawing", MarkerArray, queue_size=1, latch=True)
 
     def update(self) -> None:
-        """Publish the drawings if they have changed and there are subscribers."""
         has_changed = self._published != self._drawings.changes or self._drawings.carried
         if not has_changed or not self._publisher.get_num_connections():
             return

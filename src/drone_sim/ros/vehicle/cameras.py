@@ -88,7 +88,6 @@ class CameraOutput:
         self._info = message_conversion.camera_info(self._intrinsics, self._frame)
 
     def close(self) -> None:
-        """Unregister the topics."""
         for publisher in (self._image, self._compressed, self._info_publisher):
             if publisher is not None:
                 publisher.unregister()
@@ -148,7 +147,6 @@ class CompressedPublisher:
         return settings
 
     def unregister(self) -> None:
-        """Unregister the topics."""
         self._is_open = False
         self._has_pending.set()
         for publisher in (self.publisher, self._server.descr_topic, self._server.update_topic):
@@ -258,7 +256,6 @@ class TruthOutput:
         self._flow_known.publish(image(255 * known.astype(np.uint8), "mono8", header))
 
     def close(self) -> None:
-        """Unregister the topics."""
         for publisher in (self._labels, *self._made, self._flow, self._flow_known, self._overlay):
             publisher.unregister()
 

@@ -148,7 +148,6 @@ class VehicleInputs:
         self._parameters, self._weather_limits = vehicle.parameters, self._simulation.parameters.weather
 
     def close(self) -> None:
-        """Unregister the topics."""
         for subscriber in self._subscribers:
             subscriber.unregister()
         self._services.close()

@@ -51,7 +51,6 @@ class VehicleOutputs:
         self._display_throttle, self._state_throttle = Throttle(_DISPLAY_PERIOD), Throttle(_STATE_PERIOD)
 
     def close(self) -> None:
-        """Unregister the topics."""
         state = self._odometry, self._command, self._propellers, self._joints, self._flight_state, self._hears_commands
         for publisher in state:
             publisher.unregister()
@@ -107,7 +106,6 @@ class SensorOutput:
         self._sensor = sensor
 
     def close(self) -> None:
-        """Unregister the topics."""
         for publisher in self._publishers.values():
             publisher.unregister()
 

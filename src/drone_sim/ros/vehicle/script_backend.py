@@ -53,7 +53,6 @@ class RosBackend:
         return rospy.get_param(name, None)
 
     def set_parameter(self, name: str, value: Any) -> None:
-        """Set a parameter."""
         rospy.set_param(name, value)
 
     def delete_parameter(self, name: str) -> None:
@@ -111,7 +110,6 @@ class RosBackend:
         return rospy.Subscriber(topic, message_class(kind), take, queue_size=10).unregister
 
     def advertise(self, topic: str, kind: str, queue: int, latch: bool) -> _Sender:
-        """Advertise a topic."""
         made = message_class(kind)
         return _Sender(rospy.Publisher(topic, made, queue_size=queue, latch=latch), made, self._stamp)
 

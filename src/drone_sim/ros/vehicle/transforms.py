@@ -26,7 +26,6 @@ class Transforms:
     """
 
     def __init__(self) -> None:
-        """Advertise."""
         self._new_subscribers = NewSubscribers()
         self._moving = rospy.Publisher("/tf", TFMessage, subscriber_listener=self._new_subscribers, queue_size=100)
         self._fixed = rospy.Publisher("/tf_static", TFMessage, queue_size=10, latch=True)

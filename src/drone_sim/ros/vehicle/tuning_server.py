@@ -72,7 +72,6 @@ class TuningServer:
         self._updates.publish(self._config)
 
     def close(self) -> None:
-        """Unregister topics and service."""
         for publisher in (self._description, self._updates):
             publisher.unregister()
         self._service.shutdown()

@@ -71,7 +71,6 @@ class VehicleTopics:
             self._tuning.follow(self._simulation.child_scripts[self.vehicle.name].tuning)
 
     def close(self) -> None:
-        """Unregister all topics."""
         outputs = [output for _, output in (*self.cameras, *self.sensors)]
         parts: list[Any] = [self.inputs, self.outputs, self.driver, self._tuning, *outputs]
         for part in filter(None, parts):
@@ -140,7 +139,6 @@ class FleetTopics:
                 message.publish(topics.vehicle, self._stamp)
 
     def publish_pictures(self) -> None:
-        """Publish the pictures of every vehicle's cameras."""
         for topics in self._topics.values():
             for _, camera in topics.cameras:
                 camera.publish(self._stamp)

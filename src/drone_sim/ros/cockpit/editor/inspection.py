@@ -49,7 +49,6 @@ class ScriptInspector:
 
     @property
     def answers(self) -> dict[str, Answer]:
-        """Functions that answer requests of browsers, by the name of the request."""
         return {"inspect": self._inspect}
 
     def _inspect(self, message: Mapping[str, Any]) -> Mapping[str, Any]:

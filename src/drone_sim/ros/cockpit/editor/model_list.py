@@ -60,7 +60,6 @@ class ModelList:
         self.folder = folder / _FOLDER
 
     def groups(self) -> list[dict[str, Any]]:
-        """Return all models by group."""
         vehicles: dict[str, _Operation] = {
             name.capitalize(): {"do": "add_vehicle", "type": name, "height": _HEIGHT} for name in TYPES
         }

@@ -36,7 +36,6 @@ class Board:
             self._tell({"panel": {part: content}, "version": self._version})
 
     def get(self, part: str, default: Any = None) -> Any:
-        """Return the content of a part."""
         return self._parts.get(part, default)
 
     def log(self, line: str) -> None:

@@ -287,7 +287,6 @@ class ScriptWindows:
 
     @property
     def answers(self) -> dict[str, Answer]:
-        """Functions that answer browsers' requests, by name."""
         return {
             "windows": lambda _: {"windows": self._state, "pictures": self._cameras.shown},
             "answer": self._answer_dialog,

@@ -18,7 +18,7 @@ from drone_sim.ros.cockpit.editor.scene_lists import SceneList
 from drone_sim.ros.cockpit.panel.board import NO_SIMULATION, Board, one_of
 from drone_sim.ros.cockpit.panel.plots import Plots
 from drone_sim.ros.cockpit.panel.tuning import SpeedControl, VehicleTuning
-from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
+from drone_sim.ros.cockpit.server.page_socket import Answer
 from drone_sim.ros.cockpit.teleop import REQUESTS, CommandPublisher
 from drone_sim.ros.cockpit.topics import FoundTopics
 from drone_sim.ros.core import network
@@ -43,12 +43,14 @@ class Panel:
         self, simulator: Simulator, commands: CommandPublisher, scenes: SceneList, tell: Callable[[Any], None]
     ):
         """`simulator` is called, `commands` sends commands, `scenes` lists scenes; `tell` sends to all browsers."""
-        self._simulator, self._commands, self._scenes = simulator, commands, scenes
+        self._simulator, self._commands, self._scenes, self._tell = simulator, commands, scenes, tell
+        self.pulse = Pulse(simulator.node, tell)
         self.board = Board(tell)
         self.plots = Plots(self.board)
         self.tuning = VehicleTuning(self.board)
         self.speed = SpeedControl(self.board, simulator.node)
-        self._flight: list[rospy.Subscriber] = []
+        self._subscribers: list[rospy.Subscriber] = []  # to the simulator
+        self._flight: list[rospy.Subscriber] = []  # to the followed vehicle
         self._followed = ""
         self.board.show("status", NO_SIMULATION)
 
@@ -125,55 +127,48 @@ class Panel:
                 ),
             ]
 
+    # ---- the simulator
 
-class SimulatorListener:
-    """Subscriptions to one simulator, whose state they show on the panel."""
-
-    def __init__(self, node: str, panel: Panel, socket: PageSocket, hear: Callable[[], None]):
-        """Subscribe to `node`, show its state on `panel`, and send failures of scripts through `socket`.
-
-        `hear` is called with every message that shows that the node is alive.
-        """
-        self._node, self._hear = node, hear
-        self._panel, self._socket = panel, socket
+    def listen(self, on: bool) -> None:
+        """Subscribe to the simulator's state, log, diagnosis, signals and parameters, or unsubscribe."""
+        self.pulse.expect(on)
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        node = self._simulator.node
         subscriptions = (
             ("/rosout_agg", Log, self._on_log),
             ("/diagnostics", DiagnosticArray, self._on_diagnostics),
             (f"{node}/state", String, self._on_state),
-            (f"{node}/signals", String, panel.plots.on_signals),
-            (f"{node}/parameter_updates", Config, panel.speed.on_set),
+            (f"{node}/signals", String, self.plots.on_signals),
+            (f"{node}/parameter_updates", Config, self.speed.on_set),
         )
-        self._subscribers = [rospy.Subscriber(*subscription, queue_size=20) for subscription in subscriptions]
-
-    def close(self) -> None:
-        for subscriber in self._subscribers:
-            subscriber.unregister()
+        self._subscribers = [rospy.Subscriber(*each, queue_size=20) for each in subscriptions] if on else []
 
     def _on_state(self, message: Any) -> None:
-        self._hear()
-        self._panel.board.show("status", message.data)
+        self.pulse.hear()
+        self.board.show("status", message.data)
 
     def _on_log(self, message: Any) -> None:
-        if message.name != self._node:
+        if message.name != self._simulator.node:
             return
-        self._hear()
-        self._panel.board.log(f"{_LEVELS.get(message.level, '')}{message.msg}")
+        self.pulse.hear()
+        self.board.log(f"{_LEVELS.get(message.level, '')}{message.msg}")
         failure = script_failure(message.msg) if message.level >= Log.ERROR else None
         if failure is not None:
-            self._socket.tell({"failure": failure._asdict()})
+            self._tell({"failure": failure._asdict()})
 
     def _on_diagnostics(self, message: Any) -> None:
-        own = f"{self._node.strip('/')}: "
+        own = f"{self._simulator.node.strip('/')}: "
         found = {one.name.removeprefix(own): one for one in message.status if one.name.startswith(own)}
         if not found:  # another node's
             return
-        self._hear()
+        self.pulse.hear()
         said = [
             {"of": name, "said": one.message, "wrong": one.level != DiagnosticStatus.OK} for name, one in found.items()
         ]
-        self._panel.board.show("diagnosis", sorted(said, key=lambda one: not one["wrong"]))
+        self.board.show("diagnosis", sorted(said, key=lambda one: not one["wrong"]))
         values = {one.key: one.value for one in found["simulation"].values} if "simulation" in found else {}
-        self._panel.board.show("pace", values.get("real-time factor", ""))
+        self.board.show("pace", values.get("real-time factor", ""))
 
 
 class Pulse(threading.Thread):

@@ -105,7 +105,6 @@ class DragControls:
             self._changed |= self._handles.keys()
 
     def on_update(self, message: InteractiveMarkerUpdate) -> None:
-        """Add, move and remove handles."""
         with self._lock:
             for marker in message.markers:
                 self._handles[marker.name] = marker, marker.pose

@@ -98,7 +98,6 @@ class MarkerTopic:
         self._changed: dict[Key, Entry | None] = {}
 
     def on_markers(self, message: MarkerArray) -> None:
-        """Add, change and delete markers."""
         numbers: dict[str, int] | None = None
         fresh: dict[Key, Entry | None] = {}
         for marker in message.markers:

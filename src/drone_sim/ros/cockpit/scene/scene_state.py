@@ -94,7 +94,6 @@ class SceneState:
             return any(changed)
 
     def clear(self) -> None:
-        """Remove all frames and markers."""
         with self._lock:
             self.version += 1
             self._cleared = self.version

@@ -223,7 +223,6 @@ class _CheckedConnection(ServerConnection):
     """WebSocket of a browser. If the browser violates the protocol, it is disconnected, with one warning."""
 
     async def recv(self, decode: bool | None = None) -> Any:
-        """Return the next message, as `ServerConnection` does."""
         try:
             return await super().recv(decode)
         except ConnectionClosedError as error:

@@ -95,7 +95,6 @@ class PageServer:
         self._handlers.set_result((socket, find))
 
     def stop(self) -> None:
-        """Close all connections, and stop listening."""
         self._server.close()
         closing = asyncio.run_coroutine_threadsafe(self._server.wait_closed(), self._loop)
         try:

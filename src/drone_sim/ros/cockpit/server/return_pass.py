@@ -45,7 +45,6 @@ class ReturnPass:
         return self._give.hex()
 
     def challenge(self) -> str:
-        """Return a new challenge."""
         content = f"{int(time.monotonic())}.{secrets.token_hex(16)}"
         return f"{content}.{_mac(self._secret, content)}"
 
