@@ -73,21 +73,18 @@ class _PendingAnswer:
             return "doubled"
         if self.awaited.topic.endswith(_STAMPED_TOPIC):
             return "" if message.header.stamp == self.stamp else "of another stamp"
-        return "" if self._could_be_seen_by(sender(message)) else "early"
+        trigger = self.awaited.trigger
+        if not self.is_triggered():
+            return "early"
+        if trigger == _CLOCK:  # the node may answer any message of the step, and these are written in any order
+            return ""
+        # If the node is connected, the trigger must have been given to its socket.
+        links = [each for each in connections.subscribers_of(trigger) if each.endpoint_id == sender(message)]
+        return "early" if any(map(connections.has_queued, links)) else ""
 
     def is_triggered(self) -> bool:
         """Return whether the trigger has been published: not if the step has failed."""
         return connections.sent_count(self.awaited.trigger) > self.sent_before
-
-    def _could_be_seen_by(self, node: str) -> bool:
-        """Return whether the trigger has been published, and been given to the node's socket if it is connected."""
-        trigger = self.awaited.trigger
-        if not self.is_triggered():
-            return False
-        if trigger == _CLOCK:  # the node may answer any message of the step, and these are written in any order
-            return True
-        links = [each for each in connections.subscribers_of(trigger) if each.endpoint_id == node]
-        return not any(map(connections.has_queued, links))
 
 
 class Lockstep:
@@ -279,9 +276,16 @@ class Lockstep:
     def _are_nodes_connected(self) -> bool:
         """Return whether all nodes are connected, and none of their connections has been added for a while."""
         self._update_topics()
-        now, present = self._clock(), self._relevant_connections()
-        if present != self._connections:
-            self._connections, self._changed_at = present, now
+        now = self._clock()
+        # The connections of awaited topics and triggers count, and all those of the nodes that are to answer. /clock does
+        # not: nodes that have nothing to do with the flight connect to it at any time.
+        topics = {*self._awaited, *(awaited.trigger for awaited in self._awaited.values())} - {_CLOCK}
+        senders = {each.callerid_pub for each in self._senders()}
+        relevant = {
+            (topic, node) for topic, node in connections.all_connections() if topic in topics or node in senders
+        }
+        if relevant != self._connections:
+            self._connections, self._changed_at = relevant, now
         with self._lock:
             timeout = self._parameters.timeout
             self._stale_answers = {k: old for k, old in self._stale_answers.items() if now - old.since < timeout}
@@ -294,26 +298,22 @@ class Lockstep:
             self._waiting_since, self._has_connected = None, True
             for awaited in self._awaited.values():
                 awaited.sender_names = _names(connections.publishers_of(awaited.topic))
-            rospy.loginfo(f"lockstep: {self._simulation.time:.2f} s: in step with {self._nodes()}")
+            rospy.loginfo(f"lockstep: {self._simulation.time:.2f} s: in step with {_names(self._senders())}")
             return True
         self._report_missing(obstacle, now - self._waiting_since)
         return False
 
-    def _relevant_connections(self) -> set[tuple[str, str]]:
-        """Return the connections of awaited topics and triggers, and all those of the nodes that are to answer.
-
-        /clock does not count: nodes that have nothing to do with the flight connect to it at any time.
-        """
-        topics = {*self._awaited, *(awaited.trigger for awaited in self._awaited.values())} - {_CLOCK}
-        senders = {each.callerid_pub for name in self._awaited for each in connections.publishers_of(name)}
-        return {(topic, node) for topic, node in connections.all_connections() if topic in topics or node in senders}
-
     def _obstacle(self, is_checked: bool = False) -> str:
         """Return in words why time stands, '' if all nodes are connected. Raises ParameterError if `is_checked`."""
         problems = self._problems + self._unreceived_topics(is_checked)
-        missing = [text for awaited in self._awaited.values() for text in _missing(awaited)]
         if problems:
             return f"because {'; '.join(problems)}"
+        missing = []
+        for awaited in self._awaited.values():
+            if not connections.publishers_of(awaited.topic):
+                missing.append(f"a publisher of {awaited.topic}")
+            if awaited.trigger != _CLOCK and not connections.subscribers_of(awaited.trigger):
+                missing.append(f"a subscriber of {awaited.trigger}")
         return f"until there is {' and '.join(missing)}" if missing else ""
 
     def _report_missing(self, obstacle: str, waited: float) -> None:
@@ -327,9 +327,9 @@ class Lockstep:
         if waited > limit and is_limited:
             raise NoAnswer(f"{line}: it did not come within {limit:g} s (lockstep/start_timeout)")
 
-    def _nodes(self) -> str:
-        senders = {each.callerid_pub for name in self._awaited for each in connections.publishers_of(name)}
-        return ", ".join(sorted(senders))
+    def _senders(self) -> list[Any]:
+        """Return the connections of the nodes that are to answer."""
+        return [each for name in self._awaited for each in connections.publishers_of(name)]
 
     # ---- topics
 
@@ -381,17 +381,18 @@ class Lockstep:
     # ---- diagnosis
 
     def finding(self) -> Finding:
-        """Return what /diagnostics says."""
+        """Return the line and values for /diagnostics."""
+        nodes = _names(self._senders())
         mean = f"{self._waited / self._waits * 1e3:.2f} ms" if self._waits else "not known"
         values = {
             "waits for": ", ".join(f"{name} (after {each.entry.trigger})" for name, each in self._awaited.items()),
-            "nodes": self._nodes(),
+            "nodes": nodes,
             "mean wait": mean,
             "answers": str(self._waits),
             "timeouts": str(self._timeouts),
             "ignored messages": ", ".join(f"{count} {why}" for why, count in sorted(self._ignored.items())) or "none",
         }
-        line = f"in step with {self._nodes() or 'nobody yet'}; mean wait {mean}"
+        line = f"in step with {nodes or 'nobody yet'}; mean wait {mean}"
         return finding("lockstep", line, list(self._find_problems()), values)
 
     def _find_problems(self) -> Iterator[Problem]:
@@ -437,16 +438,6 @@ def _awaited_topic(topic: str, name: str, vehicle: Vehicle, entry: AwaitedTopic)
 
 def _names(senders: list[Any]) -> str:
     return ", ".join(sorted({each.callerid_pub for each in senders}))
-
-
-def _missing(awaited: _AwaitedTopic) -> list[str]:
-    """Return what is not connected yet, in words."""
-    missing = []
-    if not connections.publishers_of(awaited.topic):
-        missing.append(f"a publisher of {awaited.topic}")
-    if awaited.trigger != _CLOCK and not connections.subscribers_of(awaited.trigger):
-        missing.append(f"a subscriber of {awaited.trigger}")
-    return missing
 
 
 def _is_direct(awaited: _AwaitedTopic) -> bool:

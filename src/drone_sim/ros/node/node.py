@@ -102,7 +102,7 @@ class Node:
         restored = self._lockstep.reset if self._lockstep else lambda: None
         self._services = Services(self.player, self._timeline, self._inbox, self._topics.follow, restored)
         self._editing = SceneEditing(self.player, self._inbox, self._services)
-        self._windows = WindowTopics(self.simulation, self._inbox)
+        self._windows = WindowTopics(self.simulation, self._inbox, self._time.stamp)
         self._signals = SignalTopic(self.simulation)
         subscribe_object_poses(self.simulation, self._inbox)
         self._inspection = InspectionTopics(self.player, self._inbox)
@@ -288,7 +288,7 @@ class Node:
         self._topics.publish_command()
         for markers in self._rviz:
             markers.update()
-        self._windows.update(self._time.stamp)
+        self._windows.update()
         self._signals.update()
         self._inspection.update()
         self._editing.update()

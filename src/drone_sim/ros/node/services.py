@@ -107,7 +107,7 @@ class Services:
         return self._report_start(self._player.start())
 
     def stop(self) -> str:
-        """Run cleanup, and restore the initial scene."""
+        """Run the script's cleanup, and restore the initial scene."""
         return self._player.stop()
 
     def restart(self) -> str:

@@ -35,9 +35,9 @@ _MAX_LENGTH = 10_000  # characters of an answer
 class WindowTopics:
     """Publishes the open windows as JSON when they change, and takes answers."""
 
-    def __init__(self, simulation: Simulation, inbox: Inbox):
-        """Advertise and subscribe for `simulation`, whose thread runs the jobs in `inbox`."""
-        self._simulation, self._inbox = simulation, inbox
+    def __init__(self, simulation: Simulation, inbox: Inbox, stamp: Stamp):
+        """Advertise and subscribe for `simulation`, whose thread runs the jobs in `inbox`; `stamp` is for pictures."""
+        self._simulation, self._inbox, self._stamp = simulation, inbox, stamp
         self._windows = rospy.Publisher("~windows", String, queue_size=1, latch=True)
         self._answers = rospy.Subscriber("~window_answers", String, self._on_answer, queue_size=10)
         simulation.windows.readers.add(lambda: self._answers.get_num_connections() > 0)
@@ -45,9 +45,9 @@ class WindowTopics:
         self._throttle = Throttle(_PERIOD)
         self._shown = 0  # number of changes of the windows at the last message
 
-    def update(self, stamp: Stamp) -> None:
+    def update(self) -> None:
         """Publish the windows if they have changed, and the pictures of views."""
-        self._pictures.publish(stamp)
+        self._pictures.publish(self._stamp)
         windows = self._simulation.windows
         if windows.changes == self._shown or not self._throttle.passes():
             return
@@ -80,19 +80,18 @@ class ViewPictures:
     """Topics of the pictures in views. A vision sensor of the scene has a topic `~views/NAME` while a view shows it."""
 
     def __init__(self, simulation: Simulation):
-        """Begin without views of cameras and sensors of `simulation`."""
         self._simulation = simulation
         self._throttle = Throttle(_PICTURE_PERIOD)
         self._publishers: dict[str, rospy.Publisher] = {}  # of sensors of the scene, by name
 
     def follow(self, sensors: list[str]) -> list[str]:
         """Return the picture topics of objects with these names; '' for an object that takes no pictures."""
-        own = {name for name in sensors if self._eye(name) is not None}
-        for name in self._publishers.keys() - own:
+        of_scene = {name for name in sensors if self._eye(name) is not None}
+        for name in self._publishers.keys() - of_scene:
             self._publishers.pop(name).unregister()
-        for name in own - self._publishers.keys():
+        for name in of_scene - self._publishers.keys():
             self._publishers[name] = rospy.Publisher(self._own_topic(name), Image, queue_size=1)
-        return [self._own_topic(name) if name in own else self._vehicles_topic(name) for name in sensors]
+        return [self._own_topic(name) if name in of_scene else self._vehicles_topic(name) for name in sensors]
 
     def publish(self, stamp: Stamp) -> None:
         """Publish pictures of sensors of the scene to subscribers, at most every _PICTURE_PERIOD."""
@@ -100,8 +99,7 @@ class ViewPictures:
         if not watched or not self._throttle.passes():
             return
         for name in watched:
-            eye = self._eye(name)
-            if eye is not None:
+            if (eye := self._eye(name)) is not None:
                 message = image_messages.image(eye.picture("color"), "rgb8")
                 message.header.stamp = stamp()
                 self._publishers[name].publish(message)
