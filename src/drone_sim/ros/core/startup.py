@@ -56,8 +56,7 @@ def init_node(name: str, is_required: bool = False, **options: Any) -> bool:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
     try:
-        _check_master()
-        _check_own_address()
+        _check_network()
         own_name = rospy.names.get_mappings().get("__name", "" if options.get("anonymous") else name)
         if own_name:
             _take_name(str(rosgraph.names.resolve_name(own_name, rospy.core.get_caller_id())), is_required)
@@ -86,17 +85,14 @@ def status_of_node(name: str, action: Callable[[], Any]) -> int:
     return 1
 
 
-def _check_master() -> None:
+def _check_network() -> None:
+    """Raise OSError without a master, ValueError if other nodes cannot resolve this node's address."""
     uri = str(rosgraph.get_master_uri())
     check_master_uri(uri)
     try:
         call(uri, "getPid", timeout=_CALL_TIMEOUT)
     except FAILURES:
         raise OSError(f"no ROS master at {uri}: start roscore, or use roslaunch") from None
-
-
-def _check_own_address() -> None:
-    """Raise ValueError if other nodes cannot resolve this node's address."""
     variable = next((name for name in ("ROS_HOSTNAME", "ROS_IP") if name in os.environ), None)
     host = os.environ[variable] if variable else rosgraph.network.get_host_name()
     try:

@@ -19,7 +19,7 @@ from drone_sim.run.profiles import command_topics
 
 PERIOD = 1.0  # s of real time
 PATIENCE = 2.0  # s, for the simulation's answer
-_MASTER_PERIOD = 5.0  # s of real time, between two questions to the master
+_MASTER_PERIOD = 5.0  # s of real time, between two requests to the master
 _TWISTS = "geometry_msgs/Twist", "geometry_msgs/TwistStamped"
 _MAX_LENGTH = 600  # characters of a value
 _BUSY = "simulation"  # name of the finding that the simulation does not answer
@@ -33,7 +33,7 @@ class Diagnostics(threading.Thread):
     """
 
     def __init__(self, look: Callable[[], list[Finding]], stamp: Callable[[], rospy.Time], inbox: Inbox):
-        """Advertise. `look` and `stamp` are called in the simulation's thread, which runs the jobs in `inbox`."""
+        """Advertise. `look` returns the findings; it and `stamp` are called in the thread that runs `inbox`'s jobs."""
         super().__init__(name="diagnostics", daemon=True)
         self._look, self._stamp, self._inbox = look, stamp, inbox
         self._ended = threading.Event()
@@ -59,14 +59,14 @@ class Diagnostics(threading.Thread):
                 self.unheard = unheard_commands()
             self._ask()
             try:
-                message = DiagnosticArray(status=[_status(one) for one in self._findings.values()])
+                message = DiagnosticArray(status=list(map(_status, self._findings.values())))
                 message.header.stamp = self._stamped
                 self._publisher.publish(message)
             except rospy.ROSException:  # the node ends, and has closed the topic
                 return
 
     def _ask(self) -> None:
-        """Have the simulation looked at, unless it still owes an answer; wait for it."""
+        """Request new findings, unless a request is still unanswered; wait for the answer for PATIENCE."""
         if self._answered.is_set():
             self._answered.clear()
             self._asked = time.monotonic()

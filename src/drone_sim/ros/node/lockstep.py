@@ -277,8 +277,8 @@ class Lockstep:
         """Return whether all nodes are connected, and none of their connections has been added for a while."""
         self._update_topics()
         now = self._clock()
-        # The connections of awaited topics and triggers count, and all those of the nodes that are to answer. /clock does
-        # not: nodes that have nothing to do with the flight connect to it at any time.
+        # The connections of awaited topics and triggers count, and all those of the nodes that are to answer, but not
+        # /clock: nodes that have nothing to do with the flight connect to it at any time.
         topics = {*self._awaited, *(awaited.trigger for awaited in self._awaited.values())} - {_CLOCK}
         senders = {each.callerid_pub for each in self._senders()}
         relevant = {

@@ -38,8 +38,11 @@ def check_launch_arguments() -> None:
 
 
 def check(command: Sequence[str], folder: Path) -> None:
-    """Raise ParameterError for a wrong argument of a command that was given in a folder."""
-    arguments = _arguments(command)
+    """Raise ParameterError for a wrong argument of a `roslaunch` command that was given in a folder."""
+    starts = [number for number, word in enumerate(command[:2], 1) if Path(word).name == "roslaunch"]
+    if not starts:  # another program; the first word may be python
+        return
+    arguments = list(command[starts[0] :])
     files = [number for number, one in enumerate(arguments) if one.endswith(_SUFFIXES) and ":=" not in one]
     for launch in sorted((package_path() / "launch").glob("*.launch")):
         if len(files) == 1 and _is(launch, arguments, files[0], folder):
@@ -48,14 +51,6 @@ def check(command: Sequence[str], folder: Path) -> None:
                 name, given, _ = argument.partition(":=")
                 if given and not name.startswith("__") and name not in known:
                     raise ParameterError(f"{argument}: {launch.name} has no argument {name}; {near_names(name, known)}")
-
-
-def _arguments(command: Sequence[str]) -> list[str]:
-    """Return the arguments after `roslaunch`; none for another program."""
-    for number, word in enumerate(command[:2]):  # the first word may be python
-        if Path(word).name == "roslaunch":
-            return list(command[number + 1 :])
-    return []
 
 
 def _is(launch: Path, arguments: Sequence[str], number: int, folder: Path) -> bool:

@@ -94,7 +94,7 @@ class MarkerTopic:
         self._mesh_url = mesh_url
         self._hidden, self._is_shaded = hidden, is_shaded
         self._lock = threading.Lock()
-        self._entries: dict[Key, Entry] = {}
+        self._keys: set[Key] = set()  # of the present markers
         self._changed: dict[Key, Entry | None] = {}
 
     def on_markers(self, message: MarkerArray) -> None:
@@ -103,7 +103,7 @@ class MarkerTopic:
         for marker in message.markers:
             if marker.action == Marker.DELETEALL:
                 # All markers follow again, maybe with other ids. The n-th of a namespace replaces the n-th before.
-                numbers, fresh = {}, dict.fromkeys(self._entries)
+                numbers, fresh = {}, dict.fromkeys(self._keys)
                 continue
             number = marker.id if numbers is None else numbers.get(marker.ns, 0)
             if numbers is not None:
@@ -112,11 +112,7 @@ class MarkerTopic:
             is_gone = marker.action == Marker.DELETE or marker.ns in self._hidden
             fresh[key] = None if is_gone else entry_of(marker, self.layer, self._mesh_url, self._is_shaded)
         with self._lock:
-            for key, entry in fresh.items():
-                if entry is None:
-                    self._entries.pop(key, None)
-                else:
-                    self._entries[key] = entry
+            self._keys = (self._keys | fresh.keys()) - {key for key, entry in fresh.items() if entry is None}
             self._changed.update(fresh)
 
     def take(self) -> dict[Key, Entry | None]:
