@@ -8,8 +8,7 @@ from visualization_msgs.msg import Marker
 
 from drone_sim.mechanics import frames
 from drone_sim.ros.rviz import marker_topics
-from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
-from drone_sim.ros.rviz.scene_markers import SceneMarkers
+from drone_sim.ros.rviz.scene_markers import RvizMeshes, SceneMarkers
 from drone_sim.scene.kinds.dummy import Dummy
 from drone_sim.scene.kinds.path import PathParameters
 

@@ -31,7 +31,10 @@ class Topics:
 
 
 class Transforms:
-    def publish_static(self, _vehicles, _stamp):
+    def __init__(self, _simulation, _stamp):
+        pass
+
+    def publish_static(self):
         pass
 
 

@@ -3,7 +3,7 @@
 Parameters (private): every key of config/drone.yaml.
 Topics, in the namespace of each vehicle: see ros/vehicle; for rviz: see ros/rviz; services: services.py.
 /clock is published with use_sim_time: see ros/core/publishing.py; /diagnostics: see diagnostics.py.
-Frames: see ros/vehicle/transforms.py.
+Frames: see ros/vehicle/outputs.py.
 """
 
 from __future__ import annotations
@@ -39,8 +39,7 @@ from drone_sim.ros.rviz.flight_markers import CommandMarkers, HeightMarkers, Pat
 from drone_sim.ros.rviz.force_markers import ForceMarkers
 from drone_sim.ros.rviz.handles import ObjectHandles, VehicleHandles
 from drone_sim.ros.rviz.marker_topics import namespace
-from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
-from drone_sim.ros.rviz.scene_markers import SceneMarkers, SurroundingsMarkers, VehicleMarkers
+from drone_sim.ros.rviz.scene_markers import RvizMeshes, SceneMarkers, SurroundingsMarkers, VehicleMarkers
 from drone_sim.ros.vehicle.script_backend import RosBackend
 from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.ros.vehicle.vehicle_topics import FleetTopics

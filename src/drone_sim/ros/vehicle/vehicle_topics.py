@@ -14,8 +14,7 @@ from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.ros.vehicle.cameras import CameraOutput
 from drone_sim.ros.vehicle.driver_topics import DriverOutputs
 from drone_sim.ros.vehicle.inputs import VehicleInputs
-from drone_sim.ros.vehicle.outputs import SensorOutput, VehicleOutputs
-from drone_sim.ros.vehicle.transforms import Transforms
+from drone_sim.ros.vehicle.outputs import SensorOutput, Transforms, VehicleOutputs
 from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.scene_settings import PLACE
@@ -89,7 +88,7 @@ class FleetTopics:
         self._inbox, self._gate = inbox, gate
         self._stamp = stamp
         self._topics: dict[str, VehicleTopics] = {}
-        self._transforms = Transforms()
+        self._transforms = Transforms(simulation, stamp)
         self._topology_version = -1
         self._tuned: tuple[int, int, bool] | None = None
         self.descriptions: tuple[str, ...] = ()  # names of the parameters that hold the URDFs; any thread may read it
@@ -123,7 +122,7 @@ class FleetTopics:
             else:
                 self._topics[name] = VehicleTopics(self._simulation, vehicle, self._inbox, self._gate)
         self.descriptions = tuple(rospy.resolve_name(f"{name}/robot_description") for name in vehicles)
-        self._transforms.publish_static(vehicles.values(), self._stamp)
+        self._transforms.publish_static()
         # rospy's topics are in reference cycles, and each has an open descriptor (epoll) until it is collected.
         gc.collect()
 
@@ -153,11 +152,11 @@ class FleetTopics:
         """Publish joint states and transforms: tf2 takes only one transform for each stamp."""
         for topics in self._topics.values():
             topics.outputs.publish_joints(topics.vehicle, self._stamp)
-        self._transforms.publish(self._simulation.vehicles.values(), self._stamp)
+        self._transforms.publish()
 
     def tell_new_subscribers(self) -> bool:
         """Send transforms to new subscribers; return whether there are new subscribers to pictures or state."""
-        self._transforms.tell_new_subscribers(self._simulation.vehicles.values(), self._stamp)
+        self._transforms.tell_new_subscribers()
         return any([topics.new_subscribers.take() for topics in self._topics.values()])
 
     def publish_command(self) -> None:
