@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from geometry_msgs.msg import PointStamped, Vector3Stamped, WrenchStamped
 from sensor_msgs.msg import BatteryState, FluidPressure, Imu, MagneticField, NavSatFix, Range
+from std_msgs.msg import String
 
 from drone_sim.ros.core.message_conversion import xyz
 
@@ -56,6 +58,15 @@ def find_topics(topics: Iterable[tuple[str, str]]) -> FoundTopics:
     return FoundTopics(min(views), tuple(own), cameras, sensors)
 
 
+def read_json(message: String, max_length: int) -> dict[str, Any] | None:
+    """Return the mapping in a JSON message; None if it is none, or has more than `max_length` characters."""
+    try:
+        content = json.loads(message.data) if len(message.data) <= max_length else None
+    except (ValueError, RecursionError):
+        return None
+    return content if isinstance(content, dict) else None
+
+
 class PlottedMessage(NamedTuple):
     """A message type, the names of the numbers that are plotted, and a function that returns them."""
 
@@ -69,8 +80,8 @@ def _axes(what: str, unit: str) -> tuple[str, ...]:
 
 
 PLOTTED = {
-    one.message._type: one  # type: ignore[attr-defined]
-    for one in (
+    plotted.message._type: plotted  # type: ignore[attr-defined]
+    for plotted in (
         PlottedMessage(
             Imu,
             (*_axes("acceleration", "m/s²"), *_axes("rate", "rad/s")),

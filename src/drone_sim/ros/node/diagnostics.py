@@ -79,7 +79,7 @@ class Diagnostics(threading.Thread):
 
     def _answer(self) -> None:
         try:
-            self._findings = {one.name: one for one in self._look()}
+            self._findings = {finding.name: finding for finding in self._look()}
             self._stamped = self._stamp()
         except Exception as error:  # a flight does not end because it could not be described
             self._findings = {_BUSY: Finding(_BUSY, ERROR, f"cannot be diagnosed: {error!r}", {})}
@@ -100,7 +100,7 @@ def unheard_commands() -> dict[str, list[str]]:
         kinds = dict(call(uri, "getTopicTypes"))
     except (*FAILURES, TypeError):  # TypeError: an answer of another shape
         return {}
-    others = {topic: [one for one in nodes if one != rospy.get_name()] for topic, nodes in published.items()}
+    others = {topic: [node for node in nodes if node != rospy.get_name()] for topic, nodes in published.items()}
     return {
         topic: nodes
         for topic, nodes in sorted(others.items())
@@ -108,7 +108,7 @@ def unheard_commands() -> dict[str, list[str]]:
     }
 
 
-def _status(found: Finding) -> DiagnosticStatus:
-    values = [KeyValue(key, value[:_MAX_LENGTH]) for key, value in found.values.items()]
-    name = f"{rospy.get_name()[1:]}: {found.name}"
-    return DiagnosticStatus(found.level, name, found.message[:_MAX_LENGTH], "none", values)  # no hardware
+def _status(finding: Finding) -> DiagnosticStatus:
+    values = [KeyValue(key, value[:_MAX_LENGTH]) for key, value in finding.values.items()]
+    name = f"{rospy.get_name()[1:]}: {finding.name}"
+    return DiagnosticStatus(finding.level, name, finding.message[:_MAX_LENGTH], "none", values)  # no hardware

@@ -131,7 +131,7 @@ class Node:
         self._diagnostics = Diagnostics(self._findings, self._time.stamp, self._inbox)
         self._beat = Beat(_CHANGED_PERIOD, _IDLE_PERIOD)
         self._shown = -1  # the world's changes, when it was shown
-        for camera in [one for vehicle in self._first() for one in vehicle.cameras.values()]:
+        for camera in [camera for vehicle in self._first() for camera in vehicle.cameras.values()]:
             camera.look()  # the first picture takes long: compiling shaders must not make a step late
 
     def run(self, ending: Callable[[], bool] = lambda: False) -> None:
@@ -358,7 +358,7 @@ def main(watchdog: Watchdog) -> int:
         parameters = parameters_of(rospy.get_name())
         script_path(parameters.script)  # none there ends the node; an error in one that is there stops the flight
         with _simulated_time(parameters.lockstep):
-            check_others([one.name for one in parameters.fleet], use_sim_time())
+            check_others([vehicle.name for vehicle in parameters.fleet], use_sim_time())
             nodes.append(Node(parameters))
             MasterWatch(nodes[0].descriptions).start()
             release_name()

@@ -43,10 +43,10 @@ def check(command: Sequence[str], folder: Path) -> None:
     if not starts:  # another program; the first word may be python
         return
     arguments = list(command[starts[0] :])
-    files = [number for number, one in enumerate(arguments) if one.endswith(_SUFFIXES) and ":=" not in one]
+    files = [number for number, word in enumerate(arguments) if word.endswith(_SUFFIXES) and ":=" not in word]
     for launch in sorted((package_path() / "launch").glob("*.launch")):
         if len(files) == 1 and _is(launch, arguments, files[0], folder):
-            known = [str(one.get("name")) for one in ElementTree.parse(launch).getroot().findall("arg")]
+            known = [str(each.get("name")) for each in ElementTree.parse(launch).getroot().findall("arg")]
             for argument in arguments:
                 name, given, _ = argument.partition(":=")
                 if given and not name.startswith("__") and name not in known:
@@ -75,8 +75,8 @@ def check_others(vehicles: Iterable[str], simulated: bool) -> None:
 
     def others(topic: str) -> list[str]:
         """Return the simulators that publish a topic, and still answer."""
-        nodes = [one for one in published.get(topic, ()) if one != own and one in services.get(f"{one}/{_OURS}", ())]
-        return [one for one in nodes if is_alive(uri, one)]
+        nodes = [node for node in published.get(topic, ()) if node != own]
+        return [node for node in nodes if node in services.get(f"{node}/{_OURS}", ()) and is_alive(uri, node)]
 
     for name in vehicles:
         there = others(rospy.resolve_name(f"{name}/{_OF_A_VEHICLE}"))

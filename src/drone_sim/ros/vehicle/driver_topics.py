@@ -170,13 +170,15 @@ def _rpy(vehicle: Vehicle) -> frames.Vector:
 
 
 def _percent(vehicle: Vehicle) -> float:
-    batteries = [one for one in vehicle.instruments.by_name.values() if isinstance(one, Battery)]
-    return next((_FULL * one.latest.value.charge / one.parameters.capacity for one in batteries if one.latest), _FULL)
+    for sensor in vehicle.instruments.by_name.values():
+        if isinstance(sensor, Battery) and sensor.latest:
+            return _FULL * sensor.latest.value.charge / sensor.parameters.capacity
+    return _FULL
 
 
 def _specific_force(vehicle: Vehicle) -> Any:
     """Return the last specific force (m/s^2) of the vehicle's first IMU, 0 without one."""
-    imus = [one for one in vehicle.instruments.by_name.values() if isinstance(one, Imu)]
+    imus = [sensor for sensor in vehicle.instruments.by_name.values() if isinstance(sensor, Imu)]
     force = next((imu.latest.value.specific_force for imu in imus if imu.latest), (0.0, 0.0, 0.0))
     return twist_message(force, force).linear
 

@@ -183,7 +183,7 @@ class Transforms:
         for send in self._new_subscribers.take():
             now = self._stamp()
             vehicles = self._simulation.vehicles.values()
-            send(TFMessage([each for one in vehicles for each in (*_moving(now, one), *_turning(now, one))]))
+            send(TFMessage([each for own in vehicles for each in (*_moving(now, own), *_turning(now, own))]))
 
 
 def _moving(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:

@@ -13,6 +13,7 @@ from std_msgs.msg import String
 
 from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.server.page_socket import Answer
+from drone_sim.ros.cockpit.topics import read_json
 
 _VIEW_TIMEOUT = 4.0  # s without a request after which a table counts as closed; requests come every second
 _CONNECTION_TIMEOUT = 1.0  # s
@@ -120,7 +121,7 @@ class ScriptInspector:
                 self._subscribers.append(rospy.Subscriber(topic, String, callback, queue_size=1))
 
     def _on_variables(self, message: String) -> None:
-        state = _read(message)
+        state = read_json(message, _MAX_LENGTH)
         if state is None:
             return
         with self._lock:
@@ -132,7 +133,7 @@ class ScriptInspector:
                 self._broadcast({"variables": state})
 
     def _on_names(self, message: String) -> None:
-        names = _read(message) or {}
+        names = read_json(message, _MAX_LENGTH) or {}
         lists: list[Any] = [names.get(kind) for kind in self._names]
         if all(isinstance(words, list) and all(isinstance(word, str) for word in words) for words in lists):
             with self._lock:
@@ -146,11 +147,3 @@ def _union(pages: list[_Page]) -> _Lines:
         for file, lines in page.lines.items():
             union.setdefault(file, set()).update(lines)
     return {file: sorted(lines)[:_MAX_LINES] for file, lines in sorted(union.items())[:_MAX_FILES]}
-
-
-def _read(message: String) -> dict[str, Any] | None:
-    try:
-        state = json.loads(message.data) if len(message.data) <= _MAX_LENGTH else None
-    except (ValueError, RecursionError):
-        return None
-    return state if isinstance(state, dict) else None

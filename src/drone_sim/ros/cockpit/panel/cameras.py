@@ -19,7 +19,7 @@ from std_msgs.msg import String
 from drone_sim.message_text import shown
 from drone_sim.ros.cockpit.panel.board import Board, one_of
 from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
-from drone_sim.ros.cockpit.topics import ImageTopic
+from drone_sim.ros.cockpit.topics import ImageTopic, read_json
 from drone_sim.ros.core import image_messages
 
 _MAX_PICTURES = 8  # that wait for their truth; and messages of truth that wait for their picture
@@ -32,8 +32,8 @@ _JPEG = (cv2.IMWRITE_JPEG_QUALITY, 80)
 _MILLIMETRES = "16UC1"  # REP-118
 _WINDOWS = ("views", "dialogs", "consoles")
 BOXES, MASK = OVERLAYS = ("boxes", "mask")
-_CONNECT_TIMEOUT = 3.0  # s, for the simulation to subscribe to answers
 _MAX_LENGTH = 1 << 21  # characters of a message; the simulation's are shorter
+_CONNECT_TIMEOUT = 3.0  # s, for the simulation to subscribe to answers
 _NAMES = {"track": "tracking"}  # names for people, by topic
 
 
@@ -207,12 +207,12 @@ class Overlay:
             self._subscribers[name] = rospy.Subscriber(f"{self._topic}/truth/{name}", *topics[name], **options)
 
     def _on_labels(self, message: String) -> None:
-        categories = _parse(message).get("categories")
+        categories = (read_json(message, _MAX_LENGTH) or {}).get("categories")
         if isinstance(categories, Mapping):
             self._categories = {int(key): str(name) for key, name in categories.items() if str(key).isdigit()}
 
     def _on_boxes(self, message: String) -> None:
-        content = _parse(message)
+        content = read_json(message, _MAX_LENGTH) or {}
         if isinstance(content.get("stamp"), float) and isinstance(content.get("objects"), list):
             boxes = [box for box in content["objects"] if isinstance(box, dict)]
             self._boxes.append((content["stamp"], boxes))
@@ -265,15 +265,6 @@ def _nearest(messages: deque[tuple[float, Any]], stamp: float) -> Any:
     return min([*messages], key=lambda message: abs(message[0] - stamp), default=(0.0, None))[1]
 
 
-def _parse(message: String) -> Mapping[str, Any]:
-    """Return the mapping in a JSON message; {} for an invalid one."""
-    try:
-        content = json.loads(message.data) if len(message.data) <= _MAX_LENGTH else None
-    except (ValueError, RecursionError):
-        content = None
-    return content if isinstance(content, Mapping) else {}
-
-
 class ScriptWindows:
     """Sends views, dialogs and consoles of scripts to the browsers; a view switches its camera on."""
 
@@ -306,7 +297,7 @@ class ScriptWindows:
             self._show({kind: [] for kind in _WINDOWS})
 
     def _on_message(self, message: String) -> None:
-        state = _parse(message)
+        state = read_json(message, _MAX_LENGTH) or {}
         if all(isinstance(state.get(kind), list) for kind in _WINDOWS):
             self._show({kind: [window for window in state[kind] if isinstance(window, dict)] for kind in _WINDOWS})
 

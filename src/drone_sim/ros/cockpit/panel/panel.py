@@ -25,9 +25,8 @@ from drone_sim.ros.core import network
 from drone_sim.ros.core.simulator import FAILURES, Simulator, script_failure
 
 _LEVELS = {Log.WARN: "warning: ", Log.ERROR: "error: ", Log.FATAL: "error: "}
-_PLAIN = ("start", "stop", "restart", "step", "snapshot", "restore")
 _CALLS: dict[str, tuple[Any, ...]] = {
-    **{one: (one,) for one in _PLAIN},
+    **{service: (service,) for service in ("start", "stop", "restart", "step", "snapshot", "restore")},
     "pause": ("pause", True),
     "resume": ("pause", False),
 }
@@ -159,16 +158,17 @@ class Panel:
 
     def _on_diagnostics(self, message: Any) -> None:
         own = f"{self._simulator.node.strip('/')}: "
-        found = {one.name.removeprefix(own): one for one in message.status if one.name.startswith(own)}
-        if not found:  # another node's
+        statuses = {each.name.removeprefix(own): each for each in message.status if each.name.startswith(own)}
+        if not statuses:  # another node's
             return
         self.pulse.hear()
-        said = [
-            {"of": name, "said": one.message, "wrong": one.level != DiagnosticStatus.OK} for name, one in found.items()
+        lines = [
+            {"of": name, "said": status.message, "wrong": status.level != DiagnosticStatus.OK}
+            for name, status in statuses.items()
         ]
-        self.board.show("diagnosis", sorted(said, key=lambda one: not one["wrong"]))
-        values = {one.key: one.value for one in found["simulation"].values} if "simulation" in found else {}
-        self.board.show("pace", values.get("real-time factor", ""))
+        self.board.show("diagnosis", sorted(lines, key=lambda line: not line["wrong"]))
+        values = statuses["simulation"].values if "simulation" in statuses else []
+        self.board.show("pace", next((each.value for each in values if each.key == "real-time factor"), ""))
 
 
 class Pulse(threading.Thread):

@@ -33,9 +33,9 @@ def free_place(address: Any, port: Any) -> tuple[str, int]:
         raise AddressError(f"port = {str(port)[:80]}: must be a whole number from 0 to {_MAX_PORT}, such as 8080")
     family, host = _resolve(address)
     last = min(port + _MAX_TRIES - 1, _MAX_PORT)
-    for one in range(port, last + 1):
-        if _is_free(family, host, one):
-            return host, one
+    for candidate in range(port, last + 1):
+        if _is_free(family, host, candidate):
+            return host, candidate
     raise AddressError(f"port = {port}: all ports from {port} to {last} are in use at {host}")
 
 
@@ -48,24 +48,21 @@ def _resolve(address: Any) -> tuple[socket.AddressFamily, str]:
     if not isinstance(address, str) or not address:
         raise wrong
     try:
-        found = socket.getaddrinfo(address, None, type=socket.SOCK_STREAM)
+        resolved = socket.getaddrinfo(address, None, type=socket.SOCK_STREAM)
+        family, _, _, _, (host, *_) = min(resolved, key=lambda info: info[0] != socket.AF_INET)
+        _is_free(family, str(host), 0)
     except (OSError, UnicodeError):
         raise wrong from None
-    family, _, _, _, place = min(found, key=lambda one: one[0] != socket.AF_INET)
-    try:
-        _is_free(family, str(place[0]), 0)
-    except OSError:
-        raise wrong from None
-    return family, str(place[0])
+    return family, str(host)
 
 
 def _is_free(family: socket.AddressFamily, host: str, port: int) -> bool:
     """Return whether the port is free. Raises AddressError if the user may not use it, OSError for other reasons."""
-    with socket.socket(family, socket.SOCK_STREAM) as one:
-        one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as the server does: it can reuse a closed port
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as the server does: it can reuse a closed port
         try:
-            one.bind((host, port))
-            one.listen()
+            probe.bind((host, port))
+            probe.listen()
         except PermissionError:
             raise AddressError(f"port = {port}: only root may use it; choose one from 1024 on") from None
         except OSError as error:
@@ -79,7 +76,7 @@ def urls(host: str, port: int, token: str) -> tuple[str, str]:
     """Return the cockpit's URL on this machine, and on other machines ('' if they cannot reach it)."""
     here = _LOOPBACK_OF_ALL.get(host, host)
     there = _external_address(host) if host in _LOOPBACK_OF_ALL else ""
-    url, far = (f"http://{f'[{one}]' if ':' in one else one}:{port}/?token={token}" for one in (here, there))
+    url, far = (f"http://{f'[{name}]' if ':' in name else name}:{port}/?token={token}" for name in (here, there))
     return url, far if there else ""
 
 
@@ -87,9 +84,9 @@ def _external_address(host: str) -> str:
     """Return the address at which other machines reach this one; its host name if it has no route to others."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        with socket.socket(family, socket.SOCK_DGRAM) as one:
-            one.connect((_REMOTE_EXAMPLES[family], 9))  # sends nothing, but chooses the local address of the route
-            return str(one.getsockname()[0])
+        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+            probe.connect((_REMOTE_EXAMPLES[family], 9))  # sends nothing, but chooses the local address of the route
+            return str(probe.getsockname()[0])
     except OSError:
         return socket.gethostname()
 

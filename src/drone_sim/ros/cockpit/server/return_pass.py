@@ -67,8 +67,8 @@ def _mac(key: bytes, text: str) -> str:
     return hmac.new(key, text.encode(errors="backslashreplace"), hashlib.sha256).hexdigest()
 
 
-def _is_equal(one: str, other: str) -> bool:
-    return hmac.compare_digest(one.encode(errors="backslashreplace"), other.encode(errors="backslashreplace"))
+def _is_equal(mac: str, other: str) -> bool:
+    return hmac.compare_digest(mac.encode(errors="backslashreplace"), other.encode(errors="backslashreplace"))
 
 
 def is_local(connection: ServerConnection) -> bool:
