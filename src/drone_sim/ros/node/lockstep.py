@@ -48,11 +48,6 @@ class _AwaitedTopic:
     triggers: int = 0  # since the beginning of the run
     sender_names: str = ""  # of the nodes that could answer the last time that there were any
 
-    def count_trigger(self) -> bool:
-        """Count a trigger; return whether it is to be answered."""
-        self.triggers += 1
-        return self.triggers % (self.entry.every * (self.entry.steps or 1)) == 0
-
 
 @dataclass
 class _PendingAnswer:
@@ -194,7 +189,8 @@ class Lockstep:
                 self._begin_wait(awaited, ros_time(self._simulation.time))
 
     def _begin_wait(self, awaited: _AwaitedTopic, stamp: rospy.Time) -> None:
-        if awaited.count_trigger():
+        awaited.triggers += 1
+        if awaited.triggers % (awaited.entry.every * (awaited.entry.steps or 1)) == 0:
             before = self._sent_before.get(awaited.trigger)
             before = connections.sent_count(awaited.trigger) if before is None else before
             senders = connections.publishers_of(awaited.topic)

@@ -1,11 +1,10 @@
-"""Topics under a driver's names: messages of any installed type, copies of our topics, and services."""
+"""Topics that a vehicle publishes under a driver's names: messages of any installed type, and copies of our topics."""
 
 from __future__ import annotations
 
 import contextlib
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
 from typing import Any
 
 import rospy
@@ -14,8 +13,7 @@ from std_msgs.msg import Header
 from drone_sim.config.types import ParameterError, nested
 from drone_sim.mechanics import frames
 from drone_sim.message_text import near_names
-from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.core.message_conversion import BASE_LINK, fill, frame, full_name, message_class, service_class
+from drone_sim.ros.core.message_conversion import BASE_LINK, fill, frame, full_name, message_class
 from drone_sim.ros.core.message_conversion import pose as pose_message
 from drone_sim.ros.core.message_conversion import twist as twist_message
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
@@ -23,15 +21,12 @@ from drone_sim.ros.vehicle.cameras import CameraOutput
 from drone_sim.ros.vehicle.outputs import SensorOutput
 from drone_sim.sensors.battery import Battery
 from drone_sim.sensors.imu import Imu
-from drone_sim.vehicles.commands import REQUESTS
 from drone_sim.vehicles.driver import DriverTopic, Source
-from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
 _QUEUE_SIZE = 10
 _MOVING = 0.001  # of a command: the Bebop's driver takes smaller numbers for zero
 _FULL = 100.0  # %, of a vehicle without a battery
-_SUCCESS = "success", "result"  # fields of responses that say whether it worked
 
 
 class Missing:
@@ -54,38 +49,6 @@ class Missing:
         """Log one line for each package."""
         for package, names in self._names.items():
             rospy.logwarn(f"the package {package} is not in your workspace, so these are not there: {', '.join(names)}")
-
-
-class DriverServices:
-    """The services of one vehicle under a driver's names."""
-
-    def __init__(self, parameters: VehicleParameters, inbox: Inbox, ask: Callable[[str], None], missing: Missing):
-        """Advertise. `ask` asks the vehicle for what a topic of REQUESTS does; the thread of `inbox` calls it."""
-        self._inbox, self._ask = inbox, ask
-        self._servers = []
-        for entry in parameters.topics.values():
-            name = full_name(parameters.name, entry.topic)
-            if entry.service:
-                with missing.noted(entry.type, name):
-                    kind = service_class(str(entry.type))
-                    self._servers.append(rospy.Service(name, kind, partial(self._answer, entry, kind._response_class)))
-
-    def _answer(self, entry: DriverTopic, make_response: type, request: Any) -> Any:
-        """Do what the service says: `motors` with a request for false stops the propellers."""
-        stops = entry.takes == "motors" and not getattr(request, request.__slots__[0])
-        asked = "emergency" if stops else str(entry.takes)
-        if asked in REQUESTS:
-            self._inbox.put(lambda: self._ask(asked))
-        response = make_response()
-        for field in _SUCCESS:
-            if hasattr(response, field):
-                setattr(response, field, True)
-        return response
-
-    def close(self) -> None:
-        """End the services."""
-        for server in self._servers:
-            server.shutdown("the vehicle is gone, or its topics have changed")
 
 
 class DriverMessage:

@@ -1,8 +1,9 @@
-"""Topics that a vehicle subscribes to. Callbacks run in rospy's threads: they check messages and queue jobs."""
+"""Topics that a vehicle subscribes to, and its services. Callbacks in rospy's threads check messages and queue jobs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import rospy
@@ -16,9 +17,9 @@ from drone_sim.config.types import ParameterError
 from drone_sim.grading.permissions import CHANGE, MOVE, PUSH
 from drone_sim.mechanics.state import Pose
 from drone_sim.ros.core.inbox import Gate, Inbox, open_gate
-from drone_sim.ros.core.message_conversion import full_name, message_class, xyz
+from drone_sim.ros.core.message_conversion import full_name, message_class, service_class, xyz
 from drone_sim.ros.core.validation import check_changes, check_frame, intervention, read_changes, read_pose, sender
-from drone_sim.ros.vehicle.driver_topics import DriverServices, Missing
+from drone_sim.ros.vehicle.driver_topics import Missing
 from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
@@ -39,12 +40,13 @@ _INTERVENTIONS = {  # changes of the world, which a graded flight may forbid
     "push": PUSH,
     **dict.fromkeys(("weather", "set_wind", "faults"), CHANGE),
 }
+_SUCCESS = "success", "result"  # fields of a driver's responses that say whether it worked
 _Job = Callable[[Vehicle], Any]
 _Reader = tuple[type, Callable[[Any], _Job]]  # the type of a topic's messages, and their reader
 
 
 class VehicleInputs:
-    """Subscriptions in the namespace of one vehicle."""
+    """Subscriptions and services in the namespace of one vehicle."""
 
     def __init__(self, simulation: Simulation, parameters: VehicleParameters, inbox: Inbox, gate: Gate = open_gate):
         """Subscribe for the vehicle with these parameters.
@@ -79,7 +81,13 @@ class VehicleInputs:
         for topic, entry in drivers.items():
             with missing.noted(entry.type, full_name(self._name, topic)):
                 self._subscribe(topic, str(entry.takes), *self._drivers_reader(entry, own))
-        self._services = DriverServices(parameters, inbox, self._ask, missing)
+        self._services: list[rospy.Service] = []
+        for entry in parameters.topics.values():
+            name = full_name(self._name, entry.topic)
+            if entry.service:
+                with missing.noted(entry.type, name):
+                    kind = service_class(str(entry.type))
+                    self._services.append(rospy.Service(name, kind, partial(self._serve, entry, kind._response_class)))
         missing.warn()
 
     def _drivers_reader(self, entry: DriverTopic, own: Mapping[str, _Reader]) -> _Reader:
@@ -91,11 +99,23 @@ class VehicleInputs:
             return kind, lambda message: self._twist(getattr(message, "twist", message), entry)
         return own[str(entry.takes)]
 
-    def _ask(self, topic: str) -> None:
-        """Ask for what a topic of REQUESTS does, in the simulation's thread."""
-        vehicle = self._simulation.vehicles.get(self._name)
-        if vehicle is not None:
-            vehicle.ask(topic)
+    def _serve(self, entry: DriverTopic, make_response: type, request: Any) -> Any:
+        """Do what a driver's service says: `motors` with a request for false stops the propellers."""
+        stops = entry.takes == "motors" and not getattr(request, request.__slots__[0])
+        topic = "emergency" if stops else str(entry.takes)
+
+        def ask() -> None:
+            vehicle = self._simulation.vehicles.get(self._name)
+            if vehicle is not None:
+                vehicle.ask(topic)
+
+        if topic in REQUESTS:
+            self._inbox.put(ask)
+        response = make_response()
+        for field in _SUCCESS:
+            if hasattr(response, field):
+                setattr(response, field, True)
+        return response
 
     def _subscribe(self, topic: str, meaning: str, kind: type, read: Callable[[Any], _Job]) -> None:
         """Subscribe to a topic: queue the job of each valid message, and log why another one is refused.
@@ -150,7 +170,8 @@ class VehicleInputs:
     def close(self) -> None:
         for subscriber in self._subscribers:
             subscriber.unregister()
-        self._services.close()
+        for service in self._services:
+            service.shutdown("the vehicle is gone, or its topics have changed")
 
     # ---- readers of messages: each returns a job, or raises Refused
 

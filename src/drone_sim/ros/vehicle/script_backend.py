@@ -6,6 +6,7 @@ import contextlib
 import queue
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import genpy
@@ -117,7 +118,7 @@ class RosBackend:
         """Advertise an image topic; images are dropped if a camera of the node already publishes on it."""
         if self._is_camera_topic(topic):
             rospy.loginfo(f"{topic}: the node's camera already publishes it, so the script's images are not published")
-            return _NoSender()
+            return SimpleNamespace(publish=lambda _image: None, subscribers=lambda: 0, shutdown=lambda: None)
         return _ImageSender(rospy.Publisher(topic, ImageMessage, queue_size=queue), ImageMessage, self._stamp)
 
 
@@ -141,14 +142,3 @@ class _ImageSender(_Sender):
     def publish(self, image: Image) -> None:
         header = Header(stamp=self._stamp(), frame_id=image.frame_id)
         self._publisher.publish(image_messages.image(image.pixels, "rgb8", header))
-
-
-class _NoSender:
-    def publish(self, _message: Any) -> None:
-        pass
-
-    def subscribers(self) -> int:
-        return 0
-
-    def shutdown(self) -> None:
-        pass

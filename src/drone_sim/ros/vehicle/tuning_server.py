@@ -110,8 +110,12 @@ def described(known: Mapping[str, ParameterField], values: Mapping[str, Any], re
     """
     groups: dict[str, list[dict[str, Any]]] = {"": []}
     for name, field in known.items():
-        first = str(field.location[0])
-        groups.setdefault(first if first in _GROUPS else rest, []).append(_parameter(name, field))
+        kind, first = _TYPES[field.kind], str(field.location[0])
+        words = [{"name": choice, "type": kind, "value": choice, "description": ""} for choice in field.choices]
+        edit_method = str({"enum": words, "enum_description": field.description}) if words else ""
+        parameter = {"name": name, "type": kind, "level": 0, "description": field.description}
+        group = groups.setdefault(first if first in _GROUPS else rest, [])
+        group.append({**parameter, "edit_method": edit_method})
     whole = {"name": "Default", "type": "", "id": 0, "parent": 0, "parameters": groups.pop("")}
     parts = [
         {"name": group, "type": "", "id": number, "parent": 0, "parameters": parameters, "groups": []}
@@ -123,10 +127,3 @@ def described(known: Mapping[str, ParameterField], values: Mapping[str, Any], re
         max={name: "" if field.kind is str else field.high for name, field in known.items()},
         defaults=dict(values),
     )
-
-
-def _parameter(name: str, field: ParameterField) -> dict[str, Any]:
-    kind = _TYPES[field.kind]
-    words = [{"name": choice, "type": kind, "value": choice, "description": ""} for choice in field.choices]
-    edit_method = str({"enum": words, "enum_description": field.description}) if words else ""
-    return {"name": name, "type": kind, "level": 0, "description": field.description, "edit_method": edit_method}

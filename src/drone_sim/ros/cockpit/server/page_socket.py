@@ -91,8 +91,7 @@ class PageSocket:
 
     def tell(self, message: Mapping[str, Any]) -> None:
         """Send a message to all browsers."""
-        text = json.dumps(message)
-        self._call_queues(lambda queue: queue.put(text))
+        self._call_queues(SendQueue.put, json.dumps(message))
 
     def tell_tree(self, message: Mapping[str, Any]) -> None:
         """Send a change of the object tree to the browsers that edit the scene."""
@@ -109,16 +108,16 @@ class PageSocket:
         `header` has the name as `picture`, and other properties for the page; `content` is a JPEG or PNG.
         """
         picture = json.dumps(header).encode() + b"\n" + content
-        self._call_queues(lambda queue: queue.put_picture(header["picture"], picture))
+        self._call_queues(SendQueue.put_picture, header["picture"], picture)
 
     def close_picture(self, name: str) -> None:
         """Remove the pictures with this name from the queues."""
-        self._call_queues(lambda queue: queue.forget(name))
+        self._call_queues(SendQueue.forget, name)
 
-    def _call_queues(self, call: Callable[[SendQueue], Any]) -> None:
+    def _call_queues(self, method: Callable[..., Any], *arguments: Any) -> None:
         for loop, queue in list(self._queues.values()):
             with contextlib.suppress(RuntimeError):  # the server has ended, and its loop with it
-                loop.call_soon_threadsafe(call, queue)
+                loop.call_soon_threadsafe(method, queue, *arguments)
 
     # ---- messages
 
