@@ -46,7 +46,7 @@ class CameraSwitches:
         self._lock = threading.RLock()  # browsers' threads turn switches, too
         self._sources: dict[str, ImageTopic] = {}
         self._names: dict[str, str] = {}
-        self._shown: dict[str, _CameraListener] = {}
+        self._shown: dict[str, _Camera] = {}
         self._views: frozenset[str] = frozenset()
         self._gone: set[str] = set()  # topics that were on when they disappeared, as while a scene is loaded
         self._resting = True
@@ -71,7 +71,7 @@ class CameraSwitches:
             for topic, camera in self._shown.items():
                 if camera.source != self._sources[topic]:  # in another scene the camera may have truth, or none
                     camera.listen(False)
-                    self._shown[topic] = replacement = _CameraListener(self._sources[topic])
+                    self._shown[topic] = replacement = _Camera(self._sources[topic])
                     replacement.listen(not self._resting)
 
     def answer_camera(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -85,7 +85,9 @@ class CameraSwitches:
         topic = one_of(message, "topic", [topic for topic in self._shown if self._sources[topic].has_truth])
         kind = one_of(message, "overlay", OVERLAYS)
         with self._lock:
-            self._shown[topic].switch_overlay(kind, _is_on(message))
+            camera = self._shown[topic]
+            camera.overlays = camera.overlays | {kind} if _is_on(message) else camera.overlays - {kind}
+            camera.listen(not self._resting)
         return {}
 
     def follow_views(self, topics: frozenset[str]) -> None:
@@ -99,7 +101,7 @@ class CameraSwitches:
         """Turn a switch on or off; do nothing for an unknown topic."""
         with self._lock:
             if on and topic in self._sources and topic not in self._shown:
-                self._shown[topic] = camera = _CameraListener(self._sources[topic])
+                self._shown[topic] = camera = _Camera(self._sources[topic])
                 camera.listen(not self._resting)
             elif not on and topic in self._shown:
                 self._shown.pop(topic).listen(False)
@@ -122,10 +124,9 @@ class CameraSwitches:
                 rospy.logwarn_throttle(10, f"{topic} is not shown: {error}")
                 continue
             header: dict[str, Any] = {"picture": topic, "name": self._names.get(topic, topic), "note": caption}
-            if camera.overlay:
-                stamp = message.header.stamp.to_sec()
-                header |= {"step": _step(message), **camera.overlay.description(stamp)}
-                picture = camera.overlay.draw(picture, stamp)
+            if camera.source.has_truth:
+                picture, truth = camera.add_truth(picture, message.header.stamp.to_sec())
+                header |= {"step": _step(message), **truth}
             self._socket.show_picture(header, picture)
 
     def rest(self, resting: bool) -> None:
@@ -136,75 +137,35 @@ class CameraSwitches:
                 camera.listen(not resting)
 
 
-class _CameraListener:
+class _Camera:
+    """Subscriptions to a camera's pictures and, while they are shown, to its boxes and masks."""
+
     def __init__(self, source: ImageTopic):
         self.source = source
-        self._latest: deque[Any] = deque(maxlen=_MAX_PICTURES)
-        self._subscriber: rospy.Subscriber | None = None
-        self.overlay = Overlay(source.topic) if source.has_truth else None
-
-    def switch_overlay(self, kind: str, on: bool) -> None:
-        if self.overlay is not None:
-            self.overlay.kinds = self.overlay.kinds | {kind} if on else self.overlay.kinds - {kind}
-            self.overlay.listen(self._subscriber is not None)
-
-    def listen(self, on: bool) -> None:
-        source = self.source
-        if self.overlay is not None:
-            self.overlay.listen(on)
-        if on and self._subscriber is None:
-            kind = CompressedImage if source.compressed else Image
-            topic = source.compressed or source.topic
-            self._subscriber = rospy.Subscriber(topic, kind, self._latest.append, queue_size=1, buff_size=_BUFFER)
-        elif not on and self._subscriber is not None:
-            self._subscriber.unregister()
-            self._subscriber = None
-
-    def take(self) -> Any:
-        """Return the newest picture since the last call, or None. Only one thread calls this.
-
-        A picture waits for its truth, which comes a little later, but not for ever.
-        """
-        pictures = [*self._latest]
-        if self.overlay is not None:
-            complete = [picture for picture in pictures if self.overlay.has(picture.header.stamp.to_sec())]
-            pictures = complete if complete or len(pictures) < _MAX_PICTURES else pictures
-        if not pictures:
-            return None
-        while self._latest and self._latest.popleft() is not pictures[-1]:
-            pass
-        return pictures[-1]
-
-
-class Overlay:
-    """Boxes and masks over a camera's picture, from the truth that a camera with `truth: true` publishes.
-
-    It subscribes to those that are shown.
-    """
-
-    def __init__(self, topic: str):
-        """`topic` is that of the camera's pictures."""
-        self._topic = topic
-        self.kinds: frozenset[str] = frozenset()
+        self.overlays: frozenset[str] = frozenset()  # those of OVERLAYS that are shown
+        self._pictures: deque[Any] = deque(maxlen=_MAX_PICTURES)
         self._categories: dict[int, str] = {}
-        self._boxes: deque[tuple[float, list[dict[str, Any]]]] = deque(maxlen=_MAX_PICTURES)
-        self._masks: deque[tuple[float, Image]] = deque(maxlen=_MAX_PICTURES)
+        self._boxes: deque[tuple[float, list[dict[str, Any]]]] = deque(maxlen=_MAX_PICTURES)  # by stamp, s
+        self._masks: deque[tuple[float, Image]] = deque(maxlen=_MAX_PICTURES)  # by stamp, s
         self._subscribers: dict[str, rospy.Subscriber] = {}
 
     def listen(self, on: bool) -> None:
-        """Subscribe to the topics of `kinds` (`on`), or to none."""
+        """Subscribe to the pictures, and to the truth for `overlays`; to nothing if not `on`."""
         topics: dict[str, tuple[type, Callable[[Any], None]]] = {}
-        if on and self.kinds:
-            topics["labels"] = String, self._on_labels
-        if on and BOXES in self.kinds:
-            topics["boxes"] = String, self._on_boxes
-        if on and MASK in self.kinds:
-            topics["categories"] = Image, self._on_mask
-        for name in self._subscribers.keys() - topics.keys():
-            self._subscribers.pop(name).unregister()
-        for name in topics.keys() - self._subscribers.keys():
-            options = {"queue_size": 1, "buff_size": _BUFFER}
-            self._subscribers[name] = rospy.Subscriber(f"{self._topic}/truth/{name}", *topics[name], **options)
+        if on:
+            kind = CompressedImage if self.source.compressed else Image
+            topics[self.source.compressed or self.source.topic] = kind, self._pictures.append
+        truth = f"{self.source.topic}/truth"
+        if on and self.overlays:
+            topics[f"{truth}/labels"] = String, self._on_labels
+        if on and BOXES in self.overlays:
+            topics[f"{truth}/boxes"] = String, self._on_boxes
+        if on and MASK in self.overlays:
+            topics[f"{truth}/categories"] = Image, self._on_mask
+        for topic in self._subscribers.keys() - topics.keys():
+            self._subscribers.pop(topic).unregister()
+        for topic in topics.keys() - self._subscribers.keys():
+            self._subscribers[topic] = rospy.Subscriber(topic, *topics[topic], queue_size=1, buff_size=_BUFFER)
 
     def _on_labels(self, message: String) -> None:
         categories = (read_json(message, _MAX_LENGTH) or {}).get("categories")
@@ -220,39 +181,50 @@ class Overlay:
     def _on_mask(self, message: Image) -> None:
         self._masks.append((message.header.stamp.to_sec(), message))
 
-    def has(self, stamp: float) -> bool:
-        """Return whether the messages of all `kinds` with a stamp (s) have come."""
-        messages = {BOXES: self._boxes, MASK: self._masks}
-        return all(any(abs(at - stamp) < _TOLERANCE for at, _ in [*messages[kind]]) for kind in self.kinds)
+    def take(self) -> Any:
+        """Return the newest picture since the last call, or None. Only one thread calls this.
 
-    def description(self, stamp: float) -> dict[str, Any]:
-        """Return the boxes (px) and the legend that the page itself draws over the picture with a stamp (s)."""
+        A picture waits for the truth of its stamp, which comes a little later, but not for ever.
+        """
+        truths = [self._boxes if overlay == BOXES else self._masks for overlay in self.overlays]
+
+        def is_complete(picture: Any) -> bool:
+            stamp = picture.header.stamp.to_sec()
+            return all(any(abs(at - stamp) < _TOLERANCE for at, _ in [*messages]) for messages in truths)
+
+        pictures = [*self._pictures]
+        complete = list(filter(is_complete, pictures))
+        pictures = complete if complete or len(pictures) < _MAX_PICTURES else pictures
+        if not pictures:
+            return None
+        while self._pictures and self._pictures.popleft() is not pictures[-1]:
+            pass
+        return pictures[-1]
+
+    def add_truth(self, picture: bytes, stamp: float) -> tuple[bytes, dict[str, Any]]:
+        """Return a picture (JPEG or PNG) with the mask of its stamp (s) over it, if that is shown and has come.
+
+        Also return the boxes (px) and the legend that the page itself draws.
+        """
         colors = {name: color_of(number) for number, name in self._categories.items()}
-        boxes = _nearest(self._boxes, stamp) or [] if BOXES in self.kinds else []
+        boxes = _nearest(self._boxes, stamp) or [] if BOXES in self.overlays else []
         shown = [
             {"name": box.get("name"), "box": box.get("visible"), "color": colors.get(str(box.get("category")), "#fff")}
             for box in boxes
             if box.get("name") != _FLOOR
         ]
-        mask = _nearest(self._masks, stamp) if MASK in self.kinds else None
-        numbers = np.unique(image_messages.pixels(mask)).tolist() if mask is not None else []
-        legend = [
-            {"name": self._categories[number], "color": color_of(number)}
-            for number in numbers
-            if number in self._categories
-        ]
-        return {"overlays": sorted(self.kinds), "boxes": shown, "legend": legend}
-
-    def draw(self, picture: bytes, stamp: float) -> bytes:
-        """Return a picture (JPEG or PNG) with the mask of its stamp over it, if that is shown and has come."""
-        message = _nearest(self._masks, stamp) if MASK in self.kinds else None
-        image = None if message is None else cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
-        if image is None:
-            return picture
-        mask = image_messages.pixels(message)
-        mask = cv2.resize(mask, image.shape[1::-1], interpolation=cv2.INTER_NEAREST)
-        masked = image_messages.draw_mask(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), mask)
-        return bytes(cv2.imencode(".jpg", cv2.cvtColor(masked, cv2.COLOR_RGB2BGR))[1])
+        legend: list[dict[str, str]] = []
+        message = _nearest(self._masks, stamp) if MASK in self.overlays else None
+        if message is not None:
+            mask = image_messages.pixels(message)
+            names = {number: self._categories.get(number) for number in np.unique(mask).tolist()}
+            legend = [{"name": name, "color": color_of(number)} for number, name in names.items() if name is not None]
+            image = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
+            if image is not None:
+                mask = cv2.resize(mask, image.shape[1::-1], interpolation=cv2.INTER_NEAREST)
+                masked = image_messages.draw_mask(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), mask)
+                picture = bytes(cv2.imencode(".jpg", cv2.cvtColor(masked, cv2.COLOR_RGB2BGR))[1])
+        return picture, {"overlays": sorted(self.overlays), "boxes": shown, "legend": legend}
 
 
 def color_of(number: int) -> str:
