@@ -50,7 +50,8 @@ class Inbox:
         self._timeout = timeout
         self._jobs: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._has_jobs = threading.Event()
-        self._sleep, self._wake = sleep or self._has_jobs.wait, wake
+        self.wait = sleep or self._has_jobs.wait  # sleeps until a job arrives, for at most a time (s)
+        self._wake = wake
         self._direct_thread = 0  # id of the thread in `run_directly`
 
     def put(self, job: Callable[[], None], intervention: Intervention | None = None) -> None:
@@ -94,10 +95,6 @@ class Inbox:
             state = "it will not be executed" if result.cancel() else "it is still being executed"
             raise TimeoutError(f"no answer within {self._timeout:g} s: {state}")
         return result.result()
-
-    def wait(self, seconds: float) -> None:
-        """Sleep until a job arrives, for at most `seconds`."""
-        self._sleep(seconds)
 
     def run_jobs(self) -> None:
         """Run all jobs that have arrived by now. Only the simulation's thread calls this.

@@ -35,7 +35,6 @@ from drone_sim.ros.core import message_conversion
 from drone_sim.ros.rviz.marker_topics import TEXT_PERIOD, MarkerTopic, band, namespace, new_marker
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.kinds.dummy import Dummy
-from drone_sim.scene.scene import Scene
 from drone_sim.shapes.shape import Corner, Primitive, Rgba
 from drone_sim.shapes.visual import Visual
 from drone_sim.vehicles.vehicle import Vehicle
@@ -72,16 +71,23 @@ _GROUND = (
 _GREY = (0.6, 0.6, 0.6, 1.0)
 
 
-class SceneMarkers:
-    """Publisher of all objects in the scene but the floor. Each marker's namespace is the object's name."""
+class _Markers:
+    """Base class of publishers; `_published` is the state of the last message."""
+
+    name = ""
+    period = TEXT_PERIOD  # s of real time
 
     def __init__(self, simulation: Simulation, files: RvizMeshes):
         """Advertise for the scene of `simulation`; textured visuals are written to `files`."""
-        self._simulation = simulation
-        self._files = files
-        self._published: tuple[list[Visual], list[str], np.ndarray] | None = None
-        self._published_bodiless: list[Marker] = []
-        self._topic = MarkerTopic(f"{namespace(simulation)}/scene", _PERIOD)
+        self._simulation, self._files = simulation, files
+        self._published: Any = None
+        self._topic = MarkerTopic(f"{namespace(simulation)}/{self.name}", self.period)
+
+
+class SceneMarkers(_Markers):
+    """Publisher of all objects in the scene but the floor. Each marker's namespace is the object's name."""
+
+    name, period = "scene", _PERIOD
 
     def update(self) -> None:
         """Publish the objects if any has changed and there are subscribers."""
@@ -91,31 +97,24 @@ class SceneMarkers:
         (visuals, poses), names = self._simulation.scene.visuals(), self._simulation.scene.visual_names()
         bodiless = [*bodiless_markers(self._simulation.scene.objects.values())]
         before = self._published
-        is_same = before and (visuals, names) == before[:2] and np.array_equal(poses, before[2])
-        if is_same and bodiless == self._published_bodiless:
+        if before and (visuals, names, bodiless) == before[:3] and np.array_equal(poses, before[3]):
             return
-        self._published, self._published_bodiless = (visuals, names, poses), copy.deepcopy(bodiless)
+        self._published = visuals, names, copy.deepcopy(bodiless), poses
         markers = [Marker(action=Marker.DELETEALL)]
         for name, visual, pose in zip(names, visuals, poses):
-            of_visual = markers_of(visual, tuple(pose[:3].ravel().tolist()), self._files)
-            for marker in of_visual:
+            for marker in markers_of(visual, tuple(pose[:3].ravel().tolist()), self._files):
                 marker.ns = name
-            markers += of_visual
+                markers.append(marker)
         markers += bodiless
         for marker in markers:
             marker.frame_locked = True
         self._topic.show(markers)
 
 
-class VehicleMarkers:
+class VehicleMarkers(_Markers):
     """Publisher of the vehicles, when one is added or removed. Markers move with the frames of links."""
 
-    def __init__(self, simulation: Simulation, files: RvizMeshes):
-        """Advertise for the vehicles of `simulation`; textured visuals are written to `files`."""
-        self._simulation = simulation
-        self._files = files
-        self._topic = MarkerTopic(f"{namespace(simulation)}/view/bodies", TEXT_PERIOD)
-        self._published = -1  # topology version
+    name = "view/bodies"
 
     def update(self) -> None:
         """Publish the vehicles if any was added or removed and there are subscribers."""
@@ -208,15 +207,10 @@ def _light(normals: np.ndarray, matrix: Matrix) -> np.ndarray:
 # ---- surroundings
 
 
-class SurroundingsMarkers:
+class SurroundingsMarkers(_Markers):
     """Publisher of floor, ground and sky, when the scene or its floor is replaced."""
 
-    def __init__(self, simulation: Simulation, files: RvizMeshes):
-        """Advertise for the scene of `simulation`; its floor is written to `files`."""
-        self._simulation = simulation
-        self._files = files
-        self._published: tuple[Scene, int] | None = None  # scene, and the number of its floor's body
-        self._topic = MarkerTopic(f"{namespace(simulation)}/view/surroundings", TEXT_PERIOD)
+    name = "view/surroundings"
 
     def update(self) -> None:
         """Publish the surroundings if they have changed and there are subscribers."""

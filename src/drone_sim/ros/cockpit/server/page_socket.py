@@ -10,7 +10,7 @@ import logging
 import math
 import socket
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -251,20 +251,20 @@ class SendQueue:
 
     async def take(self) -> str | bytes:
         """Wait for the next message to send, and return it."""
-        while True:
-            for message in self._ready():
-                return message
+        while (message := self._next()) is None:
             self._has_news.clear()
             await self._has_news.wait()
+        return message
 
-    def _ready(self) -> Iterator[str | bytes]:
+    def _next(self) -> str | bytes | None:
         if self._messages:
-            yield self._messages.popleft()
+            return self._messages.popleft()
         if self._unshown_scenes < _MAX_SCENES:
             self._version, changes = self._scene(self._version)
             if changes:
                 self._unshown_scenes += 1
-                yield changes
+                return changes
         for name in self._pictures.keys() - self._unshown_pictures:
             self._unshown_pictures.add(name)
-            yield self._pictures.pop(name)
+            return self._pictures.pop(name)
+        return None
