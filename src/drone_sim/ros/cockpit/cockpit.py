@@ -27,7 +27,7 @@ from drone_sim.ros.cockpit.scene.scene_state import SceneState
 from drone_sim.ros.cockpit.scene.scene_view import SceneView
 from drone_sim.ros.cockpit.server.access_control import Content
 from drone_sim.ros.cockpit.server.page_server import PageServer, find_manual
-from drone_sim.ros.cockpit.server.page_socket import PageSocket
+from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
 from drone_sim.ros.cockpit.teleop import CommandPublisher, HeldCommands
 from drone_sim.ros.cockpit.topics import FoundTopics, find_topics
 from drone_sim.ros.core.master_watch import MasterWatch
@@ -44,32 +44,27 @@ class Cockpit:
 
     def __init__(self, server: PageServer, simulator: str, scripts: Path):
         """Serve the simulator node `simulator` through `server`; `scripts` is the user's folder of scripts."""
-        self._simulator = Simulator(simulator)
+        self._server, self._simulator = server, Simulator(simulator)
+        node = self._simulator.node
         self._topics = FoundTopics()
         self._view: SceneView | None = None
         self._asked_master_at = 0.0
+        self._state, self._meshes, self._lessons = SceneState(), MeshStore(), Lessons()
         self._commands = CommandPublisher()
-        self._state, self._meshes = SceneState(), MeshStore()
         held = HeldCommands(self._commands.send)
-        store, self._lessons = ScriptStore(scripts), Lessons()
-        self._server = server
-        self._inspector = ScriptInspector(self._simulator.node, store, lambda message: self._socket.tell(message))
-        self._editing = SceneEditing(
-            self._simulator.node,
-            scripts,
-            lambda message: self._socket.tell_tree(message),
-            lambda: self._commands.vehicle,
-        )
-        player = TimelinePlayer(self._simulator.node)
-        editor = EditorBackend(store, self._lessons, self._simulator, player, self._editing)
+        answers: dict[str, Answer] = {}  # filled below, before the socket serves browsers
+        handlers = {"drag": self._drag, "push": self._push}
+        self._socket = PageSocket(held, answers, handlers, scene=self._state.since)
+        store = ScriptStore(scripts)
+        self._inspector = ScriptInspector(node, store, self._socket.tell)
+        self._editing = SceneEditing(node, scripts, self._socket.tell_tree, lambda: self._commands.vehicle)
+        editor = EditorBackend(store, self._lessons, self._simulator, TimelinePlayer(node), self._editing)
         self._report_file = editor.grader.report_file
-        answers = {**editor.answers, **self._inspector.answers, **self._editing.answers}
-        takes = {"drag": self._drag, "push": self._push}
-        self._socket = PageSocket(held, answers, takes, scene=self._state.since)
         self._panel = Panel(self._simulator, self._commands, SceneList(scripts), self._socket.tell)
         self._cameras = CameraSwitches(self._panel.board, self._socket)
-        self._windows = ScriptWindows(self._simulator.node, self._cameras, self._socket)
-        answers.update({**self._panel.answers, **self._windows.answers})
+        self._windows = ScriptWindows(node, self._cameras, self._socket)
+        for part in (editor, self._inspector, self._editing, self._panel, self._windows):
+            answers.update(part.answers)
         server.begin(self._socket.serve, self._find)
         room = Classroom(self._panel.board, lambda: bool(self._socket.browsers), self._camera, editor.for_teachers)
         for loop in (lambda: held.run(lambda: not rospy.is_shutdown()), self._hold_dragged, room.run):
