@@ -28,7 +28,7 @@ from websockets.sync.client import connect
 
 from drone_sim.ros.cockpit.cockpit import Cockpit
 from drone_sim.ros.cockpit.editor.task_flights import Grader
-from drone_sim.ros.cockpit.scene.markers import FrameTree, MarkerTopic
+from drone_sim.ros.cockpit.scene.markers import FrameTree, MarkerListener
 from drone_sim.ros.cockpit.scene.meshes import MeshStore, as_glb
 from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL, AccessControl
 from drone_sim.ros.cockpit.server.page_server import PageServer, find_manual, page_files
@@ -362,7 +362,7 @@ def test_what_the_master_knows():
 LINE = [Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)]
 
 
-class Topic(MarkerTopic):
+class Topic(MarkerListener):
     """A topic whose markers one browser sees."""
 
     def __init__(self, layer="drawing", **options):
@@ -468,7 +468,7 @@ def test_a_frame_waits_for_its_parents():
 
 
 def test_what_happens_in_one_step_is_one_message():
-    browser, frames, topic = Browser(), FrameTree(), MarkerTopic("view/path")
+    browser, frames, topic = Browser(), FrameTree(), MarkerListener("view/path")
     frames.on_transforms(TFMessage([transform("world", "a"), transform("world", "b")]))
     topic.on_markers(MarkerArray([marker(0)]))
     assert browser.state.change(frames.take(), topic.take())

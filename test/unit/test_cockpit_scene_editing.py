@@ -11,8 +11,8 @@ from std_msgs.msg import String
 from test_cockpit_inspection import Topic
 
 from drone_sim.files.resources import package_path
-from drone_sim.ros.cockpit.editor import scene_editing
-from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
+from drone_sim.ros.cockpit.editor import scene_backend
+from drone_sim.ros.cockpit.editor.scene_backend import SceneBackend
 from drone_sim.scripting.python.helpers import BUILT_IN
 
 ROW = {"handle": 3, "name": "Gate"}
@@ -35,8 +35,8 @@ def _asked(monkeypatch):
         return Answer(True, json.dumps({"revision": len(asked), "file": asked[-1].get("save", "")}))
 
     monkeypatch.setattr(Topic, "there", {})
-    monkeypatch.setattr(scene_editing.rospy, "Subscriber", Topic)
-    monkeypatch.setattr(scene_editing.rospy, "ServiceProxy", lambda name, kind: ask)
+    monkeypatch.setattr(scene_backend.rospy, "Subscriber", Topic)
+    monkeypatch.setattr(scene_backend.rospy, "ServiceProxy", lambda name, kind: ask)
     return asked
 
 
@@ -47,7 +47,7 @@ def _told():
 
 @pytest.fixture(name="editing")
 def _editing(asked, told, tmp_path):
-    made = SceneEditing("/sim", tmp_path, told.append)
+    made = SceneBackend("/sim", tmp_path, told.append)
     made.subscribe(True)
     return made
 
@@ -118,7 +118,7 @@ def test_run_writes_the_script_into_a_scene_that_names_one(editing, asked):
 
 
 def test_a_saved_scene_keeps_the_script_that_was_run(editing, asked, monkeypatch, tmp_path):
-    monkeypatch.setattr(scene_editing.rospy, "get_param", lambda name, default: str(tmp_path / "mine.py"))
+    monkeypatch.setattr(scene_backend.rospy, "get_param", lambda name, default: str(tmp_path / "mine.py"))
     say(1, None, [DRONE], state="stopped")
     editing.answers["save_scene"]({"file": "scene"})
     assert [next(iter(one)) for one in asked] == ["edit", "save"]

@@ -15,7 +15,7 @@ from drone_sim.ros.cockpit.classroom import Classroom
 from drone_sim.ros.cockpit.editor.backend import EditorBackend
 from drone_sim.ros.cockpit.editor.inspection import ScriptInspector
 from drone_sim.ros.cockpit.editor.lessons import Lessons
-from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
+from drone_sim.ros.cockpit.editor.scene_backend import SceneBackend
 from drone_sim.ros.cockpit.editor.scene_lists import NEW_SCENE, SceneList
 from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
@@ -57,7 +57,7 @@ class Cockpit:
         self._socket = PageSocket(held, answers, handlers, scene=self._state.since)
         store = ScriptStore(scripts)
         self._inspector = ScriptInspector(node, store, self._socket.tell)
-        self._editing = SceneEditing(node, scripts, self._socket.tell_tree, lambda: self._commands.vehicle)
+        self._editing = SceneBackend(node, scripts, self._socket.tell_tree, lambda: self._commands.vehicle)
         editor = EditorBackend(store, self._lessons, self._simulator, TimelinePlayer(node), self._editing)
         self._report_file = editor.grader.report_file
         self._panel = Panel(self._simulator, self._commands, SceneList(scripts), self._socket.tell)

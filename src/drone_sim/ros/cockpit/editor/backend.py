@@ -10,7 +10,7 @@ from typing import Any
 from drone_sim.grading.submissions import handed_in
 from drone_sim.ros.cockpit.editor.checks import TextChecker
 from drone_sim.ros.cockpit.editor.lessons import Lesson, Lessons
-from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
+from drone_sim.ros.cockpit.editor.scene_backend import SceneBackend
 from drone_sim.ros.cockpit.editor.scene_files import SceneSwitcher, plan_of
 from drone_sim.ros.cockpit.editor.script_store import OWN, ScriptFile, ScriptStore, ScriptStoreError
 from drone_sim.ros.cockpit.editor.task_flights import Grader, TimelinePlayer
@@ -33,7 +33,7 @@ class EditorBackend:
         lessons: Lessons,
         simulator: Simulator,
         player: TimelinePlayer,
-        scene: SceneEditing,
+        scene: SceneBackend,
     ):
         """`simulator` flies a script in `scene`; `player` sends the timeline of its task meanwhile."""
         self._store, self._lessons, self._simulator = store, lessons, simulator

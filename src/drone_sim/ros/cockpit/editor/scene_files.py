@@ -20,7 +20,7 @@ from drone_sim.grading import tasks
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.randomization import Randomization
 from drone_sim.ros.cockpit.editor.lessons import Lesson
-from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
+from drone_sim.ros.cockpit.editor.scene_backend import SceneBackend
 from drone_sim.ros.cockpit.editor.scene_lists import NO_SCENE, scene_path
 from drone_sim.ros.core.simulator import Simulator, script_failure
 from drone_sim.scene import scene_parameters
@@ -103,7 +103,7 @@ def _content(config: Mapping[str, Any], scene: Mapping[str, Any]) -> dict[str, A
 class SceneSwitcher:
     """Switches to the scene of a lesson, and back to the user's scene afterwards."""
 
-    def __init__(self, simulator: Simulator, scene: SceneEditing):
+    def __init__(self, simulator: Simulator, scene: SceneBackend):
         self._simulator, self._scene = simulator, scene
         self._lesson_scene = ""  # the scene file that the last lesson loaded
         self._user_scene = ""  # the scene file before that

@@ -74,7 +74,7 @@ class FrameTree:
         return 0
 
 
-class MarkerTopic:
+class MarkerListener:
     """The markers of one topic. Thread-safe."""
 
     def __init__(

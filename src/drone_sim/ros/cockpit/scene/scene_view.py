@@ -20,7 +20,7 @@ from visualization_msgs.msg import (
 
 from drone_sim.message_text import near_names, shown
 from drone_sim.ros.cockpit.scene.handles import DragControls, read_drag
-from drone_sim.ros.cockpit.scene.markers import FrameTree, MarkerTopic
+from drone_sim.ros.cockpit.scene.markers import FrameTree, MarkerListener
 from drone_sim.ros.cockpit.scene.meshes import MeshStore
 from drone_sim.ros.cockpit.scene.scene_state import SceneState
 from drone_sim.ros.core.message_conversion import WORLD_FRAME
@@ -41,10 +41,10 @@ class SceneView:
         self._pushers: dict[str, rospy.Publisher] = {}
         self._frames = FrameTree()
         self._markers = {
-            _SCENE: MarkerTopic(_SCENE, meshes.url, is_shaded=True),
-            _BODIES: MarkerTopic(_BODIES, meshes.url, is_shaded=True),
-            _SURROUNDINGS: MarkerTopic(_SURROUNDINGS, meshes.url, hidden=("sky", "ground")),
-            **{name: MarkerTopic(name, meshes.url) for name in _OTHER_TOPICS},
+            _SCENE: MarkerListener(_SCENE, meshes.url, is_shaded=True),
+            _BODIES: MarkerListener(_BODIES, meshes.url, is_shaded=True),
+            _SURROUNDINGS: MarkerListener(_SURROUNDINGS, meshes.url, hidden=("sky", "ground")),
+            **{name: MarkerListener(name, meshes.url) for name in _OTHER_TOPICS},
         }
         self._feedback = {
             name: rospy.Publisher(f"{namespace}/{name}/feedback", InteractiveMarkerFeedback, queue_size=10)
@@ -76,7 +76,7 @@ class SceneView:
         markers = {}
         # A handle is shown once the simulation has subscribed to its feedback: earlier feedback would be lost.
         ready = [self._handles[name] for name, publisher in self._feedback.items() if publisher.get_num_connections()]
-        sources: list[MarkerTopic | DragControls] = [*self._markers.values(), *ready]
+        sources: list[MarkerListener | DragControls] = [*self._markers.values(), *ready]
         for source in sources:
             markers.update(source.take())
         self._state.change(self._frames.take(), markers)

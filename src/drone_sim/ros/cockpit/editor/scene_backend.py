@@ -35,7 +35,7 @@ _TREE_TIMEOUT, _TREE_POLL = 5.0, 0.02  # s, for the tree of a scene that was ope
 _MAX_SIZE = 6 << 20  # bytes of an uploaded model: in base64 it must fit into a message of 8 MiB
 
 
-class SceneEditing:
+class SceneBackend:
     """Forwards edits to the simulator, and keeps the object tree for browsers that connect later."""
 
     def __init__(
