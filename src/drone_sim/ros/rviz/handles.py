@@ -27,7 +27,6 @@ from drone_sim.ros.rviz.scene_markers import bodiless_markers, marker_of
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.kinds.dummy import Dummy
-from drone_sim.scene.scene import Scene
 from drone_sim.shapes.visual import Visual
 from drone_sim.vehicles import checks
 from drone_sim.vehicles.parameters import VehicleParameters
@@ -289,10 +288,14 @@ class ObjectHandles:
         return _ObjectHandle((self._simulation.scene, shape, rough_tilt, item.name == self._selected), upright, tilt)
 
     def _insert(self, names: Sequence[str], objects: dict[str, SceneObject]) -> None:
-        copies = _InvisibleCopies(self._simulation.scene)
+        scene = self._simulation.scene
+        visuals: dict[str, list[tuple[Visual, Matrix]]] = {name: [] for name in names}
+        for name, visual, pose in zip(scene.visual_names(), *scene.visuals()):
+            if name in visuals:
+                visuals[name].append((visual, tuple(pose[:3].ravel().tolist())))
         for name in names:
             upright = self._shown[name].level
-            markers = copies.markers(name, objects[name], upright)
+            markers = _invisible_copy(objects[name], visuals[name], upright)
             size = max((max(marker.scale.x, marker.scale.y, marker.scale.z) for marker in markers), default=0.0)
             arrow_size = min(max(size, _ARROW_SIZES[0]), _ARROW_SIZES[1])
             handle = new_handle(name, markers, arrow_size, arrows=name == self._selected)
@@ -326,24 +329,19 @@ class ObjectHandles:
             self._server.setPose(name, message_conversion.pose(shown.level))
 
 
-class _InvisibleCopies:
-    """Invisible, slightly larger copies of the shapes of a scene's objects, which the mouse can pick."""
+def _invisible_copy(item: SceneObject, visuals: Sequence[tuple[Visual, Matrix]], handle: Matrix) -> list[Marker]:
+    """Return markers that the mouse can pick: an invisible, slightly larger copy of an object's shape, if it has one.
 
-    def __init__(self, scene: Scene):
-        self._visuals: dict[str, list[tuple[Visual, Matrix]]] = {}
-        for name, visual, pose in zip(scene.visual_names(), *scene.visuals()):
-            self._visuals.setdefault(name, []).append((visual, tuple(pose[:3].ravel().tolist())))
-
-    def markers(self, name: str, item: SceneObject, handle: Matrix) -> list[Marker]:
-        """Return an object's markers in the frame of its handle, whose pose is `handle`; none without a shape."""
-        markers = []
-        for visual, matrix in self._visuals.get(name, ()):
-            local = frames.relative(handle, matrix)
-            markers += [marker_of(primitive, local, _INVISIBLE) for primitive in visual.shape.for_rviz()]
-        if isinstance(item, Dummy):
-            markers += bodiless_markers([item])
-            markers[-1].pose = message_conversion.pose(frames.IDENTITY)
-        for marker in markers:
-            for axis in "xyz":
-                setattr(marker.scale, axis, _ENLARGEMENT * getattr(marker.scale, axis))
-        return markers
+    `visuals` are the object's, with their poses; the markers are in the frame of the handle, whose pose is `handle`.
+    """
+    markers = []
+    for visual, matrix in visuals:
+        local = frames.relative(handle, matrix)
+        markers += [marker_of(primitive, local, _INVISIBLE) for primitive in visual.shape.for_rviz()]
+    if isinstance(item, Dummy):
+        markers += bodiless_markers([item])
+        markers[-1].pose = message_conversion.pose(frames.IDENTITY)
+    for marker in markers:
+        for axis in "xyz":
+            setattr(marker.scale, axis, _ENLARGEMENT * getattr(marker.scale, axis))
+    return markers
