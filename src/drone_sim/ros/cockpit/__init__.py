@@ -1,1 +1,1 @@
-"""The cockpit: scene, controls, cameras, script and plots in a browser. A node of its own, with the topics of all."""
+"""The cockpit, a node of its own: scene, controls, cameras, scripts and plots in a browser."""

@@ -1,1 +1,1 @@
-"""The node's life: parameters, start, steps, services, end."""
+"""The simulator node: parameters, start, steps, services, end."""

@@ -1,1 +1,1 @@
-"""What only rviz asks for."""
+"""Markers and handles for rviz, drawn only for subscribers."""

@@ -88,7 +88,7 @@ class Panel:
         self._show_vehicles(vehicles)
         return {"said": f"the keys fly {self._commands.vehicle}"}
 
-    # ---- what is shown
+    # ---- contents of the board
 
     def offer(self, found: FoundTopics, scene: str) -> None:
         """Show the available vehicles and scenes; `scene` is the value of the simulator's parameter."""

@@ -1,1 +1,1 @@
-"""The scene: what stands in it, what can be dragged, and where one looks from."""
+"""The scene in the browser: frames, markers, meshes, and handles to drag."""
