@@ -55,7 +55,6 @@ class VehicleTopics:
         _set_description(parameters)
 
     def follow(self, vehicle: Vehicle) -> None:
-        """Use this vehicle from now on."""
         self.vehicle = vehicle
         for name, camera in self.cameras:
             camera.follow(vehicle.cameras[name])

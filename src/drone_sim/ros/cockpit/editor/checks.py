@@ -22,7 +22,6 @@ class TextChecker:
     """Client of a checking process, which starts with the first check and is replaced after a timeout."""
 
     def __init__(self, timeout: float = _TIMEOUT):
-        """`timeout` (s) is that of a check."""
         self._timeout = timeout
         self._process: subprocess.Popen[str] | None = None
         self._lock = threading.Lock()  # several browsers may ask at once

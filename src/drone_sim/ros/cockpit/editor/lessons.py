@@ -79,7 +79,6 @@ class Lessons:
         return [*self._sections(), *self._tasks()]
 
     def find(self, name: object) -> Lesson | None:
-        """Return the lesson with a name; None if there is none."""
         return next((lesson for lesson in self.all() if lesson.name == name), None)
 
     def of_script(self, script: ScriptFile) -> Lesson | None:

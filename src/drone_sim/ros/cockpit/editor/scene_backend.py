@@ -139,7 +139,6 @@ class SceneBackend:
 
     @property
     def answers(self) -> dict[str, Answer]:
-        """The handler of each request."""
 
         def pick(message: _Message, *keys: str) -> dict[str, Any]:
             return {key: message[key] for key in keys if key in message}

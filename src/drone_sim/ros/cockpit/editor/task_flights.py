@@ -46,7 +46,6 @@ class TimelinePlayer:
     """
 
     def __init__(self, node: str):
-        """`node` is the simulator's name."""
         self._node = node
         self._lock = threading.Lock()
         self._sender: TimelineSender | None = None

@@ -210,7 +210,6 @@ class SendQueue:
     """
 
     def __init__(self, scene: SceneSince = lambda version: (version, b"")):
-        """`scene` is as for PageSocket."""
         self.follows_tree = False
         self._scene, self._version = scene, -1
         self._unshown_scenes = 0
@@ -220,7 +219,6 @@ class SendQueue:
         self._has_news = asyncio.Event()
 
     def put(self, message: str) -> None:
-        """Add a message."""
         self._messages.append(message)
         self._has_news.set()
 
