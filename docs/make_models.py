@@ -13,7 +13,7 @@ from take_task_pictures import looking
 
 from drone_sim.editing.editor import SceneEditor
 from drone_sim.render.intrinsics import Intrinsics
-from drone_sim.ros.cockpit.editor.model_list import PICTURES, ModelList
+from drone_sim.ros.cockpit.editor.lists import PICTURES, ModelList
 from drone_sim.run.parameters import load
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation

@@ -18,7 +18,7 @@ from websockets.sync.client import connect
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "unit"))
 from cockpit_asked import Asked
 
-from drone_sim.ros.cockpit.editor.scene_lists import SceneList
+from drone_sim.ros.cockpit.editor.lists import SceneList
 from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows
 from drone_sim.ros.cockpit.panel.panel import Panel

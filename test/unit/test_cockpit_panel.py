@@ -11,7 +11,7 @@ from dynamic_reconfigure.encoding import decode_config, encode_config, encode_de
 from rosgraph_msgs.msg import Log
 
 from drone_sim.hosting.tunable import tunables
-from drone_sim.ros.cockpit.editor.scene_lists import SceneList
+from drone_sim.ros.cockpit.editor.lists import SceneList
 from drone_sim.ros.cockpit.panel import tuning as tuning_module
 from drone_sim.ros.cockpit.panel.board import Board
 from drone_sim.ros.cockpit.panel.panel import Panel

@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 from drone_sim.files.resources import package_path
-from drone_sim.ros.cockpit.editor.scene_lists import NEW_SCENE, SceneList
+from drone_sim.ros.cockpit.editor.lists import NEW_SCENE, SceneList
 
 GATES = "package://drone_sim/config/scenes/gates.yaml"
 

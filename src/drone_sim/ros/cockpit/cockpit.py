@@ -15,8 +15,8 @@ from drone_sim.ros.cockpit.classroom import Classroom
 from drone_sim.ros.cockpit.editor.backend import EditorBackend
 from drone_sim.ros.cockpit.editor.inspection import ScriptInspector
 from drone_sim.ros.cockpit.editor.lessons import Lessons
+from drone_sim.ros.cockpit.editor.lists import NEW_SCENE, SceneList
 from drone_sim.ros.cockpit.editor.scene_backend import SceneBackend
-from drone_sim.ros.cockpit.editor.scene_lists import NEW_SCENE, SceneList
 from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
 from drone_sim.ros.cockpit.panel.board import NO_SIMULATION

@@ -19,8 +19,7 @@ from std_msgs.msg import String
 from drone_sim.editing.properties import properties
 from drone_sim.files import writing
 from drone_sim.files.resources import package_path
-from drone_sim.ros.cockpit.editor.model_list import ModelList
-from drone_sim.ros.cockpit.editor.scene_lists import RecentScenes
+from drone_sim.ros.cockpit.editor.lists import ModelList, RecentScenes
 from drone_sim.ros.cockpit.server.page_socket import Answer
 from drone_sim.ros.core.launch_parameters import script_from_shell
 from drone_sim.ros.core.simulator import FAILURES

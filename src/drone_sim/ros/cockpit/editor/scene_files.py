@@ -20,8 +20,8 @@ from drone_sim.grading import tasks
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.randomization import Randomization
 from drone_sim.ros.cockpit.editor.lessons import Lesson
+from drone_sim.ros.cockpit.editor.lists import NO_SCENE, scene_path
 from drone_sim.ros.cockpit.editor.scene_backend import SceneBackend
-from drone_sim.ros.cockpit.editor.scene_lists import NO_SCENE, scene_path
 from drone_sim.ros.core.simulator import Simulator, script_failure
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import BESIDE

@@ -14,7 +14,7 @@ from dynamic_reconfigure.msg import Config
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import Bool, String
 
-from drone_sim.ros.cockpit.editor.scene_lists import SceneList
+from drone_sim.ros.cockpit.editor.lists import SceneList
 from drone_sim.ros.cockpit.panel.board import NO_SIMULATION, Board, one_of
 from drone_sim.ros.cockpit.panel.plots import Plots
 from drone_sim.ros.cockpit.panel.tuning import SpeedControl, VehicleTuning
