@@ -149,18 +149,14 @@ class ModelList:
             name.capitalize(): {"do": "add_vehicle", "type": name, "height": _HEIGHT} for name in TYPES
         }
         vehicles["Quadricopter of V-REP"] = {**vehicles["Quadricopter"], "values": _BARE}
-        arena: dict[str, _Operation] = {name: {"do": "add_model", "model": name} for name in ARENA}
-        arena["text_sign"] = {"do": "add_sign", "text": "START"}
-        return [
-            {"name": "Shapes", "models": [_row(title, operation) for title, operation in SHAPES.items()]},
-            {"name": "Arena", "models": [_row(name.replace("_", " ").capitalize(), op) for name, op in arena.items()]},
-            {"name": "Vehicles", "models": [_row(title, operation) for title, operation in vehicles.items()]},
-            {"name": "Sensors", "models": [_row(title, operation) for title, operation in SENSORS.items()]},
-            {
-                "name": "Yours",
-                "models": [_row(file.name, self.operation(file), "") for file in own_files(self.folder, KINDS)],
-            },
-        ]
+        arena: dict[str, _Operation] = {
+            name.replace("_", " ").capitalize(): {"do": "add_model", "model": name} for name in ARENA
+        }
+        arena["Text sign"] = {"do": "add_sign", "text": "START"}
+        shipped = {"Shapes": SHAPES, "Arena": arena, "Vehicles": vehicles, "Sensors": SENSORS}
+        groups = {group: [_row(*model) for model in models.items()] for group, models in shipped.items()}
+        groups["Yours"] = [_row(file.name, self.operation(file), "") for file in own_files(self.folder, KINDS)]
+        return [{"name": group, "models": models} for group, models in groups.items()]
 
     def operation(self, file: Path) -> _Operation:
         """Return the edit operation that adds a file of the user's."""
