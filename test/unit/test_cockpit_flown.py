@@ -17,7 +17,7 @@ from std_msgs.msg import Header, String
 from drone_sim.files.resources import package_path
 from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
-from drone_sim.ros.cockpit.editor import scene_files, task_flights
+from drone_sim.ros.cockpit.editor import lesson_scenes, task_flights
 from drone_sim.ros.cockpit.editor.script_store import ScriptStore, ScriptStoreError
 from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
 from drone_sim.run import parameters
@@ -36,13 +36,13 @@ def _ask(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", tasks.names())
 def test_a_tasks_scene_is_what_its_plan_says(name, tmp_path):
     plan = plans.read(tasks.find(name))
-    wanted, file = plan.parameters(), scene_files.scene_of(plan, tmp_path)
+    wanted, file = plan.parameters(), lesson_scenes.scene_of(plan, tmp_path)
     found = parameters.load({"scene_file": file})
     assert found.model_dump(exclude={"vehicles", "scene_file"} | _carried(found)) == wanted.model_dump(
         exclude={"vehicles", "scene_file"} | _carried(found)
     )
     assert [one.model_dump() for one in found.fleet] == [one.model_dump() for one in wanted.fleet]
-    said = scene_files.describe_scene_of(plan)
+    said = lesson_scenes.describe_scene_of(plan)
     assert "/" not in said.replace("m/s", "") and ("The wind blows" in said) == any(wanted.weather.wind)
     assert plan.name in said and not any(one.startswith("=") for one in said.split(", "))
 

@@ -9,9 +9,9 @@ from typing import Any
 
 from drone_sim.grading.submissions import handed_in
 from drone_sim.ros.cockpit.editor.checks import TextChecker
+from drone_sim.ros.cockpit.editor.lesson_scenes import SceneSwitcher, plan_of
 from drone_sim.ros.cockpit.editor.lessons import Lesson, Lessons
 from drone_sim.ros.cockpit.editor.scene_backend import SceneBackend
-from drone_sim.ros.cockpit.editor.scene_files import SceneSwitcher, plan_of
 from drone_sim.ros.cockpit.editor.script_store import OWN, ScriptFile, ScriptStore, ScriptStoreError
 from drone_sim.ros.cockpit.editor.task_flights import Grader, TimelinePlayer
 from drone_sim.ros.cockpit.server.page_socket import Answer
