@@ -20,7 +20,7 @@ export class Models {
   constructor(shelf, find, edit) {
     Object.assign(this, { shelf, find, edit });
     this.groups = [];
-    this.taken = []; // boxes of what has been added by keys, and is not told yet
+    this.taken = []; // boxes of what has been added without a drag, and is not told yet
     this.landing = new Landing(edit.scene);
     find.oninput = () => this.show();
     find.addEventListener("keydown", (event) => event.key === "Escape" && this.clear(event));
@@ -58,7 +58,7 @@ export class Models {
   card({ model, title, picture, op }) {
     this.ops.set(model, { op, title });
     const seen = picture ? create("img", { src: picture, alt: "", draggable: false }) : create("span", { className: "blank" });
-    const card = create("button", { type: "button", className: "card", title: `${title}: drag it into the scene, or press Enter` }, seen, create("span", { textContent: title }));
+    const card = create("button", { type: "button", className: "card", title: `${title}: drag it into the scene, or click on it` }, seen, create("span", { textContent: title }));
     card.dataset.model = model;
     return card;
   }
@@ -88,7 +88,8 @@ export class Models {
     const { op, title } = this.began;
     const { label, place } = this;
     this.end();
-    if (label && place) this.put(op, title, place);
+    if (!label) this.putBeside(op, title);
+    else if (place) this.put(op, title, place);
   }
 
   end() {
@@ -111,7 +112,6 @@ export class Models {
     return this.edit.handles.isSnapped !== free ? [onGrid(x), onGrid(y), Number(z.toFixed(4))] : [x, y, z].map((one) => Number(one.toFixed(4)));
   }
 
-  // By the keyboard it lands beside what stands where one looks.
   key(event) {
     const card = event.target.closest?.(".card");
     if (event.key !== "Enter" || !card) return;
@@ -119,6 +119,11 @@ export class Models {
     event.stopPropagation();
     if (event.repeat) return;
     const { op, title } = this.ops.get(card.dataset.model);
+    this.putBeside(op, title);
+  }
+
+  // Puts a model that was not dragged beside what stands where the camera looks.
+  putBeside(op, title) {
     const place = this.freePlace(Math.max(ROOM, ...(op.objects?.[0].size ?? [])) / 2);
     this.put(op, title, this.snapped([place.x, place.y, 0], false));
   }
