@@ -10,7 +10,7 @@ from drone_sim.mechanics import frames
 from drone_sim.ros.rviz import marker_topics
 from drone_sim.ros.rviz.scene_markers import RvizMeshes, SceneMarkers
 from drone_sim.scene.kinds.dummy import Dummy
-from drone_sim.scene.kinds.path import PathParameters
+from drone_sim.scene.kinds.paths import PathParameters
 
 FAR = 1e-5  # m
 

@@ -156,7 +156,7 @@ class Unit:
     word: str
 
 
-def _increasing(pair: tuple[float, float] | None) -> tuple[float, float] | None:
+def increasing(pair: tuple[float, float] | None) -> tuple[float, float] | None:
     if pair is not None and not pair[0] < pair[1]:
         raise ValueError("must be [lowest, highest] with lowest < highest")
     return pair
@@ -190,7 +190,7 @@ MarginOrNone = Annotated[Annotated[Finite, Within(0.001, 1)] | None, BeforeValid
 Limits = Annotated[
     tuple[Velocity, Velocity] | None,
     BeforeValidator(_none_from_word),
-    AfterValidator(_increasing),
+    AfterValidator(increasing),
     Parts(("lowest", "highest")),
     Field(description="2 numbers, [lowest, highest] in m/s, or none"),
 ]

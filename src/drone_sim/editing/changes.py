@@ -9,8 +9,8 @@ from drone_sim.mechanics.object_tree import WORLD, levels
 from drone_sim.run.scene_document import SceneContent
 from drone_sim.run.scene_settings import Settings
 from drone_sim.run.simulation import Simulation
-from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters
+from drone_sim.scene.scene_parameters import AttachedScriptParameters
 
 _Value = TypeVar("_Value")
 _Pair = tuple[_Value | None, _Value | None]  # before and after; None if absent

@@ -13,8 +13,8 @@ from drone_sim.files import yaml_files
 from drone_sim.files.yaml_writing import dump
 from drone_sim.message_text import near_names, shown
 from drone_sim.scene import models, scene_parameters
-from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters
+from drone_sim.scene.scene_parameters import AttachedScriptParameters
 
 _KEYS = {"objects": list, "scripts": list, "vehicles": dict}
 _EXPECTED = "must be objects as in a scene file, such as - {shape: box, size: [1, 1, 1], position: [0, 0, 0.5]}"

@@ -18,9 +18,9 @@ from drone_sim.mechanics.object_names import first_free, numbered
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene import models, scene_parameters
-from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters, placed
 from drone_sim.scene.object_parameters import ObjectParameters
+from drone_sim.scene.scene_parameters import AttachedScriptParameters
 
 _DESCRIPTION_KEYS = ("alias", "category", "model")
 _OPERATION_FOR = {"name": "rename", "parent": "reparent", "position": "move", "rpy": "move"}

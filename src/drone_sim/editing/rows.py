@@ -13,8 +13,8 @@ from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.run.scene_settings import PLACE, vehicles_in
 from drone_sim.run.simulation import Simulation
 from drone_sim.run.simulation_setup import own_script
-from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters, place_of
+from drone_sim.scene.scene_parameters import AttachedScriptParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
 Row = dict[str, Any]

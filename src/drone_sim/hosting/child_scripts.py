@@ -14,8 +14,8 @@ from drone_sim.hosting.picture_filters import eye_of, filter_picture, filters_pi
 from drone_sim.hosting.tuning import Tuning
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.saved_state import Restore, in_turn
-from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.distances import Distances
+from drone_sim.scene.scene_parameters import AttachedScriptParameters
 from drone_sim.scripting import load
 from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.api.host import Operations, SceneServices

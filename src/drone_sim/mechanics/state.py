@@ -12,6 +12,7 @@ from drone_sim.mechanics.frames import (
     invert,
     multiply_quaternions,
     position,
+    to_quaternion,
     transform,
 )
 
@@ -24,6 +25,11 @@ class Pose(NamedTuple):
 
     position: Vector
     orientation: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+    @classmethod
+    def of(cls, matrix: Matrix) -> Pose:
+        """Return the pose of a transform."""
+        return cls(position(matrix), to_quaternion(matrix))
 
     @property
     def matrix(self) -> Matrix:

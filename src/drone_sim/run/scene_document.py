@@ -20,8 +20,8 @@ from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.scene_settings import Settings, settings_of, settings_without_file, with_files_seen_from
 from drone_sim.scene import models, scene_parameters
-from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters
+from drone_sim.scene.scene_parameters import AttachedScriptParameters
 
 _Handles = Mapping[str, int]  # by object name
 

@@ -19,7 +19,6 @@ from drone_sim.mechanics.object_tree import NO_HANDLES, Handles, ObjectTree
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.velocity_meter import VelocityMeter
 from drone_sim.run.parameters import Parameters
-from drone_sim.scene import object_collections
 from drone_sim.scene.operations import SceneOperations
 from drone_sim.scene.scene import Scene
 from drone_sim.scripting.api.remote_ports import RemotePorts
@@ -214,7 +213,6 @@ class SimulationSetup:
             self.scene.name_objects()
         except ParameterError as error:
             raise ParameterError(f"{self.parameters.scene_place(error.location)}: {error.problems[0].reason}") from None
-        object_collections.begin(self.parameters.scene.collections, self.context)
 
     def _check(self) -> None:
         if not self._world.is_finite():

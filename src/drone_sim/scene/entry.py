@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
+from pydantic import Field
+
 from drone_sim.config.types import Angles, Checked, Finite, Label, ParameterError, Point, Switch, Within
+from drone_sim.context import SimulationContext
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, from_rpy, to_quaternion
 from drone_sim.mechanics.joint import FORCE, POSITION, SPHERICAL, VELOCITY, Joint
@@ -64,6 +68,18 @@ class EntryParameters(Checked):
     def shown(self) -> str:
         """The name that 4.x paths use: the alias, or else the name."""
         return self.alias or self.name
+
+
+class KindParameters(EntryParameters):
+    """An entry of `objects` that is not a shape."""
+
+    name: Annotated[Label, Field(min_length=1)]
+    position: Point = (0.0, 0.0, 0.0)
+    kind: str
+
+    @abstractmethod
+    def make(self, place: Place, context: SimulationContext) -> SceneObject:
+        """Return the object."""
 
 
 # ---- present values

@@ -20,9 +20,9 @@ from drone_sim.files.yaml_writing import dump
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.scene import scene_parameters
-from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters, pose_keys
 from drone_sim.scene.object_parameters import CompoundParameters, ObjectParameters, PartParameters
+from drone_sim.scene.scene_parameters import AttachedScriptParameters
 from drone_sim.shapes import SCENE_SHAPES
 from drone_sim.shapes.compound import parts_of
 from drone_sim.shapes.shape import DrawnShape

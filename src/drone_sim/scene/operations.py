@@ -9,7 +9,7 @@ import contextlib
 import itertools
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from drone_sim.config.errors import changed
 from drone_sim.config.types import ParameterError
@@ -18,25 +18,36 @@ from drone_sim.mechanics.joint import Joint
 from drone_sim.mechanics.object_names import first_free, numbered, plain, shifted, suffixes
 from drone_sim.mechanics.object_tree import PARENT, WORLD, levels
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.scene import dummy_links, models
-from drone_sim.scene.attached_scripts import MAX_SCRIPTS, AttachedScriptParameters, RunningScripts
-from drone_sim.scene.entry import EntryParameters, Place, placed
-from drone_sim.scene.kinds.dummy import DummyParameters
-from drone_sim.scene.kinds.force_sensor import ForceSensor, ForceSensorParameters
-from drone_sim.scene.kinds.joint import JointParameters
-from drone_sim.scene.kinds.kind import KindParameters
+from drone_sim.scene import models
+from drone_sim.scene.entry import EntryParameters, KindParameters, Place, placed
+from drone_sim.scene.kinds.dummy import DummyParameters, check_links
+from drone_sim.scene.kinds.joints import ForceSensor, ForceSensorParameters, JointParameters
 from drone_sim.scene.object_parameters import CompoundParameters, ObjectParameters
-from drone_sim.scene.object_record import ObjectRecord
 from drone_sim.scene.scaling import scaled
-from drone_sim.scene.scene import Scene
+from drone_sim.scene.scene import ObjectRecord, Scene
 from drone_sim.scene.scene_parameters import (
     MAX_OBJECTS,
+    MAX_SCRIPTS,
+    AttachedScriptParameters,
     check_files,
     check_parents,
     entry_from,
 )
 
 _IN_DYNAMICS = (ObjectParameters, JointParameters, ForceSensorParameters)
+
+
+class RunningScripts(Protocol):
+    """Interface to the scripts of the scene's objects, called when objects are added, renamed or removed."""
+
+    def attach(self, objects: Collection[str]) -> object:
+        """Attach the scripts of added objects; each is initialised before its first call."""
+
+    def rename(self, name: str, new: str) -> None:
+        """Move the script of a renamed object, if it has one, to the object's new name."""
+
+    def end(self, objects: Collection[str]) -> None:
+        """Call cleanup and detach the scripts of objects to be removed; a script that is running ends later."""
 
 
 class SceneOperations:
@@ -311,7 +322,7 @@ class SceneOperations:
     def _check_links(self, changed_entries: Iterable[EntryParameters]) -> None:
         """Raise ParameterError if one of these entries has a link that cannot be; they are records already."""
         if any(isinstance(entry, DummyParameters) and entry.linked for entry in changed_entries):
-            dummy_links.check(self._scene.entries.values())
+            check_links(self._scene.entries.values())
 
     # ---- scripts
 

@@ -9,8 +9,8 @@ from drone_sim.config.errors import changed
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.joint import PRISMATIC
 from drone_sim.scene.entry import EntryParameters
-from drone_sim.scene.kinds.curved_path import CurvedPathParameters
-from drone_sim.scene.kinds.joint import JointParameters
+from drone_sim.scene.kinds.joints import JointParameters
+from drone_sim.scene.kinds.paths import CurvedPathParameters
 from drone_sim.scene.object_parameters import CompoundParameters, ObjectParameters, PartParameters
 
 _LENGTHS = {  # of kinds that are not shapes

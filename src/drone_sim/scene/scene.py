@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,28 +13,51 @@ from drone_sim.config.types import ParameterError
 from drone_sim.context import SimulationContext
 from drone_sim.mechanics.frames import Matrix, Vector, multiply
 from drone_sim.mechanics.joint import Joint
+from drone_sim.mechanics.object_collections import Item
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.message_text import near_names
-from drone_sim.scene import building, chains
-from drone_sim.scene.attached_scripts import AttachedScriptParameters
+from drone_sim.scene import chains
 from drone_sim.scene.bodies import CarriedBody, ShapeInWorld, ShapeObject, bodies_above
-from drone_sim.scene.building import Built
-from drone_sim.scene.chains import Chain
-from drone_sim.scene.dummy_links import DummyLinks
-from drone_sim.scene.entry import EntryParameters, Place
-from drone_sim.scene.kinds.force_sensor import ForceSensor, ForceSensorParameters
-from drone_sim.scene.kinds.joint import JointParameters
-from drone_sim.scene.kinds.kind import KindParameters
+from drone_sim.scene.chains import Built, Chain
+from drone_sim.scene.entry import EntryParameters, KindParameters, Place, place_of, stands_at
+from drone_sim.scene.kinds.dummy import DummyLinks
+from drone_sim.scene.kinds.joints import ForceSensor, ForceSensorParameters, JointParameters
 from drone_sim.scene.object_drag import ObjectDrag
 from drone_sim.scene.object_parameters import ObjectParameters
-from drone_sim.scene.object_record import ObjectRecord
-from drone_sim.scene.scene_parameters import FloorParameters, SceneParameters, check_files
+from drone_sim.scene.scene_parameters import AttachedScriptParameters, FloorParameters, SceneParameters, check_files
 from drone_sim.shapes.visual import Visual
 from drone_sim.world.joints import JointDrive
 
 _LOG = logging.getLogger(__name__)
 _Key = tuple[Any, ...]  # identifies the content of a body
 _AT_REST = (0.0, 0.0, 0.0)
+
+
+@dataclass(eq=False)
+class ObjectRecord:
+    """An object of the scene. Its object in the tree, and a shape's body, are made from the entry."""
+
+    entry: EntryParameters
+    version: int = 0  # incremented to rebuild the body
+    body: tuple[int, int] | None = None  # of a shape: number and link in the world
+    item: SceneObject | None = None  # in the object tree
+    start: Matrix | None = None  # world pose in the initial scene; None if the object was added later
+    factors: Vector = (1.0, 1.0, 1.0)  # total scale along x, y and z
+
+    @property
+    def present(self) -> EntryParameters:
+        """The entry with the present pose, parent, joint state and `static`; `entry` itself if nothing differs."""
+        entry, item = self.entry, self.item
+        if item is None:
+            return entry
+        values = place_of(item)
+        if stands_at(entry, values):  # keep the author's numbers
+            del values["position"], values["rpy"]
+        if isinstance(item, ShapeObject) and isinstance(entry, ObjectParameters) and item.mass and not item.is_held:
+            values["static"] = item.is_static
+        values = {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
+        values = {key: value for key, value in values.items() if getattr(entry, key) != value}
+        return entry.model_copy(update=values) if values else entry
 
 
 class Scene:
@@ -97,13 +121,13 @@ class Scene:
         ParameterError for a file that cannot be read; then nothing has changed.
         """
         entries = self.entries
-        result = chains.found(entries)
-        required = {self._key(chain): chain for chain in (*building.alone(entries, result.chains), *result.chains)}
+        present, reasons = chains.found(entries)
+        required = {self._key(chain): chain for chain in present}
         new = {key: chain for key, chain in required.items() if key not in self._built}
         matrices = {index: self._matrix(index) for chain in new.values() for index in chain.members()}
         speeds = {index: self._speed(index) for index in matrices}
         try:
-            built = building.build(self._world, entries, new.values(), matrices)
+            built = chains.build(self._world, entries, new.values(), matrices)
         except ValueError as error:
             raise ParameterError(str(error)) from None
         obsolete = self._built.keys() - required.keys()
@@ -116,7 +140,7 @@ class Scene:
                 self.records[index].body = item.body, link
             self._restore_velocities(item, speeds)
         self._add_names()
-        return built, result.reasons
+        return built, reasons
 
     def _key(self, chain: Chain) -> _Key:
         versions = tuple(self.records[index].version for index in chain.members())
@@ -135,7 +159,7 @@ class Scene:
         parent = next(parents, None)
         if parent is None:  # the parent is a vehicle, which is added after the scene
             return entry.local
-        return multiply(multiply(self._matrix(parent), building.motion(self.records[parent].entry)), entry.local)
+        return multiply(multiply(self._matrix(parent), chains.motion(self.records[parent].entry)), entry.local)
 
     def _speed(self, index: int) -> tuple[Vector, Vector, float]:
         """Return the velocities of an entry whose body is replaced: linear (m/s), angular (rad/s), along a joint."""
@@ -189,12 +213,25 @@ class Scene:
         self._forget_objects()
         self._add_objects(self._built.values())
         if all(record.start is None for record in self.records.values()):
-            self._place_free_children(building.parents_first(self.entries))
+            self._place_free_children(chains.parents_first(self.entries))
             for record in self.records.values():
                 record.start = record.item.matrix() if record.item is not None else None
         self._follow()
         self._world.rigid_links.set({})  # so that all runs begin equal to the last bit
         self._links.is_stale = True
+        self._add_collections()
+
+    def _add_collections(self) -> None:
+        """Add the collections of the objects that exist; log a warning for each missing object."""
+        for collection in self.parameters.collections:
+            handle = self._context.collections.add(collection.name)
+            for item in collection.items:
+                try:
+                    of = -1 if item.what == "all" else self.tree.handle(item.object)
+                except ValueError as error:
+                    _LOG.warning("collection %s: %s", collection.name, error)
+                    continue
+                self._context.collections.extend(handle, Item(item.what, of, item.removes, item.without))
 
     def rebuild(self, change_tree: Callable[[], None] = lambda: None, bodies: bool = True) -> None:
         """Update world and tree from the entries; `change_tree` is called once the new bodies exist.
@@ -241,7 +278,7 @@ class Scene:
 
     def _add_objects(self, new_bodies: Iterable[Built]) -> list[int]:
         """Add the missing objects to the tree, and connect joints and force sensors of new bodies; return the new."""
-        new = building.parents_first({key: record.entry for key, record in self.records.items() if record.item is None})
+        new = chains.parents_first({key: record.entry for key, record in self.records.items() if record.item is None})
         for index in new:
             self.records[index].item = self._add(index)
         for built in new_bodies:
@@ -322,7 +359,9 @@ class Scene:
 
     def hold_linked_dummies(self) -> None:
         """Link the bodies of linked dummies in the world, before a step."""
-        self._links.hold(self.records.values())
+        if self._links.is_stale:
+            self._links.find((record.entry, record.item) for record in self.records.values())
+        self._links.hold()
 
     def _place_free_children(self, added: Iterable[int]) -> None:
         """Move added free children to their entries' poses relative to the parent, now that it exists."""

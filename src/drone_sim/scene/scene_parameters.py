@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
@@ -14,10 +14,13 @@ from drone_sim.config.types import (
     Checked,
     DatumParameters,
     File,
+    FileName,
     Finite,
+    Label,
     MagneticField,
     ParameterError,
     ParameterProblem,
+    ScriptValue,
     Switch,
     Unit,
     Within,
@@ -31,20 +34,20 @@ from drone_sim.files.resources import resolve
 from drone_sim.mechanics.object_names import first_free, numbered
 from drone_sim.mechanics.object_tree import DEEPEST
 from drone_sim.message_text import near_names, shown
-from drone_sim.scene import attached_scripts, dummy_links, object_collections
-from drone_sim.scene.attached_scripts import AttachedScriptParameters, AttachedScripts
 from drone_sim.scene.entry import EntryParameters
 from drone_sim.scene.kinds import KINDS
-from drone_sim.scene.object_collections import CollectionList
+from drone_sim.scene.kinds.dummy import check_links
 from drone_sim.scene.object_parameters import SHAPES, ObjectParameters
 
-MAX_OBJECTS = 2000
+MAX_OBJECTS, MAX_SCRIPTS = 2000, 256
 # These keys of a scene file take precedence over the parameters.
 WORLD_KEYS = ("time_step", "sub_step", "gravity", "physics")
 BESIDE = ("drone", "vehicles", "weather", *WORLD_KEYS)  # keys of a scene file that are not of the scene
 MAX_TRIANGLES = 500_000  # of all meshes of a scene; a mesh counts once per use
 MAX_PIXELS = 4 * images.MAX_SIDE**2  # of all textures of a scene
 MAX_REACH = 1e5  # m, distance of a mesh's vertices from its origin
+_MAX_SCRIPT_PARAMETERS = 256  # per script
+_MAX_COLLECTIONS, _MAX_ITEMS = 256, 10_000
 
 
 class FloorParameters(Checked):
@@ -55,14 +58,113 @@ class FloorParameters(Checked):
     edge: Switch
 
 
+class AttachedScriptParameters(Checked):
+    """A child script on the object named `object`, of the scene or of a vehicle.
+
+    `embedded`: `..` in its paths is that object's parent, as up to CoppeliaSim 4.8, and not the object itself.
+    """
+
+    object: Label
+    script: FileName
+    embedded: Switch = False
+    parameters: Annotated[dict[Label, ScriptValue], Field(default_factory=dict, max_length=_MAX_SCRIPT_PARAMETERS)]
+
+
+class ItemParameters(Checked):
+    """Members of a collection: an object, its descendants (tree), its ancestors (chain), or all objects.
+
+    `removes`: remove them from the members of the preceding items; `without`: tree or chain without the object itself.
+    """
+
+    what: Literal["single", "tree", "chain", "all"]
+    object: Label = ""
+    removes: Switch = False
+    without: Switch = False
+
+    def model_post_init(self, _context: Any) -> None:
+        """Raise ParameterError for an item without the object that it needs."""
+        if not self.object and self.what != "all":
+            raise ParameterError(f"a {self.what} needs the name of an object", ("object",), "''")
+
+
+class CollectionParameters(Checked):
+    """A collection."""
+
+    name: Annotated[Label, Field(min_length=1)]
+    items: Annotated[list[ItemParameters], Field(max_length=_MAX_ITEMS)]
+
+
 if TYPE_CHECKING:
     EntryChoice = EntryParameters
 else:
     EntryChoice = one_of(*SHAPES, *KINDS, key="shape", or_key="kind")
 
 
-_Value = TypeVar("_Value")
+class SceneParameters(Checked):
+    """The world without vehicles."""
+
+    datum: DatumParameters
+    magnetic_field: MagneticField
+    floor: FloorParameters
+    objects: Annotated[list[EntryChoice], Field(max_length=MAX_OBJECTS)]
+    scripts: Annotated[list[AttachedScriptParameters], Field(max_length=MAX_SCRIPTS)]
+    collections: Annotated[list[CollectionParameters], Field(max_length=_MAX_COLLECTIONS)]
+
+    def model_post_init(self, _context: Any) -> None:
+        """Name the shapes that have no name; check names, parents, links, scripts and collections."""
+        name_shapes(self.objects)
+        _check_unique("objects", "name", self.objects)
+        check_parents(self.objects)
+        check_links(self.objects)
+        _check_unique("scripts", "object", self.scripts)
+        for index, script in enumerate(self.scripts):
+            if not script.script:
+                raise ParameterError("no file", ("scripts", index, "script"), "''")
+        _check_unique("collections", "name", self.collections)
+
+
+def _check_unique(section: str, key: str, items: Iterable[Checked]) -> None:
+    values: set[str] = set()
+    for index, item in enumerate(items):
+        value = getattr(item, key)
+        if value in values:
+            raise ParameterError("is used twice", (section, index, key), f"'{value}'")
+        values.add(value)
+
+
 _VREP_NAMES = {"box": "Cuboid", "mesh": "Shape", "compound": "Shape", "urdf": "Shape"}
+
+
+def name_shapes(objects: list[EntryChoice]) -> None:
+    """Name the shapes that have no name as V-REP names new ones: Cuboid, Cuboid0, Cuboid1, ..."""
+    taken = {entry.name for entry in objects}
+    free: dict[str, Iterator[str]] = {}
+    for index, entry in enumerate(objects):
+        if not entry.name and isinstance(entry, ObjectParameters):
+            word = _VREP_NAMES.get(entry.shape, entry.shape.capitalize())
+            name = first_free(free.setdefault(word, numbered(word)), taken)
+            objects[index] = entry.model_copy(update={"name": name, "alias": word if name != word else ""})
+
+
+def check_parents(objects: Iterable[EntryParameters]) -> None:
+    """Raise ParameterError for an entry that is its own ancestor or has too many ancestors."""
+    entries = {entry.name: entry for entry in objects}
+    for index, entry in enumerate(entries.values()):
+        ancestors: set[str] = set()  # also the entry itself if the parents form a cycle
+        name = entry.parent
+        while name and name in entries and name not in ancestors:
+            ancestors.add(name)
+            name = entries[name].parent
+        where, value = ("objects", index, "parent"), f"'{entry.parent}'"
+        if entry.name in ancestors:
+            raise ParameterError(f"'{entry.name}' would be its own ancestor", where, value)
+        if len(ancestors) > DEEPEST:
+            raise ParameterError(f"'{entry.name}' has more than {DEEPEST} ancestors", where, value)
+
+
+# ---- reading
+
+_Value = TypeVar("_Value")
 # Built when a single entry is first read, which few simulations do.
 _ENTRY: TypeAdapter[EntryParameters] = TypeAdapter(EntryChoice, config=ConfigDict(defer_build=True))
 _SCRIPT = TypeAdapter(AttachedScriptParameters)
@@ -83,66 +185,6 @@ def _checked(adapter: TypeAdapter[_Value], kind: Any, values: Mapping[str, Any])
         return adapter.validate_python(values)
     except ValidationError as error:
         raise ParameterError(one_line([(None, problem.text) for problem in problems(error, kind)])) from None
-
-
-class SceneParameters(Checked):
-    """The world without vehicles."""
-
-    datum: DatumParameters
-    magnetic_field: MagneticField
-    floor: FloorParameters
-    objects: Annotated[list[EntryChoice], Field(max_length=MAX_OBJECTS)]
-    scripts: AttachedScripts
-    collections: CollectionList
-
-    def model_post_init(self, _context: Any) -> None:
-        """Name the shapes that have no name; check names, parents, scripts and collections."""
-        name_shapes(self.objects)
-        names: set[str] = set()
-        for index, entry in enumerate(self.objects):
-            if entry.name in names:
-                raise _problem(index, "name", entry.name, "is used twice")
-            names.add(entry.name)
-        check_parents(self.objects)
-        dummy_links.check(self.objects)
-        attached_scripts.check(self.scripts)
-        object_collections.check(self.collections)
-
-
-def name_shapes(objects: list[EntryChoice]) -> None:
-    """Name the shapes that have no name as V-REP names new ones: Cuboid, Cuboid0, Cuboid1, ..."""
-    taken = {entry.name for entry in objects}
-    free: dict[str, Iterator[str]] = {}
-    for index, entry in enumerate(objects):
-        if not entry.name and isinstance(entry, ObjectParameters):
-            word = _VREP_NAMES.get(entry.shape, entry.shape.capitalize())
-            name = first_free(free.setdefault(word, numbered(word)), taken)
-            objects[index] = entry.model_copy(update={"name": name, "alias": word if name != word else ""})
-
-
-def _problem(index: int, key: str, value: str, why: str) -> ParameterError:
-    return ParameterError(why, ("objects", index, key), f"'{value}'")
-
-
-def check_parents(objects: Iterable[EntryParameters]) -> None:
-    """Raise ParameterError for an entry that is its own ancestor or has too many ancestors."""
-    entries = {entry.name: entry for entry in objects}
-    for index, entry in enumerate(entries.values()):
-        ancestors = _ancestors(entry, entries)
-        if entry.name in ancestors:
-            raise _problem(index, "parent", entry.parent, f"'{entry.name}' would be its own ancestor")
-        if len(ancestors) > DEEPEST:
-            raise _problem(index, "parent", entry.parent, f"'{entry.name}' has more than {DEEPEST} ancestors")
-
-
-def _ancestors(entry: EntryParameters, entries: Mapping[str, EntryParameters]) -> dict[str, None]:
-    """Return the names of an entry's ancestors among `entries`, including its own name in a cycle."""
-    ancestors: dict[str, None] = {}
-    name = entry.parent
-    while name and name in entries and name not in ancestors:
-        ancestors[name] = None
-        name = entries[name].parent
-    return ancestors
 
 
 def read(file: str) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import pybullet
 
-from drone_sim.mechanics.frames import Matrix, invert, multiply, position, to_quaternion
+from drone_sim.mechanics.frames import Matrix, invert, multiply
 from drone_sim.mechanics.state import Pose
 
 _MAX_FORCE = 1e9  # N; PyBullet's default would let heavy bodies come apart
@@ -65,7 +65,7 @@ class RigidLinks:
         if anchor.body != WORLD:
             info = pybullet.getDynamicsInfo(anchor.body, anchor.link, self._client)
             local = multiply(invert(Pose(info[3], info[4]).matrix), local)
-        return Pose(position(local), to_quaternion(local))
+        return Pose.of(local)
 
 
 def _is_same(old: Anchor, new: Anchor) -> bool:

@@ -19,7 +19,7 @@ from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.volume import Spot, Volume
 from drone_sim.scene.bodies import bodies_above
-from drone_sim.scene.kinds.kind import KindParameters, Place
+from drone_sim.scene.entry import KindParameters, Place
 from drone_sim.scripting.api.sensors import EVERYTHING
 from drone_sim.world import World
 from drone_sim.world.queries import SurfacePoint

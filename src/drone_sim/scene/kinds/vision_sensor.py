@@ -14,7 +14,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.render.intrinsics import Intrinsics, Lens, Orthographic
-from drone_sim.scene.kinds.kind import KindParameters, Place
+from drone_sim.scene.entry import KindParameters, Place
 from drone_sim.scripting.api.sensors import EVERYTHING
 from drone_sim.scripting.api.vision import Detected
 

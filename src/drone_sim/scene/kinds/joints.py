@@ -1,4 +1,4 @@
-"""A joint of the scene; chains.py describes its part in the dynamics."""
+"""Joints and force sensors, which can hold a shape; chains.py describes their part in the dynamics."""
 
 from __future__ import annotations
 
@@ -7,26 +7,18 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
-from drone_sim.config.types import Coordinate, Finite, ParameterError, Within
+from drone_sim.config.types import Coordinate, Finite, ParameterError, Within, increasing
 from drone_sim.context import SimulationContext
+from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.joint import FORCE, POSITION, VELOCITY, Joint, JointControl
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.scene.kinds.kind import KindParameters, Place
+from drone_sim.scene.entry import KindParameters, Place
+from drone_sim.world import World
 
-_Value = Annotated[Finite, Within(-1e5, 1e5)]  # rad or m
-_Force = Annotated[Finite, Within(0, 1e9)]  # N m or N
-_DEFAULT_FORCE = 100.0
-
-
-def _check_order(pair: tuple[float, float] | None) -> tuple[float, float] | None:
-    if pair is not None and not pair[0] < pair[1]:
-        raise ValueError("must be [lowest, highest] with lowest < highest")
-    return pair
-
-
+_ZERO = (0.0, 0.0, 0.0)
 _Limits = Annotated[
     tuple[Coordinate, Coordinate] | None,
-    AfterValidator(_check_order),
+    AfterValidator(increasing),
     Field(description="2 numbers, [lowest, highest] in rad or m"),
 ]
 
@@ -37,10 +29,10 @@ class JointParameters(KindParameters):
     kind: Literal["joint"]
     type: Literal["revolute", "prismatic", "spherical"]
     limits: _Limits = None
-    value: _Value = 0.0
+    value: Annotated[Finite, Within(-1e5, 1e5)] = 0.0  # rad or m
     mode: Literal["kinematic", "passive", "position", "velocity", "force"] = "kinematic"
     target: Annotated[Finite, Within(-1e9, 1e9)] = 0.0
-    max_force: _Force = _DEFAULT_FORCE
+    max_force: Annotated[Finite, Within(0, 1e9)] = 100.0  # N m or N
 
     def model_post_init(self, context: Any) -> None:
         """Raise ParameterError for a value outside the limits, and for a value or limits of a spherical joint."""
@@ -65,5 +57,40 @@ class JointParameters(KindParameters):
         )
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
-        """Return the joint, not moved by the dynamics yet."""
         return Joint(*place, motion=self.type, limits=self.limits, value=self.value, control=self.control)
+
+
+class ForceSensorParameters(KindParameters):
+    """A force sensor: a rigid link between its child shape and its parent that measures the transmitted wrench."""
+
+    kind: Literal["force_sensor"]
+
+    def make(self, place: Place, context: SimulationContext) -> SceneObject:
+        return ForceSensor(*place, kind="force_sensor")
+
+
+class ForceSensor(SceneObject):
+    """Measures the force and torque transmitted to its child shape."""
+
+    _held_link: tuple[World, int, int] | None = None
+
+    def hold(self, world: World, body: int, link: int) -> None:
+        """Attach the sensor to the link of a body that it holds."""
+        self._held_link = world, body, link
+        world.joints.measure(body, link)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether it holds a shape in the dynamics."""
+        return self._held_link is not None
+
+    def release(self) -> None:
+        """Detach the sensor from its link."""
+        self._held_link = None
+
+    def read(self) -> tuple[Vector, Vector]:
+        """Return the force (N) and torque (N m) that the child exerts, of the last sub-step, in the sensor's frame."""
+        if self._held_link is None:
+            return _ZERO, _ZERO
+        world, body, link = self._held_link
+        return world.joints.load(body, link)

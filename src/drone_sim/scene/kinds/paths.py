@@ -1,4 +1,4 @@
-"""A path of V-REP 3.x: control points with rounded corners."""
+"""Paths that scripts follow: of straight segments, and V-REP 3.x's of control points with rounded corners."""
 
 from __future__ import annotations
 
@@ -10,17 +10,44 @@ from pydantic import Field
 from drone_sim.config.types import Checked, Finite, ParameterError, Point, Switch, Unit, Within
 from drone_sim.context import SimulationContext
 from drone_sim.mechanics.controlled_path import METRES_PER_RADIAN, ControlledPath, PathRules
+from drone_sim.mechanics.path import Path
 from drone_sim.mechanics.path_curves import ControlPoint, Station
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.scene.kinds.kind import KindParameters, Place
-from drone_sim.scene.kinds.path import MAX_POINTS, Turn
+from drone_sim.scene.entry import KindParameters, Place
 
+_MAX_POINTS = 10_000
+_Turn = tuple[Finite, Finite, Finite, Finite]
 MAX_LINE = 100_000  # points of all curves of a path
 LONGEST = 1e6  # m
 FACTORS, COUNTS = (0.1, 0.99), (1, 100)
 _Factor = Annotated[Finite, Within(*FACTORS)]
 _Metres = Annotated[Finite, Within(1e-4, 1e3)]  # m
 _Pause = Annotated[Finite, Within(0, 1e3)]  # m
+
+
+class PathParameters(KindParameters):
+    """A path of straight segments; `points` in its own frame; `closed`: the last is joined to the first.
+
+    `turns` are the points' quaternions x, y, z, w, for scripts that read them; by default they look along the path.
+    """
+
+    kind: Literal["path"]
+    points: Annotated[list[Point], Field(min_length=2, max_length=_MAX_POINTS)]
+    closed: Switch = False
+    turns: Annotated[tuple[_Turn, ...], Field(max_length=_MAX_POINTS)] = ()
+
+    def model_post_init(self, context: Any) -> None:
+        """Raise ParameterError for quaternions that are not unit, or not one for each point."""
+        super().model_post_init(context)
+        if self.turns and len(self.turns) != len(self.points):
+            raise ParameterError(
+                f"{len(self.turns)} quaternions for {len(self.points)} points: must be one for each point", ("turns",)
+            )
+        if any(abs(math.hypot(*quaternion) - 1.0) > 1e-3 for quaternion in self.turns):
+            raise ParameterError("each must be a unit quaternion x, y, z, w", ("turns",))
+
+    def make(self, place: Place, context: SimulationContext) -> SceneObject:
+        return Path(*place, self.points, self.closed, self.turns)
 
 
 class ControlPointParameters(Checked):
@@ -31,7 +58,7 @@ class ControlPointParameters(Checked):
     """
 
     position: Point
-    turn: Turn = (0.0, 0.0, 0.0, 1.0)
+    turn: _Turn = (0.0, 0.0, 0.0, 1.0)
     factors: tuple[_Factor, _Factor] = (0.5, 0.5)
     count: Annotated[int, Within(*COUNTS)] = 15
     pause: _Pause = 0.0
@@ -60,7 +87,7 @@ class CurvedPathParameters(KindParameters):
     """
 
     kind: Literal["curved_path"]
-    control_points: Annotated[list[ControlPointParameters], Field(max_length=MAX_POINTS)]
+    control_points: Annotated[list[ControlPointParameters], Field(max_length=_MAX_POINTS)]
     closed: Switch = False
     orientation: Literal["own", "automatic", "x_up"] = "automatic"
     flat: Switch = False
