@@ -1,8 +1,8 @@
-"""Changes of a scene by an edit, which can be undone and redone."""
+"""Changes of a scene by edits, and their history for undo and redo."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple, TypeVar
 
 from drone_sim.mechanics.object_tree import WORLD, levels
@@ -12,10 +12,13 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.scene.entry import EntryParameters
 from drone_sim.scene.scene_parameters import AttachedScriptParameters
 
+MOST = 100  # steps of undo
+_Key = TypeVar("_Key")
 _Value = TypeVar("_Value")
 _Pair = tuple[_Value | None, _Value | None]  # before and after; None if absent
+_Changed = Mapping[int, tuple[EntryParameters, EntryParameters]]
 _DESCRIPTION_KEYS = ("alias", "category", "model")
-_POSE_KEYS = ("parent", "position", "rpy")
+_POSE_KEYS = {"parent", "position", "rpy"}
 
 
 class SceneChange(NamedTuple):
@@ -27,13 +30,14 @@ class SceneChange(NamedTuple):
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing has changed."""
         return not self.entries and not self.scripts and self.settings[0] == self.settings[1]
 
     @property
     def reversed(self) -> SceneChange:
         """The change that undoes this one."""
-        return SceneChange(_swapped(self.entries), _swapped(self.scripts), (self.settings[1], self.settings[0]))
+        entries = {handle: (after, before) for handle, (before, after) in self.entries.items()}
+        scripts = {name: (after, before) for name, (before, after) in self.scripts.items()}
+        return SceneChange(entries, scripts, (self.settings[1], self.settings[0]))
 
     def followed_by(self, other: SceneChange) -> SceneChange:
         """Return this change and the following one combined."""
@@ -53,16 +57,9 @@ def change_between(before: SceneContent, after: SceneContent) -> SceneChange:
     )
 
 
-_Key = TypeVar("_Key")
-
-
 def _differences(before: Mapping[_Key, _Value], after: Mapping[_Key, _Value]) -> dict[_Key, _Pair[_Value]]:
     pairs = ((key, (before.get(key), after.get(key))) for key in {**before, **after})
     return {key: pair for key, pair in pairs if pair[0] is not pair[1] and pair[0] != pair[1]}
-
-
-def _swapped(pairs: Mapping[_Key, _Pair[_Value]]) -> dict[_Key, _Pair[_Value]]:
-    return {key: (after, before) for key, (before, after) in pairs.items()}
 
 
 def _combined(first: Mapping[_Key, _Pair[_Value]], second: Mapping[_Key, _Pair[_Value]]) -> dict[_Key, _Pair[_Value]]:
@@ -73,102 +70,165 @@ def _combined(first: Mapping[_Key, _Pair[_Value]], second: Mapping[_Key, _Pair[_
     return {key: pair for key, pair in pairs.items() if pair[0] != pair[1]}
 
 
-def apply_change(simulation: Simulation, change: SceneChange, apply_settings: Callable[[Settings], None]) -> None:
-    """Apply a change to a scene that is in the state before it; `apply_settings` applies changed settings.
+def apply_change(simulation: Simulation, change: SceneChange) -> None:
+    """Apply a change to a scene that is in the state before it.
 
     Raises ValueError; a part of the change may then be applied already.
     """
-    _ChangeApplier(simulation, change).apply_change(apply_settings)
+    entries, scripts = change.entries.items(), change.scripts.items()
+    removed = [handle for handle, (_, new) in entries if new is None]
+    added = {handle: new for handle, (old, new) in entries if old is None and new is not None}
+    changed = {handle: (old, new) for handle, (old, new) in entries if old is not None and new is not None}
+    for name, (_, script) in scripts:
+        if script is None:
+            simulation.operations.detach_script(name)
+    if removed:
+        simulation.operations.remove(removed)
+    if change.settings[0] != change.settings[1]:
+        simulation.apply_settings(change.settings[1])  # this may replace operations, tree and scene
+    _rename(simulation, {handle: new.name for handle, (old, new) in changed.items() if old.name != new.name})
+    if added:
+        simulation.tree.reserve({new.name: handle for handle, new in added.items()})
+        simulation.operations.add([*added.values()])
+        simulation.scene.put_in_order()
+    _replace_entries(simulation, changed)
+    _set_places(simulation, changed)
+    for name, (_, script) in scripts:
+        if script is not None and simulation.scene.scripts.get(name) != script:
+            simulation.operations.attach_script(script)
 
 
-class _ChangeApplier:
-    def __init__(self, simulation: Simulation, change: SceneChange):
-        self._simulation = simulation
-        self._change = change
-        pairs = change.entries.items()
-        self._removed = [handle for handle, (_, after) in pairs if after is None]
-        self._added = {handle: after for handle, (before, after) in pairs if before is None and after is not None}
-        self._changed = {handle: (old, new) for handle, (old, new) in pairs if old is not None and new is not None}
+def _rename(simulation: Simulation, names: dict[int, str]) -> None:
+    """Rename objects, even if some exchange their names."""
+    tree, operations = simulation.tree, simulation.operations
+    while names:
+        free = [handle for handle, name in names.items() if name not in tree]
+        if not free:
+            first = next(iter(names))
+            operations.rename(first, operations.free_name(names[first]))
+        for handle in free:
+            operations.rename(handle, names.pop(handle))
 
-    def apply_change(self, apply_settings: Callable[[Settings], None]) -> None:
-        self._remove()
-        before, after = self._change.settings
-        if before != after:
-            apply_settings(after)
-        self._rename({handle: new.name for handle, (old, new) in self._changed.items() if old.name != new.name})
-        if self._added:
-            self._simulation.context.objects.reserve({new.name: handle for handle, new in self._added.items()})
-            self._simulation.operations.add([*self._added.values()])
-            self._simulation.scene.put_in_order()
-        self._replace_entries()
-        self._set_places()
-        for name, (_, script) in self._change.scripts.items():
-            if script is not None and self._simulation.scene.scripts.get(name) != script:
-                self._simulation.operations.attach_script(script)
 
-    def _remove(self) -> None:
-        operations = self._simulation.operations
-        for name, (_, script) in self._change.scripts.items():
-            if script is None:
-                operations.detach_script(name)
-        if self._removed:
-            operations.remove(self._removed)
+def _replace_entries(simulation: Simulation, changed: _Changed) -> None:
+    """Set the new entries, all at once, so that the world is rebuilt only once."""
+    operations, tree, entries = simulation.operations, simulation.tree, {}
+    for handle, (old, new) in changed.items():
+        if type(old) is not type(new):  # replace the object by one of another type, at the same place in the tree
+            children = [child for child, _ in tree.children(tree[handle])]
+            script = simulation.scene.scripts.get(new.name)
+            operations.remove([handle])
+            tree.reserve({new.name: handle})
+            operations.add([new], [script] if script else [])
+            for child in children:
+                operations.set_parent(child, handle, keep_in_place=True)
+    same_type = {handle: (old, new) for handle, (old, new) in changed.items() if type(old) is type(new)}
+    for handle, (old, new) in same_type.items():
+        if _different_keys(old, new) - {"name", *_DESCRIPTION_KEYS, *_POSE_KEYS}:
+            now = operations.entry(handle)
+            entries[handle] = new.model_copy(update={"name": now.name, "parent": now.parent})
+    if entries:
+        operations.replace_entries(entries)
+    for handle, (old, new) in same_type.items():
+        described = {key: getattr(new, key) for key in _DESCRIPTION_KEYS if key in _different_keys(old, new)}
+        if described:
+            operations.describe(handle, **described)
 
-    def _rename(self, names: dict[int, str]) -> None:
-        """Rename objects, even if some exchange their names."""
-        tree, operations = self._simulation.context.objects, self._simulation.operations
-        while names:
-            free = [handle for handle, name in names.items() if name not in tree]
-            if not free:
-                first = next(iter(names))
-                operations.rename(first, operations.free_name(names[first]))
-            for handle in free:
-                operations.rename(handle, names.pop(handle))
 
-    def _replace_entries(self) -> None:
-        """Set the new entries, all at once, so that the world is rebuilt only once."""
-        operations, entries = self._simulation.operations, {}
-        for handle, (old, new) in self._changed.items():
-            if type(old) is not type(new):
-                self._replace(handle, new)
-        for handle, (old, new) in self._changed.items():
-            if type(old) is type(new) and _different_keys(old, new) - {"name", *_DESCRIPTION_KEYS, *_POSE_KEYS}:
-                now = operations.entry(handle)
-                entries[handle] = new.model_copy(update={"name": now.name, "parent": now.parent})
-        if entries:
-            operations.replace_entries(entries)
-        for handle, (old, new) in self._changed.items():
-            described = {key: getattr(new, key) for key in _DESCRIPTION_KEYS if key in _different_keys(old, new)}
-            if described and type(old) is type(new):
-                operations.describe(handle, **described)
-
-    def _replace(self, handle: int, entry: EntryParameters) -> None:
-        """Replace an object by one of another type, at the same place in the tree."""
-        tree, operations = self._simulation.context.objects, self._simulation.operations
-        children = [child for child, _ in tree.children(tree[handle])]
-        script = self._simulation.scene.scripts.get(entry.name)
-        operations.remove([handle])
-        tree.reserve({entry.name: handle})
-        operations.add([entry], [script] if script else [])
-        for child in children:
-            operations.set_parent(child, handle, keep_in_place=True)
-
-    def _set_places(self) -> None:
-        tree, operations = self._simulation.context.objects, self._simulation.operations
-        reparented = {handle: new for handle, (old, new) in self._changed.items() if old.parent != new.parent}
-        for handle in reparented:  # to the world first: two objects may exchange their places
-            operations.set_parent(handle, WORLD, keep_in_place=True)
-        for handle, new in reparented.items():
-            if new.parent:
-                operations.set_parent(handle, tree.handle(new.parent), keep_in_place=True)
-        moved = [
-            (handle, new)
-            for handle, (old, new) in self._changed.items()
-            if any(getattr(old, key) != getattr(new, key) for key in _POSE_KEYS)
-        ]
-        for handle, new in sorted(moved, key=lambda item: levels(tree[item[0]])):
-            operations.put(handle, new.local)
+def _set_places(simulation: Simulation, changed: _Changed) -> None:
+    tree, operations = simulation.tree, simulation.operations
+    reparented = {handle: new for handle, (old, new) in changed.items() if old.parent != new.parent}
+    for handle in reparented:  # to the world first: two objects may exchange their places
+        operations.set_parent(handle, WORLD, keep_in_place=True)
+    for handle, new in reparented.items():
+        if new.parent:
+            operations.set_parent(handle, tree.handle(new.parent), keep_in_place=True)
+    moved = [
+        (handle, new) for handle, (old, new) in changed.items() if not _POSE_KEYS.isdisjoint(_different_keys(old, new))
+    ]
+    for handle, new in sorted(moved, key=lambda item: levels(tree[item[0]])):
+        operations.put(handle, new.local)
 
 
 def _different_keys(old: EntryParameters, new: EntryParameters) -> set[str]:
     return {key for key in type(new).model_fields if getattr(old, key, None) != getattr(new, key)}
+
+
+# ---- history
+
+
+class Step(NamedTuple):
+    """One step of undo: its name, the `merge` key that its edits share, and the change."""
+
+    name: str
+    merge: str
+    change: SceneChange
+
+
+class History:
+    """The steps that can be undone and redone."""
+
+    def __init__(self) -> None:
+        self._done: list[Step] = []
+        self._undone: list[Step] = []
+        self._at_start: tuple[list[Step], list[Step]] | None = None  # both lists at the start of the simulation
+
+    @property
+    def undo_name(self) -> str:
+        """The name of the next step to undo, '' if there is none."""
+        return self._done[-1].name if self._done else ""
+
+    @property
+    def redo_name(self) -> str:
+        """The name of the next step to redo, '' if there is none."""
+        return self._undone[-1].name if self._undone else ""
+
+    def is_last(self, merge: str) -> bool:
+        """Return whether the last step has this `merge` key."""
+        return bool(self._done) and self._done[-1].merge == merge
+
+    def of(self, merge: str) -> Step:
+        """Return the newest step with this `merge` key. Raises ValueError if there is none."""
+        for step in reversed(self._done):
+            if step.merge == merge:
+                return step
+        raise ValueError("there is nothing to undo")
+
+    def add(self, step: Step) -> None:
+        """Add a step and clear the steps to redo; steps with the same `merge` key in a row become one."""
+        self._undone.clear()
+        last = self._done[-1] if self._done else None
+        if last is not None and step.merge and last.merge == step.merge:
+            self._done[-1] = last._replace(change=last.change.followed_by(step.change))
+            if self._done[-1].change.is_empty:
+                self._done.pop()
+            return
+        self._done = [*self._done, step][-MOST:]
+
+    def undone(self) -> Step:
+        """Return the step to undo, and move it to those to redo. Raises ValueError if there is none."""
+        if not self._done:
+            raise ValueError("there is nothing to undo")
+        self._undone.append(self._done.pop())
+        return self._undone[-1]
+
+    def redone(self) -> Step:
+        """Return the step to redo, and move it to those to undo. Raises ValueError if there is none."""
+        if not self._undone:
+            raise ValueError("there is nothing to redo")
+        self._done.append(self._undone.pop()._replace(merge=""))
+        return self._done[-1]
+
+    def clear(self) -> None:
+        """Clear the history, for another scene."""
+        self._done, self._undone, self._at_start = [], [], None
+
+    def start(self) -> None:
+        """Begin a run: stop() drops the steps made after this."""
+        self._at_start = [*self._done], [*self._undone]
+
+    def stop(self) -> None:
+        """End a run: restore the history to that at the start."""
+        if self._at_start is not None:
+            self._done, self._undone = self._at_start
+            self._at_start = None

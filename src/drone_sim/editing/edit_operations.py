@@ -9,11 +9,11 @@ from typing import Any
 
 from drone_sim.config.errors import checked
 from drone_sim.config.types import Checked, ParameterError
-from drone_sim.editing import clipboard, records, scripts, signs
+from drone_sim.editing import clipboard, records
 from drone_sim.editing.object_edits import ObjectEdits
 from drone_sim.editing.vehicle_edits import FLOOR, VehicleEdits
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import Matrix, Quaternion, Vector
+from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.mechanics.state import Pose
 from drone_sim.run.simulation import Simulation
@@ -41,26 +41,26 @@ class EditOperations:
         executors: Mapping[type[Checked], Callable[[Any], list[int] | None]] = {
             records.Add: self._objects.add,
             records.AddModel: self._objects.add_model,
-            records.AddSign: lambda op: signs.add(self._simulation, op),
+            records.AddSign: self._objects.add_sign,
             records.AddVehicle: self._vehicles.add,
             records.Remove: self._remove,
             records.Move: self._move,
             records.Rename: self._rename,
             records.Reparent: self._reparent,
-            records.Scale: lambda op: self._objects.scale(self._handles(op.objects), op.factors),
+            records.Scale: lambda op: self._simulation.operations.scale(self._handles(op.objects), op.factors),
             records.Copy: self._copy,
             records.Paste: self._paste,
             records.Group: lambda op: self._objects.group(self._handles(op.objects), op.name, op.as_),
             records.Ungroup: lambda op: self._objects.ungroup(self._simulation.tree.resolve(op.object)),
             records.AttachScript: self._attach_script,
-            records.DetachScript: lambda op: scripts.detach(self._simulation, self._simulation.tree.resolve(op.object)),
+            records.DetachScript: self._objects.detach_script,
         }
-        changed = [self._simulation.tree.resolve(op.object)] if hasattr(op, "object") else self._changed_handles(op)
+        if isinstance(op, (records.Scale, records.Reparent)):
+            changed = self._handles(op.objects)
+        else:
+            changed = [self._simulation.tree.resolve(op.object)] if hasattr(op, "object") else []
         created = executors[type(op)](op)
         return changed if created is None else created
-
-    def _changed_handles(self, op: Any) -> list[int]:
-        return self._handles(op.objects) if isinstance(op, (records.Scale, records.Reparent)) else []
 
     def _handles(self, objects: list[Any]) -> list[int]:
         return [self._simulation.tree.resolve(item) for item in objects]
@@ -174,21 +174,17 @@ class EditOperations:
                 raise ValueError("attach_script to a vehicle needs a file, which becomes its key `script`")
             self._vehicles.set(handle, {"script": op.script})
         else:
-            scripts.attach(self._simulation, handle, op.script, op.language, op.parameters)
-
-
-def _unit(quaternion: Quaternion) -> Quaternion:
-    length = math.hypot(*quaternion)
-    if length < _MIN_LENGTH:
-        raise ValueError(f"quaternion: its length is {length:g}: must be about 1")
-    x, y, z, w = (value / length for value in quaternion)
-    return x, y, z, w
+            self._objects.attach_script(op)
 
 
 def _placed(op: records.Move, present: Matrix) -> Matrix:
     position = frames.position(present) if op.position is None else op.position
     if op.quaternion is not None:
-        return Pose(position, _unit(op.quaternion)).matrix
+        length = math.hypot(*op.quaternion)
+        if length < _MIN_LENGTH:
+            raise ValueError(f"quaternion: its length is {length:g}: must be about 1")
+        x, y, z, w = (value / length for value in op.quaternion)
+        return Pose(position, (x, y, z, w)).matrix
     rpy = frames.to_rpy(present) if op.rpy is None else op.rpy
     matrix = frames.from_rpy(position, rpy)
     if op.rpy is None:  # keep the rotation exactly

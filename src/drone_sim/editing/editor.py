@@ -10,10 +10,9 @@ from typing import Any
 from drone_sim.config.errors import checked
 from drone_sim.config.types import Checked
 from drone_sim.editing import records
-from drone_sim.editing.changes import SceneChange, apply_change, change_between
+from drone_sim.editing.changes import History, SceneChange, Step, apply_change, change_between
 from drone_sim.editing.drafts import Drafts
 from drone_sim.editing.edit_operations import EditOperations
-from drone_sim.editing.history import History, Step
 from drone_sim.editing.scene_files import SceneFiles
 from drone_sim.files.yaml_text import YamlText
 from drone_sim.run.pacing import Throttle
@@ -142,9 +141,11 @@ class SceneEditor:
             self.revision += 1
         return self._answer(name, handles=[key for key in handles if self.simulation.tree.get(key) is not None])
 
-    def _apply(self, change: SceneChange) -> None:
+    def _apply(self, change: SceneChange) -> list[int]:
+        """Apply a change; return the handles of its objects."""
         if not change.is_empty:
-            apply_change(self.simulation, change, self.simulation.apply_settings)
+            apply_change(self.simulation, change)
+        return [*change.entries]
 
     def _answer(self, message: str, **more: Any) -> dict[str, Any]:
         return {"revision": self.revision, "said": message, "until_stop": self.simulation.running, **more}
@@ -156,11 +157,7 @@ class SceneEditor:
         step = self.history.of(request.merge)
         change, now = step.change.reversed, self.simulation.document.settings
         settings = now, as_between(now, *change.settings)
-        return self._change(f"Revert: {step.name}", lambda: self._revert(change._replace(settings=settings)))
-
-    def _revert(self, change: SceneChange) -> list[int]:
-        self._apply(change)
-        return [*change.entries]
+        return self._change(f"Revert: {step.name}", lambda: self._apply(change._replace(settings=settings)))
 
     def _step(self, step: Callable[[], Step], back: Callable[[], Step], word: str) -> dict[str, Any]:
         """Undo or redo a step; `back` restores the history if that fails."""
@@ -220,11 +217,8 @@ class SceneEditor:
     def _save(self, request: records.Save) -> dict[str, Any]:
         path = self.files.save(None if request.save is True else str(request.save))
         if self.simulation.running:
-            note = (
-                ""
-                if path == self.simulation.document.file
-                else ". This is a copy: to save the scene itself, stop the simulation first"
-            )
+            is_copy = path != self.simulation.document.file
+            note = ". This is a copy: to save the scene itself, stop the simulation first" if is_copy else ""
             return self._answer(f"saved the scene as it is in flight to {path}{note}", file=str(path))
         self._saved = self.revision
         return self._answer(f"saved {path}", file=str(path))

@@ -5,24 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from drone_sim.config.types import FoundFile, named_in
+from drone_sim.config.types import named_in
 from drone_sim.files.resources import locate, package_path
 from drone_sim.message_text import near_names
 from drone_sim.scene.models import Model, read
 
-MODELS = "config/models"
+_MODELS = "config/models"
 _MESHES = (".obj", ".stl", ".dae")
 KINDS = (".yaml", ".ttm", ".urdf", *_MESHES)
 
 
 def package_models() -> dict[str, Path]:
     """Return the files of the models that come with the package, by name."""
-    return {file.stem: file for file in sorted((package_path() / MODELS).glob("*.yaml"))}
-
-
-def _in_package(file: FoundFile) -> FoundFile:
-    """Return a model's file under a name that is valid for any scene on any machine."""
-    return named_in(Path(), f"package://drone_sim/{MODELS}/{file.given}")
+    return {file.stem: file for file in sorted((package_path() / _MODELS).glob("*.yaml"))}
 
 
 def read_model_file(name: str, folder: Path, imported: Callable[[Path], Path]) -> Model:
@@ -37,7 +32,9 @@ def read_model_file(name: str, folder: Path, imported: Callable[[Path], Path]) -
             raise ValueError(f"no model named '{name}'; {near_names(name, available)}")
         model = read(available[name], imported)
         for entry in model.objects:
-            entry.update({key: _in_package(entry[key]) for key in ("file", "texture") if key in entry})
+            for key in ("file", "texture"):
+                if key in entry:  # a name that is valid for any scene on any machine
+                    entry[key] = named_in(Path(), f"package://drone_sim/{_MODELS}/{entry[key].given}")
         return model
     if suffix not in KINDS:
         raise ValueError(f"{name[:80]}: a model is a {', '.join(KINDS[:-1])} or {KINDS[-1]} file")

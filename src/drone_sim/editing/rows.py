@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from drone_sim.config.types import Checked
+from drone_sim.editing.properties import Part, part_named
 from drone_sim.editing.vehicle_edits import FLOOR
-from drone_sim.editing.vehicle_parts import Part, part_named
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.run.scene_settings import PLACE, vehicles_in

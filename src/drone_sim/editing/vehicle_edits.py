@@ -9,7 +9,7 @@ from typing import Any
 
 from drone_sim.config.types import ParameterError, merged
 from drone_sim.editing import records
-from drone_sim.editing.vehicle_parts import Part, part_named, parts_of, with_part
+from drone_sim.editing.properties import Part, part_named, parts_of, with_part
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.object_names import first_free, plain
