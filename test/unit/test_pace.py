@@ -4,7 +4,7 @@ import pytest
 
 from drone_sim.config.types import ParameterError
 from drone_sim.run import parameters
-from drone_sim.run.diagnosis.counts import between, count
+from drone_sim.run.diagnosis.finding import between, count
 from drone_sim.run.pacing import Pace, Pacer, period
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation

@@ -6,11 +6,12 @@ This module defines what is allowed, and no values: config/drone.yaml holds ever
 from __future__ import annotations
 
 import copy
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 
 from drone_sim.config.errors import changed, line_of, problems
 from drone_sim.config.types import (
@@ -36,9 +37,7 @@ from drone_sim.files.yaml_files import YamlLines
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.importing.cache import imported_scene
 from drone_sim.message_text import MAX_NAME, shown
-from drone_sim.run.dumps import read_config
-from drone_sim.run.lockstep_parameters import LockstepParameters
-from drone_sim.run.profiles import profile_files
+from drone_sim.run.profiles import profile_files, read_config
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import SceneParameters
 from drone_sim.sensors.validation import check_rates
@@ -49,6 +48,13 @@ MAX_SUB_STEPS = 1000
 MAX_VEHICLES = 256
 MAX_STEP_COUNT = 1_000_000
 _SPACING = 1.0  # m, between two vehicles in a row
+
+STEP = "step"
+_NONE = "none"  # as the launch argument, for no topics: an empty one is hard to write
+_MAX_AWAITED = 64
+_LONGEST_TOPIC = 200  # characters
+_TOPIC = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
+_STEPS = re.compile(r"([1-9][0-9]{0,4}) steps?")
 
 
 class RemoteApiParameters(Checked):
@@ -71,6 +77,67 @@ class PhysicsParameters(Checked):
     """Terms of rigid-body dynamics that V-REP leaves out."""
 
     gyroscopic: Switch
+
+
+def _check_topic(topic: str) -> str:
+    if not _TOPIC.fullmatch(topic):
+        raise ValueError("must be a topic such as cmd_vel, drone2/cmd_vel or /drone/cmd_vel")
+    return topic
+
+
+def _check_trigger(trigger: str) -> str:
+    if not (_STEPS.fullmatch(trigger) or _TOPIC.fullmatch(trigger)):
+        raise ValueError("must be step, a number of steps such as `4 steps`, odom, or a camera's topic such as front")
+    return trigger
+
+
+class AwaitedTopic(Checked):
+    """A topic that the vehicles listen to, and the message that each of its messages answers."""
+
+    topic: Annotated[str, Field(max_length=_LONGEST_TOPIC), AfterValidator(_check_topic)]
+    trigger: Annotated[str, Field(max_length=_LONGEST_TOPIC), AfterValidator(_check_trigger)]
+    every: Annotated[int, Within(1, 100_000)]
+
+    @property
+    def steps(self) -> int:
+        """Number of steps between two triggers; 0 if a vehicle's topic is the trigger."""
+        if self.trigger == STEP:
+            return 1
+        found = _STEPS.fullmatch(self.trigger)
+        return int(found[1]) if found else 0
+
+
+def _check_list(value: Any) -> Any:
+    if not isinstance(value, list):
+        raise ValueError("must be a list of topics such as [cmd_vel]")
+    return value
+
+
+class LockstepParameters(Checked):
+    """What the next step waits for, and for how long. Without topics in `wait_for`, no step waits."""
+
+    wait_for: Annotated[list[AwaitedTopic], BeforeValidator(_check_list), Field(max_length=_MAX_AWAITED)]
+    trigger: Annotated[str, Field(max_length=_LONGEST_TOPIC), AfterValidator(_check_trigger)]
+    every: Annotated[int, Within(1, 100_000)]
+    timeout: Annotated[Finite, Within(0.01, 1e4)]
+    start_timeout: Annotated[Finite, Within(0.1, 1e4)]
+    on_timeout: Literal["hold", "go on", "end"]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _complete_topics(cls, values: Any) -> Any:
+        """Accept names in place of entries, and names separated by commas, as the launch argument has them."""
+        if not isinstance(values, Mapping):
+            return values
+        entries = values.get("wait_for")
+        if isinstance(entries, str):
+            entries = [] if entries.strip() in ("", _NONE) else [name.strip() for name in entries.split(",")]
+        if not isinstance(entries, (list, tuple)):
+            return values
+        common = {key: values[key] for key in ("trigger", "every") if key in values}
+        named = [{"topic": entry} if isinstance(entry, str) else entry for entry in entries]
+        completed = [{**common, **entry} if isinstance(entry, Mapping) else entry for entry in named]
+        return {**values, "wait_for": completed}
 
 
 class Parameters(PaceParameters, EquipmentParameters):

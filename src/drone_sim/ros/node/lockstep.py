@@ -17,8 +17,8 @@ from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.core.message_conversion import ros_time
 from drone_sim.ros.core.validation import sender
 from drone_sim.run.diagnosis.finding import WARN, Finding, Problem, finding
-from drone_sim.run.lockstep_parameters import AwaitedTopic, LockstepParameters
 from drone_sim.run.pacing import Throttle
+from drone_sim.run.parameters import AwaitedTopic, LockstepParameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.vehicle import Vehicle
 

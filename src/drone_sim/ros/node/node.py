@@ -45,9 +45,8 @@ from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.ros.vehicle.vehicle_topics import FleetTopics
 from drone_sim.run.diagnosis.diagnosis import Diagnosis
 from drone_sim.run.diagnosis.finding import Finding
-from drone_sim.run.lockstep_parameters import LockstepParameters
 from drone_sim.run.pacing import Beat, Pace, Pacer, period
-from drone_sim.run.parameters import Parameters
+from drone_sim.run.parameters import LockstepParameters, Parameters
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.run.watchdog import Watchdog

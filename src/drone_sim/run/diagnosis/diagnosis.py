@@ -8,8 +8,7 @@ from importlib import metadata
 
 from drone_sim.message_text import shown
 from drone_sim.run.diagnosis.command_log import CommandLog
-from drone_sim.run.diagnosis.counts import Counts, Since, between, count
-from drone_sim.run.diagnosis.finding import ERROR, WARN, Finding, Problem, finding
+from drone_sim.run.diagnosis.finding import ERROR, WARN, Counts, Finding, Problem, between, count, finding
 from drone_sim.run.diagnosis.vehicles import VehicleDiagnosis, is_unmoved
 from drone_sim.run.pacing import Pacer
 from drone_sim.run.player import Player
@@ -23,7 +22,7 @@ _LATE = 0.1  # fraction of the steps; a few are late on any busy computer
 _SUSTAINED = 3  # diagnoses in a row that are too slow before that is a problem: a start, or a busy second, is none
 
 
-def cameras(simulation: Simulation, since: Since | None) -> Finding:
+def cameras(simulation: Simulation, since: Counts | None) -> Finding:
     """Check the renderer, the time per picture, and the rate of each subscribed camera."""
     renderer, values, problems = simulation.vision.renderer, {}, []
     values["renderer"] = f"PyBullet's {TINY}" if renderer == TINY else renderer or "none yet: no camera has been used"
@@ -46,7 +45,7 @@ def cameras(simulation: Simulation, since: Since | None) -> Finding:
     return finding("cameras", fine, problems, values)
 
 
-def _nominal(simulation: Simulation, vehicle: str, name: str, since: Since) -> float:
+def _nominal(simulation: Simulation, vehicle: str, name: str, since: Counts) -> float:
     """Return the expected rate of pictures in Hz of real time."""
     parameters = simulation.parameters
     every = simulation.vehicles[vehicle].parameters.cameras[name].every
@@ -55,7 +54,7 @@ def _nominal(simulation: Simulation, vehicle: str, name: str, since: Since) -> f
     return parameters.real_time_factor / (parameters.time_step * every)
 
 
-def slowness(player: Player, since: Since | None) -> list[Problem]:
+def slowness(player: Player, since: Counts | None) -> list[Problem]:
     """Return the problems of a real-time factor that is not reached, and of late steps."""
     problems, parameters = [], player.simulation.parameters
     if since is None:
@@ -69,7 +68,7 @@ def slowness(player: Player, since: Since | None) -> list[Problem]:
 
 
 def pace(
-    player: Player, pacer: Pacer, since: Since | None, simulated_time: bool, held: bool, slow: Sequence[Problem] = ()
+    player: Player, pacer: Pacer, since: Counts | None, simulated_time: bool, held: bool, slow: Sequence[Problem] = ()
 ) -> Finding:
     """Check state and script errors; with `simulated_time`, also whether /clock runs.
 

@@ -8,8 +8,7 @@ from types import MappingProxyType
 
 from drone_sim.mechanics.state import Twist
 from drone_sim.run.diagnosis.command_log import CommandLog
-from drone_sim.run.diagnosis.counts import Since
-from drone_sim.run.diagnosis.finding import ERROR, WARN, Finding, Problem, finding, numbers
+from drone_sim.run.diagnosis.finding import ERROR, WARN, Counts, Finding, Problem, finding, numbers
 from drone_sim.run.player import Player
 from drone_sim.run.profiles import profile_cure
 from drone_sim.scripting import load
@@ -36,7 +35,7 @@ class VehicleDiagnosis:
         vehicle: Vehicle,
         player: Player,
         log: CommandLog,
-        since: Since | None,
+        since: Counts | None,
         frames_below: str = "",
         unmoved: float = 0.0,
         unheard: Mapping[str, Sequence[str]] = MappingProxyType({}),
