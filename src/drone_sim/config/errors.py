@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from drone_sim.config.schema import ValueType, field_type, value_type
+from drone_sim.config.fields import ValueType, field_type, value_type
 from drone_sim.config.types import (
     PATTERNS,
     Checked,
@@ -49,10 +49,14 @@ def problems(error: ValidationError, model: type[BaseModel]) -> list[ParameterPr
     missing: dict[Location, list[_ErrorPlace]] = {}
     for detail in error.errors():
         place = _place(model, detail["loc"])
+        raised = detail.get("ctx", {}).get("error")
         if detail["type"] == "missing" and not place.is_in_list:
             missing.setdefault(place.location[:-1], []).append(place)
+        elif isinstance(raised, ParameterError):  # from a check of several keys
+            several = raised.below(*place.location).problems
+            unique.update((each._replace(or_above=bool(each.location)), None) for each in several)
         else:
-            unique.update(dict.fromkeys(_problems(detail, place, model)))
+            unique[_problem(detail, place, model)] = None
     return [*unique, *map(_missing, missing.values())]
 
 
@@ -121,15 +125,6 @@ def _choice(value: ValueType) -> _Choice:
     return _Choice("", {})
 
 
-def _description(value: ValueType) -> str:
-    """Return a description of a type for messages, '' if it has none."""
-    if value.description:
-        return value.description
-    if get_origin(value.kind) is tuple:
-        return f"{len(value.elements)} numbers" if value.elements else "left out"
-    return f"one of {', '.join(map(repr, value.words))}" if value.words else ""
-
-
 # ---- text of a problem
 
 
@@ -138,13 +133,6 @@ def _missing(places: list[_ErrorPlace]) -> ParameterProblem:
     if len(places) == 1:
         return ParameterProblem(location, f"missing{_with_description(places[0], '; it must be')}", or_above=True)
     return ParameterProblem(location[:-1], f"{', '.join(str(place.location[-1]) for place in places)} are missing")
-
-
-def _problems(error: Any, place: _ErrorPlace, model: type[BaseModel]) -> Sequence[ParameterProblem]:
-    raised = error.get("ctx", {}).get("error")
-    if isinstance(raised, ParameterError):  # from a check of several keys
-        return [each._replace(or_above=bool(each.location)) for each in raised.below(*place.location).problems]
-    return [_problem(error, place, model)]
 
 
 def _problem(error: Any, place: _ErrorPlace, model: type[BaseModel]) -> ParameterProblem:
@@ -188,8 +176,13 @@ def _reason(error: Any, place: _ErrorPlace) -> str:
 
 
 def _with_description(place: _ErrorPlace, verb: str) -> str:
-    description = _description(place.type)
-    return f"{verb} {description}" if description else ""
+    """Return the verb with a description of the type of the value; '' if the type has none."""
+    value = place.type
+    text = f"one of {', '.join(map(repr, value.words))}" if value.words else ""
+    if get_origin(value.kind) is tuple:
+        text = f"{len(value.elements)} numbers" if value.elements else "left out"
+    text = value.description or text
+    return f"{verb} {text}" if text else ""
 
 
 def _must_be_one_of(choice: _Choice, key: str = "") -> str:

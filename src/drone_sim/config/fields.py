@@ -1,17 +1,77 @@
-"""Fields of parameter models: allowed values, and defaults and comments of config/drone.yaml."""
+"""Fields of parameter models: types and allowed values; defaults and comments in config/drone.yaml."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
-from typing import Any, NamedTuple
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
 
 import yaml
+from pydantic.fields import FieldInfo
 
-from drone_sim.config.schema import ValueType, field_type, value_type
 from drone_sim.config.types import Checked, Location, Parts, Unit, Within
 from drone_sim.files.resources import package_path
+
+_Mark = TypeVar("_Mark")
+
+
+class ValueType(NamedTuple):
+    """The type of a value without Annotated and `| None`, the marks of Annotated (outer ones first), and whether the
+    value may be None.
+    """
+
+    kind: Any
+    marks: tuple[Any, ...] = ()
+    has_none: bool = False
+
+    @property
+    def words(self) -> tuple[Any, ...]:
+        """The values of a Literal; empty for other types."""
+        return get_args(self.kind) if get_origin(self.kind) is Literal else ()
+
+    @property
+    def elements(self) -> tuple[Any, ...]:
+        """The types of a tuple's elements; empty for other types."""
+        return get_args(self.kind) if get_origin(self.kind) is tuple else ()
+
+    @property
+    def fields(self) -> dict[str, FieldInfo]:
+        """The fields of a model, by their keys; empty for other types."""
+        fields = getattr(self.kind, "model_fields", {})
+        return {field.alias or name: field for name, field in fields.items()}
+
+    @property
+    def description(self) -> str:
+        """The description of a field or an annotation, '' if there is none."""
+        return next((str(mark.description) for mark in self.marks if getattr(mark, "description", None)), "")
+
+    def mark(self, kind: type[_Mark]) -> _Mark | None:
+        """Return the first mark of a class, or None."""
+        return next((mark for mark in self.marks if isinstance(mark, kind)), None)
+
+
+def value_type(annotation: Any, marks: tuple[Any, ...] = ()) -> ValueType:
+    """Return the type of the values of an annotation; `marks` are those around it."""
+    has_none = False
+    while True:
+        arguments = get_args(annotation)
+        others = [inner for inner in arguments if inner is not NoneType]
+        if get_origin(annotation) is Annotated:
+            annotation, marks = arguments[0], (*marks, *arguments[1:])
+        elif get_origin(annotation) in (Union, UnionType) and len(others) == 1:
+            annotation, has_none = others[0], True
+        else:
+            return ValueType(annotation, marks, has_none)
+
+
+def field_type(field: FieldInfo) -> ValueType:
+    """Return the type of a model's field."""
+    return value_type(field.annotation, (*field.metadata, field))
+
+
+# ---- fields
 
 
 class ParameterField(NamedTuple):
@@ -52,16 +112,13 @@ def _fields_in(value: ValueType, here: ParameterField) -> Iterator[ParameterFiel
     elif isinstance(value.kind, type) and issubclass(value.kind, Checked):
         yield from fields_of(value.kind, here.location)
     elif value.kind in (float, int, bool):
-        yield _number(value, here)
-
-
-def _number(value: ValueType, here: ParameterField) -> ParameterField:
-    kind, within, unit = value.kind, value.mark(Within), value.mark(Unit)
-    text = ", ".join(filter(None, (unit.word if unit else "", value.description)))
-    if within is None:
-        return here._replace(kind=kind, description=text)
-    low = 0.0 if within.or_zero or here.none is not None else within.low
-    return here._replace(kind=kind, low=kind(low), high=kind(within.high), description=text)
+        kind, within, unit = value.kind, value.mark(Within), value.mark(Unit)
+        text = ", ".join(filter(None, (unit.word if unit else "", value.description)))
+        here = here._replace(kind=kind, description=text)
+        if within is not None:
+            low = 0.0 if within.or_zero or here.none is not None else within.low
+            here = here._replace(low=kind(low), high=kind(within.high))
+        yield here
 
 
 def _elements(value: ValueType, here: ParameterField) -> Iterator[ParameterField]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from drone_sim.config.schema import ValueType, field_type, value_type
+from drone_sim.config.fields import ValueType, field_type, value_type
 from drone_sim.config.types import Checked, Unit, Within, flattened, nested, word_of
 from drone_sim.mechanics.object_names import plain
 from drone_sim.scene.kinds import KINDS
