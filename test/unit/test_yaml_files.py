@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drone_sim.files import yaml_files, yaml_text, yaml_writing
+from drone_sim.files import yaml_files, yaml_writing
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
 
@@ -140,8 +140,8 @@ def test_a_text_says_what_it_is_to_say_whatever_that_is(keys, floor, stay, chang
         one.update(changes)
         one.pop(gone, None)
     new = {**said, "floor": {**said["floor"], **floor}, **keys, "objects": [*items, *[ITEM] * added]}
-    made = yaml_text.YamlText(WRITTEN).rewrite(new, {"objects": [*stay, *[None] * added]})
-    assert yaml_text.has_values(made, new), made
+    made = yaml_writing.YamlText(WRITTEN).rewrite(new, {"objects": [*stay, *[None] * added]})
+    assert yaml_writing.has_values(made, new), made
     assert "# above\n" in made
 
 

@@ -14,7 +14,7 @@ from drone_sim.editing.changes import History, SceneChange, Step, apply_change, 
 from drone_sim.editing.drafts import Drafts
 from drone_sim.editing.edit_operations import EditOperations
 from drone_sim.editing.scene_files import SceneFiles
-from drone_sim.files.yaml_text import YamlText
+from drone_sim.files.yaml_writing import YamlText
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
 from drone_sim.run.scene_settings import as_between

@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 from drone_sim.config.types import ParameterError
 from drone_sim.files import writing, yaml_files
 from drone_sim.files.resources import cache_path, resolve
-from drone_sim.files.yaml_text import YamlText, has_values
-from drone_sim.files.yaml_writing import dump
+from drone_sim.files.yaml_writing import YamlText, dump, has_values
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.run.parameters import Parameters
