@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +38,7 @@ def written(
         "vehicles": copy.deepcopy(dict(vehicles)),
     }
     scene_parameters.find_files_beside(folder, {"vehicles": plain["vehicles"]})
-    content = _rename_files(plain, lambda file: file.seen_from(None))
+    content = scene_parameters.renamed_files(plain, lambda file: file.seen_from(None))
     return dump({key: section for key, section in content.items() if section}, "scene")
 
 
@@ -56,14 +56,12 @@ def read(text: str, folder: Path) -> _Content:
     for key, part in content.items():
         if key not in _KEYS:
             raise ParameterError(f"the pasted text: unknown key {shown(key)}; {near_names(str(key), _KEYS)}")
-        if not isinstance(part, _KEYS[key]) or not all(isinstance(entry, dict) for entry in _entries(part)):
+        entries = part.values() if isinstance(part, dict) else part
+        if not isinstance(part, _KEYS[key]) or not all(isinstance(entry, dict) for entry in entries):
             raise ParameterError(f"the pasted text: {key} = {shown(part)}: {_EXPECTED}")
     scene_parameters.find_files_beside(folder, {"scene": content, "vehicles": content.get("vehicles")})
-    return {**{key: kind() for key, kind in _KEYS.items()}, **_rename_files(content, lambda it: _relative(it, folder))}
-
-
-def _entries(section: Any) -> list[Any]:
-    return [*section.values()] if isinstance(section, dict) else section
+    renamed = scene_parameters.renamed_files(content, lambda file: _relative(file, folder))
+    return {**{key: kind() for key, kind in _KEYS.items()}, **renamed}
 
 
 def _parsed(text: str) -> Any:
@@ -79,14 +77,6 @@ def _parsed(text: str) -> Any:
         except yaml_files.YamlError as error:
             errors.append(error)
     raise ParameterError(f"the pasted text {shown(text)} is not YAML ({errors[0]}): it {_EXPECTED}")
-
-
-def _rename_files(value: Any, name: Callable[[FoundFile], str]) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _rename_files(item, name) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_rename_files(item, name) for item in value]
-    return name(value) if isinstance(value, FoundFile) else value
 
 
 def _relative(file: FoundFile, folder: Path) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from drone_sim.config.types import FoundFile, merged
+from drone_sim.config.types import merged
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
@@ -178,13 +178,5 @@ def with_files_seen_from(settings: Settings, here: Path, there: Path) -> Setting
         return settings
     content = scene_parameters.from_content(copy.deepcopy(dict(settings)), here)
     scene = content.pop("scene")
-    seen: dict[str, Any] = _with_files_from({**scene, **content}, there)
+    seen = scene_parameters.renamed_files({**scene, **content}, lambda file: file.seen_from(there))
     return {key: seen[key] for key in settings}
-
-
-def _with_files_from(value: Any, folder: Path) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _with_files_from(item, folder) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_with_files_from(item, folder) for item in value]
-    return value.seen_from(folder) if isinstance(value, FoundFile) else value

@@ -89,8 +89,19 @@ def place_of(item: SceneObject) -> dict[str, Any]:
     """Return the present values of an entry's keys for pose, parent and the state of a joint."""
     parent = item.parent
     matrix = item.matrix() if parent is None else frames.relative(parent.below(), item.matrix())
-    values = {**pose_keys(matrix), "parent": "" if parent is None else parent.name}
-    return {**values, **_joint(item)} if isinstance(item, Joint) else values
+    values: dict[str, Any] = {**pose_keys(matrix), "parent": "" if parent is None else parent.name}
+    if isinstance(item, Joint):
+        control = item.control
+        values.update(mode=control.mode, max_force=control.max_force)
+        targets = {POSITION: control.position, VELOCITY: control.velocity, FORCE: control.force}
+        if control.mode in targets:
+            values["target"] = targets[control.mode]
+        if item.limits is not None:
+            values["limits"] = list(item.limits)
+        low, high = item.limits or (-math.inf, math.inf)
+        if item.motion != SPHERICAL:
+            values["value"] = min(max(item.value, low), high)
+    return values
 
 
 def rounded(values: Iterable[float], decimals: int = 9) -> list[float]:
@@ -115,17 +126,3 @@ def placed(entry: EntryParameters, parent: str, matrix: Matrix) -> EntryParamete
     """Return the entry with another parent and pose in the parent's frame."""
     place = {key: tuple(values) for key, values in pose_keys(matrix).items()}
     return entry.model_copy(update={"parent": parent, **place})
-
-
-def _joint(joint: Joint) -> dict[str, Any]:
-    control = joint.control
-    values: dict[str, Any] = {"mode": control.mode, "max_force": control.max_force}
-    targets = {POSITION: control.position, VELOCITY: control.velocity, FORCE: control.force}
-    if control.mode in targets:
-        values["target"] = targets[control.mode]
-    if joint.limits is not None:
-        values["limits"] = list(joint.limits)
-    low, high = joint.limits or (-math.inf, math.inf)
-    if joint.motion != SPHERICAL:
-        values["value"] = min(max(joint.value, low), high)
-    return values

@@ -1,7 +1,4 @@
-"""Operations on the objects of a scene, for scripts and windows, while the simulation runs and while it is stopped.
-
-Operations are atomic: on an error, with a message of one line, nothing changes. Values are named as in a scene file.
-"""
+"""Operations on the objects of a scene, for scripts and windows, while the simulation runs and while it is stopped."""
 
 from __future__ import annotations
 
@@ -34,6 +31,7 @@ from drone_sim.scene.scene_parameters import (
     entry_from,
 )
 
+_Scripts = Sequence[AttachedScriptParameters]
 _IN_DYNAMICS = (ObjectParameters, JointParameters, ForceSensorParameters)
 
 
@@ -51,17 +49,18 @@ class RunningScripts(Protocol):
 
 
 class SceneOperations:
-    """Adds, removes, renames, reparents, copies, recolours and scales objects, identified by their handles."""
+    """Operations on objects, which are identified by their handles; values are named as in a scene file.
+
+    Operations are atomic: if one is not possible, it raises ValueError with a message of one line, and nothing changes.
+    """
 
     def __init__(self, scene: Scene, folder: Path | None, scripts: RunningScripts, imported: Callable[[Path], Path]):
         """Create them; models are read from and written to `folder`.
 
         `imported` converts a V-REP file to a scene file and returns it; it raises ValueError and OSError.
         """
-        self.folder = folder
-        self._scene = scene
-        self.imported = imported
-        self._scripts = scripts
+        self.folder, self.imported = folder, imported
+        self._scene, self._scripts = scene, scripts
 
     # ---- entries and handles
 
@@ -91,15 +90,8 @@ class SceneOperations:
 
     # ---- adding and removing
 
-    def add(
-        self,
-        items: Sequence[Mapping[str, Any] | EntryParameters],
-        scripts: Sequence[AttachedScriptParameters] = (),
-    ) -> list[int]:
-        """Add entries as in a scene file, and scripts on them; return the handles of the new objects.
-
-        Raises ParameterError.
-        """
+    def add(self, items: Sequence[Mapping[str, Any] | EntryParameters], scripts: _Scripts = ()) -> list[int]:
+        """Add entries as in a scene file, and scripts on them; return the handles of the new objects."""
         scene, tree = self._scene, self._scene.tree
         entries = [item if isinstance(item, EntryParameters) else entry_from(item) for item in items]
         if len(scene.records) + len(entries) > MAX_OBJECTS:
@@ -129,7 +121,7 @@ class SceneOperations:
         return [tree.handle(entry.name) for entry in entries]
 
     def remove(self, handles: Collection[int]) -> None:
-        """Remove objects with their scripts; their children stay where they are. Raises ValueError."""
+        """Remove objects with their scripts; their children stay where they are."""
         scene = self._scene
         names = [self._record(handle).entry.name for handle in handles]
         self._scripts.end([name for name in names if name in scene.scripts])
@@ -157,19 +149,14 @@ class SceneOperations:
             self._end_links({record.entry.name for record in removed})
 
     def copy(self, handles: Sequence[int]) -> list[int]:
-        """Add copies of objects, which may be children of each other, and of their scripts; return the copies' handles.
-
-        Raises ValueError.
-        """
+        """Add copies of objects, which may be children of each other, and of their scripts; return the new handles."""
         entries = [self.entry(handle) for handle in handles]
         names = {entry.name for entry in entries}
         matrices = map(self._scene.tree.matrix, handles)
         copies = [entry if entry.parent in names else placed(entry, "", at) for entry, at in zip(entries, matrices)]
         return self.add_named_anew(copies, [script for name, script in self._scene.scripts.items() if name in names])
 
-    def add_named_anew(
-        self, entries: Sequence[EntryParameters], scripts: Sequence[AttachedScriptParameters] = ()
-    ) -> list[int]:
+    def add_named_anew(self, entries: Sequence[EntryParameters], scripts: _Scripts = ()) -> list[int]:
         """Add entries and their scripts under their names or, if one is taken, all of them with names of copies."""
         tree, renames = self._scene.tree, {"": ""}
         names: list[str] = []
@@ -188,7 +175,7 @@ class SceneOperations:
         return self.add(renamed, new_scripts)
 
     def add_mesh(self, name: str, vertices: Sequence[float], indices: Sequence[int]) -> int:
-        """Add a static mesh, given by vertices (m) and triangle indices; return its handle. Raises ValueError."""
+        """Add a static mesh, given by vertices (m) and triangle indices; return its handle."""
         entries = [*self._scene.entries.values(), *self._scene.parameters.objects]
         used = {file for entry in entries if isinstance(file := getattr(entry, "file", None), str)}
         file = models.mesh_file(vertices, indices, used)
@@ -196,7 +183,7 @@ class SceneOperations:
         return self.add([{**keys, "mass": 1.0, "static": True, "respondable": False}])[0]
 
     def group(self, handles: Sequence[int]) -> int:
-        """Merge shapes into one compound with name and frame of the first; return its handle. Raises ValueError."""
+        """Merge shapes into one compound with name and frame of the first; return its handle."""
         if len({*handles}) != len(handles) or len(handles) < 2:
             raise ValueError("must be at least two different shapes")
         entries = [self.entry(member) for member in handles]
@@ -208,7 +195,7 @@ class SceneOperations:
         return handle
 
     def ungroup(self, handle: int) -> list[int]:
-        """Split a compound into one shape for each part; return their handles. Raises ValueError."""
+        """Split a compound into one shape for each part; return their handles."""
         entry = self.entry(handle)
         parts = models.parted(entry, self._scene.tree.matrix(handle))
         new = self.add_named_anew([entry_from({**part, "name": entry.name}) for part in parts])
@@ -226,18 +213,15 @@ class SceneOperations:
         self.remove(handles)
 
     def load_model(self, name: str) -> int:
-        """Add the objects and scripts of a model, also of a V-REP model (.ttm); return the first object's handle.
-
-        Raises ValueError.
-        """
+        """Add the objects and scripts of a model, also of a V-REP model (.ttm); return the first object's handle."""
         return self.add_named_anew(*models.read(models.inside(self.folder, name, ".ttm"), self.imported).checked())[0]
 
     def save_model(self, handle: int, name: str) -> None:
-        """Write an object and its descendants to a file in the folder of the scene. Raises ValueError."""
+        """Write an object and its descendants to a file in the folder of the scene."""
         self.write_model(self.model(handle), models.inside(self.folder, name))
 
     def write_model(self, members: Sequence[int], path: Path) -> None:
-        """Write objects with their scripts to a file, the base first. Raises ValueError."""
+        """Write objects with their scripts to a file, the base first."""
         entries = [self.entry(member) for member in members]
         names = {entry.name for entry in entries}
         for index, entry in enumerate(entries):
@@ -249,7 +233,7 @@ class SceneOperations:
     # ---- names and parents
 
     def rename(self, handle: int, name: str) -> None:
-        """Rename an object; the name must be unused. Raises ValueError."""
+        """Rename an object; the name must be unused."""
         scene, record = self._scene, self._record(handle)
         before = record.entry
         if name in scene.tree and scene.tree.handle(name) != handle:
@@ -275,11 +259,11 @@ class SceneOperations:
             self._scripts.rename(name, new_name)
 
     def set_alias(self, handle: int, alias: str) -> None:
-        """Set an object's alias, which need not be unique. Raises ValueError."""
+        """Set an object's alias, which need not be unique."""
         self.describe(handle, alias=alias)
 
     def describe(self, handle: int, **values: Any) -> None:
-        """Set `alias`, `category` or `model` (whether it is a model base) of an object. Raises ValueError."""
+        """Set `alias`, `category` or `model` (whether it is a model base) of an object."""
         record = self._record(handle)
         checked = changed(record.entry, values)
         record.entry = record.entry.model_copy(update={key: getattr(checked, key) for key in values})
@@ -288,7 +272,7 @@ class SceneOperations:
         described.alias, described.is_model = checked.shown, checked.model
 
     def link(self, handle: int, other: int) -> None:
-        """Link two dummies in place of their present links; -1 for `other` only ends the link. Raises ValueError."""
+        """Link two dummies in place of their present links; -1 for `other` only ends the link."""
         linked = [self._record(one) for one in (handle, other) if one != WORLD]
         for record in linked:
             if not isinstance(record.entry, DummyParameters):
@@ -302,7 +286,7 @@ class SceneOperations:
                 linked[0].entry = linked[0].entry.model_copy(update={"linked": linked[1].entry.name})
 
     def linked(self, handle: int) -> int:
-        """Return the handle of the dummy that a dummy is linked to, -1 if it has no link. Raises ValueError."""
+        """Return the handle of the dummy that a dummy is linked to, -1 if it has no link."""
         tree = self._scene.tree
         record = self._record_of(tree[handle])
         if record is None:  # a vehicle's object
@@ -327,7 +311,7 @@ class SceneOperations:
     # ---- scripts
 
     def attach_script(self, script: AttachedScriptParameters) -> None:
-        """Attach a script to an object, also of a vehicle, in place of its present one. Raises ValueError."""
+        """Attach a script to an object, also of a vehicle, in place of its present one."""
         scene = self._scene
         scene.tree.handle(script.object)
         if script.object not in scene.scripts and len(scene.scripts) >= MAX_SCRIPTS:
@@ -351,7 +335,7 @@ class SceneOperations:
     # ---- poses and parents
 
     def put(self, handle: int, local: frames.Matrix) -> None:
-        """Set an object's pose in its parent's frame, also of an object that a joint holds. Raises ValueError."""
+        """Set an object's pose in its parent's frame, also of an object that a joint holds."""
         scene, record = self._scene, self._record(handle)
         moved = scene.tree[handle]
         if not getattr(moved, "is_held", False) and moved.kind not in ("joint", "force_sensor"):
@@ -406,11 +390,11 @@ class SceneOperations:
     # ---- properties
 
     def change(self, handle: int, **values: Any) -> None:
-        """Change keys of an object's entry, such as `mass` or `size`. Raises ParameterError."""
+        """Change keys of an object's entry, such as `mass` or `size`."""
         self.replace_entries({handle: self.entry_with(handle, values)})
 
     def entry_with(self, handle: int, values: dict[str, Any]) -> EntryParameters:
-        """Return the entry of an object with some values changed, for `replace_entries`. Raises ParameterError."""
+        """Return the entry of an object with some values changed, for `replace_entries`."""
         entry = self.entry(handle)
         if values.get("mass") and isinstance(entry, ObjectParameters) and not entry.mass:
             values.setdefault("static", True)  # as before
@@ -423,7 +407,7 @@ class SceneOperations:
         return entry.model_copy(update={key: getattr(checked, key) for key in values})
 
     def paint(self, handle: int, rgba: Sequence[float | None]) -> None:
-        """Set the color of a shape and all its parts; None keeps a component. Raises ValueError."""
+        """Set the color of a shape and all its parts; None keeps a component."""
         entry, record = self.entry(handle), self._record(handle)
         before = self.color(handle)
         painted = [old if new is None else new for old, new in zip(before, rgba)]
@@ -444,7 +428,7 @@ class SceneOperations:
         return entry.parts[0].color if isinstance(entry, CompoundParameters) else entry.color
 
     def box(self, handle: int) -> tuple[frames.Vector, frames.Vector]:
-        """Return size and centre (m) of a shape's bounding box, in the shape's frame. Raises ValueError."""
+        """Return size and centre (m) of a shape's bounding box, in the shape's frame."""
         low, high = models.bounds(self.entry(handle))
         (a, b, c), (x, y, z) = map(float, high - low), map(float, (low + high) / 2)
         return (a, b, c), (x, y, z)
@@ -458,10 +442,7 @@ class SceneOperations:
         return [(entry.shape, getattr(entry, "size", ()))] if isinstance(entry, ObjectParameters) else []
 
     def scale(self, handles: Collection[int], factors: Sequence[float], positions: bool = False) -> None:
-        """Scale objects and their masses by factors along x, y and z; `positions`: also their positions in the parent.
-
-        Raises ValueError, before any object is changed, for an object that cannot be scaled so.
-        """
+        """Scale objects and their masses by factors along x, y and z; if `positions`, also their positions."""
         x, y, z = factors
         entries = {handle: scaled(self.entry(handle), (x, y, z)) for handle in handles}
         tree = self._scene.tree
@@ -487,7 +468,7 @@ class SceneOperations:
         return x * item.size_factor, y * item.size_factor, z * item.size_factor
 
     def replace_entries(self, entries: Mapping[int, EntryParameters]) -> None:
-        """Replace the entries of objects; names, parents and poses stay the same. Raises ParameterError."""
+        """Replace the entries of objects; names, parents and poses stay the same."""
         scene = self._scene
         records = {handle: self._record(handle) for handle in entries}
         new_entries = entries.values()

@@ -45,15 +45,17 @@ def _scaled_shape(entry: ObjectParameters, factors: Vector) -> dict[str, Any]:
         }
     if isinstance(entry, CompoundParameters):
         factor = _uniform(entry, factors, "a compound")
-        values["parts"] = [_scaled_part(part, factor) for part in entry.parts]
+        values["parts"] = [
+            {
+                **part.model_dump(),
+                "position": [factor * value for value in part.position],
+                "size": _scaled_size(part, (factor, factor, factor)),
+            }
+            for part in entry.parts
+        ]
     else:
         values["size"] = _scaled_size(entry, factors)
     return values
-
-
-def _scaled_part(part: PartParameters, factor: float) -> dict[str, Any]:
-    position = [factor * value for value in part.position]
-    return {**part.model_dump(), "position": position, "size": _scaled_size(part, (factor, factor, factor))}
 
 
 def _scaled_size(shape: ObjectParameters | PartParameters, factors: Vector) -> list[float]:

@@ -87,7 +87,11 @@ class Scene:
         self._built: dict[_Key, Built] = {}
         self._holders: dict[int, list[Joint | ForceSensor]] = {}  # of the links of each body
         self._forget_objects()
-        _warn(self.entries, self._build()[1])
+        reasons = self._build()[1]
+        for reason in sorted({*reasons.values()}):
+            names = [self.records[index].entry.name for index, other in reasons.items() if other == reason]
+            some = ", ".join(names[:12]) + (" …" if names[12:] else "")
+            _LOG.warning("only scripts move these joints, because %s: %s", reason, some)
 
     @property
     def entries(self) -> dict[int, EntryParameters]:
@@ -155,8 +159,7 @@ class Scene:
             return entry.local
         if entry.parent in self.tree:
             return multiply(self.tree[self.tree.handle(entry.parent)].below(), entry.local)
-        parents = (key for key, other in self.records.items() if other.entry.name == entry.parent)
-        parent = next(parents, None)
+        parent = next((key for key, other in self.records.items() if other.entry.name == entry.parent), None)
         if parent is None:  # the parent is a vehicle, which is added after the scene
             return entry.local
         return multiply(multiply(self._matrix(parent), chains.motion(self.records[parent].entry)), entry.local)
@@ -263,8 +266,7 @@ class Scene:
     def paint(self, record: ObjectRecord, rgba: Sequence[float]) -> None:
         """Set the displayed color of a shape."""
         assert record.body is not None, "only shapes have a color"
-        body, link = record.body
-        self._world.set_color(body, rgba, link)
+        self._world.set_color(record.body[0], rgba, record.body[1])
 
     def _forget_objects(self) -> None:
         self.drag.let_go_of_all()
@@ -347,14 +349,10 @@ class Scene:
 
     def _follow(self) -> None:
         """Move the kinematic bodies to their frames; a chain that hangs on another chain's link follows that chain."""
-
-        def depth(body: int) -> int:
-            return len(bodies_above(objects[first[body]]))
-
-        objects = self.objects
+        objects, bases = self.objects, self._carried_bases
         first = {built.body: built.chain.hung[0].joint for built in self._built.values() if built.chain.hung}
-        bases = self._carried_bases
-        self._context.carried.bases = {body: bases[body] for body in sorted(bases, key=depth)}
+        nearest_first = sorted(bases, key=lambda body: len(bodies_above(objects[first[body]])))
+        self._context.carried.bases = {body: bases[body] for body in nearest_first}
         self._context.carried.follow()
 
     def hold_linked_dummies(self) -> None:
@@ -437,14 +435,3 @@ def _solid(record: ObjectRecord, local: Matrix) -> ShapeInWorld:
     assert isinstance(entry, ObjectParameters) and record.body is not None, "only shapes have bodies"
     number, link = record.body
     return ShapeInWorld(number, link, entry.local if link != -1 else local, entry.mass, entry.static)
-
-
-def _warn(entries: Mapping[int, object], reasons: Mapping[int, str]) -> None:
-    """Log one warning for each reason, with the joints that the dynamics does not move."""
-    for reason in sorted({*reasons.values()}):
-        names = [getattr(entries[index], "name", "") for index, other in reasons.items() if other == reason]
-        _LOG.warning(
-            "only scripts move these joints, because %s: %s",
-            reason,
-            ", ".join(names[:12]) + (" …" if names[12:] else ""),
-        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
@@ -16,6 +16,7 @@ from drone_sim.config.types import (
     File,
     FileName,
     Finite,
+    FoundFile,
     Label,
     MagneticField,
     ParameterError,
@@ -246,34 +247,34 @@ def _resolve_files(folder: Path, values: Any) -> None:
             values[key] = named_in(folder, name)
 
 
-# ---- checks of meshes, textures and URDFs before anything is built
+def renamed_files(value: Any, name: Callable[[FoundFile], str]) -> Any:
+    """Return values with `name` of each file that `find_files_beside` has resolved."""
+    if isinstance(value, Mapping):
+        return {key: renamed_files(item, name) for key, item in value.items()}
+    if isinstance(value, list):
+        return [renamed_files(item, name) for item in value]
+    return name(value) if isinstance(value, FoundFile) else value
 
 
 def check_files(floor: FloorParameters, objects: Iterable[EntryParameters]) -> None:
     """Raise ParameterError with a message of one line for the first file of the scene that cannot be used."""
+    shapes = [entry for entry in objects if isinstance(entry, ObjectParameters)]
+    pixels = triangles = 0
     try:
-        shapes = [entry for entry in objects if isinstance(entry, ObjectParameters)]
-        _check_textures({floor.texture, *(shape.texture for shape in shapes if shape.texture)})
-        _check_meshes(shapes)
+        for path in sorted({floor.texture, *(shape.texture for shape in shapes if shape.texture)}):
+            height, width = images.read(path).shape[:2]
+            pixels += height * width
+            if pixels > MAX_PIXELS:
+                why = f"the textures of the scene have more than {MAX_PIXELS} pixels together"
+                raise ValueError(f"texture {path}: {why}")
+        for path, scale in (mesh for shape in shapes for mesh in shape.to_shape().meshes()):
+            triangles += mesh_files.triangles(path)
+            if triangles > MAX_TRIANGLES:
+                why = f"the meshes of the scene have more than {MAX_TRIANGLES} triangles together"
+                raise ValueError(f"mesh {path}: {why}")
+            reach = float(np.max(mesh_files.reach(path) * np.abs(scale)))
+            if reach > MAX_REACH:
+                why = f"reaches {reach:g} m from its origin; at most {MAX_REACH:g} m are allowed"
+                raise ValueError(f"mesh {path}: {why}")
     except ValueError as error:
         raise ParameterError(" ".join(str(error).split())) from None
-
-
-def _check_textures(paths: set[str]) -> None:
-    pixels = 0
-    for path in sorted(paths):
-        height, width = images.read(path).shape[:2]
-        pixels += height * width
-        if pixels > MAX_PIXELS:
-            raise ValueError(f"texture {path}: the textures of the scene have more than {MAX_PIXELS} pixels together")
-
-
-def _check_meshes(shapes: list[ObjectParameters]) -> None:
-    count = 0
-    for path, scale in (mesh for shape in shapes for mesh in shape.to_shape().meshes()):
-        count += mesh_files.triangles(path)
-        if count > MAX_TRIANGLES:
-            raise ValueError(f"mesh {path}: the meshes of the scene have more than {MAX_TRIANGLES} triangles together")
-        reach = float(np.max(mesh_files.reach(path) * np.abs(scale)))
-        if reach > MAX_REACH:
-            raise ValueError(f"mesh {path}: reaches {reach:g} m from its origin; at most {MAX_REACH:g} m are allowed")

@@ -80,18 +80,20 @@ class ProximitySensor(SceneObject):
         context = self._context
         context.carried.follow()
         carriers = bodies_above(self)
-        return self._nearest(lambda body, link: body not in carriers and wanted(context.name_of(body, link)))
-
-    def _nearest(self, counts: Callable[[int, int], bool]) -> Detection | None:
         matrix, volume, step = self.matrix(), self.volume, self.volume.step
-        search = _Search(self._context.world, matrix, volume, counts)
+        search = _Search(
+            context.world,
+            matrix,
+            volume,
+            lambda body, link: body not in carriers and wanted(context.name_of(body, link)),
+        )
         best = min([*search.along(volume.spots()), *search.inside()], default=None)
         if best is None:
             return None
         for _ in range(_REFINEMENTS if step else 0):
             best = min([best, *search.along(volume.spots_around(volume.spot(best.point), step))])
             step /= _REFINEMENT_FACTOR
-        name = self._context.name_of(best.body, best.link)
+        name = context.name_of(best.body, best.link)
         return Detection(best.distance, best.point, name, frames.rotate_back(matrix, best.normal))
 
 
