@@ -349,16 +349,11 @@ def _parameters_in_scene(values: dict[str, Any], file: Any) -> Parameters:
     if not (isinstance(file, str) and file):
         return _checked(values, file, {})
     if Path(file).suffix.lower() in SUFFIXES:
-        file = _import_scene(file)
+        try:
+            file = str(imported_scene(resolve(file)))
+        except (OSError, VrepFileError) as error:
+            raise ParameterError(str(error), ("scene_file",), shown(file)) from None
     return _checked(values, file, scene_parameters.read(file), file)
-
-
-def _import_scene(file: str) -> str:
-    """Import a V-REP file and return the path of the scene file made from it. Raises ParameterError."""
-    try:
-        return str(imported_scene(resolve(file)))
-    except (OSError, VrepFileError) as error:
-        raise ParameterError(str(error), ("scene_file",), shown(file)) from None
 
 
 def _checked(
@@ -374,18 +369,18 @@ def _checked(
         parameters = Parameters.model_validate(merged({**values, "scene_file": file}, overrides))
     except ValidationError as error:
         wrong = problems(error, Parameters)
-        # A wrong value that a vehicle inherits is reported at the top level.
-        own = [problem for problem in wrong if _is_in(problem, values, scene)]
+        # A wrong value that a vehicle inherits, and that is not in its own entry, is reported at the top level.
+        own = [
+            problem
+            for problem in wrong
+            if problem.location[:1] != ("vehicles",)
+            or any(_has(source, problem.location[:3]) for source in (values, scene))
+        ]
         reported = own or list(dict.fromkeys(problem._replace(location=problem.location[2:]) for problem in wrong))
         raise ParameterError.of(reported, _line_in_file(reported, named, bool(scene), lines)) from None
     parameters._values = values
     parameters._in_scene_file = {key: scene[key] for key in scene_parameters.BESIDE if key in scene}
     return parameters.model_copy(update={"vehicles": {}}) if is_empty and not values.get("vehicles") else parameters
-
-
-def _is_in(problem: ParameterProblem, *sources: Mapping[str, Any]) -> bool:
-    """Return whether a wrong value stands in the vehicle's entry; inherited values are reported at the top level."""
-    return problem.location[:1] != ("vehicles",) or any(_has(source, problem.location[:3]) for source in sources)
 
 
 def _has(value: Any, location: Location) -> bool:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import copy
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
-from drone_sim.config.types import ParameterError
+from drone_sim.config.types import Checked, ParameterError
 from drone_sim.files import writing, yaml_files
 from drone_sim.files.resources import cache_path, resolve
 from drone_sim.files.yaml_writing import YamlText, dump, has_values
@@ -23,6 +23,7 @@ from drone_sim.scene.entry import EntryParameters
 from drone_sim.scene.scene_parameters import AttachedScriptParameters
 
 _Handles = Mapping[str, int]  # by object name
+_Key = TypeVar("_Key", int, str)
 
 
 def home() -> Path:
@@ -116,38 +117,34 @@ class SceneDocument:
 
     def _content(self, now: SceneContent, folder: Path) -> tuple[dict[str, Any], dict[str, list[int | None]]]:
         """Return the content for a file in `folder`, and the old index of each list item (None: new), by key."""
-        before, here = self._text, self.folder
+        before = self._text
+        settings = with_files_seen_from(now.settings, self.folder, folder)
+        objects, kept_objects = self._items("objects", before.entries, now.entries, folder)
+        scripts, kept_scripts = self._items("scripts", before.scripts, now.scripts, folder)
+        needed = {"objects"} if not before.content else before.content.keys()
+        lists = {key: items for key, items in (("objects", objects), ("scripts", scripts)) if items or key in needed}
+        result: dict[str, Any] = {**settings, **lists}
+        ordered = {key: result[key] for key in (*before.content, *result) if key in result}
+        return ordered, {"objects": kept_objects, "scripts": kept_scripts}
+
+    def _items(
+        self, section: str, before: Iterable[tuple[_Key, Checked]], now: Mapping[_Key, Checked], folder: Path
+    ) -> tuple[list[Any], list[int | None]]:
+        """Return the items of a list for a file in `folder`, and their indices in the text (None: new)."""
         items: list[Any] = []
         kept: list[int | None] = []
-        rest = dict(now.entries)
-        for index, (handle, old) in enumerate(before.entries):
-            entry = rest.pop(handle, None)
-            if entry is not None and type(entry) is type(old):
-                raw = before.content["objects"][index]
-                items.append(_updated(raw, models.plain(old, here), models.plain(entry, folder)))
+        rest = dict(now)
+        for index, (key, old) in enumerate(before):
+            item = rest.pop(key, None)
+            if item is not None and type(item) is type(old):
+                raw = self._text.content[section][index]
+                items.append(_updated(raw, models.plain(old, self.folder), models.plain(item, folder)))
                 kept.append(index)
-            elif entry is not None:
-                rest[handle] = entry
-        new = [models.in_order(models.plain(entry, folder)) for entry in rest.values()]
-        new_scripts, kept_scripts = self._script_items(now.scripts, folder)
-        settings = with_files_seen_from(now.settings, here, folder)
-        lists = {"objects": [*items, *new], "scripts": new_scripts}
-        needed = {"objects"} if not before.content else before.content.keys()
-        result: dict[str, Any] = {**settings, **{key: items for key, items in lists.items() if items or key in needed}}
-        ordered = {key: result[key] for key in (*before.content, *result) if key in result}
-        return ordered, {"objects": [*kept, *[None] * len(new)], "scripts": kept_scripts}
-
-    def _script_items(
-        self, now: Mapping[str, AttachedScriptParameters], folder: Path
-    ) -> tuple[list[Any], list[int | None]]:
-        items, kept, rest = [], [], dict(now)
-        for index, before in enumerate(self._text.scripts):
-            script = rest.pop(before.object, None)
-            if script is not None:
-                raw = self._text.content["scripts"][index]
-                items.append(_updated(raw, models.plain(before, self.folder), models.plain(script, folder)))
-                kept.append(index)
-        return [*items, *(models.plain(script, folder) for script in rest.values())], [*kept, *[None] * len(rest)]
+            elif item is not None:
+                rest[key] = item
+        items += [models.in_order(models.plain(item, folder)) for item in rest.values()]
+        kept += [None] * len(rest)
+        return items, kept
 
 
 class _Text:
@@ -172,8 +169,10 @@ class _Text:
         return [(self._handles.get(entry.name, WORLD), entry) for entry in entries]
 
     @cached_property
-    def scripts(self) -> list[AttachedScriptParameters]:
-        return [scene_parameters.script_from(values) for values in self._items("scripts")]
+    def scripts(self) -> list[tuple[str, AttachedScriptParameters]]:
+        """The scripts, each with the name of its object."""
+        scripts = [scene_parameters.script_from(values) for values in self._items("scripts")]
+        return [(script.object, script) for script in scripts]
 
     def _items(self, key: str) -> list[Any]:
         content = scene_parameters.from_content(copy.deepcopy(dict(self.content)), self._folder)

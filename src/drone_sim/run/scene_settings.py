@@ -51,7 +51,9 @@ def settings_now(
     entries = vehicles_in(settings, parameters)
     has_moved = False
     for vehicle in parameters.fleet:
-        entry, pose = entries[vehicle.name], _current_pose(vehicles[vehicle.name])
+        entry, body = entries[vehicle.name], vehicles[vehicle.name].body
+        # At its start the vehicle has its entry's pose, from which it may have been lowered to the floor.
+        pose = vehicles[vehicle.name].parameters.matrix if are_same(body.matrix, body.start.matrix) else body.matrix
         start = frames.from_rpy(entry["position"], (*entry.get("tilt", vehicle.tilt), entry.get("yaw", vehicle.yaw)))
         if not are_same(pose, start):
             has_moved = True
@@ -62,12 +64,6 @@ def settings_now(
         differences = _differences(weather.model_dump(mode="json"), parameters.weather.model_dump(mode="json"))
         settings = {**settings, "weather": merged(settings.get("weather") or {}, differences)}
     return settings
-
-
-def _current_pose(vehicle: Vehicle) -> Matrix:
-    """Return a vehicle's pose; at its start, its entry's pose, from which it may have been lowered to the floor."""
-    body = vehicle.body
-    return vehicle.parameters.matrix if are_same(body.matrix, body.start.matrix) else body.matrix
 
 
 def as_between(now: Settings, before: Settings, after: Settings) -> Settings:
@@ -114,13 +110,12 @@ def vehicles_in(settings: Settings, parameters: Parameters) -> _VehicleSettings:
     entries = configured if isinstance(configured, Mapping) else {}
     drone = settings.get("drone") if not entries else None
     default = {key: value for key, value in drone.items() if key != "name"} if isinstance(drone, Mapping) else {}
-    own = {vehicle.name: entries.get(vehicle.name, default) or {} for vehicle in parameters.fleet}
-    return {each.name: {**_place(each, own[each.name]), **copy.deepcopy(own[each.name])} for each in parameters.fleet}
-
-
-def _place(vehicle: VehicleParameters, entry: Mapping[str, Any]) -> dict[str, Any]:
-    place: dict[str, Any] = {"position": list(vehicle.position)}
-    return {**place, "yaw": vehicle.yaw} if vehicle.yaw or "yaw" in entry else place
+    result = {}
+    for vehicle in parameters.fleet:
+        entry = copy.deepcopy(entries.get(vehicle.name, default) or {})
+        yaw = {"yaw": vehicle.yaw} if vehicle.yaw or "yaw" in entry else {}
+        result[vehicle.name] = {"position": list(vehicle.position), **yaw, **entry}
+    return result
 
 
 def say_place(entry: dict[str, Any], matrix: Matrix, leans: bool = True) -> None:
