@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from drone_sim.mechanics import frames, path_curves, path_turns
+from drone_sim.mechanics import frames, path_curves
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.path import Path
 from drone_sim.mechanics.path_curves import ControlPoint, Station
@@ -63,7 +63,9 @@ class ControlledPath(Path):
         stations = path_curves.line(points, rules.closed and len(points) > 2)
         closed = rules.closed and len(points) > 2 and len(stations) > 2
         if rules.orientation != OWN:
-            turns = path_turns.automatic([station.position for station in stations], closed, rules.orientation == X_UP)
+            turns = path_curves.automatic_turns(
+                [station.position for station in stations], closed, rules.orientation == X_UP
+            )
             stations = [station._replace(turn=turn) for station, turn in zip(stations, turns)]
         self._stations = [*stations, *stations[:closed]]
         super().__init__(names, alias, parent, local, [station.position for station in self._stations])

@@ -13,6 +13,7 @@ from drone_sim.vrep_files.chunks import finite, level, singles, top, unpack
 from drone_sim.vrep_files.container import MAX_SIZE, open_container
 from drone_sim.vrep_files.model import (
     VrepCollection,
+    VrepCollectionItem,
     VrepFile,
     VrepFileError,
     VrepObject,
@@ -20,7 +21,6 @@ from drone_sim.vrep_files.model import (
     VrepSettings,
     within,
 )
-from drone_sim.vrep_files.object_collections import read_collection
 from drone_sim.vrep_files.objects import SCRIPT, is_object, read_object, script_of
 from drone_sim.vrep_files.scripts import read_script
 from drone_sim.vrep_files.shapes import Pools
@@ -28,6 +28,34 @@ from drone_sim.vrep_files.shapes import Pools
 _PRESET_STEPS = (0.2, 0.1, 0.05, 0.025, 0.01)  # s, of `Spi` 0 to 4
 _PRESETS = 5  # dynamics modes below this number are presets with a fixed step
 _PRESET_DYNAMICS_STEP = 0.005  # s
+_MAX_COLLECTION_ITEMS = 10_000
+_COLLECTION_ITEMS = {  # kind of item, and whether the object itself is left out
+    0: ("single", False),
+    1: ("tree", False),
+    2: ("tree", True),
+    3: ("chain", False),
+    4: ("chain", True),
+    5: ("all", False),
+}
+_ADDS_ITEM = 1
+
+
+def read_collection(data: bytes) -> VrepCollection:
+    """Return a collection. Raises VrepFileError."""
+    collection = level(data)
+    chunks = [chunk.data for chunk in collection.chunks if chunk.tag == "Asg"]
+    if len(chunks) > _MAX_COLLECTION_ITEMS:
+        raise VrepFileError(f"Asg: {len(chunks)} items; at most {_MAX_COLLECTION_ITEMS} are allowed")
+    items = []
+    for chunk in chunks:
+        item = level(chunk)
+        number = item.bits("Gty")
+        if number not in _COLLECTION_ITEMS:
+            raise VrepFileError(f"Gty: an item of type {number}; only 0 to {max(_COLLECTION_ITEMS)} are known")
+        what, without = _COLLECTION_ITEMS[number]
+        removes = not item.bits("Var", default=_ADDS_ITEM) & _ADDS_ITEM
+        items.append(VrepCollectionItem(what, item.integer("Obj", default=-1), removes, without))
+    return VrepCollection(collection.text("Grn"), tuple(items))
 
 
 def with_simulation(settings: VrepSettings, data: bytes) -> VrepSettings:

@@ -9,12 +9,12 @@ from typing import Any
 
 import pybullet
 
+from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.state import Motion
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.world.gyroscopic_term import SLOW, GyroscopicTerm, NoGyroscopicTerm, torque_of_turn
 from drone_sim.world.impacts import Impacts
 from drone_sim.world.queries import Queries
-from drone_sim.world.shape_forces import ShapeForces
 
 # The load on a body in a step: the body, Wrench's force, torque and levers, its moments of inertia if the term ω x Iω
 # is to be cancelled, and its attitude one PyBullet step ago (None: unknown).
@@ -23,6 +23,43 @@ _pose_of, _velocity_of = pybullet.getBasePositionAndOrientation, pybullet.getBas
 _apply_force, _apply_torque = pybullet.applyExternalForce, pybullet.applyExternalTorque
 _step, _IN_WORLD, _ALONG_AXES = pybullet.stepSimulation, pybullet.WORLD_FRAME, pybullet.LINK_FRAME
 _PAST_ATTITUDE = 5  # index in a load
+_NONE: Vector = (0.0, 0.0, 0.0)
+
+
+class ShapeForces:
+    """Forces and torques that scripts apply to shapes: their sums for each link (-1: the root) of a body in a step.
+
+    They keep their directions in the world through the step.
+    """
+
+    def __init__(self, client: int):
+        self._client = client
+        self.sums: dict[tuple[int, int], tuple[Vector, Vector]] = {}
+
+    def add(self, body: int, link: int, force: Vector, torque: Vector) -> None:
+        """Add a force (N) at the centre of mass and a torque (N m) for the next step, both in the world frame."""
+        (fx, fy, fz), (tx, ty, tz) = self.sums.get((body, link), (_NONE, _NONE))
+        force = fx + force[0], fy + force[1], fz + force[2]
+        self.sums[body, link] = force, (tx + torque[0], ty + torque[1], tz + torque[2])
+
+    def drop(self, body: int, link: int, forces: bool, torques: bool) -> None:
+        """Remove the forces, or the torques, or both, that were added since the last step."""
+        force, torque = self.sums.get((body, link), (_NONE, _NONE))
+        self.sums[body, link] = _NONE if forces else force, _NONE if torques else torque
+
+    def forget(self, body: int) -> None:
+        self.sums = {key: total for key, total in self.sums.items() if key[0] != body}
+
+    def apply(self) -> None:
+        """Apply all sums in the next sub-step."""
+        client, in_world = self._client, pybullet.WORLD_FRAME
+        for (body, link), (force, torque) in self.sums.items():
+            if link == -1:
+                centre = pybullet.getBasePositionAndOrientation(body, client)[0]
+            else:
+                centre = pybullet.getLinkState(body, link, 0, 1, client)[0]
+            pybullet.applyExternalForce(body, link, force, centre, in_world, client)
+            pybullet.applyExternalTorque(body, link, torque, in_world, client)
 
 
 class Dynamics:
