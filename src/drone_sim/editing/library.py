@@ -15,11 +15,6 @@ _MESHES = (".obj", ".stl", ".dae")
 KINDS = (".yaml", ".ttm", ".urdf", *_MESHES)
 
 
-def package_models() -> dict[str, Path]:
-    """Return the files of the models that come with the package, by name."""
-    return {file.stem: file for file in sorted((package_path() / _MODELS).glob("*.yaml"))}
-
-
 def read_model_file(name: str, folder: Path, imported: Callable[[Path], Path]) -> Model:
     """Return the content of a model: a model of the package by name, or a file relative to `folder`.
 
@@ -27,7 +22,7 @@ def read_model_file(name: str, folder: Path, imported: Callable[[Path], Path]) -
     """
     suffix = Path(name).suffix.lower()
     if not suffix:
-        available = package_models()
+        available = {file.stem: file for file in sorted((package_path() / _MODELS).glob("*.yaml"))}
         if name not in available:
             raise ValueError(f"no model named '{name}'; {near_names(name, available)}")
         model = read(available[name], imported)

@@ -80,12 +80,13 @@ class SceneRows:
 def _row(handle: int, item: SceneObject, parent: int, content: Any, script: AttachedScriptParameters | None) -> Row:
     place = place_of(item)
     values: Mapping[str, Any] = content if isinstance(content, Mapping) else {}
+    kind = getattr(content, "shape", "") or getattr(content, "kind", "")
     if isinstance(content, EntryParameters):
         keys = content.model_dump(mode="json", exclude_defaults=True)
         values = {key: value for key, value in keys.items() if key not in _ROW_KEYS}
         place = {key: list(getattr(content, key)) for key in ("position", "rpy")}
     if isinstance(content, Part):
-        values = content.values
+        values, kind = content.values, content.word
     if script is not None and script.parameters:
         values = {**values, "script_parameters": dict(script.parameters)}
     matrix = item.matrix()
@@ -94,7 +95,7 @@ def _row(handle: int, item: SceneObject, parent: int, content: Any, script: Atta
         "name": item.name,
         "alias": item.alias,
         "kind": item.kind,
-        "type": _type_of(content) or ("floor" if item.name == FLOOR else item.kind),
+        "type": kind or ("floor" if item.name == FLOOR else item.kind),
         "parent": parent,
         "model": item.is_model,
         "script": script.script if script else "",
@@ -109,7 +110,3 @@ def _simple(parameters: Checked) -> dict[str, Any]:
     """Return the numbers, texts and switches of some parameters, file names as written by the author."""
     values = {key: getattr(parameters, key) for key in type(parameters).model_fields}
     return {key: getattr(it, "given", it) for key, it in values.items() if isinstance(it, (bool, int, float, str))}
-
-
-def _type_of(content: Any) -> str:
-    return content.word if isinstance(content, Part) else getattr(content, "shape", "") or getattr(content, "kind", "")

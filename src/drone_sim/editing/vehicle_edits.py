@@ -24,6 +24,7 @@ from drone_sim.vehicles.types import TYPES
 from drone_sim.vehicles.vehicle import Vehicle
 
 FLOOR = "Floor"
+_Entries = dict[str, dict[str, Any]]  # of the vehicles in a scene file, by name
 
 
 class VehicleEdits:
@@ -32,14 +33,23 @@ class VehicleEdits:
     def __init__(self, simulation: Simulation):
         self._simulation = simulation
 
-    def _apply(self, entries: dict[str, dict[str, Any]]) -> None:
-        self._simulation.apply_settings(self._with_entries(entries))
+    def _entries(self) -> _Entries:
+        return vehicles_in(self._simulation.document.settings, self._simulation.parameters)
 
-    def _with_entries(self, entries: dict[str, dict[str, Any]]) -> Settings:
+    def _settings(self, entries: _Entries) -> Settings:
         return with_vehicles(self._simulation.document.settings, entries, self._simulation.parameters)
 
-    def _entries(self) -> dict[str, dict[str, Any]]:
-        return vehicles_in(self._simulation.document.settings, self._simulation.parameters)
+    def _apply(self, entries: _Entries) -> None:
+        self._simulation.apply_settings(self._settings(entries))
+
+    def _vehicle(self, handle: int) -> Vehicle:
+        vehicle = self._simulation.vehicle_of(handle)
+        if vehicle is None:
+            raise ValueError(f"'{self._simulation.tree[handle].name}' is the floor: only its size can be changed")
+        return vehicle
+
+    def _part(self, handle: int) -> Part | None:
+        return part_named(self._vehicle(handle).parameters, self._simulation.tree[handle].name)
 
     def add(self, op: records.AddVehicle) -> list[int]:
         """Add a vehicle under an unused name.
@@ -92,17 +102,13 @@ class VehicleEdits:
             del entries[vehicle.name]
             keep_names(entries, simulation.vehicles)
         else:
-            self._remove_part(entries[vehicle.name], vehicle, plain(simulation.tree[handle].name))
+            name, part = plain(simulation.tree[handle].name), self._part(handle)
+            if part is None and name not in REMOVABLE:
+                raise ValueError(f"'{name}' is a part of '{vehicle.name}', which cannot fly without it")
+            section, key = ("objects", name) if part is None else (part.among, part.key)
+            entry = entries[vehicle.name]
+            entry[section] = {**entry.get(section, {}), key: None}
         self._apply(entries)
-
-    def _remove_part(self, entry: dict[str, Any], vehicle: Vehicle, name: str) -> None:
-        part = part_named(vehicle.parameters, name)
-        if part is not None:
-            entry[part.among] = {**entry.get(part.among, {}), part.key: None}
-            return
-        if name not in REMOVABLE:
-            raise ValueError(f"'{name}' is a part of '{vehicle.name}', which cannot fly without it")
-        entry["objects"] = {**entry.get("objects", {}), name: None}
 
     def rename(self, handle: int, name: str) -> list[int]:
         """Rename a vehicle, and so its topics, or a part of a vehicle."""
@@ -121,29 +127,24 @@ class VehicleEdits:
         return [self.root(simulation.vehicles[name])]
 
     def move(self, handle: int, relative_to: int, matrix: Matrix) -> None:
-        """Move a vehicle or a part of it."""
+        """Move a vehicle or a part of it; during a run, the settings keep the pose of a part."""
         simulation = self._simulation
         tree, vehicle = simulation.tree, self._vehicle(handle)
-        if not simulation.is_vehicle(handle):
-            self._move_part(handle, relative_to, matrix)
+        if simulation.is_vehicle(handle):
+            if relative_to not in (WORLD, PARENT):
+                matrix = frames.multiply(tree[relative_to].below(), matrix)
+            entries = self._entries()
+            say_place(entries[vehicle.name], matrix)
+            self._apply(entries)
+            if simulation.running:  # its pose may differ from that in the settings
+                put(simulation.vehicles[vehicle.name], matrix)
             return
-        if relative_to not in (WORLD, PARENT):
-            matrix = frames.multiply(tree[relative_to].below(), matrix)
-        entries = self._entries()
-        say_place(entries[vehicle.name], matrix)
-        self._apply(entries)
-        if simulation.running:  # its pose may differ from that in the settings
-            put(simulation.vehicles[vehicle.name], matrix)
-
-    def _move_part(self, handle: int, relative_to: int, matrix: Matrix) -> None:
-        tree = self._simulation.tree
         before = tree.matrix(handle)
         tree.set_matrix(handle, relative_to, matrix)
-        if self._simulation.running:
-            return
-        local = tree.matrix(handle, PARENT)
-        tree.set_matrix(handle, WORLD, before)
-        self._set_part(handle, **pose_keys(local))
+        if not simulation.running:
+            local = tree.matrix(handle, PARENT)
+            tree.set_matrix(handle, WORLD, before)
+            self._set_part(handle, **pose_keys(local))
 
     def reparent(self, handle: int, parent: int, keep: str) -> None:
         """Set the parent of a vehicle's part; `keep`: the pose in the world, or relative to the parent."""
@@ -158,14 +159,11 @@ class VehicleEdits:
         self._set_part(handle, parent="" if above is None else above.name, **pose_keys(local))
 
     def _set_part(self, handle: int, **values: Any) -> None:
-        vehicle, entries = self._vehicle(handle), self._entries()
+        vehicle, entries, part = self._vehicle(handle), self._entries(), self._part(handle)
         entry, name = entries[vehicle.name], plain(self._simulation.tree[handle].name)
-        part = self._part(handle)
         if part is not None:
-            where = f"{part.among}/{part.key}/mount"
-            raise ValueError(
-                f"'{name}' is a part of '{vehicle.name}': change its pose in the text of the scene, at {where}"
-            )
+            cure = f"change its pose in the text of the scene, at {part.among}/{part.key}/mount"
+            raise ValueError(f"'{name}' is a part of '{vehicle.name}': {cure}")
         entry["objects"] = merged(entry.get("objects") or {}, {name: values})
         self._apply(entries)
 
@@ -181,38 +179,25 @@ class VehicleEdits:
             self._set_camera_or_sensor(vehicle, part, values)
             return
         if not simulation.is_vehicle(handle):
-            raise ValueError(
-                f"'{simulation.tree[handle].name}' is a part of '{vehicle.name}': set the vehicle's own keys"
-            )
+            name = simulation.tree[handle].name
+            raise ValueError(f"'{name}' is a part of '{vehicle.name}': set the vehicle's own keys")
         entry = merged(entries[vehicle.name], dict(values))
         entries[vehicle.name] = {key: value for key, value in entry.items() if value is not None or key not in values}
         self._apply(entries)
 
-    def _part(self, handle: int) -> Part | None:
-        return part_named(self._vehicle(handle).parameters, self._simulation.tree[handle].name)
-
     def _set_camera_or_sensor(self, vehicle: Vehicle, part: Part, values: Mapping[str, Any]) -> None:
+        """Set values of a camera or sensor; those that the vehicle has by default are left out of the entry."""
         entries = self._entries()
-        old = entries[vehicle.name]
-        self._apply({**entries, vehicle.name: with_part(old, part, self._default_part(vehicle, part, entries), values)})
-
-    def _default_part(self, vehicle: Vehicle, part: Part, entries: dict[str, dict[str, Any]]) -> Part | None:
-        """Return the part with its default values, or None if the vehicle does not have it by default."""
         entry = entries[vehicle.name]
         others = {key: values for key, values in (entry.get(part.among) or {}).items() if key != part.key}
         without = {**entries, vehicle.name: {**entry, part.among: others}}
         try:
-            fleet = self._simulation.with_settings(self._with_entries(without)).fleet
+            fleet = self._simulation.with_settings(self._settings(without)).fleet
+            parts = next(parts_of(item).values() for item in fleet if item.name == vehicle.name)
+            default = next((item for item in parts if item[:2] == part[:2]), None)
         except ParameterError:  # another part needs this one
-            return None
-        (default,) = (item for item in fleet if item.name == vehicle.name)
-        return next((item for item in parts_of(default).values() if item[:2] == part[:2]), None)
-
-    def _vehicle(self, handle: int) -> Vehicle:
-        vehicle = self._simulation.vehicle_of(handle)
-        if vehicle is None:
-            raise ValueError(f"'{self._simulation.tree[handle].name}' is the floor: only its size can be changed")
-        return vehicle
+            default = None
+        self._apply({**entries, vehicle.name: with_part(entry, part, default, values)})
 
 
 def _unused_name(wanted: str, entries: Mapping[str, Any]) -> str:

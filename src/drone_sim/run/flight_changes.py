@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
-from typing import NamedTuple
+from collections.abc import Collection, Mapping
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
@@ -27,14 +26,6 @@ def check_changeable(before: Settings, after: Settings) -> None:
     for key in _FIXED_IN_FLIGHT:
         if before.get(key) != after.get(key):
             raise ValueError(f"{key}: can only be changed while the simulation is stopped: stop it first")
-
-
-class AttachedObject(NamedTuple):
-    """A scene object that is a child of a vehicle's object: its handle, the parent's name, its pose in the parent."""
-
-    handle: int
-    parent: str
-    local: Matrix
 
 
 def apply_in_flight(setup: SimulationSetup, before: Parameters, after: Parameters, script: str) -> bool:
@@ -76,13 +67,19 @@ def _replace_vehicles(setup: SimulationSetup, before: Parameters, after: Paramet
     for vehicle in new.values():
         load.script_path(script_of(vehicle, after, script))
     added = [_as_successor(vehicle, _predecessor(vehicle, old, wanted), setup.vehicles) for vehicle in new.values()]
-    attached_objects = [attached for vehicle in removed for attached in _attached_objects(vehicle)]
+    tree, operations = setup.context.objects, setup.operations
+    attached = [  # scene objects on removed vehicles: handle, name of the parent, pose in the parent
+        (child, tree[parent].name, tree.matrix(child, PARENT))
+        for vehicle in removed
+        for parent in vehicle.handles
+        for child, _ in tree.children(tree[parent])
+        if child not in vehicle.handles
+    ]
     _exchange(setup, removed, added, script)
-    for attached in attached_objects:
-        tree = setup.context.objects
-        if attached.parent in tree:
-            setup.operations.set_parent(attached.handle, tree.handle(attached.parent), keep_in_place=True)
-            setup.operations.put(attached.handle, attached.local)
+    for handle, parent_name, local in attached:
+        if parent_name in tree:
+            operations.set_parent(handle, tree.handle(parent_name), keep_in_place=True)
+            operations.put(handle, local)
     for name in wanted:  # in the order of the parameters
         setup.vehicles[name] = setup.vehicles.pop(name)
     return new
@@ -116,14 +113,6 @@ def _as_successor(
         return successor
     (x, y, z), (_, _, yaw) = frames.position(vehicle.body.matrix), frames.to_rpy(vehicle.body.matrix)
     return successor.model_copy(update={"position": (x, y, max(z, 0.0)), "yaw": yaw, "tilt": (0.0, 0.0)})
-
-
-def _attached_objects(vehicle: Vehicle) -> Iterable[AttachedObject]:
-    tree = vehicle.context.objects
-    for parent in vehicle.handles:
-        for child, _ in tree.children(tree[parent]):
-            if child not in vehicle.handles:
-                yield AttachedObject(child, tree[parent].name, tree.matrix(child, PARENT))
 
 
 def _exchange(setup: SimulationSetup, removed: list[Vehicle], added: list[VehicleParameters], script: str) -> None:

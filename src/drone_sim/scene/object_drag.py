@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from drone_sim.context import SimulationContext
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import Matrix, Vector
+from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.message_text import near_names
@@ -34,8 +34,9 @@ class ObjectDrag:
     def let_go(self, name: str) -> None:
         """Release an object: its body moves again, from rest."""
         number = self.held.pop(name, None)
-        if number is None or number in self.held.values() or self._is_static(number):
-            return
+        shapes = (item for item in self._things().values() if isinstance(item, ShapeObject) and item.number == number)
+        if number is None or number in self.held.values() or any(shape.is_static for shape in shapes):
+            return  # a script may have made a shape static
         self._world.collision_filter.freeze(number, still=False)
 
     def forget(self, number: int) -> None:
@@ -49,10 +50,13 @@ class ObjectDrag:
     def put(self, name: str, matrix: Matrix) -> None:
         """Move an object to a transform in the world, with everything fixed to it and its children.
 
-        Raises ValueError for an unknown name or a position off the floor.
+        Raises ValueError for an unknown name, or for a position off the floor that is farther out than the present one.
         """
         item = self._find(name)
-        self._check(frames.position(item.matrix()), frames.position(matrix))
+        half, now, wanted = self.floor / 2, frames.position(item.matrix()), frames.position(matrix)
+        for axis, before, value, low, high in zip("xyz", now, wanted, (-half, -half, 0.0), (half, half, self.floor)):
+            if not min(low, before) <= value <= max(high, before):
+                raise ValueError(f"position.{axis} = {value:g}: must be from {low:g} to {high:g} m on this floor")
         whole = _movable_root(item)
         matrix = frames.multiply(matrix, frames.relative(item.matrix(), whole.matrix()))
         self._objects.set_matrix(self._objects.handle(whole.name), WORLD, matrix)
@@ -62,20 +66,6 @@ class ObjectDrag:
         if name not in things:
             raise ValueError(f"no object named '{name}'; {near_names(name, things)}")
         return things[name]
-
-    def _is_static(self, number: int) -> bool:
-        """Return whether a script has made the shape of this body static."""
-        return any(
-            isinstance(item, ShapeObject) and item.number == number and item.is_static
-            for item in self._things().values()
-        )
-
-    def _check(self, now: Vector, wanted: Vector) -> None:
-        """Raise ValueError for a position off the floor that is farther out than the present one."""
-        half = self.floor / 2
-        for axis, before, value, low, high in zip("xyz", now, wanted, (-half, -half, 0.0), (half, half, self.floor)):
-            if not min(low, before) <= value <= max(high, before):
-                raise ValueError(f"position.{axis} = {value:g}: must be from {low:g} to {high:g} m on this floor")
 
 
 def _movable_root(item: SceneObject) -> SceneObject:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from dataclasses import dataclass, field
 
 from drone_sim.mechanics.state import Twist
 from drone_sim.run.diagnosis.command_log import CommandLog
@@ -27,30 +27,28 @@ _IGNORED_TIME = 3.0  # s of simulated time
 _DEAF = "this script does not subscribe to commands: the tutorial's scripts do from stage 6 on, and `pilot` does"
 
 
+@dataclass
 class VehicleDiagnosis:
-    """Diagnosis of one vehicle, between two steps."""
+    """Diagnosis of one vehicle, between two steps.
 
-    def __init__(
-        self,
-        vehicle: Vehicle,
-        player: Player,
-        log: CommandLog,
-        since: Counts | None,
-        frames_below: str = "",
-        unmoved: float = 0.0,
-        unheard: Mapping[str, Sequence[str]] = MappingProxyType({}),
-    ):
-        """`since` has the counts since the last diagnosis, or None.
+    `since` has the counts since the last diagnosis, or None. `frames_below` is the prefix of the vehicles' frames;
+    `is_unmoved` has been true for `unmoved` s. `unheard` has the topics that look like commands and have no subscriber,
+    with the publishers' names.
+    """
 
-        `frames_below` is the prefix of the vehicles' frames; `is_unmoved` has been true for `unmoved` s.
-        `unheard` has the topics that look like commands and have no subscriber, with the publishers' names.
-        """
-        self._frames_below, self._unmoved, self._unheard = frames_below, unmoved, unheard
-        self._vehicle, self._player, self._log, self._since = vehicle, player, log, since
-        self._now = log.clock()
-        self._tilt = tilt(vehicle.body)
-        self._situation = doing(vehicle)
-        self._contacts = vehicle.body.contacts()
+    vehicle: Vehicle
+    player: Player
+    log: CommandLog
+    since: Counts | None
+    frames_below: str = ""
+    unmoved: float = 0.0
+    unheard: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._now = self.log.clock()
+        self._tilt = tilt(self.vehicle.body)
+        self._situation = doing(self.vehicle)
+        self._contacts = self.vehicle.body.contacts()
 
     def finding(self) -> Finding:
         problems = [
@@ -66,17 +64,17 @@ class VehicleDiagnosis:
             *self._check_topics(),
             *self._check_response(),
         ]
-        return finding(f"vehicle {self._vehicle.name}", self._fine(), problems, self._values())
+        return finding(f"vehicle {self.vehicle.name}", self._fine(), problems, self._values())
 
     # ---- checks
 
     def _check_running(self) -> list[Problem]:
-        player = self._player
+        player = self.player
         if player.playing:
             return []
         if player.why_stopped:
             return [Problem(ERROR, f"stopped: {player.why_stopped}; `start` runs the edited file")]
-        taken = self._log.taken.get(COMMAND)
+        taken = self.log.taken.get(COMMAND)
         cure = "`pause false` resumes it" if player.state == "paused" else "`start` starts it"
         if taken is not None and self._now - taken.at < _RECENT:
             return [Problem(WARN, f"{taken.sender} sends commands, but the simulation is {player.state}: {cure}")]
@@ -84,27 +82,27 @@ class VehicleDiagnosis:
 
     def _check_script(self) -> list[Problem]:
         """Report a failed script on an object of the vehicle, while the simulation continues."""
-        error = self._vehicle.flight_state.script_error
-        return [Problem(ERROR, f"script failed: {error}")] if error and not self._player.why_stopped else []
+        error = self.vehicle.flight_state.script_error
+        return [Problem(ERROR, f"script failed: {error}")] if error and not self.player.why_stopped else []
 
     def _check_landed(self) -> list[Problem]:
         """Report commands that have no effect because the vehicle has landed or crashed."""
-        taken, state = self._log.taken.get(COMMAND), str(self._vehicle.flight_state)
+        taken, state = self.log.taken.get(COMMAND), str(self.vehicle.flight_state)
         if state == CRASHED:
             return [Problem(WARN, "crashed: `reset` puts it back at its start")]
-        if state == LANDED and taken is not None and self._vehicle.commands.now != Twist() and self._player.playing:
+        if state == LANDED and taken is not None and self.vehicle.commands.now != Twist() and self.player.playing:
             return [Problem(WARN, f"landed: commands of {taken.sender} do not move it; send `takeoff` first")]
         return []
 
     def _check_refusals(self) -> list[Problem]:
-        refused = self._log.last_refusal()
-        if refused is None or not self._log.is_refusing(refused.topic):
+        refused = self.log.last_refusal()
+        if refused is None or not self.log.is_refusing(refused.topic):
             return []
         kept = ", and keeps the last valid one" if refused.topic == COMMAND else ""
         return [Problem(WARN, f"refused a message of {refused.sender} on {refused.topic}{kept}: {refused.why}")]
 
     def _check_tilt(self) -> list[Problem]:
-        if self._tilt < _MAX_TILT or str(self._vehicle.flight_state) == CRASHED:
+        if self._tilt < _MAX_TILT or str(self.vehicle.flight_state) == CRASHED:
             return []
         how = "lies on its back" if self._tilt > math.pi / 2 and self._contacts else "leans"
         return [Problem(WARN, f"{how} ({math.degrees(self._tilt):.0f} degrees): `restart` puts it upright")]
@@ -112,7 +110,7 @@ class VehicleDiagnosis:
     def _check_situation(self) -> list[Problem]:
         """Report that the vehicle lies, slides or hangs somewhere, unless its script reports another state."""
         state = self._situation
-        if not self._player.playing or state in (FLYING, HELD, UPSIDE_DOWN) or state != situation(self._vehicle.body):
+        if not self.player.playing or state in (FLYING, HELD, UPSIDE_DOWN) or state != situation(self.vehicle.body):
             return []
         is_touched = state.startswith("touches")
         return [
@@ -121,8 +119,8 @@ class VehicleDiagnosis:
 
     def _check_limits(self) -> list[Problem]:
         problems = []
-        since, command = self._since, self._vehicle.commands.now
-        if since and since.steps and since.clipped[self._vehicle.name] > _CLIPPED_SHARE * since.steps:
+        since, command = self.since, self.vehicle.commands.now
+        if since and since.steps and since.clipped[self.vehicle.name] > _CLIPPED_SHARE * since.steps:
             problems.append(Problem(WARN, f"propellers are at their limit in {self._clipped()}"))
         wanted = math.hypot(*command.linear)
         if since and self._contacts and wanted > _MIN_COMMAND and self._speed() < _SLOW_SHARE * wanted:
@@ -134,12 +132,12 @@ class VehicleDiagnosis:
 
     def _check_sender(self) -> list[Problem]:
         """Report that no script subscribes to commands, or that the sender of the present command has exited."""
-        vehicle, taken = self._vehicle, self._log.taken.get(COMMAND)
-        if taken is None or not self._player.playing or str(vehicle.flight_state) in (LANDED, CRASHED):
+        vehicle, taken = self.vehicle, self.log.taken.get(COMMAND)
+        if taken is None or not self.player.playing or str(vehicle.flight_state) in (LANDED, CRASHED):
             return []
         if not hears_commands(vehicle):
             return [Problem(WARN, _DEAF)] if self._now - taken.at < _RECENT else []
-        has_exited = taken.sender not in self._log.senders()
+        has_exited = taken.sender not in self.log.senders()
         if has_exited and vehicle.commands.now != Twist() and not vehicle.parameters.cmd_vel_timeout:
             problem = f"still obeys the last command of {taken.sender}, which has exited"
             return [Problem(WARN, f"{problem}: publish a zero Twist, or set cmd_vel_timeout")]
@@ -147,53 +145,51 @@ class VehicleDiagnosis:
 
     def _check_rivals(self) -> list[Problem]:
         """Report several nodes that send commands at the same time: the drone obeys the last one before each step."""
-        rivals = self._log.rivals(COMMAND)
+        rivals = self.log.rivals(COMMAND)
         text = f"{' and '.join(rivals)} send {COMMAND} at the same time, and each overrides the other: stop all but one"
-        idle = [sender for sender in rivals if self._log.sends_zeros(COMMAND, sender)]
+        idle = [sender for sender in rivals if self.log.sends_zeros(COMMAND, sender)]
         text += f"; {' and '.join(idle)} sends only zeros" if idle else ""
         return [Problem(WARN, text)] if rivals else []
 
     def _check_topics(self) -> list[Problem]:
         """Report commands on topics without a subscriber, while no command reaches the vehicle."""
-        taken = self._log.taken.get(COMMAND)
+        taken = self.log.taken.get(COMMAND)
         if taken is not None and self._now - taken.at < _RECENT:
             return []
-        own = f"publish to /{self._frames_below}{self._vehicle.name}/{COMMAND}"
+        own = f"publish to /{self.frames_below}{self.vehicle.name}/{COMMAND}"
         problems = []
-        for topic, nodes in self._unheard.items():
+        for topic, nodes in self.unheard.items():
             what = f"no command arrives: {', '.join(nodes)} publishes {topic}, without a subscriber"
             problems.append(Problem(WARN, f"{what}: {', or '.join(filter(None, (own, profile_cure(topic))))}"))
         return problems
 
     def _check_response(self) -> list[Problem]:
         """Report that the script subscribes to commands, but the vehicle has not followed them for some time."""
-        if self._unmoved < _IGNORED_TIME or not hears_commands(self._vehicle):
+        if self.unmoved < _IGNORED_TIME or not hears_commands(self.vehicle):
             return []
-        problem = f"receives {_shown(self._vehicle.commands.now)}, but its velocity has not followed for"
+        problem = f"receives {_shown(self.vehicle.commands.now)}, but its velocity has not followed for"
         cure = "does the script use the command, or overwrite it in each step (twist[1] = 0)?"
-        return [Problem(WARN, f"{problem} {self._unmoved:.0f} s: {cure}")]
+        return [Problem(WARN, f"{problem} {self.unmoved:.0f} s: {cure}")]
 
     # ---- values
 
     def _fine(self) -> str:
-        taken = self._log.taken.get(COMMAND)
-        state = self._player.state
-        if not self._player.playing:
+        taken = self.log.taken.get(COMMAND)
+        state = self.player.state
+        if not self.player.playing:
             return state
         if self._situation != FLYING:
             return self._situation
         if taken is None:
-            return (
-                f"{state}; no command has been received yet" if hears_commands(self._vehicle) else f"{state}; {_DEAF}"
-            )
+            return f"{state}; no command has been received yet" if hears_commands(self.vehicle) else f"{state}; {_DEAF}"
         return f"{state} as {taken.sender} commands"
 
     def _values(self) -> dict[str, str]:
-        vehicle, log = self._vehicle, self._log
+        vehicle, log = self.vehicle, self.log
         taken, refused = log.taken.get(COMMAND), log.last_refusal()
         limits, timeout = vehicle.parameters.propellers.velocity_limits, vehicle.parameters.cmd_vel_timeout
         return {
-            "state": self._player.state,
+            "state": self.player.state,
             "flight state": str(vehicle.flight_state),
             "does": self._situation,
             "listens to commands": "yes" if hears_commands(vehicle) else "no",
@@ -213,19 +209,19 @@ class VehicleDiagnosis:
             "speed": f"{self._speed():.2f} m/s",
             "contacts": ", ".join(_names(self._contacts)) or "none",
             "put elsewhere": f"{vehicle.body.teleports} times",
-            "script": str(vehicle.parameters.script or self._player.simulation.script or load.DEFAULT),
-            "frame": f"{self._frames_below}{vehicle.parameters.frame_prefix}base_link, in world",
+            "script": str(vehicle.parameters.script or self.player.simulation.script or load.DEFAULT),
+            "frame": f"{self.frames_below}{vehicle.parameters.frame_prefix}base_link, in world",
         }
 
     def _ago(self, at: float) -> str:
         return f"{self._now - at:.1f} s ago"
 
     def _speed(self) -> float:
-        return math.hypot(*self._vehicle.body.state.linear_velocity)
+        return math.hypot(*self.vehicle.body.state.linear_velocity)
 
     def _clipped(self) -> str:
-        since = self._since
-        return f"{since.clipped[self._vehicle.name]} of the last {since.steps} steps" if since else "not known"
+        since = self.since
+        return f"{since.clipped[self.vehicle.name]} of the last {since.steps} steps" if since else "not known"
 
 
 def is_unmoved(vehicle: Vehicle) -> bool:
