@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple, TypeVar
 
 from drone_sim.mechanics.object_tree import WORLD, levels
-from drone_sim.run.scene_document import SceneContent
-from drone_sim.run.scene_settings import Settings
+from drone_sim.run.scene_document import SceneContent, Settings
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.entry import EntryParameters
 from drone_sim.scene.scene_parameters import AttachedScriptParameters

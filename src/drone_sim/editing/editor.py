@@ -17,7 +17,7 @@ from drone_sim.editing.scene_files import SceneFiles
 from drone_sim.files.yaml_writing import YamlText
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
-from drone_sim.run.scene_settings import as_between
+from drone_sim.run.scene_document import as_between
 from drone_sim.scripting.errors import ScriptError
 
 _LOG = logging.getLogger(__name__)

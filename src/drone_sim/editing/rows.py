@@ -10,7 +10,7 @@ from drone_sim.editing.properties import Part, part_named
 from drone_sim.editing.vehicle_edits import FLOOR
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.run.scene_settings import PLACE, vehicles_in
+from drone_sim.run.scene_document import PLACE, vehicles_in
 from drone_sim.run.simulation import Simulation
 from drone_sim.run.simulation_setup import own_script
 from drone_sim.scene.entry import EntryParameters, place_of

@@ -9,8 +9,7 @@ from drone_sim.files import writing, yaml_files
 from drone_sim.files.resources import locate, package_path
 from drone_sim.files.yaml_writing import YamlText
 from drone_sim.message_text import shown
-from drone_sim.run.scene_document import SceneContent, home
-from drone_sim.run.scene_settings import settings_of
+from drone_sim.run.scene_document import SceneContent, home, settings_of
 from drone_sim.run.simulation import Simulation
 
 _LONGEST_NAME = 100  # characters, without the folder

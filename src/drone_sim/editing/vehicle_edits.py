@@ -15,7 +15,7 @@ from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.object_names import first_free, plain
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.run.flight_changes import put
-from drone_sim.run.scene_settings import Settings, keep_names, say_place, vehicles_in, with_floor, with_vehicles
+from drone_sim.run.scene_document import Settings, keep_names, say_place, vehicles_in, with_floor, with_vehicles
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.entry import pose_keys, rounded
 from drone_sim.scripting.load import DEFAULT

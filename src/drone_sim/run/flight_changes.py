@@ -9,7 +9,7 @@ from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.object_names import split, suffixed
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.run.parameters import Parameters
-from drone_sim.run.scene_settings import PLACE, Settings, are_same
+from drone_sim.run.scene_document import PLACE, Settings, are_same
 from drone_sim.run.simulation_setup import SimulationSetup, script_of
 from drone_sim.scene.scene_parameters import WORLD_KEYS
 from drone_sim.scripting import load

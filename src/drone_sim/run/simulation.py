@@ -23,8 +23,14 @@ from drone_sim.mechanics.object_tree import NO_HANDLES, Handles
 from drone_sim.mechanics.saved_state import Restore
 from drone_sim.run.flight_changes import apply_in_flight, check_changeable, put
 from drone_sim.run.parameters import Parameters
-from drone_sim.run.scene_document import SceneContent, SceneDocument
-from drone_sim.run.scene_settings import Settings, have_only_moved, settings_now, without_vehicles
+from drone_sim.run.scene_document import (
+    SceneContent,
+    SceneDocument,
+    Settings,
+    have_only_moved,
+    settings_now,
+    without_vehicles,
+)
 from drone_sim.run.simulation_setup import SimulationSetup, give_back_memory, script_of
 from drone_sim.run.stepping import Stepper
 from drone_sim.scripting import load

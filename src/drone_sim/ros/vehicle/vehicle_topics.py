@@ -17,7 +17,7 @@ from drone_sim.ros.vehicle.inputs import VehicleInputs
 from drone_sim.ros.vehicle.outputs import SensorOutput, Transforms, VehicleOutputs
 from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.run.diagnosis.command_log import CommandLog
-from drone_sim.run.scene_settings import PLACE
+from drone_sim.run.scene_document import PLACE
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
