@@ -11,7 +11,7 @@ from vrep_encoder import chunk, file, integers, numbers, scene_object
 
 from drone_sim.importing.main import main
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.controlled_path import ControlledPath, PathRules
+from drone_sim.mechanics.path import ControlledPath, PathRules
 from drone_sim.mechanics.path_curves import ControlPoint, Station
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation

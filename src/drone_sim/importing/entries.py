@@ -10,7 +10,7 @@ from drone_sim.importing.folder import Report, label, number, numbers, pose_keys
 from drone_sim.importing.placing import Placed
 from drone_sim.importing.shapes import MeshWriter, TooLarge, form
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.controlled_path import AUTOMATIC, COUNTS, METRES_PER_RADIAN, OWN, X_UP
+from drone_sim.mechanics.path import AUTOMATIC, COUNTS, METRES_PER_RADIAN, OWN, X_UP
 from drone_sim.scene.kinds.paths import COUNTS as COUNT_LIMITS
 from drone_sim.scene.kinds.paths import FACTORS, LONGEST, MAX_LINE
 from drone_sim.vrep_files import paths

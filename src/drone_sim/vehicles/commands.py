@@ -152,7 +152,7 @@ class FlightState:
         return self._missing or UNKNOWN
 
     def ask(self, topic: str, message: Any, prepare: Callable[[], None] = lambda: None) -> None:
-        """Call `before` and post the message for the next step.
+        """Call `prepare` and post the message for the next step.
 
         If no script subscribes to the topic or the simulation is stopped, only log a warning, once per topic and run.
         """

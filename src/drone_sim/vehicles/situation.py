@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from drone_sim.mechanics.frames import Vector
 from drone_sim.sensors.sensor import Contact
 from drone_sim.vehicles.body import Body
 from drone_sim.vehicles.commands import UNKNOWN
@@ -37,11 +36,8 @@ def situation(body: Body) -> str:
     below = [contact for contact in contacts if contact.normal[2] > _MIN_SUPPORT]
     if not below:
         return f"touches {_strongest_contact(contacts)}"
-    return f"{_motion(body.state.linear_velocity)}on {_strongest_contact(below)}"
-
-
-def _motion(velocity: Vector) -> str:
-    return "slides " if math.hypot(*velocity) > _MIN_SLIDING_SPEED else ""
+    slides = math.hypot(*body.state.linear_velocity) > _MIN_SLIDING_SPEED
+    return f"{'slides ' if slides else ''}on {_strongest_contact(below)}"
 
 
 def _strongest_contact(contacts: Sequence[Contact]) -> str:

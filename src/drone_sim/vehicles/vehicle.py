@@ -58,9 +58,11 @@ class Vehicle:
         self.propulsion = Propulsion(rotors, self.body, suffix)
         self.handles: list[int] = []  # of its objects
         self._cleared = -1  # the tree's count of clearings when the objects were added
-        self.cameras = {
-            name: Camera(item, self._mounting(name, item), context.vision) for name, item in parameters.cameras.items()
-        }
+        self.cameras: dict[str, Camera] = {}
+        for name, item in parameters.cameras.items():
+            pose, velocity = partial(self.optical, item), partial(self._velocity, item)
+            mounting = CameraMounting(f"{self.name}/{name}", pose, velocity, context.clock)
+            self.cameras[name] = Camera(item, mounting, context.vision)
         context.blades.append(self.propulsion.blades)
         context.names[self.body.number] = (parameters.name, self.object_name)
         try:
@@ -144,10 +146,6 @@ class Vehicle:
         objects = self.context.objects
         sensor = objects.matrix(objects.handle(camera.object + self.suffix))
         return frames.multiply(sensor, OPTICAL_FROM_SENSOR)
-
-    def _mounting(self, name: str, camera: CameraParameters) -> CameraMounting:
-        pose, velocity = partial(self.optical, camera), partial(self._velocity, camera)
-        return CameraMounting(f"{self.name}/{name}", pose, velocity, self.context.clock)
 
     def _velocity(self, camera: CameraParameters) -> tuple[Vector, Vector]:
         """Linear and angular velocity of a camera: present ones, or over the last step if scripts move it."""

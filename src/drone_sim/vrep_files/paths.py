@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from drone_sim.mechanics.controlled_path import METRES_PER_RADIAN
+from drone_sim.mechanics.path import METRES_PER_RADIAN
 from drone_sim.vrep_files.chunks import Level, Texts, finite, level, position_first, singles, unpack
 from drone_sim.vrep_files.model import VrepControlPoint, VrepFileError, VrepPath
 

@@ -21,8 +21,7 @@ from drone_sim.vrep_files.model import (
     VrepSettings,
     within,
 )
-from drone_sim.vrep_files.objects import SCRIPT, is_object, read_object, script_of
-from drone_sim.vrep_files.scripts import read_script
+from drone_sim.vrep_files.objects import SCRIPT, is_object, read_object, read_script, script_of
 from drone_sim.vrep_files.shapes import Pools
 
 _PRESET_STEPS = (0.2, 0.1, 0.05, 0.025, 0.01)  # s, of `Spi` 0 to 4

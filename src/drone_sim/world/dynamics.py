@@ -112,7 +112,10 @@ class Dynamics:
     # ---- steps
 
     def apply(self, body: int, wrench: Wrench) -> None:
-        """See World.apply."""
+        """Add a wrench to that of `advance` for a body, in the next sub-step; a second one replaces the first.
+
+        `advance` must have a wrench for the body, even if it is zero.
+        """
         self._applied[body] = wrench
 
     def advance(

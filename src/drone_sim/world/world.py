@@ -88,7 +88,7 @@ class World:
         self.queries = Queries(client, self.collision_filter)
         self.rigid_links = RigidLinks(client)
         self._dynamics = Dynamics(client, self._sub_step, self.queries, gyroscopic=self._gyroscopic)
-        self.shape_forces = self._dynamics.shape_forces
+        self.shape_forces, self.apply = self._dynamics.shape_forces, self._dynamics.apply
         self.saved_states = SavedStates(client, self._forget_all_motion)
 
     def _forget_motion_of(self, body: int) -> None:
@@ -278,13 +278,6 @@ class World:
         """
         self._dynamics.advance(wrenches, sub_steps, between)
         self.pictures.look_anew()
-
-    def apply(self, body: int, wrench: Wrench) -> None:
-        """Add a wrench to that of `advance` for a body, in the next sub-step; a second one replaces the first.
-
-        `advance` must have a wrench for the body, even if it is zero.
-        """
-        self._dynamics.apply(body, wrench)
 
     def keep_initial_poses(self) -> None:
         """Save the poses of all bodies, at rest, for `saved_states.begin_anew`."""

@@ -9,8 +9,7 @@ from pydantic import Field
 
 from drone_sim.config.types import Checked, Finite, ParameterError, Point, Switch, Unit, Within
 from drone_sim.context import SimulationContext
-from drone_sim.mechanics.controlled_path import METRES_PER_RADIAN, ControlledPath, PathRules
-from drone_sim.mechanics.path import Path
+from drone_sim.mechanics.path import METRES_PER_RADIAN, ControlledPath, Path, PathRules
 from drone_sim.mechanics.path_curves import ControlPoint, Station
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.scene.entry import KindParameters, Place

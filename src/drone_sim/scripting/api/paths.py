@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.controlled_path import AUTOMATIC, COUNTS, OWN, X_UP, ControlledPath
 from drone_sim.mechanics.frames import Matrix
-from drone_sim.mechanics.path import Path, nearest
+from drone_sim.mechanics.path import AUTOMATIC, COUNTS, OWN, X_UP, ControlledPath, Path, nearest
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.host import Functions
