@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.message_text import near_names
 
 FIRST = 700_000  # the first handle; handles of objects and scripts are smaller
@@ -34,15 +35,8 @@ class Collections:
         self._names: dict[str, int] = {}
         self._next = FIRST
 
-    def save_state(self) -> Callable[[], None]:
-        """Return a function that restores the present collections."""
-        state = dict(self._items), dict(self._names), self._next
-
-        def restore() -> None:
-            items, names, self._next = state
-            self._items, self._names = dict(items), dict(names)
-
-        return restore
+    def save_state(self) -> Restore:
+        return saved(self, "_items", "_names", "_next")
 
     def add(self, name: str = "") -> int:
         """Add an empty collection; return its handle. Raises ValueError if the name is taken, or there are too many."""

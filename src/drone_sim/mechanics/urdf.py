@@ -10,7 +10,6 @@ parallel axis theorem:
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -81,22 +80,28 @@ def _merge(robot: Xml.Element) -> RigidBody:
     joints = {_link_name(joint, "child"): joint for joint in robot.findall("joint")}
     poses = {name: _pose(name, joints) for name in links}
     roots = [name for name in links if name not in joints]
-    inertials = {name: _inertial(link, poses[name]) for name, link in links.items()}
-    mass, centre, inertia = combined(list(inertials.values()))
+    inertials = {}
+    for name, link in links.items():
+        centre = np.array(transform(poses[name], origin_of(link.find("inertial"))[3::4]))
+        inertials[name] = Inertial(mass_of(link), centre, inertia_tensor(link, poses[name]))
+    whole = combined(list(inertials.values()))
+    rotating = {name: joint.attrib["name"] for name, joint in joints.items() if joint.attrib["type"] == "continuous"}
     visuals = [(name, visual) for name, link in links.items() for visual in link.findall("visual")]
     return RigidBody(
-        mass=mass,
+        mass=whole.mass,
         inertials=inertials,
-        centre_of_mass=centre,
-        inertia=inertia,
+        centre_of_mass=whole.centre,
+        inertia=whole.inertia,
         links=poses,
         parents={name: (_link_name(joint, "parent"), origin_of(joint)) for name, joint in joints.items()},
-        blade_joints={
-            name: joint.attrib["name"] for name, joint in joints.items() if joint.attrib["type"] == "continuous"
-        },
+        blade_joints=rotating,
         visuals=tuple((name, origin_of(visual)) for name, visual in visuals),
-        blades=tuple(_blades(visuals, joints, poses)),
-        xml=_one_link(robot, roots[0], poses, (mass, centre, inertia)),
+        blades=tuple(
+            BladesLink(index, rotating[name], poses[name], origin_of(visual))
+            for index, (name, visual) in enumerate(visuals)
+            if name in rotating
+        ),
+        xml=_one_link(robot, roots[0], poses, whole),
     )
 
 
@@ -126,11 +131,6 @@ def origin_of(element: Xml.Element | None) -> Matrix:
     return from_rpy(_numbers(origin.attrib["xyz"]), _numbers(origin.attrib["rpy"]))
 
 
-def _inertial(link: Xml.Element, pose: Matrix) -> Inertial:
-    centre = np.array(transform(pose, origin_of(link.find("inertial"))[3::4]))
-    return Inertial(mass_of(link), centre, inertia_tensor(link, pose))
-
-
 def mass_of(link: Xml.Element) -> float:
     """Return a link's mass (kg), 0 if it has none."""
     element = link.find("inertial/mass")
@@ -147,44 +147,23 @@ def inertia_tensor(link: Xml.Element, pose: Matrix = IDENTITY) -> np.ndarray:
     return rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
 
 
-def _blades(
-    visuals: Sequence[tuple[str, Xml.Element]], joints: dict[str, Xml.Element], poses: dict[str, Matrix]
-) -> list[BladesLink]:
-    return [
-        BladesLink(index, joints[link].attrib["name"], poses[link], origin_of(visual))
-        for index, (link, visual) in enumerate(visuals)
-        if link in joints and joints[link].attrib["type"] == "continuous"
-    ]
-
-
-def _one_link(
-    robot: Xml.Element,
-    root: str,
-    poses: dict[str, Matrix],
-    inertial: tuple[float, np.ndarray, np.ndarray],
-) -> str:
+def _one_link(robot: Xml.Element, root: str, poses: dict[str, Matrix], whole: Inertial) -> str:
+    """Return a URDF of one link with the collisions and visuals of all, and the inertia of the whole."""
     merged = Xml.Element("robot", name=robot.get("name", "drone"))
     link = Xml.SubElement(merged, "link", name=root)
-    _write_inertial(link, *inertial)
+    inertial = Xml.SubElement(link, "inertial")
+    Xml.SubElement(inertial, "origin", xyz=" ".join(repr(float(x)) for x in whole.centre))
+    Xml.SubElement(inertial, "mass", value=repr(whole.mass))
+    upper = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    Xml.SubElement(inertial, "inertia", {key: repr(float(whole.inertia[at])) for key, at in upper.items()})
     for kind in ("collision", "visual"):
         for source in robot.findall("link"):
             for element in source.findall(kind):
-                link.append(_moved(element, poses[source.attrib["name"]]))
+                matrix = multiply(poses[source.attrib["name"]], origin_of(element))
+                xyz, rpy = (" ".join(map(repr, three)) for three in (position(matrix), to_rpy(matrix)))
+                moved = copy.deepcopy(element)
+                for origin in moved.findall("origin"):
+                    moved.remove(origin)
+                Xml.SubElement(moved, "origin", xyz=xyz, rpy=rpy)
+                link.append(moved)
     return Xml.tostring(merged, encoding="unicode")
-
-
-def _write_inertial(link: Xml.Element, mass: float, centre: np.ndarray, inertia: np.ndarray) -> None:
-    inertial = Xml.SubElement(link, "inertial")
-    Xml.SubElement(inertial, "origin", xyz=" ".join(repr(float(x)) for x in centre))
-    Xml.SubElement(inertial, "mass", value=repr(mass))
-    upper = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    Xml.SubElement(inertial, "inertia", {key: repr(float(inertia[at])) for key, at in upper.items()})
-
-
-def _moved(element: Xml.Element, pose: Matrix) -> Xml.Element:
-    moved = copy.deepcopy(element)
-    matrix = multiply(pose, origin_of(element))
-    for origin in moved.findall("origin"):
-        moved.remove(origin)
-    Xml.SubElement(moved, "origin", xyz=" ".join(map(repr, position(matrix))), rpy=" ".join(map(repr, to_rpy(matrix))))
-    return moved

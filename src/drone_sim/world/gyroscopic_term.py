@@ -65,19 +65,15 @@ class NoGyroscopicTerm:
                 attitude = pybullet.getBasePositionAndOrientation(body, self._client)[1]
                 torque = self._torque(moments, _in_frame(attitude, velocity), duration)
                 _apply_torque(body, -1, torque, _ALONG_AXES, self._client)
-        if self._links:
-            self._begin_sub_step_of_links(duration)
-
-    def end_sub_step(self, duration: float) -> None:
-        """Do nothing: the whole torque acted before the step."""
-
-    def _begin_sub_step_of_links(self, duration: float) -> None:
         for body, links in self._links.items():
             states = pybullet.getLinkStates(body, list(links), 1, 1, self._client)  # with velocities, current attitudes
             for (number, moments), state in zip(links.items(), states):
                 if _rotates(state[7]):
                     torque = self._torque(moments, _in_frame(state[1], state[7]), duration)
                     _apply_torque(body, number, torque, _ALONG_AXES, self._client)
+
+    def end_sub_step(self, duration: float) -> None:
+        """Do nothing: the whole torque acted before the step."""
 
     def torque_of_velocity(
         self, moments: Vector, attitude: Quaternion, velocity: Vector, duration: float
