@@ -96,7 +96,6 @@ def _place(model: Any, loc: Location) -> _ErrorPlace:
 
 
 def _inside(value: ValueType, part: Key) -> ValueType:
-    """Return the type of a model's field, or of the items of a list or mapping."""
     if part in value.fields:
         return field_type(value.fields[str(part)])
     arguments = get_args(value.kind)

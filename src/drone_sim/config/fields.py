@@ -48,7 +48,6 @@ class ValueType(NamedTuple):
         return next((str(mark.description) for mark in self.marks if getattr(mark, "description", None)), "")
 
     def mark(self, kind: type[_Mark]) -> _Mark | None:
-        """Return the first mark of a class, or None."""
         return next((mark for mark in self.marks if isinstance(mark, kind)), None)
 
 
@@ -67,7 +66,6 @@ def value_type(annotation: Any, marks: tuple[Any, ...] = ()) -> ValueType:
 
 
 def field_type(field: FieldInfo) -> ValueType:
-    """Return the type of a model's field."""
     return value_type(field.annotation, (*field.metadata, field))
 
 

@@ -39,7 +39,6 @@ class SceneChange(NamedTuple):
         return SceneChange(entries, scripts, (self.settings[1], self.settings[0]))
 
     def followed_by(self, other: SceneChange) -> SceneChange:
-        """Return this change and the following one combined."""
         return SceneChange(
             _combined(self.entries, other.entries),
             _combined(self.scripts, other.scripts),
@@ -48,7 +47,6 @@ class SceneChange(NamedTuple):
 
 
 def change_between(before: SceneContent, after: SceneContent) -> SceneChange:
-    """Return the differences between two contents."""
     return SceneChange(
         _differences(before.entries, after.entries),
         _differences(before.scripts, after.scripts),
@@ -183,7 +181,6 @@ class History:
         return self._undone[-1].name if self._undone else ""
 
     def is_last(self, merge: str) -> bool:
-        """Return whether the last step has this `merge` key."""
         return bool(self._done) and self._done[-1].merge == merge
 
     def of(self, merge: str) -> Step:
@@ -219,7 +216,6 @@ class History:
         return self._done[-1]
 
     def clear(self) -> None:
-        """Clear the history, for another scene."""
         self._done, self._undone, self._at_start = [], [], None
 
     def start(self) -> None:

@@ -74,7 +74,6 @@ class Drafts:
         self._writing.start()
 
     def wait(self) -> None:
-        """Wait until the last draft is written."""
         if self._writing is not None:
             self._writing.join()
 

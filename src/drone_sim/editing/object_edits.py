@@ -265,7 +265,6 @@ class ObjectEdits:
         simulation.operations.attach_script(script)
 
     def detach_script(self, op: records.DetachScript) -> None:
-        """Detach the script of an object."""
         name = self._simulation.tree[self._simulation.tree.resolve(op.object)].name
         self._script_of(name)
         self._simulation.operations.detach_script(name)

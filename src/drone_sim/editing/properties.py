@@ -121,7 +121,6 @@ def parts_of(vehicle: VehicleParameters) -> dict[str, Part]:
 
 
 def part_named(vehicle: VehicleParameters, name: str) -> Part | None:
-    """Return the camera or sensor with the object `name`, or None."""
     return parts_of(vehicle).get(plain(name))
 
 

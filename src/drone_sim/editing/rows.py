@@ -25,7 +25,6 @@ class SceneRows:
     """One row for each object, rebuilt when its content changes."""
 
     def __init__(self, simulation: Simulation):
-        """Show the objects of this scene; the first follow() makes the rows."""
         self._simulation = simulation
         self._known: dict[int, tuple[Any, ...]] = {}  # content from which each row was made
         self.rows: dict[int, Row] = {}

@@ -31,7 +31,6 @@ class SceneFiles:
     # ---- text
 
     def text(self) -> str:
-        """Return the present scene as text of a scene file."""
         return self._simulation.document.text(self._simulation.content())
 
     def content_of(self, text: YamlText) -> SceneContent:

@@ -87,7 +87,6 @@ class VehicleEdits:
         return vehicle.name, {key: value for key, value in entry.items() if key not in ("suffix", "objects")}
 
     def root(self, vehicle: Vehicle) -> int:
-        """Return the handle of a vehicle's root."""
         return self._simulation.tree.handle_of(vehicle.object)
 
     def remove(self, handle: int) -> None:

@@ -49,7 +49,6 @@ class Programs:
         self._to_sun = tuple(np.array(TO_SUN) / np.linalg.norm(TO_SUN))
 
     def of(self, role: Role) -> Mapping[str, Any]:
-        """Return the programs of a role, by look."""
         if role not in self._programs:
             if role.kind == "surface":
                 programs = {look: self._compile(role, defined) for look, defined in LOOKS.items()}

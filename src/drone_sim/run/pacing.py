@@ -129,7 +129,6 @@ class Pace:
         }
 
     def values(self) -> dict[str, Any]:
-        """Return the present values by name."""
         return {FACTOR: self._simulation.parameters.real_time_factor}
 
     def change(self, changes: Mapping[str, Any]) -> None:

@@ -88,11 +88,9 @@ class SceneDocument:
         return self.file is not None and self._mtime is not None and _mtime(self.file) != self._mtime
 
     def take_text(self, text: YamlText, handles: _Handles) -> None:
-        """Use `text` as the text of the present scene."""
         self._text = _Text(text.text, self.folder, handles)
 
     def save_state(self) -> Restore:
-        """Return a function that restores text and settings."""
         return saved(self, "_text", "_settings")
 
     def belong_to(self, file: Path | None, folder: Path, text: str, handles: _Handles) -> None:
@@ -209,7 +207,6 @@ def _updated(raw: Mapping[str, Any], before: Mapping[str, Any], now: Mapping[str
 
 
 def settings_of(content: Mapping[str, Any]) -> Settings:
-    """Return the settings in the content of a scene file."""
     return {key: value for key, value in content.items() if key not in LISTS}
 
 
@@ -313,7 +310,6 @@ def say_place(entry: dict[str, Any], matrix: Matrix, leans: bool = True) -> None
 
 
 def without_vehicles(settings: Settings) -> dict[str, Any]:
-    """Return settings without the keys of the vehicles."""
     return {key: value for key, value in settings.items() if key not in ("drone", "vehicles")}
 
 

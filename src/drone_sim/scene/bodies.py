@@ -178,7 +178,6 @@ class ShapeObject(SceneObject):
 
     @property
     def is_static(self) -> bool:
-        """Whether the dynamics does not move it."""
         return self.body is None
 
     def set_static(self, static: bool) -> None:

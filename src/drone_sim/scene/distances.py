@@ -30,7 +30,6 @@ class Distances:
     """Measures distances. A vehicle is a solid; an object that is not a shape, such as a dummy, is a point."""
 
     def __init__(self, context: SimulationContext):
-        """Measure in the simulation of this context."""
         self._context = context
 
     def nearest(

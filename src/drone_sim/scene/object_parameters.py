@@ -40,7 +40,6 @@ class InertiaParameters(Checked):
 
     @property
     def inertia(self) -> PrincipalInertia:
-        """The inertia for the dynamics."""
         return PrincipalInertia(self.moments, from_rpy(self.position, self.rpy))
 
 
@@ -87,7 +86,6 @@ class PartParameters(Checked):
 
     @property
     def part(self) -> Part:
-        """The part for a Compound."""
         return Part(_shape_of(self), from_rpy(self.position, self.rpy), self.color)
 
 

@@ -259,7 +259,6 @@ class SceneOperations:
             self._scripts.rename(name, new_name)
 
     def set_alias(self, handle: int, alias: str) -> None:
-        """Set an object's alias, which need not be unique."""
         self.describe(handle, alias=alias)
 
     def describe(self, handle: int, **values: Any) -> None:
@@ -297,7 +296,6 @@ class SceneOperations:
         return next((tree.handle(name) for name in names if name in tree), WORLD)
 
     def _end_links(self, names: Collection[str]) -> None:
-        """End the links of dummies with these names."""
         for record in self._scene.records.values():
             entry = record.entry
             if isinstance(entry, DummyParameters) and entry.linked and (entry.name in names or entry.linked in names):

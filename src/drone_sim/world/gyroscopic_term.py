@@ -37,7 +37,6 @@ class NoGyroscopicTerm:
         return self._roots
 
     def add(self, body: int) -> None:
-        """Add a body whose term is to be cancelled."""
         links = {}
         for number in range(-1, pybullet.getNumJoints(body, self._client)):
             mass, _, moments, *_ = pybullet.getDynamicsInfo(body, number, self._client)

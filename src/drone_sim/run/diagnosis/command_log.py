@@ -77,7 +77,6 @@ class CommandLog:
             )
 
     def last_refusal(self) -> Refusal | None:
-        """Return the latest refusal on any topic."""
         with self._lock:
             return max(self.refused.values(), key=lambda refusal: refusal.at, default=None)
 

@@ -12,7 +12,6 @@ from drone_sim.run.diagnosis.finding import ERROR, WARN, Counts, Finding, Proble
 from drone_sim.run.diagnosis.vehicles import VehicleDiagnosis, is_unmoved
 from drone_sim.run.pacing import Pacer
 from drone_sim.run.player import Player
-from drone_sim.run.simulation import Simulation
 from drone_sim.sensors.vision import TINY
 
 _ENOUGH = 0.9  # fraction of the nominal rate, and of the requested real-time factor
@@ -20,90 +19,6 @@ _FEW = 2  # pictures that may be counted in this diagnosis or the next
 _MAX_UNSUPPORTED = 3  # messages about what an import left out
 _LATE = 0.1  # fraction of the steps; a few are late on any busy computer
 _SUSTAINED = 3  # diagnoses in a row that are too slow before that is a problem: a start, or a busy second, is none
-
-
-def cameras(simulation: Simulation, since: Counts | None) -> Finding:
-    """Check the renderer, the time per picture, and the rate of each subscribed camera."""
-    renderer, values, problems = simulation.vision.renderer, {}, []
-    values["renderer"] = f"PyBullet's {TINY}" if renderer == TINY else renderer or "none yet: no camera has been used"
-    drawn = since.pictures if since else 0
-    mean = f"{since.drawing / drawn * 1e3:.1f} ms" if since and drawn else "not known"
-    values["frame time"] = mean
-    if renderer == TINY:
-        reason = f"PyBullet's slow {TINY} draws, because there is no EGL: run `rosrun drone_sim doctor`"
-        problems.append(Problem(WARN, reason))
-    for (vehicle, name), pictures in (since.shown if since else {}).items():
-        assert since is not None
-        rate = pictures / since.seconds
-        nominal = _nominal(simulation, vehicle, name, since)
-        values[f"{vehicle}/{name}"] = f"{rate:.1f} of {nominal:.1f} Hz"
-        if pictures + _FEW < _ENOUGH * nominal * since.seconds:
-            problems.append(Problem(WARN, f"{vehicle}/{name} publishes at {rate:.1f} instead of {nominal:.1f} Hz"))
-    watched = [key for each in simulation.vehicles.values() for key, camera in each.cameras.items() if camera.watched()]
-    values["looked at"] = f"{len(watched)} of {sum(len(each.cameras) for each in simulation.vehicles.values())} cameras"
-    fine = f"{len(watched)} in use; time per picture: {mean}" if watched else "no camera is in use"
-    return finding("cameras", fine, problems, values)
-
-
-def _nominal(simulation: Simulation, vehicle: str, name: str, since: Counts) -> float:
-    """Return the expected rate of pictures in Hz of real time."""
-    parameters = simulation.parameters
-    every = simulation.vehicles[vehicle].parameters.cameras[name].every
-    if not parameters.real_time_factor:  # unpaced
-        return since.steps / every / since.seconds
-    return parameters.real_time_factor / (parameters.time_step * every)
-
-
-def slowness(player: Player, since: Counts | None) -> list[Problem]:
-    """Return the problems of a real-time factor that is not reached, and of late steps."""
-    problems, parameters = [], player.simulation.parameters
-    if since is None:
-        return []
-    factor, target = since.steps * parameters.time_step / since.seconds, parameters.real_time_factor
-    if target and factor < _ENOUGH * target:
-        problems.append(Problem(WARN, f"too slow: {factor:.2f} times real time, {target:g} is wanted"))
-    if since.late > _LATE * since.steps:
-        problems.append(Problem(WARN, f"{since.late} of the last {since.steps} steps were late"))
-    return problems
-
-
-def pace(
-    player: Player, pacer: Pacer, since: Counts | None, simulated_time: bool, held: bool, slow: Sequence[Problem] = ()
-) -> Finding:
-    """Check state and script errors; with `simulated_time`, also whether /clock runs.
-
-    `held`: the next step waits for a client of the remote API. `slow` are the problems of the pace that have lasted.
-    """
-    simulation = player.simulation
-    target = simulation.parameters.real_time_factor
-    factor = since.steps * simulation.parameters.time_step / since.seconds if since else None
-    problems = [Problem(ERROR, f"stopped: {player.why_stopped}")] if player.why_stopped and not player.playing else []
-    problems += [Problem(ERROR, f"script of {key} failed: {error}") for key, error in simulation.failed_scripts.items()]
-    problems += [
-        Problem(WARN, f"will not work here: {feature}") for feature in simulation.unsupported[:_MAX_UNSUPPORTED]
-    ]
-    if simulated_time and not player.playing:
-        problems.append(Problem(WARN, f"{player.state}: /clock stands still, and nodes that use simulated time wait"))
-    if held and since and not since.steps:
-        problems.append(Problem(WARN, "no step: a client of the remote API asked to trigger each step, and does not"))
-    else:
-        problems += slow
-    late = f"{since.late} of the last {since.steps}, " if since else ""
-    values = {
-        "state": player.state,
-        "script error": player.why_stopped,
-        "simulated time": f"{simulation.time:.2f} s",
-        "run": f"number {simulation.run}; every start and every stop begins a new run",
-        "vehicles": ", ".join(simulation.vehicles),
-        "real-time factor": f"{factor:.2f}" if factor is not None else "not known",
-        "real-time factor asked for": f"{target:g}" if target else "as fast as it can",
-        "late steps": f"{late}{pacer.overruns} in all, by {pacer.worst * 1e3:.0f} ms at most",
-        "stamps": "simulated time, from /clock" if simulated_time else "real time",
-        "scene": shown(simulation.parameters.scene_file) if simulation.parameters.scene_file else "of the parameters",
-        "PyBullet": f"{_PYBULLET}, {'with its window' if simulation.parameters.gui else 'without a window'}",
-    }
-    speed = f" at {factor:.2f} times real time" if factor is not None else ""
-    return finding("simulation", f"{player.state}{speed}", problems, values)
 
 
 def _version(package: str) -> str:
@@ -148,7 +63,7 @@ class Diagnosis:
         """Return the findings for the simulation, the cameras, and each vehicle."""
         now = count(self._player, self._pacer, self._clock())
         since, self._before = between(self._before, now), now
-        slow = slowness(self._player, since)
+        slow = self._check_speed(since)
         self._slow = self._slow + 1 if slow else 0
         lasting = slow if self._slow >= _SUSTAINED else []
         logs, unheard = self._logs(), self._unheard()
@@ -159,8 +74,8 @@ class Diagnosis:
             for name, vehicle in simulation.vehicles.items()
         }
         return [
-            pace(self._player, self._pacer, since, self._simulated_time, self._held(), lasting),
-            cameras(self._player.simulation, since),
+            self._check_simulation(since, lasting),
+            self._check_cameras(since),
             *(
                 VehicleDiagnosis(
                     vehicle,
@@ -171,6 +86,88 @@ class Diagnosis:
                     self._unmoved[name],
                     unheard,
                 ).finding()
-                for name, vehicle in self._player.simulation.vehicles.items()
+                for name, vehicle in simulation.vehicles.items()
             ),
         ]
+
+    def _check_cameras(self, since: Counts | None) -> Finding:
+        """Check the renderer, the time per picture, and the rate of each subscribed camera."""
+        simulation = self._player.simulation
+        renderer, problems = simulation.vision.renderer, []
+        shown_renderer = f"PyBullet's {TINY}" if renderer == TINY else renderer or "none yet: no camera has been used"
+        drawn = since.pictures if since else 0
+        mean = f"{since.drawing / drawn * 1e3:.1f} ms" if since and drawn else "not known"
+        values = {"renderer": shown_renderer, "frame time": mean}
+        if renderer == TINY:
+            reason = f"PyBullet's slow {TINY} draws, because there is no EGL: run `rosrun drone_sim doctor`"
+            problems.append(Problem(WARN, reason))
+        for (vehicle, name), pictures in (since.shown if since else {}).items():
+            assert since is not None
+            rate = pictures / since.seconds
+            nominal = self._nominal_rate(vehicle, name, since)
+            values[f"{vehicle}/{name}"] = f"{rate:.1f} of {nominal:.1f} Hz"
+            if pictures + _FEW < _ENOUGH * nominal * since.seconds:
+                problems.append(Problem(WARN, f"{vehicle}/{name} publishes at {rate:.1f} instead of {nominal:.1f} Hz"))
+        cameras = [camera for each in simulation.vehicles.values() for camera in each.cameras.values()]
+        watched = sum(bool(camera.watched()) for camera in cameras)
+        values["looked at"] = f"{watched} of {len(cameras)} cameras"
+        fine = f"{watched} in use; time per picture: {mean}" if watched else "no camera is in use"
+        return finding("cameras", fine, problems, values)
+
+    def _nominal_rate(self, vehicle: str, camera: str, since: Counts) -> float:
+        """Return the expected rate of pictures in Hz of real time."""
+        parameters = self._player.simulation.parameters
+        every = self._player.simulation.vehicles[vehicle].parameters.cameras[camera].every
+        if not parameters.real_time_factor:  # unpaced
+            return since.steps / every / since.seconds
+        return parameters.real_time_factor / (parameters.time_step * every)
+
+    def _check_speed(self, since: Counts | None) -> list[Problem]:
+        """Return the problems of a real-time factor that is not reached, and of late steps."""
+        problems, parameters = [], self._player.simulation.parameters
+        if since is None:
+            return []
+        factor, target = since.steps * parameters.time_step / since.seconds, parameters.real_time_factor
+        if target and factor < _ENOUGH * target:
+            problems.append(Problem(WARN, f"too slow: {factor:.2f} times real time, {target:g} is wanted"))
+        if since.late > _LATE * since.steps:
+            problems.append(Problem(WARN, f"{since.late} of the last {since.steps} steps were late"))
+        return problems
+
+    def _check_simulation(self, since: Counts | None, slow: Sequence[Problem]) -> Finding:
+        """Check state, script errors, /clock, and pace; `slow` are the problems of the pace that have lasted."""
+        player, pacer = self._player, self._pacer
+        simulation = player.simulation
+        target, scene = simulation.parameters.real_time_factor, simulation.parameters.scene_file
+        factor = since.steps * simulation.parameters.time_step / since.seconds if since else None
+        problems = []
+        if player.why_stopped and not player.playing:
+            problems.append(Problem(ERROR, f"stopped: {player.why_stopped}"))
+        for name, error in simulation.failed_scripts.items():
+            problems.append(Problem(ERROR, f"script of {name} failed: {error}"))
+        for feature in simulation.unsupported[:_MAX_UNSUPPORTED]:
+            problems.append(Problem(WARN, f"will not work here: {feature}"))
+        if self._simulated_time and not player.playing:
+            still = f"{player.state}: /clock stands still, and nodes that use simulated time wait"
+            problems.append(Problem(WARN, still))
+        if self._held() and since and not since.steps:
+            waits = "no step: a client of the remote API asked to trigger each step, and does not"
+            problems.append(Problem(WARN, waits))
+        else:
+            problems += slow
+        late = f"{since.late} of the last {since.steps}, " if since else ""
+        values = {
+            "state": player.state,
+            "script error": player.why_stopped,
+            "simulated time": f"{simulation.time:.2f} s",
+            "run": f"number {simulation.run}; every start and every stop begins a new run",
+            "vehicles": ", ".join(simulation.vehicles),
+            "real-time factor": f"{factor:.2f}" if factor is not None else "not known",
+            "real-time factor asked for": f"{target:g}" if target else "as fast as it can",
+            "late steps": f"{late}{pacer.overruns} in all, by {pacer.worst * 1e3:.0f} ms at most",
+            "stamps": "simulated time, from /clock" if self._simulated_time else "real time",
+            "scene": shown(scene) if scene else "of the parameters",
+            "PyBullet": f"{_PYBULLET}, {'with its window' if simulation.parameters.gui else 'without a window'}",
+        }
+        speed = f" at {factor:.2f} times real time" if factor is not None else ""
+        return finding("simulation", f"{player.state}{speed}", problems, values)

@@ -47,7 +47,6 @@ class JointParameters(KindParameters):
 
     @property
     def control(self) -> JointControl:
-        """Its initial control mode and targets."""
         return JointControl(
             self.mode,
             position=self.target if self.mode == POSITION else self.value,
@@ -75,17 +74,14 @@ class ForceSensor(SceneObject):
     _held_link: tuple[World, int, int] | None = None
 
     def hold(self, world: World, body: int, link: int) -> None:
-        """Attach the sensor to the link of a body that it holds."""
         self._held_link = world, body, link
         world.joints.measure(body, link)
 
     @property
     def is_held(self) -> bool:
-        """Whether it holds a shape in the dynamics."""
         return self._held_link is not None
 
     def release(self) -> None:
-        """Detach the sensor from its link."""
         self._held_link = None
 
     def read(self) -> tuple[Vector, Vector]:

@@ -72,7 +72,6 @@ class ControlPointParameters(Checked):
 
     @property
     def control_point(self) -> ControlPoint:
-        """The control point for ControlledPath."""
         station = Station(self.position, self.turn, self.pause, self.flags, self.channels)
         return ControlPoint(station, *self.factors, self.count)
 
