@@ -9,14 +9,14 @@ plane of the first floor, and transparent objects cast none.
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
 import moderngl
 import numpy as np
 
-from drone_sim.render import context, counting
+from drone_sim.render import context
 from drone_sim.render.batches import SHADE, Batch, DrawBatches
 from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics, Lens, Orthographic, Tiles
@@ -159,7 +159,7 @@ class Renderer:
     ) -> np.ndarray:
         """Return how many pixels each number of `instances` (N,) would have without occlusion, (largest + 1,)."""
         if isinstance(intrinsics, Distorted):
-            return counting.pixels(
+            return _covered_pixels(
                 instances, poses, lambda numbers, moved_poses: self.render_outputs(
                     ("instance",), intrinsics, camera_pose, moved_poses, instances=numbers
                 )["instance"],
@@ -176,7 +176,7 @@ class Renderer:
                 only.value = float(number)
                 self._draw_batches(gl, self._batches.all, ALONE)
 
-            return counting.covered(gl, np.unique(instances), draw)
+            return _covered(gl, np.unique(instances), draw)
 
     def close(self) -> None:
         """Free the context and its memory; the renderer is unusable afterwards. May be called twice."""
@@ -340,3 +340,42 @@ def _optical_from_world(camera_pose: np.ndarray) -> np.ndarray:
 def _bytes(matrix: np.ndarray) -> bytes:
     """Return one or several matrices as GLSL stores them, column by column."""
     return bytes(matrix.swapaxes(-1, -2).astype(np.float32).tobytes())
+
+
+# ---- pixel counts of objects, each rendered alone, without occlusion by others
+
+
+def _covered(gl: moderngl.Context, numbers: np.ndarray, draw: Callable[[int], None]) -> np.ndarray:
+    """Return how many pixels each of the objects `numbers` covers when alone, indexed by number, (largest + 1,).
+
+    `draw` draws only the object with that number, without clearing, and gives all its fragments the same depth.
+    The depth test `<` then passes one fragment per pixel, even where parts of the object overlap.
+    """
+    counts = np.zeros(int(numbers.max(initial=0)) + 1, dtype=np.int64)
+    query = gl.query(samples=True)
+    gl.depth_func = "<"
+    for number in numbers:
+        gl.fbo.clear()
+        with query:
+            draw(int(number))
+        counts[number] = query.samples
+    gl.depth_func = "<="
+    return counts
+
+
+def _covered_pixels(
+    instances: np.ndarray, poses: np.ndarray, mask: Callable[[np.ndarray, np.ndarray], np.ndarray]
+) -> np.ndarray:
+    """Return the same as `_covered` for a distorted lens, by rendering one image per object; slower.
+
+    instances, poses: each visual's object number, (N,), and pose, (N, 4, 4). `mask` renders the output "instance" for
+    other numbers and poses.
+    """
+    counts = np.zeros(int(instances.max(initial=0)) + 1, dtype=np.int64)
+    hidden_pose = np.eye(4)
+    hidden_pose[2, 3] = -1e9  # m, far below everything that a camera sees
+    for number in np.unique(instances):
+        is_part = instances == number
+        covered_pixels = mask(is_part.astype(np.uint16), np.where(is_part[:, None, None], poses, hidden_pose))
+        counts[number] = covered_pixels.sum(dtype=np.int64)
+    return counts

@@ -25,46 +25,18 @@ _BLADE_TURN = 3.0  # rad per metre of air; slow enough that 20 images/s show the
 class Rotors:
     """The links and blades of the propellers of one body."""
 
-    def __init__(self, rigid: RigidBody, urdf_name: str, type_of_vehicle: VehicleType):
+    def __init__(self, rigid: RigidBody, urdf_name: str, kind: VehicleType):
         """Read them from the URDF. Raises UrdfError if a link is missing."""
-        self._type = type_of_vehicle
-        names = [f"propeller_{place}" for place in type_of_vehicle.places]
+        self.kind = kind
+        names = [f"propeller_{place}" for place in kind.places]
         for name in names:
             if name not in rigid.links:
                 raise urdf.UrdfError(f"{urdf_name}: no link {name}")
         self.links: list[Matrix] = [rigid.links[name] for name in names]  # root from link
         self.inertials = [rigid.inertials[name] for name in names]  # without their blades, in the root link's frame
         self.others = [inertial for name, inertial in rigid.inertials.items() if name not in names]
-        self._blades = rigid.blades
-
-    def propellers(
-        self,
-        law: PropellerParameters,
-        inertial_from_root: Matrix,
-        time_step: float,
-        commanded: Callable[[], Sequence[float]],
-    ) -> Propellers:
-        """Return the thrust model of the propellers; `commanded` returns the particle velocities (m/s)."""
-        points = [frames.position(frames.multiply(inertial_from_root, link)) for link in self.links]
-        axes = [(link[2], link[6], link[10]) for link in self.links]
-        return self._type.thrust_model(law, axes, points, self._type.senses, time_step, commanded)
-
-    def angle(self, number: int, air: float) -> float:
-        """Return the angle (rad) of a propeller's blades after `air` metres of air; opposite to the reaction torque."""
-        return -self._type.rotors[number][1] * _BLADE_TURN * air
-
-    def by_joint(self, values: Sequence[float]) -> dict[str, float]:
-        """Return the propellers' values by the name of their blades' joint in the URDF."""
-        return {f"blades_{place}_joint": value for place, value in zip(self._type.places, values)}
-
-    def visuals(self, angles: dict[str, float], speeds: dict[str, float]) -> dict[int, Place]:
-        """Return the places of the blades' visuals, by index; `angles` (rad) and `speeds` (rad/s) are by joint."""
-        places = {}
-        for blades in self._blades:
-            rotation = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, angles.get(blades.joint_name, 0.0)))
-            place = frames.multiply(frames.multiply(blades.joint, rotation), blades.local)
-            places[blades.visual] = Place(place, blades.joint, speeds.get(blades.joint_name, 0.0))
-        return places
+        self.blades = rigid.blades
+        self.joints = [f"blades_{place}_joint" for place in kind.places]  # names in the URDF
 
 
 class Blades:
@@ -98,23 +70,29 @@ class Blades:
             self._set_angles[name] = angle
             self.turned = True
         number = self._names.index(name)
-        return self._set_angles.get(name, self._rotors.angle(number, self._law().air[number]))
+        return self._set_angles.get(name, self._angle(number, self._law().air[number]))
+
+    def _angle(self, number: int, air: float) -> float:
+        """Return the angle (rad) of a propeller's blades after `air` metres of air; opposite to the reaction torque."""
+        return -self._rotors.kind.rotors[number][1] * _BLADE_TURN * air
 
     @property
     def angles(self) -> dict[str, float]:
         """Angle (rad, 0 to 2 pi) of each propeller's blades, by URDF joint."""
-        return self._rotors.by_joint([self.turn(name) % (2 * math.pi) for name in self._names])
-
-    @property
-    def _speeds(self) -> dict[str, float]:
-        """Angular velocity (rad/s) of each propeller's blades, by URDF joint; 0 if a script set their angle."""
-        speeds = [self._rotors.angle(number, flow) for number, flow in enumerate(self._law().velocities)]
-        return self._rotors.by_joint([rate * (name not in self._set_angles) for name, rate in zip(self._names, speeds)])
+        return {key: self.turn(name) % (2 * math.pi) for key, name in zip(self._rotors.joints, self._names)}
 
     def show(self) -> None:
-        """Move the blades' visuals to the present angles."""
+        """Move the blades' visuals to the present angles; they rotate unless a script set their angle."""
         self.turned = False
-        self._body.place_visuals(self._rotors.visuals(self.angles, self._speeds))
+        rates = [self._angle(number, flow) for number, flow in enumerate(self._law().velocities)]  # rad/s
+        turning = [rate * (name not in self._set_angles) for name, rate in zip(self._names, rates)]
+        angles, speeds = self.angles, dict(zip(self._rotors.joints, turning))
+        places = {}
+        for blades in self._rotors.blades:
+            rotation = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, angles.get(blades.joint_name, 0.0)))
+            place = frames.multiply(frames.multiply(blades.joint, rotation), blades.local)
+            places[blades.visual] = Place(place, blades.joint, speeds.get(blades.joint_name, 0.0))
+        self._body.place_visuals(places)
 
     def save_state(self) -> Restore:
         """Return a function that restores the angles that scripts set."""
@@ -139,7 +117,10 @@ class Propulsion:
 
     def begin(self, law: PropellerParameters, time_step: float) -> None:
         """Create the thrust model at rest, as at the start of a run."""
-        self.law: Propellers = self.rotors.propellers(law, self._body.inertial_from_root, time_step, self._velocities)
+        kind, links = self.rotors.kind, self.rotors.links
+        points = [frames.position(frames.multiply(self._body.inertial_from_root, link)) for link in links]
+        axes = [(link[2], link[6], link[10]) for link in links]
+        self.law = kind.thrust_model(law, axes, points, kind.senses, time_step, self._velocities)
         self._body.propellers = self.law
         self.blades.reset()
 
