@@ -345,12 +345,8 @@ class Word:
         """Return the word in a mapping or model; None if there is none."""
         if not isinstance(value, Mapping):
             return next((str(getattr(value, key)) for key in (self.key, self.or_key) if hasattr(value, key)), None)
-        word = value.get(self.used_in(value))
+        word = value.get(self.or_key if self.or_key in value else self.key)
         return word if isinstance(word, str) else None
-
-    def used_in(self, value: Any) -> str:
-        """Return the key under which a value has, or should have, its word."""
-        return self.or_key if isinstance(value, Mapping) and self.or_key in value else self.key
 
 
 def one_of(*models: type[Checked], key: str = "kind", or_key: str = "") -> Any:

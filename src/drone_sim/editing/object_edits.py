@@ -22,7 +22,7 @@ from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.object_names import first_free, numbered
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.run.simulation import Simulation
-from drone_sim.scene import models, scene_parameters
+from drone_sim.scene import geometry, models, scene_parameters
 from drone_sim.scene.entry import EntryParameters, placed
 from drone_sim.scene.object_parameters import ObjectParameters
 from drone_sim.scene.scene_parameters import AttachedScriptParameters, entry_from, script_from
@@ -288,7 +288,7 @@ def _set_down(entry: EntryParameters, position: Sequence[float], yaw: float) -> 
     x, y, z = position
     lowest = 0.0
     if isinstance(entry, ObjectParameters) and entry.shape != "urdf":
-        low, high = models.bounds(entry)
+        low, high = geometry.bounds(entry)
         rotation = frames.from_rpy((0.0, 0.0, 0.0), entry.rpy)
         lowest = min(frames.transform(rotation, corner)[2] for corner in itertools.product(*zip(low, high)))
     pose = frames.from_rpy((x, y, z - float(lowest)), (0.0, 0.0, yaw))

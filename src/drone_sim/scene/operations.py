@@ -15,12 +15,11 @@ from drone_sim.mechanics.joint import Joint
 from drone_sim.mechanics.object_names import first_free, numbered, plain, shifted, suffixes
 from drone_sim.mechanics.object_tree import PARENT, WORLD, levels
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.scene import models
+from drone_sim.scene import geometry, models
 from drone_sim.scene.entry import EntryParameters, KindParameters, Place, placed
 from drone_sim.scene.kinds.dummy import DummyParameters, check_links
 from drone_sim.scene.kinds.joints import ForceSensor, ForceSensorParameters, JointParameters
 from drone_sim.scene.object_parameters import CompoundParameters, ObjectParameters
-from drone_sim.scene.scaling import scaled
 from drone_sim.scene.scene import ObjectRecord, Scene
 from drone_sim.scene.scene_parameters import (
     MAX_OBJECTS,
@@ -187,7 +186,7 @@ class SceneOperations:
         if len({*handles}) != len(handles) or len(handles) < 2:
             raise ValueError("must be at least two different shapes")
         entries = [self.entry(member) for member in handles]
-        compound = models.grouped(entries, [self._scene.tree.matrix(member) for member in handles])
+        compound = geometry.grouped(entries, [self._scene.tree.matrix(member) for member in handles])
         (handle,) = self.add([{**compound, "name": self.free_name(entries[0].name)}])
         self._move_script(entries[0].name, self._scene.tree[handle].name)
         self._replace_by(handles, handle)
@@ -197,7 +196,7 @@ class SceneOperations:
     def ungroup(self, handle: int) -> list[int]:
         """Split a compound into one shape for each part; return their handles."""
         entry = self.entry(handle)
-        parts = models.parted(entry, self._scene.tree.matrix(handle))
+        parts = geometry.parted(entry, self._scene.tree.matrix(handle))
         new = self.add_named_anew([entry_from({**part, "name": entry.name}) for part in parts])
         self._move_script(entry.name, self._scene.tree[new[0]].name)
         self._replace_by([handle], new[0])
@@ -427,7 +426,7 @@ class SceneOperations:
 
     def box(self, handle: int) -> tuple[frames.Vector, frames.Vector]:
         """Return size and centre (m) of a shape's bounding box, in the shape's frame."""
-        low, high = models.bounds(self.entry(handle))
+        low, high = geometry.bounds(self.entry(handle))
         (a, b, c), (x, y, z) = map(float, high - low), map(float, (low + high) / 2)
         return (a, b, c), (x, y, z)
 
@@ -442,7 +441,7 @@ class SceneOperations:
     def scale(self, handles: Collection[int], factors: Sequence[float], positions: bool = False) -> None:
         """Scale objects and their masses by factors along x, y and z; if `positions`, also their positions."""
         x, y, z = factors
-        entries = {handle: scaled(self.entry(handle), (x, y, z)) for handle in handles}
+        entries = {handle: geometry.scaled(self.entry(handle), (x, y, z)) for handle in handles}
         tree = self._scene.tree
         places = {}
         if positions:

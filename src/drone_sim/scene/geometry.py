@@ -1,17 +1,25 @@
-"""Scaling of entries: lengths by the factors, mass with the volume."""
+"""Geometry of entries: scaling (lengths by the factors, mass with the volume), compounds, bounding boxes."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import fields
 from typing import Any
 
+import numpy as np
+
 from drone_sim.config.errors import changed
-from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.joint import PRISMATIC
-from drone_sim.scene.entry import EntryParameters
+from drone_sim.scene.entry import EntryParameters, pose_keys
 from drone_sim.scene.kinds.joints import JointParameters
 from drone_sim.scene.kinds.paths import CurvedPathParameters
 from drone_sim.scene.object_parameters import CompoundParameters, ObjectParameters, PartParameters
+from drone_sim.shapes import SCENE_SHAPES
+from drone_sim.shapes.compound import parts_of
+from drone_sim.shapes.shape import DrawnShape
 
 _LENGTHS = {  # of kinds that are not shapes
     "dummy": ("size",),
@@ -105,3 +113,67 @@ def _uniform(entry: EntryParameters, factors: Vector, what: str) -> float:
             f"'{entry.name}', {what}, must be scaled by the same factor along x, y and z, not by {x:g}, {y:g}, {z:g}"
         )
     return factors[0]
+
+
+# ---- compounds
+
+
+def grouped(entries: Sequence[EntryParameters], frames_of: Sequence[Matrix]) -> dict[str, Any]:
+    """Return the entry of a compound of several shapes, in the frame of the first. Raises ValueError."""
+    parts, mass = [], 0.0
+    for entry, matrix in zip(entries, frames_of):
+        if not isinstance(entry, ObjectParameters) or entry.shape == "urdf":
+            raise ValueError(f"'{entry.name}' is not a shape that can be grouped")
+        local = frames.relative(frames_of[0], matrix)
+        members = entry.parts if isinstance(entry, CompoundParameters) else [entry]
+        for member in members:
+            pose = local if member is entry else frames.multiply(local, frames.from_rpy(member.position, member.rpy))
+            parts.append({**_shape_keys(member), **pose_keys(pose)})
+        mass += entry.mass
+    first = entries[0]
+    assert isinstance(first, ObjectParameters), "checked above"
+    common = {
+        key: getattr(first, key) for key in ("parent", "position", "rpy", "alias", "static", "respondable", "visible")
+    }
+    return {**common, "shape": "compound", "mass": mass, "parts": parts}
+
+
+def parted(entry: EntryParameters, matrix: Matrix) -> list[dict[str, Any]]:
+    """Return the entries of the parts of a compound, each without a parent. Raises ValueError."""
+    if not isinstance(entry, CompoundParameters):
+        raise ValueError(f"'{entry.name}' is not a compound")
+    volumes = [_volume(part) for part in entry.parts]
+    common = {key: getattr(entry, key) for key in ("static", "respondable", "visible")}
+    return [
+        {
+            **common,
+            **_shape_keys(part),
+            **pose_keys(frames.multiply(matrix, frames.from_rpy(part.position, part.rpy))),
+            "mass": entry.mass * volume / sum(volumes),
+        }
+        for part, volume in zip(entry.parts, volumes)
+    ]
+
+
+def _shape_keys(parameters: ObjectParameters | PartParameters) -> dict[str, Any]:
+    keys = [field.name for field in fields(SCENE_SHAPES[parameters.shape])]
+    return {"shape": parameters.shape, "color": parameters.color, **{key: getattr(parameters, key) for key in keys}}
+
+
+def _volume(part: PartParameters) -> float:
+    shape = part.part.shape
+    return shape.solid().volume if isinstance(shape, DrawnShape) else 0.0
+
+
+def bounds(entry: EntryParameters) -> tuple[np.ndarray, np.ndarray]:
+    """Return the minimum and maximum corner (m) of a shape in its own frame. Raises ValueError if it is not a shape."""
+    if not isinstance(entry, ObjectParameters) or entry.shape == "urdf":
+        raise ValueError(f"'{entry.name}' has no bounding box of its own")
+    corners = []
+    for shape, local, _ in parts_of(entry.to_shape(), entry.color):
+        assert isinstance(shape, DrawnShape), "every shape except a urdf is drawn"
+        transform = np.reshape(local, (3, 4))
+        for part in shape.triangles():
+            corners.append(part.corners.reshape(-1, 3) @ transform[:, :3].T + transform[:, 3])
+    points = np.concatenate(corners)
+    return points.min(axis=0), points.max(axis=0)
