@@ -49,6 +49,7 @@ MAX_PIXELS = 4 * images.MAX_SIDE**2  # of all textures of a scene
 MAX_REACH = 1e5  # m, distance of a mesh's vertices from its origin
 _MAX_SCRIPT_PARAMETERS = 256  # per script
 _MAX_COLLECTIONS, _MAX_ITEMS = 256, 10_000
+_VREP_NAMES = {"box": "Cuboid", "mesh": "Shape", "compound": "Shape", "urdf": "Shape"}
 
 
 class FloorParameters(Checked):
@@ -131,9 +132,6 @@ def _check_unique(section: str, key: str, items: Iterable[Checked]) -> None:
         if value in values:
             raise ParameterError("is used twice", (section, index, key), f"'{value}'")
         values.add(value)
-
-
-_VREP_NAMES = {"box": "Cuboid", "mesh": "Shape", "compound": "Shape", "urdf": "Shape"}
 
 
 def name_shapes(objects: list[EntryChoice]) -> None:
