@@ -113,7 +113,10 @@ class LensView:
         gathered = {name: stack[self._place] for name, stack in drawn.items()}
         if "depth" in drawn:
             nearest = gathered["depth"]
-            depth = self._interpolate_depth(drawn["depth"], nearest)
+            with np.errstate(divide="ignore"):  # where the lens sees nothing
+                smooth = 1.0 / cv2.remap(1.0 / drawn["depth"], self._exact[0], self._exact[1], cv2.INTER_LINEAR)
+            # Interpolated in 1/depth (linear on a plane) within one surface, else that of the nearest pixel.
+            depth = np.where(np.abs(smooth - nearest) < _SAME_SURFACE * nearest, smooth, nearest)
             gathered["depth"] = (depth * self._depth_factor).astype(np.float32)
         if "before" in drawn and rotation is not None:  # the point moved like its nearest pixel
             offset = self._ray * depth[..., None] - self._nearest_ray * nearest[..., None]
@@ -121,12 +124,6 @@ class LensView:
         for name, output in gathered.items():
             output[~self._has_ray] = np.nan if name in ("depth", "before") else 0
         return gathered
-
-    def _interpolate_depth(self, stack: np.ndarray, nearest: np.ndarray) -> np.ndarray:
-        """Return each pixel's depth, interpolated in 1/depth (linear on a plane) within one surface, else `nearest`."""
-        with np.errstate(divide="ignore"):  # where the lens sees nothing
-            smooth = 1.0 / cv2.remap(1.0 / stack, self._exact[0], self._exact[1], cv2.INTER_LINEAR)
-        return np.where(np.abs(smooth - nearest) < _SAME_SURFACE * nearest, smooth, nearest)
 
 
 def _tiles(lens: Distorted, has_ray: np.ndarray) -> list[_Tile]:

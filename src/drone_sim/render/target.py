@@ -91,13 +91,9 @@ def _dtype_name(dtype: type) -> str:
 
 def without_alpha(rgba: np.ndarray, out: np.ndarray | None) -> np.ndarray:
     """Return RGB of RGBA, written into `out` if given; raises ValueError if that does not fit."""
-    return np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB, dst=_check_out(out, (*rgba.shape[:2], 3), np.uint8)))
-
-
-def _check_out(out: np.ndarray | None, shape: tuple[int, ...], dtype: type) -> np.ndarray:
-    """Return `out`, or a new array if it is None. Raises ValueError if `out` does not fit."""
+    shape = (*rgba.shape[:2], 3)
     if out is None:
-        return np.empty(shape, dtype=dtype)
-    if out.shape != shape or out.dtype != dtype or not out.flags.c_contiguous:
-        raise ValueError(f"out must be a C-contiguous {np.dtype(dtype).name} array of shape {shape}")
-    return out
+        out = np.empty(shape, dtype=np.uint8)
+    elif out.shape != shape or out.dtype != np.uint8 or not out.flags.c_contiguous:
+        raise ValueError(f"out must be a C-contiguous uint8 array of shape {shape}")
+    return np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB, dst=out))

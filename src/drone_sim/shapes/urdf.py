@@ -73,18 +73,13 @@ def _complete_inertials(robot: Xml.Element) -> dict[str, tuple[float, float, flo
 def _complete(link: Xml.Element, is_held: bool) -> tuple[float, float, float]:
     has_inertial = link.find("inertial") is not None
     mass = urdf.mass_of(link) if has_inertial else 0.0 if is_held else _DEFAULT_MASS
-    inertia = _stated_inertia(link) or _evenly_filled(link, mass)
+    tensor, centre = urdf.inertia_tensor(link), frames.position(urdf.origin_of(link.find("inertial")))
+    inertia = principal(tensor, np.array(centre)) if tensor.any() else _evenly_filled(link, mass)
     least = min(inertia.moments)
     if least < -_ROUNDING * max(map(abs, inertia.moments)):
         raise ValueError(f"link {link.attrib['name']}: inertia: principal moment {least:g} kg m²: must be 0 or more")
     _write(link, mass, inertia)
     return inertia.moments
-
-
-def _stated_inertia(link: Xml.Element) -> PrincipalInertia | None:
-    tensor = urdf.inertia_tensor(link)
-    centre = frames.position(urdf.origin_of(link.find("inertial")))
-    return principal(tensor, np.array(centre)) if tensor.any() else None
 
 
 def _evenly_filled(link: Xml.Element, mass: float) -> PrincipalInertia:

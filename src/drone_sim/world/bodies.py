@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Any
 
 import pybullet
 
 from drone_sim.mechanics.state import Pose
 from drone_sim.shapes.plane import Plane
-from drone_sim.shapes.shape import Geometry, SceneShape, UrdfFile
+from drone_sim.shapes.shape import SceneShape, UrdfFile
 from drone_sim.shapes.visual import GROUND
 from drone_sim.world.bullet_files import BulletFiles
 
@@ -38,11 +37,12 @@ def create(
             return _load(client, geometry, pose, moves)
         key = repr(geometry), repr(color)
         if key not in made:
-            collision = pybullet.createCollisionShape(physicsClientId=client, **_collision(geometry))
-            visual = pybullet.createVisualShape(
-                getattr(pybullet, geometry.type), rgbaColor=color, physicsClientId=client, **geometry.visual
+            kind = getattr(pybullet, geometry.type)
+            flags = {"flags": getattr(pybullet, geometry.flags)} if geometry.flags else {}
+            made[key] = (
+                pybullet.createCollisionShape(kind, physicsClientId=client, **geometry.collision, **flags),
+                pybullet.createVisualShape(kind, rgbaColor=color, physicsClientId=client, **geometry.visual),
             )
-            made[key] = collision, visual
         return pybullet.createMultiBody(0, *made[key], position, orientation, physicsClientId=client)
     except pybullet.error as error:
         raise ValueError(f"{shape}: PyBullet cannot create it ({error})") from None
@@ -81,11 +81,6 @@ def set_material(client: int, body: int) -> None:
         activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
         physicsClientId=client,
     )
-
-
-def _collision(geometry: Geometry) -> dict[str, Any]:
-    flags = {"flags": getattr(pybullet, geometry.flags)} if geometry.flags else {}
-    return {"shapeType": getattr(pybullet, geometry.type), **geometry.collision, **flags}
 
 
 # ---- the floor, and the ground around it

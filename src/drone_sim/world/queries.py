@@ -169,7 +169,14 @@ class Queries:
         # If the requested body is the second one of a contact, PyBullet swaps bodies, positions and normal, but not the
         # friction. A request for it as the second body returns exactly these contacts.
         swapped = {row[1] for row in _contacts(_ANY_BODY, body, _ANY_LINK, _ANY_LINK, self._client)}
-        return [_touch(row, -1.0 if row[2] in swapped else 1.0) for row in rows if row[9] > 0.0]
+        touches = []
+        for row in rows:
+            if row[9] > 0.0:
+                sign = -1.0 if row[2] in swapped else 1.0
+                push, first, along, second, across = row[9], row[10] * sign, row[11], row[12] * sign, row[13]
+                x, y, z = (n * push + a * first + b * second for n, a, b in zip(row[7], along, across))
+                touches.append(ContactPoint(row[2], row[5], row[7], (x, y, z)))
+        return touches
 
     def lowest(self, body: int) -> float:
         """Return the height (m) of the lowest point that can collide, of a body without joints."""
@@ -218,10 +225,3 @@ def _normal(start: Vector, end: Vector, hit: Any) -> Vector:
     length = dist(start, end)
     x, y, z = ((a - b) / length for a, b in zip(start, end))
     return x, y, z
-
-
-def _touch(row: Any, sign: float) -> ContactPoint:
-    other, point, normal = row[2], row[5], row[7]
-    push, first, along, second, across = row[9], row[10] * sign, row[11], row[12] * sign, row[13]
-    x, y, z = (n * push + a * first + b * second for n, a, b in zip(normal, along, across))
-    return ContactPoint(other, point, normal, (x, y, z))
