@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from drone_sim.config.errors import checked
@@ -96,10 +96,9 @@ class EditOperations:
         return clipboard.written(entries, scripts_on, vehicles, self._simulation.document.folder)
 
     def _paste(self, op: records.Paste) -> list[int]:
-        content = clipboard.read(op.text, self._simulation.document.folder)
-        occupied = {
-            self._place(it) for it in self._simulation.tree if self._is_of_scene(it) or self._simulation.is_vehicle(it)
-        }
+        simulation = self._simulation
+        content = clipboard.read(op.text, simulation.document.folder)
+        occupied = {self._place(it) for it in simulation.tree if self._is_of_scene(it) or simulation.is_vehicle(it)}
         created: list[int] = []
         for name, values in content["vehicles"].items():
             place = {key: values[key] for key in ("position", "yaw") if key in values}
@@ -108,16 +107,13 @@ class EditOperations:
         if content["objects"]:
             add = {"do": "add", "objects": content["objects"], "scripts": content["scripts"]}
             created += self._objects.add(checked(records.Add, add))
-        self._put_aside(self._simulation.tree.tops(created), occupied)
-        return created
-
-    def _put_aside(self, handles: list[int], occupied: Collection[Vector]) -> None:
-        """Move new objects by a common offset so that none is at an occupied position."""
-        places = [self._place(handle) for handle in handles]
+        # Move the new objects by a common offset so that none is at an occupied position.
+        places = {handle: self._place(handle) for handle in simulation.tree.tops(created)}
         steps = (step * _PASTE_OFFSET for step in itertools.count())
-        by = next(by for by in steps if not any((x + by, y + by, z) in occupied for x, y, z in places))
-        for handle, (x, y, z) in zip(handles, places) if by else ():
+        by = next(by for by in steps if not any((x + by, y + by, z) in occupied for x, y, z in places.values()))
+        for handle, (x, y, z) in places.items() if by else ():
             self._move(records.Move(do="move", object=handle, position=(x + by, y + by, z)))
+        return created
 
     def _place(self, handle: int) -> Vector:
         x, y, z = (round(value, 6) for value in frames.position(self._simulation.tree.matrix(handle)))
@@ -125,9 +121,8 @@ class EditOperations:
 
     def _move(self, op: records.Move) -> None:
         tree, handle = self._simulation.tree, self._simulation.tree.resolve(op.object)
-        fixed_frames = {"world": WORLD, "parent": PARENT}
-        is_fixed = isinstance(op.relative_to, str) and op.relative_to in fixed_frames
-        frame = fixed_frames[str(op.relative_to)] if is_fixed else self._simulation.tree.resolve(op.relative_to)
+        fixed_frames: dict[Any, int] = {"world": WORLD, "parent": PARENT}
+        frame = fixed_frames[op.relative_to] if op.relative_to in fixed_frames else tree.resolve(op.relative_to)
         matrix = _placed(op, tree.matrix(handle, frame))
         if self._is_of_scene(handle):
             self._objects.put(handle, frame, matrix)
@@ -135,21 +130,15 @@ class EditOperations:
             self._vehicles.move(handle, frame, matrix)
 
     def _rename(self, op: records.Rename) -> list[int]:
-        handle = self._simulation.tree.resolve(op.object)
-        is_of_scene = self._is_of_scene(handle)
-        if not self._simulation.is_vehicle(handle):  # the name of a vehicle is not that of an object
-            self._check_free(op.name, handle)
-        return self._objects.rename(handle, op.name) if is_of_scene else self._vehicles.rename(handle, op.name)
-
-    def _check_free(self, name: str, handle: int) -> None:
-        """Raise ParameterError, which says where the other object is, if another object has this name."""
         tree = self._simulation.tree
-        if name not in tree or tree.handle(name) == handle:
-            return
-        other = tree.handle(name)
-        vehicle = self._simulation.vehicle_of(other)
-        owner = f", a part of the vehicle '{vehicle.name}'" if vehicle else ""
-        raise ParameterError(f"an object named '{name}' already exists: {tree.path(other)}{owner}")
+        handle = tree.resolve(op.object)
+        other = tree.handle(op.name) if op.name in tree else handle
+        if other != handle and not self._simulation.is_vehicle(handle):  # a vehicle's name is not that of an object
+            vehicle = self._simulation.vehicle_of(other)
+            owner = f", a part of the vehicle '{vehicle.name}'" if vehicle else ""
+            raise ParameterError(f"an object named '{op.name}' already exists: {tree.path(other)}{owner}")
+        edits = self._objects if self._is_of_scene(handle) else self._vehicles
+        return edits.rename(handle, op.name)
 
     def _reparent(self, op: records.Reparent) -> None:
         parent = WORLD if op.parent == WORLD else self._simulation.tree.resolve(op.parent)
