@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector, cross
@@ -13,20 +12,8 @@ from drone_sim.mechanics.saved_state import Restore, in_turn
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose, State
 from drone_sim.scene.entry import Place
+from drone_sim.scene.object_parameters import ObjectParameters
 from drone_sim.world import World
-
-
-class ShapeInWorld(NamedTuple):
-    """A shape in the world: a link (-1: the root) of a body, its mass (kg), and whether it is static.
-
-    local: the shape's pose in its parent's frame; if a joint holds it, in the moved frame of the joint.
-    """
-
-    number: int
-    link: int
-    local: Matrix
-    mass: float
-    static: bool = False
 
 
 class SceneBody:
@@ -121,9 +108,10 @@ class ShapeObject(SceneObject):
         world: World,
         changed: Callable[[ShapeObject], None],
         follow: Callable[[], None],
-        solid: ShapeInWorld,
+        entry: ObjectParameters,
+        body: tuple[int, int],
     ):
-        """Create it at a place in the tree, with the body `solid` in the world.
+        """Create it at a place in the tree, with a body in the world: its number, and the link (-1: the root).
 
         `changed` is called after its parent, its body or its being static has changed; `follow` after put().
         """
@@ -131,21 +119,25 @@ class ShapeObject(SceneObject):
         self._parent = place.parent
         self._changed, self._follow = changed, follow
         super().__init__(*place, kind="shape")
-        self.embody(solid)
+        self.embody(entry, body, place.local)
         self.pass_carriers()
 
-    def embody(self, solid: ShapeInWorld) -> None:
-        """Use another body in the world; call `pass_carriers` next."""
-        self.number, self.link, local, self.mass, static = solid
+    def embody(self, entry: ObjectParameters, body: tuple[int, int], local: Matrix) -> None:
+        """Use another body in the world; call `pass_carriers` next.
+
+        `local` is the pose in the parent's frame. If a joint holds the shape, the entry's pose counts, in the moved
+        frame of the joint.
+        """
+        (self.number, self.link), self.mass = body, entry.mass
         self._not_colliding: set[int] = set()
         self.carried = CarriedBody(self._world, self.number, self.matrix)
         if self.is_held:
             self.local = IDENTITY
-            self.body = LinkBody(self._world, self.number, self.link, local)
+            self.body = LinkBody(self._world, self.number, self.link, entry.local)
         else:
             self.local = local
-            self.body = SceneBody(self._world, self.number) if self.mass and not static else None
-            if static and self.mass:
+            self.body = SceneBody(self._world, self.number) if entry.moves else None
+            if entry.static and self.mass:
                 self._world.collision_filter.freeze(self.number, still=True)
         self._changed(self)
 

@@ -17,7 +17,7 @@ from drone_sim.mechanics.object_collections import Item
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.message_text import near_names
 from drone_sim.scene import chains
-from drone_sim.scene.bodies import CarriedBody, ShapeInWorld, ShapeObject, bodies_above
+from drone_sim.scene.bodies import CarriedBody, ShapeObject, bodies_above
 from drone_sim.scene.chains import Built, Chain
 from drone_sim.scene.entry import EntryParameters, KindParameters, Place, place_of, stands_at
 from drone_sim.scene.kinds.dummy import DummyLinks
@@ -243,13 +243,13 @@ class Scene:
         """
         new_bodies = self._build()[0] if bodies else []
         for index in (index for body in new_bodies for index in body.links):
-            record = self.records[index]
-            if isinstance(record.item, ShapeObject):
-                record.item.embody(_solid(record, record.entry.local))
+            entry, body, item = self.records[index].entry, self.records[index].body, self.records[index].item
+            if isinstance(item, ShapeObject) and isinstance(entry, ObjectParameters) and body is not None:
+                item.embody(entry, body, entry.local)
         change_tree()
-        for item in self.objects.values():
-            if isinstance(item, ShapeObject):
-                item.pass_carriers()
+        for shape in self.objects.values():
+            if isinstance(shape, ShapeObject):
+                shape.pass_carriers()
         self._place_free_children(self._add_objects(new_bodies))
         self._follow()
         self._links.is_stale = True
@@ -296,8 +296,9 @@ class Scene:
         if isinstance(entry, KindParameters):
             added = entry.make(place, self._context)
         else:
+            assert isinstance(entry, ObjectParameters) and record.body is not None, "a shape has a body"
             follow = self._context.carried.follow
-            added = ShapeObject(place, self._world, self._update_carried, follow, _solid(record, local))
+            added = ShapeObject(place, self._world, self._update_carried, follow, entry, record.body)
         added.is_model, added.size_factor = entry.model, entry.size_factor
         try:
             self.tree.insert(added)
@@ -427,11 +428,3 @@ class Scene:
     def _numbers(self) -> list[int]:
         bodies = (self.records[index].body for index in sorted(self.records))
         return list(dict.fromkeys(body[0] for body in bodies if body is not None))
-
-
-def _solid(record: ObjectRecord, local: Matrix) -> ShapeInWorld:
-    """Return a shape's body; `local` is its pose in the parent's frame, unless a joint holds it."""
-    entry = record.entry
-    assert isinstance(entry, ObjectParameters) and record.body is not None, "only shapes have bodies"
-    number, link = record.body
-    return ShapeInWorld(number, link, entry.local if link != -1 else local, entry.mass, entry.static)
