@@ -110,12 +110,12 @@ class SceneFiles:
 
 def _is_read_only(path: Path) -> bool:
     """Return whether a file belongs to the package or cannot be written."""
-    return package_path() in path.resolve().parents or (path.exists() and not _is_writable(path))
-
-
-def _is_writable(path: Path) -> bool:
+    if package_path() in path.resolve().parents:
+        return True
+    if not path.exists():
+        return False
     try:
         writing.check_writable(path)
     except OSError:
-        return False
-    return True
+        return True
+    return False

@@ -95,7 +95,14 @@ def read_config(path: Path, below: Mapping[str, Any]) -> dict[str, Any]:
 def _nested_keys(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
     matches = {name: sum(key in common(name) for key in values) for name in TYPES}  # propeller names differ by type
     shared = common(max(matches, key=lambda name: matches[name]))
-    known = {**shared, **{name: ParameterField(_location(name), float) for name in values if name not in shared}}
+    known = dict(shared)
+    for name in values:
+        if (
+            name not in shared
+        ):  # a parameter that only some vehicles have; a script parameter's name may contain slashes
+            first, slash, rest = name.partition("/")
+            location = (first, rest) if slash and first == SCRIPT else tuple(name.split("/", _MAX_DEPTH))
+            known[name] = ParameterField(location, float)
     try:
         return nested(known, {}, values)
     except KeyError as error:
@@ -105,9 +112,3 @@ def _nested_keys(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
         ) from None
     except (TypeError, AttributeError):
         raise ParameterError(f"{path}: a parameter name that has a value is also the prefix of other names") from None
-
-
-def _location(name: str) -> tuple[str, ...]:
-    """Return the keys of a parameter that only some vehicles have. A script parameter's name may contain slashes."""
-    first, slash, rest = name.partition("/")
-    return (first, rest) if slash and first == SCRIPT else tuple(name.split("/", _MAX_DEPTH))

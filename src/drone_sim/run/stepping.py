@@ -46,14 +46,10 @@ class DivergenceCheck:
                 continue
             if max(abs(x), abs(y)) <= self._edge:
                 self._over_floor.add(vehicle.name)
-            elif vehicle.name in self._over_floor:
-                self._warn_once(vehicle, x, y)
-
-    def _warn_once(self, vehicle: Vehicle, x: float, y: float) -> None:
-        if vehicle.name not in self._left_floor:
-            self._left_floor.add(vehicle.name)
-            name = "the drone" if vehicle.parameters.is_alone else vehicle.name
-            LOG.warning("%s left the floor at x=%.2f y=%.2f m: nothing is below it", name, x, y)
+            elif vehicle.name in self._over_floor and vehicle.name not in self._left_floor:
+                self._left_floor.add(vehicle.name)
+                name = "the drone" if vehicle.parameters.is_alone else vehicle.name
+                LOG.warning("%s left the floor at x=%.2f y=%.2f m: nothing is below it", name, x, y)
 
 
 class Stepper:

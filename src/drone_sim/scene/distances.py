@@ -52,10 +52,11 @@ class Distances:
         second = self._split(others)
         if len(ones) == len(others) == 1 and (ones[0] is others[0] or first.solids.keys() & second.solids.keys()):
             raise ValueError(f"'{ones[0].name}' and '{others[0].name}' are parts of one rigid body")
+        back = self._to_solids(second.points, first.solids, reach)
         pairs = itertools.chain(
             self._between(first, lambda *place: place in second.solids, second.solids, reach),
             self._to_solids(first.points, second.solids, reach),
-            map(_swapped, self._to_solids(second.points, first.solids, reach)),
+            (Nearest(pair.distance, pair.end, pair.start, pair.name, pair.own) for pair in back),
             _between_points(first.points, second.points, reach),
         )
         return min(pairs, default=None)
@@ -100,10 +101,6 @@ class Distances:
             return self._context.body_of("Floor"), -1
         number = getattr(_carrier(item).body, "number", None)
         return None if number is None else (number, -1)
-
-
-def _swapped(pair: Nearest) -> Nearest:
-    return Nearest(pair.distance, pair.end, pair.start, pair.name, pair.own)
 
 
 def _between_points(ones: Sequence[SceneObject], others: Sequence[SceneObject], reach: float) -> Iterator[Nearest]:
