@@ -98,11 +98,12 @@ class SceneOperations:
         if len(scene.scripts) + len(scripts) > MAX_SCRIPTS:
             raise ParameterError(f"a scene has at most {MAX_SCRIPTS} scripts, not {len(scene.scripts) + len(scripts)}")
         names: set[str] = set()
+        parents = {entry.name for entry in entries}
         for entry in entries:
             if not entry.name or entry.name in tree or entry.name in names:
                 why = f"an object named '{entry.name}' already exists" if entry.name else "an object needs a `name`"
                 raise ParameterError(why)
-            if entry.parent and entry.parent not in tree and entry.parent not in {other.name for other in entries}:
+            if entry.parent and entry.parent not in tree and entry.parent not in parents:
                 raise ParameterError(f"no object is named '{entry.parent}', the parent of '{entry.name}'")
             names.add(entry.name)
         check_parents(entries)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import pybullet
 
@@ -22,12 +22,6 @@ class SavedStates:
         self._snapshots: set[int] = set()
 
     # ---- initial poses
-
-    def keep_all(self, bodies: Iterable[int]) -> None:
-        """Save the poses of bodies, at rest, and restore them, so that all runs begin equal to the last bit."""
-        for body in bodies:
-            self.keep(body)
-        self.begin_anew()
 
     def keep(self, body: int) -> None:
         """Save the pose of a body, at rest, for `begin_anew`."""

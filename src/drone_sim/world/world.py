@@ -280,5 +280,7 @@ class World:
         self.pictures.look_anew()
 
     def keep_initial_poses(self) -> None:
-        """Save the poses of all bodies, at rest, for `saved_states.begin_anew`."""
-        self.saved_states.keep_all(self._inertial_frames)
+        """Save the poses of all bodies, at rest, and restore them, so that all runs begin equal to the last bit."""
+        for body in self._inertial_frames:
+            self.saved_states.keep(body)
+        self.saved_states.begin_anew()
