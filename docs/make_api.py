@@ -19,11 +19,11 @@ from drone_sim.scripting.api.listing import apis, arguments_of, declared, first_
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "test" / "unit"))
-from api_examples import ANY, REMOTE_API, SIM, Example  # noqa: E402
+from api_examples import ANY, OMPL, REMOTE_API, SIM, Example  # noqa: E402
 from api_examples_ros import ROS  # noqa: E402
 from api_examples_vision import VISION  # noqa: E402
 
-EXAMPLES = {"sim": SIM, "simROS": ROS, "simVision": VISION, "simRemoteApi": REMOTE_API}
+EXAMPLES = {"sim": SIM, "simROS": ROS, "simVision": VISION, "simRemoteApi": REMOTE_API, "simOMPL": OMPL}
 PAGE = HERE / "api.md"
 _INTRODUCTION = """\
 # The script API

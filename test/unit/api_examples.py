@@ -477,3 +477,41 @@ SIM: dict[str, list[Example]] = {
 }
 
 REMOTE_API = {name: [Example("NAME(19999)", [-1])] for name in ("start", "stop", "reset", "status")}  # nobody serves it
+
+# TASK has SPACE, from (0, 0) to (1, 0) with RRTConnect.
+_STRAIGHT = near(0, 0, 0.5, 0, 1, 0)
+OMPL = {
+    "createTask": [Example("NAME('t')", [ANY])],
+    "createStateSpace": [
+        Example("NAME('p', simOMPL.StateSpaceType.pose2d, TARGET, {-2,-2}, {2,2})", [ANY]),
+    ],
+    "createStateSpaceForJoint": [Example("NAME('j', HINGE)", [ANY])],
+    "setDubinsParams": [Example("NAME(SPACE, 0.5, true)", [], "NAME(SPACE, 0.5, True)")],
+    "setStateSpace": [Example("NAME(simOMPL.createTask('u'), {SPACE})", [])],
+    "setStateSpaceForJoints": [Example("NAME(simOMPL.createTask('u'), {HINGE})", [])],
+    "getStateSpaceDimension": [Example("NAME(TASK)", [2])],
+    "setAlgorithm": [Example("NAME(TASK, simOMPL.Algorithm.RRTConnect)", [])],
+    "setCollisionPairs": [Example("NAME(TASK, {})", [])],
+    "setVerboseLevel": [Example("NAME(TASK, 1)", [])],
+    "setStateValidityCheckingResolution": [Example("NAME(TASK, 0.01)", [])],
+    "setStateValidationCallback": [Example("NAME(TASK, '')", [])],
+    "setStartState": [Example("NAME(TASK, {0,0})", [])],
+    "setGoalState": [Example("NAME(TASK, {1,0})", [])],
+    "setGoalStates": [Example("NAME(TASK, {{1,0}})", [])],
+    "addGoalState": [Example("NAME(TASK, {1,0})", [])],
+    "setup": [Example("NAME(TASK)", [])],
+    "solve": [Example("NAME(TASK, 4)", [True])],
+    "simplifyPath": [Example("NAME(TASK)", [])],
+    "interpolatePath": [Example("NAME(TASK, 3)", [])],
+    "getPath": [Example("NAME(TASK)", [_STRAIGHT])],
+    "hasExactSolution": [Example("NAME(TASK)", [True])],
+    "hasApproximateSolution": [Example("NAME(TASK)", [False])],
+    "compute": [Example("NAME(TASK, 4, -1, 3)", [True, _STRAIGHT])],
+    "isStateValid": [Example("NAME(TASK, {0,1})", [True])],
+    "writeState": [Example("NAME(TASK, {0,0})", [])],
+    "readState": [Example("NAME(TASK)", [near(0, 0)])],
+    "getPathStateCount": [Example("NAME(TASK, {0,0, 1,0})", [2])],
+    "getPathState": [Example("NAME(TASK, {0,0, 1,0}, 2)", [[1, 0]])],
+    "destroyStateSpace": [Example("NAME(SPACE)", [])],
+    "destroyTask": [Example("NAME(TASK)", [])],
+}

@@ -74,6 +74,12 @@ local function REFUSED(f, ...)
 end
 local function SECOND(_, value) return value end
 local DRAWN = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 1)
+local SPACE = simOMPL.createStateSpace('p', simOMPL.StateSpaceType.position2d, sim.getObject('/target'), {-2,-2}, {2,2})
+local TASK = simOMPL.createTask('t')
+simOMPL.setStateSpace(TASK, {SPACE})
+simOMPL.setAlgorithm(TASK, simOMPL.Algorithm.RRTConnect)
+simOMPL.setStartState(TASK, {0, 0})
+simOMPL.setGoalState(TASK, {1, 0})
 """
 PYTHON = """
 def check(number, result): out.take(number, list(result) if isinstance(result, tuple) else [result])
@@ -86,6 +92,12 @@ def INVERTED():
     sim.invertMatrix(m)
     return m
 DRAWN = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 1)
+SPACE = simOMPL.createStateSpace('p', simOMPL.StateSpaceType.position2d, sim.getObject('/target'), [-2,-2], [2,2])
+TASK = simOMPL.createTask('t')
+simOMPL.setStateSpace(TASK, [SPACE])
+simOMPL.setAlgorithm(TASK, simOMPL.Algorithm.RRTConnect)
+simOMPL.setStartState(TASK, [0, 0])
+simOMPL.setGoalState(TASK, [1, 0])
 def SECOND(values): return values[1]
 def REFUSED(f, *values):
     try:
@@ -120,7 +132,7 @@ def _modules(simulation):
         "sim": make_sim(own, around),
         "simROS": make_sim_ros(MessageBus("drone"), simulation.clock),
         "simVision": make_sim_vision(own, around),
-        **make_plugins(own),
+        **make_plugins(own, around),
     }
     simulation.operations.remove(set(shared.objects) - before)
 

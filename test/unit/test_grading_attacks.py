@@ -542,6 +542,7 @@ NEVER = {  # what no plan allows
     "the goal's copy": ("sim.removeObject(sim.getObject('/Board'))", "change Flag"),
     "a model": ("sim.loadModel('model.yaml')", "load a model"),
     "a port": ("simRemoteApi.start(19999)", "open a port"),
+    "a path": ("simOMPL.createTask('t')", "plan a path in the judge's process"),
     "a file": ("sim.saveModel(box, 'mine.yaml')", "write Box"),
 }
 TRIES = """
@@ -744,6 +745,12 @@ REACHES = {
     "open": """
         sim: extRemoteApiReset extRemoteApiStart extRemoteApiStatus extRemoteApiStop
         simRemoteApi: reset start status stop""",
+    "plan": """
+        simOMPL: addGoalState compute createStateSpace createStateSpaceForJoint createTask destroyStateSpace destroyTask
+        getPath getPathState getPathStateCount getStateSpaceDimension hasApproximateSolution hasExactSolution
+        interpolatePath isStateValid readState setAlgorithm setCollisionPairs setDubinsParams setGoalState setGoalStates
+        setStartState setStateSpace setStateSpaceForJoints setStateValidationCallback
+        setStateValidityCheckingResolution setVerboseLevel setup simplifyPath solve writeState""",
 }
 
 
@@ -783,7 +790,7 @@ def test_it_is_known_of_every_function_what_a_submission_reaches_by_it():
         assert own in reached, f"{own}: enter in REACHES what a submission reaches by it"
         what, needs = reached[own], actions.action_of(name, [])
         assert (name in values.checks) == (own in looks["values that the scene's scripts have not set"])
-        if what in ("move", "push", "change", "call", "run", "load", "write", "open"):
+        if what in ("move", "push", "change", "call", "run", "load", "write", "open", "plan"):
             assert needs == what, name
         elif what == "its own frames":
             assert actions.action_of(name, [simulation.context.objects.handle_of(drone.object)]) in ("move", None), name

@@ -1,5 +1,7 @@
 """Names that the API does not have, in Lua: an error where they are read, unless the script only asks for a plugin."""
 
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -50,14 +52,35 @@ def test_an_unknown_name_is_an_error_where_it_is_read(failed, body, said):
 
 
 def test_a_plugin_that_is_not_there_says_so(failed):
-    assert "there is no plugin simOMPL here: there is no path planner" in failed("simOMPL.createTask('x')")
+    assert "there is no plugin simIK here: inverse kinematics" in failed("simIK.createEnvironment()")
+
+
+def test_without_the_package_ompl_scripts_say_how_to_install_it(tmp_path):
+    text = """
+import importlib.util
+importlib.util.find_spec = lambda name, find=importlib.util.find_spec: None if name == "ompl" else find(name)
+from drone_sim.scripting import load
+from drone_sim.scripting.api.listing import apis
+from drone_sim.scripting.time_limit import TimeLimit
+for line in ("assert(simOMPL == nil)", "simOMPL.createTask('x')", "simExtOMPL_createTask('x')", "require('simOMPL')"):
+    open("s.lua", "w").write(line)
+    try:
+        load.load("s.lua", apis(), TimeLimit(10.0))
+    except Exception as error:
+        print(error)
+"""
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2] / "src")}
+    command = [sys.executable, "-c", text]
+    run = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    lines = run.stdout.splitlines()
+    assert len(lines) == 3 and all("./dev.sh setup --all, or pip install ompl, installs" in line for line in lines)
 
 
 @pytest.mark.parametrize(
     "body",
     [
         "assert(simROS2 == nil and not simIK and simROS and simUI)",
-        "local r = simOMPL and simOMPL.createTask()",
+        "local r = simIK and simIK.createEnvironment()",
         "if simTimePub then error('set') end simTimePub = 1 assert(simTimePub == 1)",
         "if simDone then error('set') end function simDone() end",
         "sim.mine = 3 assert(sim.mine == 3)",

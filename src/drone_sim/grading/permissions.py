@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 MOVE, PUSH, CHANGE = "move", "push", "change"  # actions that a plan's `allowed` allows
 CALL, READ = "call", "read"  # actions that a plan's `calls` and `reads` allow
-WRITE, LOAD, OPEN, RUN = "write", "load", "open", "run"  # actions that no plan allows
+WRITE, LOAD, OPEN, RUN, PLAN = "write", "load", "open", "run", "plan"  # actions that no plan allows
 _BY_PLAN = (MOVE, PUSH, CHANGE)
 MAX_TRIED = 20  # forbidden calls listed in a result
 _FREE_CLASSES: tuple[type, ...] = (
@@ -112,7 +112,12 @@ _ACTIONS = {
     "executeScriptString": RUN,
 }
 _PORT_PREFIXES = ("simRemoteApi.", "sim.extRemoteApi")  # of functions that open a port for clients
-_SUBJECTS = {LOAD: "a model", OPEN: "a port", RUN: "a text in a script"}  # for messages
+_SUBJECTS = {
+    LOAD: "a model",
+    OPEN: "a port",
+    RUN: "a text in a script",
+    PLAN: "a path in the judge's process",
+}  # for messages
 _SETTING_PARAMETERS = ("setScriptSimulationParameter", "setUserParameter")
 _PROPELLER_PARAMETER = "particleVelocity"
 _SELF = CONSTANTS["handle_self"]
@@ -349,6 +354,8 @@ def _function_action(function: str) -> str | None:
         return None
     if function.startswith(_PORT_PREFIXES):
         return OPEN
+    if function.startswith("simOMPL."):
+        return PLAN
     return _ACTIONS.get(_declared_names().get(function, function).partition(".")[2], CHANGE)
 
 

@@ -7,9 +7,11 @@ import logging
 from abc import ABC, abstractmethod
 from collections import ChainMap
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, TypeVar
 
 from drone_sim.context import SimulationContext
+from drone_sim.hosting.kept_places import keep_places
 from drone_sim.hosting.picture_filters import eye_of, filter_picture, filters_pictures
 from drone_sim.hosting.tuning import Tuning
 from drone_sim.mechanics.frames import Vector
@@ -104,7 +106,7 @@ class HostedScript(ABC):
             "sim": make_sim(self, around),
             "simROS": make_sim_ros(self.bus, context.clock),
             "simVision": make_sim_vision(self, around),
-            **make_plugins(self),
+            **make_plugins(self, around),
         }
         script = context.load_script(path, modules, limit, turns, context.breakpoints)
         self.flat_names = script.flat_names
@@ -330,6 +332,7 @@ def services(
         masses=lambda: _merged(vehicle.propulsion.masses() for vehicle in seen),
         inertias=lambda: _merged(vehicle.propulsion.inertias() for vehicle in seen),
         nearest=Distances(context).nearest,
+        keep_places=partial(keep_places, context),
     )
 
 

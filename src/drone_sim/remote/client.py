@@ -121,7 +121,7 @@ class Client:
             self._topology_version = simulation.topology_version
             host = ClientHost(simulation)
             ros = make_sim_ros(self._bus, simulation.clock)
-            self._modules = {"sim": self._sim(host), "simROS": ros, **make_plugins(host)}
+            self._modules = {"sim": self._sim(host), "simROS": ros, **make_plugins(host, host.services())}
             self._functions = {
                 f"{name}.{key}": self._watched(f"{name}.{key}", function)
                 for name, api in self._modules.items()
@@ -168,7 +168,7 @@ class Client:
         self.require(module)
         _, functions, constants = contents(self._modules[module])
         called: dict[str, Any] = {name: {"func": {}} for name in functions}
-        return {**called, **{name: {"const": value} for name, value in constants.items()}}
+        return {**called, **{name: _constant(value) for name, value in constants.items()}}
 
     def _hear(self) -> Task:
         """Call the client's functions with the messages and service requests received for them."""
@@ -242,6 +242,12 @@ class _ScriptsForClients(Scripts):
 def one_line(name: str, function: Function, arguments: Sequence[Any], error: Exception) -> str:
     """Return the error text for a client of an error in a call, with the function's name as the client knows it."""
     return str(error) if isinstance(error, _ONE_LINE_ERRORS) else explain(name, function, arguments, error)
+
+
+def _constant(value: Any) -> dict[str, Any]:
+    """Return a constant, or the members of an enumeration, as the client's library expects it."""
+    members = getattr(value, "__dict__", None)
+    return {"const": value} if members is None else {name: _constant(member) for name, member in members.items()}
 
 
 def _argument(value: Any) -> Any:

@@ -32,6 +32,7 @@ _FLAT = {
     "simROS": "simExtRosInterface_",
     "simUI": "simExtCustomUI_",
     "simVision": "simExtVision_",
+    "simOMPL": "simExtOMPL_",
 }  # prefixes of V-REP 3.x names
 _MISTAKES = (TypeError, ValueError, KeyError, IndexError, AttributeError, OverflowError)
 _SHOWN = 60  # characters of a value

@@ -165,6 +165,10 @@ drawing points lines triangles trianglepoints quadpoints discpoints cubepoints s
 particle points1 points2 points4 roughspheres spheres respondable1to4=0x20 respondable5to8=0x40
     particlerespondable=0x80 ignoresgravity=0x100 invisible=0x200 itemsizes=0x400 itemdensities=0x800
     itemcolors=0x1000 cyclic=0x2000 emissioncolor=0x4000 water=0x8000 painttag=0x10000
+# planners and state spaces of simOMPL, in 3.x
+ompl_algorithm BiTRRT=30001 BITstar BKPIECE1 CForest EST FMT KPIECE1 LazyPRM LazyPRMstar LazyRRT LBKPIECE1 LBTRRT PDST
+    PRM PRMstar RRT RRTConnect RRTstar SBL SPARS SPARStwo STRIDE TRRT
+ompl_statespacetype position2d=50001 pose2d position3d pose3d joint_position dubins cyclic_joint_position
 # sim_call_type in 3.x
 childscriptcall initialization=2 actuation=6 sensing cleanup=1 threaded=27
 """

@@ -13,6 +13,7 @@ from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.inertia import Inertia
 from drone_sim.mechanics.object_collections import Collections, members
 from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.saved_state import Restore
 from drone_sim.mechanics.velocity_meter import VelocityMeter
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.control import Control, Turns
@@ -145,6 +146,7 @@ class SceneServices:
     masses: Callable[[], Mapping[str, float]] = dict  # kg, of a vehicle's shapes
     inertias: Callable[[], Mapping[str, Inertia]] = dict  # of a vehicle's shapes, in their frames
     nearest: MeasureDistance = lambda *_: None
+    keep_places: Callable[[], Restore] = lambda: lambda: None  # returns a function that undoes all movements
 
 
 class Functions:

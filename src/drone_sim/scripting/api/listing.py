@@ -21,7 +21,12 @@ from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.windows import Windows
 
 _MANUAL = "https://manual.coppeliarobotics.com/en"
-_PAGES = {"simROS": "rosInterf", "simUI": "simUI", "simVision": "simVision"}  # of the manual, one for each plugin
+_PAGES = {
+    "simROS": "rosInterf",
+    "simUI": "simUI",
+    "simVision": "simVision",
+    "simOMPL": "simOMPL",
+}  # of the manual, one for each plugin
 
 
 def apis() -> dict[str, Api]:
@@ -44,7 +49,12 @@ def apis() -> dict[str, Api]:
     )
     ros = make_sim_ros(MessageBus("drone"), host.context.clock)
     vision = make_sim_vision(host, SceneServices())
-    return {"sim": make_sim(host, SceneServices()), "simROS": ros, "simVision": vision, **make_plugins(host)}
+    return {
+        "sim": make_sim(host, SceneServices()),
+        "simROS": ros,
+        "simVision": vision,
+        **make_plugins(host, SceneServices()),
+    }
 
 
 @functools.cache

@@ -29,7 +29,9 @@ from drone_sim.scripting.api.object_collections import CollectionFunctions
 from drone_sim.scripting.api.objects import ObjectKinds, Objects
 from drone_sim.scripting.api.older_motions import OlderMotions
 from drone_sim.scripting.api.packing import Bits, Packing, Tables
+from drone_sim.scripting.api.path_planning import ENUMERATIONS, PathPlanning
 from drone_sim.scripting.api.paths import Paths
+from drone_sim.scripting.api.planning_problem import IS_INSTALLED
 from drone_sim.scripting.api.remote_ports import OlderRemotePortFunctions, RemotePortFunctions
 from drone_sim.scripting.api.ros_functions import RosFunctions, ServiceFunctions, TopicFunctions
 from drone_sim.scripting.api.scene_objects import SceneObjects, Shapes
@@ -105,12 +107,14 @@ def make_sim_vision(host: Host, services: SceneServices) -> Api:
     return Api("simVision", functions_of(filters), {}, filters.save_state)
 
 
-def make_plugins(host: Host) -> dict[str, Api]:
-    """Return `simRemoteApi`, and the plugins of CoppeliaSim that are accepted and ignored, by name."""
+def make_plugins(host: Host, services: SceneServices) -> dict[str, Api]:
+    """Return `simRemoteApi`, `simOMPL` if OMPL is installed, and the plugins that are accepted and ignored, by name."""
     ignored = _ignored(host)
     ports = functions_of(RemotePortFunctions(host.context.remote_ports, ignored))
+    planning = functions_of(PathPlanning(host, services, ignored)) if IS_INSTALLED else {}
     return {
         **{name: Api(name, ignored.functions(name), {}) for name in PLUGINS},
+        **({"simOMPL": Api("simOMPL", planning, ENUMERATIONS)} if planning else {}),
         "simRemoteApi": Api("simRemoteApi", ports, {}),
     }
 

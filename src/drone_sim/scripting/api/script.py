@@ -90,8 +90,11 @@ class Script(ABC):
         return self._counted(self._run_text, text)
 
     @abstractmethod
-    def call_own(self, name: str, arguments: list[Any]) -> Any:
-        """Like call_function, for a call by the script itself: counts towards its current time limit."""
+    def call_own(self, name: Callback, arguments: list[Any]) -> Any:
+        """Like call_function, for a call by the script itself: counts towards its current time limit.
+
+        The function may also be given as itself.
+        """
 
     @abstractmethod
     def execute_own(self, text: str) -> Any:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 
 from drone_sim.message_text import near_names
+from drone_sim.scripting.api.planning_problem import IS_INSTALLED
 
 _LONGEST = 80  # characters of a name that is shown
 
@@ -14,7 +15,6 @@ PLUGINS = {
     "simROS2": "this is ROS 1: simROS has the same functions",
     "simB0": "the ZeroMQ remote API does what B0 did",
     "simIK": "inverse kinematics is not supported",
-    "simOMPL": "there is no path planner: plan outside, and send waypoints",
     "simGeom": "there is no geometry plugin",
     "simOctomap": "octrees are not supported",
     "simIM": "these image filters are not supported: publish the picture to a node that uses OpenCV",
@@ -29,16 +29,19 @@ PLUGINS = {
     "simRRS1": "industrial robots are not supported",
     "simSkeleton": "there is no such plugin here",
 }
+_NO_PLANNER = "plan with simOMPL, or outside, and send waypoints"
+if not IS_INSTALLED:
+    PLUGINS["simOMPL"] = "./dev.sh setup --all, or pip install ompl, installs the path planner"
 
 # Patterns for the names of CoppeliaSim's functions that do not exist here, with the reasons. Flat names are converted
 # to names in modules: simCreateIkGroup is sim.createIkGroup.
 ABSENT: dict[str, str] = {
     r"simExtROS_\w+": "the plugin of V-REP 3.0 to 3.2; use simROS.advertise, simROS.publish and simROS.subscribe",
     r"simros_\w+": "the plugin of V-REP 3.0 to 3.2; use simROS.advertise, simROS.publish and simROS.subscribe",
-    r"simExtOMPL_\w+": PLUGINS["simOMPL"],
+    **({} if IS_INSTALLED else {r"simExtOMPL_\w+": PLUGINS["simOMPL"]}),
     r"simExtVision_\w+|simVision\.\w+": "this filter is not supported: read the picture in the script, or use a node",
     r"simExtOctomap_\w+": PLUGINS["simOctomap"],
-    r"simExt(?!RosInterface_)\w+": "this plugin of V-REP is not supported",
+    r"simExt(?!RosInterface_|OMPL_)\w+": "this plugin of V-REP is not supported",
     r"sim_ext_\w+": "this constant's plugin is not supported",
     r"sim\.\w*(?:Ik|IK)(?:Group|Element|Path|\b)\w*|sim\.(?:getConfigForTipPose|computeJacobian)": PLUGINS["simIK"],
     r"sim\.(?:load|save|close)Scene": ("only a client of the remote API can do this, while the simulation is stopped"),
@@ -48,7 +51,7 @@ ABSENT: dict[str, str] = {
     ),
     r"sim\.(?:set|compute)Shape(?:Mass|Inertia|Material|BB)\w*": "use setShapeMassAndInertia",
     r"sim\.(?:generateShapeFromPath|convexDecompose)": "such objects come from the scene file",
-    r"sim\.(?:\w*PathSearch\w*|getPathPlanningHandle|searchPath|(?:find|get|simplify)Mp\w+)": PLUGINS["simOMPL"],
+    r"sim\.(?:\w*PathSearch\w*|getPathPlanningHandle|searchPath|(?:find|get|simplify)Mp\w+)": _NO_PLANNER,
     r"sim\.setScriptVariable": "executeScriptString('name = 1', script) sets a variable of another script",
     r"sim\.\w+JointDependency": "joints cannot depend on each other: set each joint",
     r"sim\.\w*(?:Collision|Distance)\w*": (

@@ -82,7 +82,7 @@ end
 
 -- Like `called`, for a call by the script itself, which is running: within its limits.
 function sandbox.called_own(name, ...)
-  local f = rawget(env, name)
+  local f = callbacks[name] or rawget(env, name)
   if type(f) ~= 'function' then return MISSING end
   return protected(function(...) return pass(name, f(...)) end, ...)
 end
@@ -105,8 +105,7 @@ end
 
 -- Call a callback with a message; if `returns`, its results are passed to Python.
 function sandbox.called_back(name, message, returns)
-  local f = callbacks[name]
-  if f == nil then f = rawget(env, name) end
+  local f = callbacks[name] or rawget(env, name)
   if type(f) ~= 'function' then return phases(), MISSING, 0 end
   if returns then return run(function() return pass(name, f(message)) end) end
   return run(f, message)

@@ -37,7 +37,8 @@ def define(state: LuaState, modules: Mapping[str, Api]) -> set[str]:
             add(script_globals, flat, flat, function)
             known.add(flat)
         for name, constant in constants.items():
-            table[name.encode()] = script_globals[f"{module}_{name}".encode()] = constant
+            value = state.values.to_lua(constant)
+            table[name.encode()] = script_globals[f"{module}_{name}".encode()] = value
             known.update((name, f"{module}_{name}"))
         sandbox[b"guard"](table, _why_not(f"{module}.", {*functions, *constants}))
         script_globals[module.encode()] = sandbox[b"modules"][module.encode()] = table

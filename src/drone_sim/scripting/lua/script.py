@@ -155,9 +155,10 @@ class LuaScript(Script):
         self._run(name, lambda: self._lua["called"](name.encode(), *to_lua(arguments, unpacked=True)))
         return self._state.values.returned()
 
-    def call_own(self, name: str, arguments: list[Any]) -> Any:
+    def call_own(self, name: Callback, arguments: list[Any]) -> Any:
         arguments = self._state.values.to_lua(arguments, unpacked=True)
-        self._check_own(name, self._lua["called_own"](name.encode(), *arguments))
+        key = name.encode() if isinstance(name, str) else name
+        self._check_own(str(name), self._lua["called_own"](key, *arguments))
         return self._state.values.returned()
 
     def _run_text(self, text: str) -> Any:

@@ -155,9 +155,8 @@ class PythonScript(Script):
         self._check_callback(name)
         return self._run(name, self._globals[name], *arguments)
 
-    def call_own(self, name: str, arguments: list[Any]) -> Any:
-        self._check_callback(name)
-        return self._globals[name](*arguments)
+    def call_own(self, name: Callback, arguments: list[Any]) -> Any:
+        return self._call_function(Call(name, arguments))
 
     def _run_text(self, text: str) -> Any:
         return self._run("executeScriptString", self.execute_own, text)

@@ -83,7 +83,7 @@ class ScriptProxy(Script):
     def _run_function(self, name: str, arguments: list[Any]) -> Any:
         return self._do("call_function", [name, arguments])
 
-    def call_own(self, name: str, arguments: list[Any]) -> Any:
+    def call_own(self, name: Callback, arguments: list[Any]) -> Any:
         return self._do("call_own", [name, arguments])
 
     def _run_text(self, text: str) -> Any:
