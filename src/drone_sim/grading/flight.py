@@ -26,8 +26,6 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.run.simulation_setup import own_script
 from drone_sim.scripting import load
 from drone_sim.scripting.api.calls import Api
-from drone_sim.scripting.api.control import Turns
-from drone_sim.scripting.breakpoints import Breakpoints
 from drone_sim.scripting.rpc.connection import ScriptConnection
 from drone_sim.scripting.rpc.script_proxy import ScriptProxy
 from drone_sim.scripting.time_limit import TimeLimit
@@ -138,19 +136,12 @@ class Flight:
             self._simulation.close()
             raise
 
-    def _load_script(
-        self,
-        path: str,
-        modules: Mapping[str, Api],
-        limit: TimeLimit,
-        turns: Turns,
-        breakpoints: Breakpoints | None = None,
-    ) -> load.Script:
+    def _load_script(self, path: str, modules: Mapping[str, Api], limit: TimeLimit, *others: Any) -> load.Script:
         """Load the submission through the connection, if there is one, and other scripts in this process."""
         is_scene = path != self._script
         if not is_scene and self._connection is not None:
             return self._watch.wrap(ScriptProxy(self._connection, path, modules, limit), is_scene)
-        loaded = self._watch.run(is_scene, load.load, path, modules, limit, turns, breakpoints)
+        loaded = self._watch.run(is_scene, load.load, path, modules, limit, *others)
         return self._watch.wrap(loaded, is_scene)
 
     def grade(self) -> Result:

@@ -42,7 +42,7 @@ from drone_sim.scripting.api import (
 from drone_sim.scripting.api.calls import methods_of
 from drone_sim.scripting.api.constants import CONSTANTS, bare
 from drone_sim.scripting.api.ignored import MODULES
-from drone_sim.scripting.api.registry import Attachment
+from drone_sim.scripting.api.registry import CHILD, Attachment
 from drone_sim.scripting.api.simulation import SimulationFunctions
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -233,7 +233,7 @@ class Actions:
         """Return the name of the object whose script a handle (of the script or of the object) means, '' for none."""
         script = self._scripts.get(handle)
         if script is not None:
-            return script.name
+            return script.name if script.kind == CHILD else ""
         scene_object = self._first_object(arguments)
         if scene_object is not None and scene_object.kind == "script":
             scene_object = scene_object.parent
@@ -292,9 +292,12 @@ class Permissions(Actions):
         if action not in self._allowed:
             self._refuse(function, action, subject, f" (allowed: [{action}] would)" if action in _BY_PLAN else "")
 
+    def _is_own(self, script: Attachment) -> bool:
+        return script.kind == CHILD and script.name in self._own
+
     def _permit_call(self, caller: Attachment, callee: Attachment, name: str) -> None:
         """Raise Forbidden if the submission may not call a function of a script, or run a text in it (`name` '')."""
-        if caller.name not in self._own or callee.name in self._own:
+        if not self._is_own(caller) or self._is_own(callee):
             return
         owner = f"the script of {callee.name}"
         if not name:

@@ -23,6 +23,7 @@ from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.api.host import Operations, SceneServices
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
+from drone_sim.scripting.api.registry import CHILD, CUSTOMIZATION
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import log_failure
 from drone_sim.scripting.time_limit import TimeLimit
@@ -43,6 +44,7 @@ class HostedScript(ABC):
     def __init__(self, own_script: str, bus: MessageBus, context: SimulationContext):
         """Create it without loading a script. `own_script`: name of the object; `bus` carries the script's messages."""
         self.own_script = own_script
+        self.script_type = CHILD
         self.bus = bus
         bus.backend = context.backend
         self.context = context
@@ -108,11 +110,12 @@ class HostedScript(ABC):
             "simVision": make_sim_vision(self, around),
             **make_plugins(self, around),
         }
-        script = context.load_script(path, modules, limit, turns, context.breakpoints)
+        customizes = self.script_type == CUSTOMIZATION
+        script = context.load_script(path, modules, limit, turns, context.breakpoints, customizes)
         self.flat_names = script.flat_names
         self._filters_pictures = filters_pictures(context, self.own_script, script)
         self.script, self.path = script, load.script_path(path)
-        context.scripts.attached_to(self.own_script).loaded(self.script, context.clock.time)
+        context.scripts.attached_to(self.own_script, self.script_type).loaded(self.script, context.clock.time)
 
     def _call_init(self) -> None:
         """Call init. Raises ScriptError, also if a subscribed callback does not exist."""
@@ -147,7 +150,7 @@ class HostedScript(ABC):
         """Unload the script and remove it from the simulation."""
         self.close()
         for name in self.script_parameters():
-            self.context.scripts.remove(name)
+            self.context.scripts.remove(name, self.script_type)
 
     def save_state(self) -> Restore:
         """Return a function that restores script, messages and parameters."""
@@ -222,22 +225,30 @@ class ChildScript(HostedScript):
 
 
 class AttachedScript(HostedScript):
-    """Script of an object other than a vehicle's body: its target, propellers and sensors, and scene objects."""
+    """A script that a scene attaches to an object: a child script, not of a vehicle's body, or a customization script.
+
+    A failure is logged, and the flight continues.
+    """
 
     def __init__(
         self,
         parameters: AttachedScriptParameters,
+        kind: int,
         handle: int,
         vehicles: Mapping[str, Vehicle],
         context: SimulationContext,
     ):
-        """Attach it to the object with a handle, without loading it. `vehicles`: all vehicles of the simulation."""
+        """Attach it to the object with a handle, without loading it. `vehicles`: all vehicles of the simulation.
+
+        `kind`: CHILD or CUSTOMIZATION.
+        """
         self._vehicles = vehicles
-        self.file = parameters.script
+        self.file = parameters.script if kind == CHILD else parameters.customization
         scene_object = context.objects[handle]
         self.vehicle = next((owner for owner in vehicles.values() if scene_object.is_part_of(owner.object)), None)
         bus = MessageBus(self.vehicle.name) if self.vehicle else MessageBus(_NO_NAMESPACE, {})
         super().__init__(scene_object.name, bus, context)
+        self.script_type = kind
         self.goes_with = self.vehicle.name if self.vehicle and handle in self.vehicle.handles else ""
         self.failure: ScriptError | None = None  # raised by the script's top level
         self._is_removed = False
@@ -246,11 +257,12 @@ class AttachedScript(HostedScript):
             self.vehicle.commands.listening.append(bus)
             self.vehicle.flight_state.script_errors.append(self.error)
         # Parameters of V-REP's script there; a propeller's built-in thrust model is replaced by the script.
-        law = self.vehicle.propulsion.disable_thrust_model(self.own_script) if self.vehicle else None
+        is_child = kind == CHILD
+        law = self.vehicle.propulsion.disable_thrust_model(self.own_script) if self.vehicle and is_child else None
         self.parameters: dict[str, Any] = {} if law is None else law
         self.parameters.update({} if law is None else {**_PROPELLER_SCRIPT, **law})
         self.parameters.update(copy.deepcopy(parameters.parameters))
-        context.scripts.add(self.own_script, self.parameters).is_embedded = parameters.embedded
+        context.scripts.add(self.own_script, self.parameters, kind=kind).is_embedded = parameters.embedded
 
     def seen(self) -> Sequence[Vehicle]:
         """Return its vehicle, or all vehicles if it belongs to none."""

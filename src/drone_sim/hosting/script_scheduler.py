@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from typing import TypeVar
 
 from drone_sim.config.types import Location, ParameterError
@@ -11,8 +12,10 @@ from drone_sim.context import SimulationContext
 from drone_sim.hosting.child_scripts import AttachedScript, ChildScript, HostedScript
 from drone_sim.mechanics.object_names import plain
 from drone_sim.mechanics.scene_object import SceneObject
+from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.scene import Scene
 from drone_sim.scripting.api.host import Operations
+from drone_sim.scripting.api.registry import CHILD, CUSTOMIZATION
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG
 from drone_sim.vehicles.vehicle import Vehicle
@@ -25,7 +28,10 @@ _Script = TypeVar("_Script", bound=HostedScript)
 
 
 class ScriptScheduler:
-    """All scripts in V-REP's order: depth first, from the root of the object tree to its leaves."""
+    """All scripts in V-REP's order: child scripts, then customization scripts, each from the root to the leaves.
+
+    Depth first, in the tree of objects.
+    """
 
     def __init__(
         self,
@@ -64,15 +70,19 @@ class ScriptScheduler:
             if name not in self.child_scripts:
                 self.child_scripts[name] = ChildScript(vehicle)
                 self.child_scripts[name].begin()
-        names = {script.own_script for script in self.attached}
+        there = {(script.own_script, script.script_type) for script in self.attached}
         added: list[AttachedScript] = []
         for index, entry in enumerate(self._scene.scripts.values()):
             if objects is not None and entry.object not in objects:
                 continue
-            handle = self._handle(entry.object, index)
-            if handle is not None and self._context.objects[handle].name not in names:
-                added.append(AttachedScript(entry, handle, self._vehicles, self._context))
-                names.add(added[-1].own_script)
+            handle = self._handle(entry, index)
+            if handle is None:
+                continue
+            for kind in (CHILD, CUSTOMIZATION):
+                key = self._context.objects[handle].name, kind
+                if (entry.script if kind == CHILD else entry.customization) and key not in there:
+                    added.append(AttachedScript(entry, kind, handle, self._vehicles, self._context))
+                    there.add(key)
         self.attached += added
         self._note_changes(len(added))
         return added
@@ -81,9 +91,9 @@ class ScriptScheduler:
         self.changes += changes
         self.is_changed = bool(changes) or self.is_changed
 
-    def _handle(self, name: str, index: int) -> int | None:
+    def _handle(self, entry: AttachedScriptParameters, index: int) -> int | None:
         """Return the handle of a script's object; None if a vehicle added later may have it. Raises ParameterError."""
-        objects = self._context.objects
+        objects, name = self._context.objects, entry.object
         if name not in objects and (objects.is_copied(plain(name)) or (plain(name) != name and plain(name) in objects)):
             _LOG.warning(
                 "there is no object named '%s' yet: its script starts once a vehicle with such an object is added", name
@@ -91,7 +101,7 @@ class ScriptScheduler:
             return None
         try:
             handle = objects.handle(name)
-            if any(objects[handle] is vehicle.object for vehicle in self._vehicles.values()):
+            if entry.script and any(objects[handle] is vehicle.object for vehicle in self._vehicles.values()):
                 raise ValueError(f"'{name}' already has a script, which the key `script` of its vehicle names")
         except ValueError as error:
             place = self._place(("scripts", index, "object"))
@@ -113,7 +123,7 @@ class ScriptScheduler:
         for script in self.attached:
             if script.own_script == name:
                 script.own_script = new
-                self._context.scripts.rename(name, new)
+                self._context.scripts.rename(name, new, script.script_type)
                 self._note_changes(1)
 
     def end(self, objects: Collection[str]) -> None:
@@ -152,7 +162,7 @@ class ScriptScheduler:
 
     def in_order(self, scripts: Sequence[_Script]) -> list[_Script]:
         """Return the scripts sorted into V-REP's order."""
-        return sorted(scripts, key=lambda script: self._path_to(script.own_script))
+        return sorted(scripts, key=lambda script: (script.script_type, self._path_to(script.own_script)))
 
     def _path_to(self, name: str) -> list[int]:
         """Return the handles on the path from the root to an object."""
@@ -165,8 +175,11 @@ class ScriptScheduler:
 
     # ---- cleanup
 
-    def clean_up(self, scripts: Sequence[AnyScript]) -> list[ScriptError]:
-        """End threads, then call every script's cleanup, even if others fail; return the errors."""
+    def clean_up(self, scripts: Sequence[AnyScript], is_over: bool = False) -> list[ScriptError]:
+        """End threads, then call every script's cleanup, even if others fail; return the errors.
+
+        `is_over`: the simulation ends, so that customization scripts are also called before that.
+        """
         errors: list[ScriptError] = []
         control = self._context.control
         before = control.is_stopping, control.is_ending
@@ -178,7 +191,9 @@ class ScriptScheduler:
                         _attempt(hosted.script.take_turn, errors)
             control.is_ending = True
             for hosted in scripts:
-                _attempt(lambda script=hosted.script: script.call("cleanup"), errors)  # type: ignore[misc]
+                phases = ("afterSimulation",) if is_over and hosted.script_type == CUSTOMIZATION else ()
+                for phase in (*phases, "cleanup"):
+                    _attempt(partial(hosted.script.call, phase), errors)
         finally:
             control.is_stopping, control.is_ending = before
         return errors

@@ -23,7 +23,7 @@ from drone_sim.scripting.api.control import Turns, Wait
 from drone_sim.scripting.api.host import Readable, SceneServices
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
-from drone_sim.scripting.api.registry import Attachment, Scripts
+from drone_sim.scripting.api.registry import CHILD, Attachment, Scripts
 from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.api.service_servers import ServiceRequest
 from drone_sim.scripting.api.types import Name
@@ -197,6 +197,8 @@ class ClientHost:
     @property
     def sensors(self) -> Mapping[str, Readable]:
         return {name: sensor for vehicle in self._vehicles for name, sensor in vehicle.instruments.by_object.items()}
+
+    script_type = CHILD
 
     @property
     def own_script(self) -> str:

@@ -115,7 +115,8 @@ class Simulation:
         self.topology_version = 0  # incremented by every start and stop, and when vehicles are added or removed
         flying_scripts = [script_of(vehicle, parameters, script) for vehicle in parameters.fleet]
         # Missing files are reported before a world is built.
-        for path in (*flying_scripts, *(attached.script for attached in parameters.scene.scripts)):
+        of_scene = (path for entry in parameters.scene.scripts for path in (entry.script, entry.customization) if path)
+        for path in (*flying_scripts, *of_scene):
             load.script_path(path)
         self._use(self._new_setup(parameters, _world(parameters, gui)))
         self.unsupported: list[str] = []  # what does not work here in a scene imported from V-REP

@@ -21,6 +21,7 @@ from drone_sim.mechanics.velocity_meter import VelocityMeter
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.operations import SceneOperations
 from drone_sim.scene.scene import Scene
+from drone_sim.scripting.api.registry import CUSTOMIZATION
 from drone_sim.scripting.api.remote_ports import RemotePorts
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import NO_SCRIPT
@@ -124,13 +125,24 @@ class SimulationSetup:
         Raises the first ScriptError.
         """
         scripts = [*self.scripts.leaving, *self.scripts.all()]
-        errors = self.scripts.clean_up(scripts) if clean_up else []
+        errors = self.scripts.clean_up(scripts, is_over=True) if clean_up else []
         for script in scripts:
             script.close()
         raise_first(errors)
 
-    def load_scripts(self, scripts: Iterable[AnyScript], script: str) -> None:
-        """Load scripts and run their init; `script` is for vehicles without one of their own. Raises ScriptError."""
+    def load_scripts(self, scripts: Sequence[AnyScript], script: str) -> None:
+        """Load scripts and run their init; `script` is for vehicles without one of their own. Raises ScriptError.
+
+        Customization scripts come first, with what V-REP calls in them before the simulation starts.
+        """
+        customizing = [hosted for hosted in scripts if hosted.script_type == CUSTOMIZATION]
+        self._load_all(customizing, script)
+        for phase in ("nonSimulation", "beforeSimulation"):
+            for hosted in customizing:
+                hosted.script.call(phase)
+        self._load_all((hosted for hosted in scripts if hosted.script_type != CUSTOMIZATION), script)
+
+    def _load_all(self, scripts: Iterable[AnyScript], script: str) -> None:
         for hosted in scripts:
             if isinstance(hosted, ChildScript):
                 path = script_of(hosted.vehicle.parameters, self.parameters, script)

@@ -21,7 +21,7 @@ from drone_sim.scene.entry import EntryParameters
 from drone_sim.scene.scene_parameters import AttachedScriptParameters
 
 _HEAD = "# A model, written by saveModel: metres, radians.\n"
-_FILE_KEYS = ("file", "texture", "script")
+_FILE_KEYS = ("file", "texture", "script", "customization")
 _FIRST_KEYS, _PLACE_KEYS = ("name", "alias", "shape", "kind", "type"), ("model", "parent", "position", "rpy")
 _MAX_MESHES, _MAX_MESH_BYTES = 1000, 256 * MEBIBYTE  # of the cache of generated meshes
 

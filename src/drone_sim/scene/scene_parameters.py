@@ -61,13 +61,14 @@ class FloorParameters(Checked):
 
 
 class AttachedScriptParameters(Checked):
-    """A child script on the object named `object`, of the scene or of a vehicle.
+    """A child script on the object named `object`, of the scene or of a vehicle, a customization script, or both.
 
     `embedded`: `..` in its paths is that object's parent, as up to CoppeliaSim 4.8, and not the object itself.
     """
 
     object: Label
-    script: FileName
+    script: FileName = ""
+    customization: FileName = ""
     embedded: Switch = False
     parameters: Annotated[dict[Label, ScriptValue], Field(default_factory=dict, max_length=_MAX_SCRIPT_PARAMETERS)]
 
@@ -120,7 +121,7 @@ class SceneParameters(Checked):
         check_links(self.objects)
         _check_unique("scripts", "object", self.scripts)
         for index, script in enumerate(self.scripts):
-            if not script.script:
+            if not script.script and not script.customization:
                 raise ParameterError("no file", ("scripts", index, "script"), "''")
         _check_unique("collections", "name", self.collections)
 
@@ -237,7 +238,7 @@ def _listed(objects: Any) -> list[Any]:
 def _resolve_files(folder: Path, values: Any) -> None:
     for part in _listed(values.get("parts")) if isinstance(values, dict) else []:
         _resolve_files(folder, part)
-    for key in ("file", "texture", "urdf", "script"):
+    for key in ("file", "texture", "urdf", "script", "customization"):
         name = values.get(key) if isinstance(values, dict) else None
         if key == "script" and not Path(str(name)).suffix:  # built-in scripts such as tutorial and target have none
             continue

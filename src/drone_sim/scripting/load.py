@@ -22,7 +22,7 @@ DEFAULT = "pilot"
 NO_SCRIPT = "none"  # the script of a vehicle that only other scripts or clients fly
 
 
-Loader = Callable[[str, Mapping[str, Api], TimeLimit, Turns, "Breakpoints | None"], Script]  # as `load` below
+Loader = Callable[..., Script]  # as `load` below
 
 
 @functools.cache
@@ -61,18 +61,22 @@ def load(
     limit: TimeLimit,
     turns: Turns | None = None,
     breakpoints: Breakpoints | None = None,
+    customizes: bool = False,
 ) -> Script:
-    """Load a child script. `turns` switch its thread; `breakpoints` are those of all scripts. Raises ScriptError."""
+    """Load a script. `turns` switch its thread; `breakpoints` are those of all scripts. Raises ScriptError.
+
+    `customizes`: whether it is a customization script.
+    """
     path = script_path(script)
     try:
         source = read_source(path)
     except ValueError as error:
         raise ScriptError("load", path, 0, str(error)) from None
     if path.endswith(".py"):
-        return PythonScript(path, source, modules, limit, turns or Turns(), breakpoints)
+        return PythonScript(path, source, modules, limit, turns or Turns(), breakpoints, customizes)
     try:
         from drone_sim.scripting.lua.script import LuaScript  # imported here because Python scripts do not need lupa
 
-        return LuaScript(path, source, modules, limit, breakpoints)
+        return LuaScript(path, source, modules, limit, breakpoints, customizes)
     except ImportError as error:
         raise ScriptError("load", path, 0, f"Lua scripts need lupa (pip install lupa): {error}") from None

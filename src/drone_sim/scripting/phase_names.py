@@ -7,11 +7,11 @@ import functools
 import logging
 from collections.abc import Collection, Iterator
 
-from drone_sim.scripting.api.constants import PHASES
+from drone_sim.scripting.api.constants import CALL_TYPES, CUSTOMIZATION_PHASES, PHASES
 
 _LOG = logging.getLogger(__name__)  # for messages about scripts, not from scripts
 _PREFIX = "sysCall_"
-FUNCTIONS = {phase: f"{_PREFIX}{phase}" for phase in PHASES}
+FUNCTIONS = {phase: f"{_PREFIX}{phase}" for phase in CALL_TYPES}
 VISION = f"{_PREFIX}vision"  # called in the script of a vision sensor, before its sensing
 THREADS = (f"{_PREFIX}thread", f"{_PREFIX}threadmain")  # in 4.3 and newer; in 4.0 to 4.2
 _NORMALIZED = {name.replace("_", "").lower(): name for name in (*FUNCTIONS.values(), *THREADS)}
@@ -20,12 +20,13 @@ _LONGEST = 60  # characters of a name that is checked
 
 # Functions that CoppeliaSim calls in some kind of script, but this simulator never calls.
 _OTHER_KINDS = """
-    nonSimulation realTimeIdle info msg event data ext moduleEntry beforeMainScript beforeSimulation afterSimulation
-    suspend suspended resume beforeInstanceSwitch afterInstanceSwitch beforeSave afterSave beforeCopy afterCopy
-    beforeDelete afterDelete afterCreate selChange userConfig addOnScriptRun addOnScriptSuspend addOnScriptSuspended
-    addOnScriptResume dyn dynCallback joint jointCallback contact contactCallback visionCallback trigger
+    realTimeIdle info msg event data ext moduleEntry beforeMainScript suspend suspended resume beforeInstanceSwitch
+    afterInstanceSwitch beforeSave afterSave beforeCopy afterCopy beforeDelete afterDelete afterCreate selChange
+    userConfig addOnScriptRun addOnScriptSuspend addOnScriptSuspended addOnScriptResume dyn dynCallback joint
+    jointCallback contact contactCallback visionCallback trigger
 """
 _ELSEWHERE = frozenset(_PREFIX + name for name in _OTHER_KINDS.split())
+_IN_CUSTOMIZATION = frozenset(FUNCTIONS[phase] for phase in CUSTOMIZATION_PHASES)
 
 
 def misspelt(functions: Collection[str]) -> Iterator[tuple[str, str]]:
@@ -41,18 +42,22 @@ def never_called(name: str, meant: str) -> str:
     return f"{name} would never be called; near names are {meant}"
 
 
-def warn(path: str, functions: Collection[str]) -> None:
-    """Log which of a script's functions look like callbacks but are not called here."""
+def warn(path: str, functions: Collection[str], customizes: bool = False) -> None:
+    """Log which of a script's functions look like callbacks but are not called here.
+
+    `customizes`: whether it is a customization script.
+    """
     for name in sorted(functions):
-        if name in _ELSEWHERE:
+        if name in _ELSEWHERE or (name in _IN_CUSTOMIZATION and not customizes):
             _LOG.warning("%s: %s is never called here; these are: %s", path, name, _list_phases())
         elif _intended_phase(name) is not None:
             _LOG.warning("%s: %s is never called; did you mean %s?", path, name, _intended_phase(name))
 
 
-def idle(functions: Collection[str]) -> str:
+def idle(functions: Collection[str], customizes: bool = False) -> str:
     """Return the message for a script of which no function is called; '' for any other script."""
-    if any(name in functions for name in (*FUNCTIONS.values(), *THREADS, VISION)):
+    called = {*FUNCTIONS.values(), *THREADS, VISION} - (frozenset() if customizes else _IN_CUSTOMIZATION)
+    if not called.isdisjoint(functions):
         return ""
     bare = [f"rename {name} to {FUNCTIONS[name]}" for name in PHASES if name in functions]
     return "; ".join([f"has none of the functions {_list_phases()}, {THREADS[0]}, so nothing flies the drone", *bare])
@@ -70,4 +75,4 @@ def _intended_phase(name: str) -> str | None:
 
 
 def _list_phases() -> str:
-    return ", ".join(FUNCTIONS.values())
+    return ", ".join(FUNCTIONS[phase] for phase in PHASES)

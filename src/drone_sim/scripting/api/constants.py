@@ -190,8 +190,12 @@ def _numbered(table: str) -> Iterator[tuple[str, int]]:
 
 CONSTANTS = dict(_numbered(_TABLE))
 PHASES = ("init", "actuation", "sensing", "cleanup")
+CUSTOMIZATION_PHASES = ("nonSimulation", "beforeSimulation", "afterSimulation")  # also, in customization scripts
 # Values of sim_call_type by phase.
-CALL_TYPES = {phase: CONSTANTS[f"syscb_{phase}"] for phase in PHASES} | {"thread": CONSTANTS["syscb_threadmain"]}
+CALL_TYPES = {
+    phase: CONSTANTS[f"syscb_{'threadmain' if phase == 'thread' else phase.lower()}"]
+    for phase in (*PHASES, "thread", *CUSTOMIZATION_PHASES)
+}
 
 AXIS = GREYSCALE = CODED = CONSTANTS["handleflag_axis"]  # the same bit, with a different meaning in each function
 BASE, WXYZ = CONSTANTS["handleflag_reljointbaseframe"], CONSTANTS["handleflag_wxyzquat"]

@@ -86,6 +86,10 @@ class Host(Protocol):
     def own_script(self) -> str:
         """Name of the object that this script is attached to, with its suffix: 'Drone', 'Drone#0'."""
 
+    @property
+    def script_type(self) -> int:
+        """CHILD or CUSTOMIZATION, of the registry."""
+
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Apply a force (N, world) at a point (m, frame of the shape) and a torque (N m, world) in the next step.
 

@@ -17,7 +17,7 @@ from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import SceneServices, ScriptContext
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
-from drone_sim.scripting.api.registry import Scripts
+from drone_sim.scripting.api.registry import CHILD, Scripts
 from drone_sim.scripting.api.windows import Windows
 
 _MANUAL = "https://manual.coppeliarobotics.com/en"
@@ -46,6 +46,7 @@ def apis() -> dict[str, Api]:
         ),
         sensors={},
         own_script="Drone",
+        script_type=CHILD,
     )
     ros = make_sim_ros(MessageBus("drone"), host.context.clock)
     vision = make_sim_vision(host, SceneServices())

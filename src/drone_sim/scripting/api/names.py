@@ -64,7 +64,7 @@ class NameFunctions:
             return find(objects, name, own_name, self.suffix)
         scripts = self._host.context.scripts
         own = objects[objects.handle(own_name)] if scripts.are_own else None
-        is_embedded = own is not None and scripts.attached_to(own_name).is_embedded
+        is_embedded = own is not None and scripts.attached_to(own_name, self._host.script_type).is_embedded
         if proxy != WORLD:
             own, is_embedded = objects[proxy], True
         above = own.parent if own is not None and is_embedded else own

@@ -422,7 +422,7 @@ class PathPlanning(Functions):
     def _is_accepted(self, task: _Task, state: list[float]) -> Any:
         """Return whether the script's function says that a state is valid."""
         scripts = self._context.scripts
-        script = scripts.attached_to(self._host.own_script).script
+        script = scripts.attached_to(self._host.own_script, self._host.script_type).script
         if not scripts.are_own or script is None:
             raise ValueError("a remote client has no functions that simOMPL can call")
         return script.call_own(task.callback, [state])

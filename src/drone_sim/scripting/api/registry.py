@@ -11,10 +11,12 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from drone_sim.message_text import near_names
+from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.script import Script
 
 ScriptParameters = dict[str, Any]  # read by getScriptSimulationParameter
 
+CHILD, CUSTOMIZATION = (CONSTANTS[f"scripttype_{kind}script"] for kind in ("child", "customization"))
 FIRST = 500_000  # the first handle, which is larger than those of objects
 DEEPEST = 8  # nested calls between scripts
 
@@ -22,13 +24,14 @@ DEEPEST = 8  # nested calls between scripts
 class Attachment:
     """The script of an object; `script` is set while it is loaded."""
 
-    def __init__(self, handle: int, name: str, parameters: ScriptParameters, is_law: bool):
-        """`name` is the object's name; `parameters` is not copied.
+    def __init__(self, handle: int, name: str, parameters: ScriptParameters, is_law: bool, kind: int = CHILD):
+        """`name` is the object's name; `parameters` is not copied. `kind`: CHILD or CUSTOMIZATION.
 
         `is_law`: it represents a built-in thrust model, which reads only these parameters.
         """
         self.handle = handle
         self.name = name
+        self.kind = kind
         self.parameters = parameters
         self.read: frozenset[str] = frozenset(parameters)
         self.asked: set[str] = set()  # names of parameters that scripts have read
@@ -66,27 +69,27 @@ class Scripts:
     def clear(self) -> None:
         """Remove all; handles start again."""
         self._by_handle: dict[int, Attachment] = {}
-        self._by_name: dict[str, Attachment] = {}
+        self._by_name: dict[tuple[str, int], Attachment] = {}
         self._numbers = itertools.count(FIRST)
         self.asked = 0  # number of parameters that scripts have read
         self._waiting: list[Attachment] = []  # callers in the present nested calls
 
-    def add(self, name: str, parameters: ScriptParameters, *, is_law: bool = False) -> Attachment:
+    def add(self, name: str, parameters: ScriptParameters, *, is_law: bool = False, kind: int = CHILD) -> Attachment:
         """Attach a script to an object; it replaces a built-in thrust model there. Return its attachment."""
-        existing = self._by_name.get(name)
+        existing = self._by_name.get((name, kind))
         handle = next(self._numbers) if existing is None else existing.handle
-        attachment = Attachment(handle, name, parameters, is_law)
-        self._by_handle[handle] = self._by_name[name] = attachment
+        attachment = Attachment(handle, name, parameters, is_law, kind)
+        self._by_handle[handle] = self._by_name[name, kind] = attachment
         return attachment
 
-    def remove(self, name: str) -> None:
+    def remove(self, name: str, kind: int = CHILD) -> None:
         """Remove the script of an object, if there is one."""
-        removed = self._by_name.pop(name, None)
+        removed = self._by_name.pop((name, kind), None)
         if removed is not None:
             del self._by_handle[removed.handle]
 
-    def rename(self, name: str, new: str) -> None:
-        renamed = self._by_name[new] = self._by_name.pop(name)
+    def rename(self, name: str, new: str, kind: int = CHILD) -> None:
+        renamed = self._by_name[new, kind] = self._by_name.pop((name, kind))
         renamed.name = new
 
     def __iter__(self) -> Iterator[Attachment]:
@@ -94,7 +97,8 @@ class Scripts:
         return iter(self._by_handle.values())
 
     def __contains__(self, name: str) -> bool:
-        return name in self._by_name
+        """Return whether a child script is attached to an object."""
+        return (name, CHILD) in self._by_name
 
     def get(self, handle: int) -> Attachment | None:
         """Return the script with a handle, None for an unknown handle."""
@@ -106,11 +110,17 @@ class Scripts:
             raise ValueError(f"there is no script with the handle {handle}")
         return self._by_handle[handle]
 
-    def attached_to(self, name: str) -> Attachment:
+    def find(self, name: str, kind: int = CHILD) -> Attachment | None:
+        """Return the script of an object, None if there is none."""
+        return self._by_name.get((name, kind))
+
+    def attached_to(self, name: str, kind: int = CHILD) -> Attachment:
         """Return the script of an object. Raises ValueError, which lists similar names."""
-        if name not in self._by_name:
-            raise ValueError(f"no script is attached to '{name}'; {near_names(name, self._by_name)}")
-        return self._by_name[name]
+        if (name, kind) not in self._by_name:
+            known = [other for other, of_kind in self._by_name if of_kind == kind]
+            what = "customization script" if kind == CUSTOMIZATION else "script"
+            raise ValueError(f"no {what} is attached to '{name}'; {near_names(name, known)}")
+        return self._by_name[name, kind]
 
     def law_parameters(self) -> Mapping[str, Any]:
         """Return the parameters that built-in thrust models read, by name."""

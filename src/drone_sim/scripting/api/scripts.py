@@ -22,7 +22,7 @@ from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.host import Functions, Host, SceneServices
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.names import NameFunctions
-from drone_sim.scripting.api.registry import Attachment, ScriptParameters
+from drone_sim.scripting.api.registry import CHILD, CUSTOMIZATION, Attachment, ScriptParameters
 from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.api.types import Handle, Name, WrongValue, refuse_if_too_large
 from drone_sim.scripting.errors import ScriptError
@@ -40,9 +40,9 @@ _LEVELS = {
 _SELF, _TREE, _CHAIN, _ALL, _MAIN = (
     CONSTANTS[f"handle_{name}"] for name in ("self", "tree", "chain", "all", "main_script")
 )
-_TYPES = tuple(CONSTANTS[f"scripttype_{name}"] for name in ("childscript", "customizationscript"))
+_TYPES = CHILD, CUSTOMIZATION
 _MISSING_TYPES = tuple(CONSTANTS[f"scripttype_{name}"] for name in ("mainscript", "addonscript", "sandboxscript"))
-_CHILD, _CUSTOMIZATION, _NONE = CONSTANTS["scripttype_childscript"], CONSTANTS["scripttype_customizationscript"], -1
+_NONE = -1
 
 
 class _OnScripts(Functions):
@@ -57,7 +57,7 @@ class _OnScripts(Functions):
     @functools.cached_property
     def _own(self) -> Attachment:
         """The script that calls. Raises ValueError for a remote client without a vehicle."""
-        return self._scripts.attached_to(self._host.own_script)
+        return self._scripts.attached_to(self._host.own_script, self._host.script_type)
 
     def _script(self, handle: int) -> Attachment:
         if handle == _SELF:
@@ -76,11 +76,11 @@ class _OnScripts(Functions):
             return self._own
         return self._on_object(handle) or self._scripts.attached_to(self._objects[handle].name)
 
-    def _on_object(self, handle: int) -> Attachment | None:
+    def _on_object(self, handle: int, kind: int = CHILD) -> Attachment | None:
         """Return the script of an object, or of a script object's parent; None if there is none."""
         item = self._objects[handle]
         owners = (owner for owner in (item, item.parent if item.kind == "script" else None) if owner is not None)
-        return next((self._scripts.attached_to(owner.name) for owner in owners if owner.name in self._scripts), None)
+        return next(filter(None, (self._scripts.find(owner.name, kind) for owner in owners)), None)
 
 
 class ScriptFunctions(_OnScripts):
@@ -235,19 +235,18 @@ class ScriptCalls(_OnScripts):
     @sim("5")
     def getScript(self, scriptType: int, object: Handle | Name = _SELF, _name: Name = "") -> int:
         """Return the handle of an object's script, by the object's handle or path; -1 for none (4.x)."""
-        found = self._attached(object) if scriptType == _CHILD else None
+        found = self._attached(object, scriptType) if scriptType in _TYPES else None
         return _NONE if found is None else found.handle
 
     @sim("345")
     def getScriptAssociatedWithObject(self, object: Handle) -> int:
         """Return the handle of an object's script, -1 for none (3.x)."""
-        return self.getScript(_CHILD, object)
+        return self.getScript(CHILD, object)
 
     @sim("345")
     def getCustomizationScriptAssociatedWithObject(self, object: Handle) -> int:
-        """Return -1: no object has a customization script."""
-        self._objects[object]
-        return _NONE
+        """Return the handle of an object's customization script, -1 for none (3.x)."""
+        return self.getScript(CUSTOMIZATION, object)
 
     @sim("345")
     def getScriptName(self, script: Handle) -> str:
@@ -335,9 +334,9 @@ class ScriptCalls(_OnScripts):
 
     def _of_type(self, handle: int, kind: int) -> Attachment:
         """Return an object's script of a type. Raises ValueError."""
-        if kind == _CUSTOMIZATION:
-            name = self._objects[handle].name
-            raise ValueError(f"no customization script is attached to '{name}': V-REP's are not imported")
+        if kind == CUSTOMIZATION:
+            found = self._on_object(handle, kind)
+            return found or self._scripts.attached_to(self._objects[handle].name, kind)
         return self._script_of(handle)
 
     @sim("5")
@@ -345,10 +344,10 @@ class ScriptCalls(_OnScripts):
         """Return an object for calls of a script's functions: `it:name(...)` in Lua, `it.name(...)` in Python."""
         return FunctionsOfScript(self.callScriptFunction, self._script(script).handle)
 
-    def _attached(self, object: Handle | Name) -> Attachment | None:
+    def _attached(self, object: Handle | Name, kind: int) -> Attachment | None:
         if object == _SELF:
-            return self._own
-        return self._on_object(self._find(object) if isinstance(object, str) else object)
+            object = self._objects.handle(self._host.own_script)
+        return self._on_object(self._find(object) if isinstance(object, str) else object, kind)
 
 
 class FunctionsOfScript:

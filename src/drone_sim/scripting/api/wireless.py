@@ -83,7 +83,7 @@ class Wireless(Functions):
 
     @property
     def _own(self) -> Attachment:
-        return self._context.scripts.attached_to(self._host.own_script)
+        return self._context.scripts.attached_to(self._host.own_script, self._host.script_type)
 
     def _antenna(self, handle: int | None) -> int:
         if handle in (None, _SELF):

@@ -70,7 +70,9 @@ end
 function sandbox.phase(number)
   if chunk then rawset(env, 'sim_call_type', CALL_TYPES[number]) end
   if number == 5 then return run(take_turn, chunk or thread_function()) end
-  return run(chunk or rawget(env, PHASES[number]))
+  local f = chunk or rawget(env, PHASES[number])
+  if not f then return phases() end
+  return run(f)
 end
 
 -- Call a function and pass its results to Python.

@@ -18,7 +18,7 @@ from typing import Any
 from drone_sim.message_text import near_names
 from drone_sim.scripting import phase_names, script_log
 from drone_sim.scripting.api.calls import Api
-from drone_sim.scripting.api.constants import CONSTANTS, PHASES
+from drone_sim.scripting.api.constants import CALL_TYPES, CONSTANTS, CUSTOMIZATION_PHASES
 from drone_sim.scripting.api.script import Script
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.api.unknown import PLUGINS, not_there
@@ -32,7 +32,7 @@ from drone_sim.scripting.time_limit import Labels, TimeLimit
 
 _LOG = logging.getLogger(__name__)  # for messages about scripts, not from scripts
 _NIL = re.compile(r"(?:field|global|method) '(\w+)'")
-_NUMBERS = {phase: number for number, phase in enumerate((*PHASES, "thread"), start=1)}
+_NUMBERS = {phase: number for number, phase in enumerate(CALL_TYPES, start=1)}
 _NEAR = 0.8  # least ratio of difflib
 _THREAD = 1 << _NUMBERS["thread"] - 1
 # Functions in calls.lua.
@@ -57,10 +57,12 @@ class LuaScript(Script):
         modules: Mapping[str, Api],
         limit: TimeLimit,
         breakpoints: Breakpoints | None = None,
+        customizes: bool = False,
     ):
         """Compile `source`, the contents of the file `path`; run its top level, unless each phase runs the whole file.
 
-        `modules` are the API, `limit` is its time limit. `breakpoints` belong to all scripts. Raises ScriptError.
+        `modules` are the API, `limit` is its time limit. `breakpoints` belong to all scripts.
+        `customizes`: whether it is a customization script. Raises ScriptError.
         """
         self._path = path
         self._limit, self._labels = limit, Labels(path, limit)
@@ -87,7 +89,7 @@ class LuaScript(Script):
                 self.follow_breakpoints()
             self._run("load", self._lua["open"], text.text, text.form.encode())
             if text.form == "functions":
-                self._check_names()
+                self._check_names(customizes)
         except BaseException:
             self._thread.close()
             raise
@@ -112,13 +114,13 @@ class LuaScript(Script):
                 line = text.line(name)
                 raise self._error("load", f"there is no sim_{name}; {near_names(name, known)}", line)
 
-    def _check_names(self) -> None:
+    def _check_names(self, customizes: bool) -> None:
         """Raise ScriptError for a misspelt phase function."""
         places = self._named_functions()
         for name, intended in phase_names.misspelt(places):
             raise ScriptError("load", *places[name], phase_names.never_called(name, intended))
-        phase_names.warn(self._path, places)
-        self.idle = phase_names.idle(places)
+        phase_names.warn(self._path, places, customizes)
+        self.idle = phase_names.idle(places, customizes)
 
     def _named_functions(self) -> dict[str, tuple[str, int]]:
         """Return file and line of the script's global functions, by name."""
@@ -135,7 +137,7 @@ class LuaScript(Script):
 
     def _run_phase(self, phase: str) -> None:
         number = _NUMBERS[phase]
-        if self._phases & 1 << number - 1:
+        if self._phases & 1 << number - 1 or phase in CUSTOMIZATION_PHASES:
             if self._end and phase == "cleanup":  # the error was raised before
                 return
             self._run(phase, self._lua.get("phase"), number)

@@ -13,7 +13,7 @@ _REQUIRE = re.compile(rb"\b(?:require|loadfile|dofile)\b")  # helpers are not se
 _REQUIRE_BUILT_IN = re.compile(
     rb"\brequire[ \t]{0,9}\(?[ \t]{0,9}['\"](?:sim|simROS|simVision|math|string|table|coroutine|os)['\"]"
 )
-_PHASE_FUNCTION = re.compile(rb"\bsysCall_(?:init|actuation|sensing|cleanup|vision|thread|threadmain)\b")
+_PHASE_FUNCTION = re.compile(rb"\bsysCall_(?:init|actuation|sensing|cleanup|vision|thread|threadmain|\w+Simulation)\b")
 _DEFINED_PHASE = re.compile(rb"\bfunction[ \t]{1,9}(?=sysCall_)" + _PHASE_FUNCTION.pattern)
 _THREAD_TYPE = re.compile(rb"\b(?:syscb_thread(?:main)?|childscriptcall_threaded)\b")
 _IN_THREAD = re.compile(

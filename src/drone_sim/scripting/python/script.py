@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _STOPPED = "__stopped__"  # name of ScriptStopped in a script's globals
 _LAZY = (inspect.isgeneratorfunction, inspect.iscoroutinefunction, inspect.isasyncgenfunction)
 _NAMES_THREAD = b"sysCall_thread"
-_RARE = frozenset(("init", "cleanup"))
+_RARE = frozenset(FUNCTIONS).difference(("actuation", "sensing"))
 _NOT_COPIED = ("__builtins__", "__loader__", "__spec__")
 
 
@@ -65,11 +65,12 @@ class PythonScript(Script):
         limit: TimeLimit,
         turns: Turns,
         breakpoints: Breakpoints | None = None,
+        customizes: bool = False,
     ):
         """Run the top level of `source`, the contents of the file `path`. Raises ScriptError.
 
         `modules` are the API, `limit` is its time limit, `turns` switch its thread. `breakpoints` belong to all
-        scripts.
+        scripts. `customizes`: whether it is a customization script.
         """
         self._path = path
         self._limit, self._labels = limit, Labels(path, limit)
@@ -92,7 +93,7 @@ class PythonScript(Script):
         try:
             with process_kept():
                 self._run("load", lambda: exec(_compiled(source, path), self._globals))
-            self._check_names()
+            self._check_names(customizes)
         except ScriptError:
             self.close()
             raise
@@ -106,7 +107,7 @@ class PythonScript(Script):
             raise ScriptError("load", self._path, 0, message) from None
         return PythonThread(turns)
 
-    def _check_names(self) -> None:
+    def _check_names(self, customizes: bool) -> None:
         """Raise ScriptError for a misspelt phase function, or one that is a generator or coroutine."""
         functions = {name: value for name, value in self._named() if callable(value) and not name.startswith("__")}
         for name, intended in phase_names.misspelt(functions):
@@ -115,8 +116,8 @@ class PythonScript(Script):
             function = functions.get(name)
             if any(is_lazy(function) for is_lazy in _LAZY):
                 raise self._error_at(function, f"{name} would not run, because it has a `yield` or is `async`")
-        phase_names.warn(self._path, functions)
-        self.idle = phase_names.idle(functions)
+        phase_names.warn(self._path, functions, customizes)
+        self.idle = phase_names.idle(functions, customizes)
 
     def _named(self) -> list[tuple[str, Any]]:
         """Return its global variables, without keys that are no strings, which `globals()` accepts."""
