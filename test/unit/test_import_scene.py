@@ -28,10 +28,6 @@ from drone_sim.files import mesh_files
 from drone_sim.importing.main import main
 from drone_sim.mechanics import frames, urdf
 from drone_sim.run import parameters
-from drone_sim.run.diagnosis.diagnosis import Diagnosis
-from drone_sim.run.diagnosis.finding import WARN
-from drone_sim.run.pacing import Pacer
-from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.entry import Place
 from drone_sim.vrep_files.model import VrepFileError
@@ -283,37 +279,33 @@ def test_what_cannot_be_brought_is_said_object_by_object(imported):
     for line in (
         "Points: a point cloud: only its pose is imported",
         "Drone: is called Drone#0 here",
-        "Drone: its customization script is not imported",
+        "Drone: its child script is disabled in the file, and is not imported",
     ):
         assert line in listed and line in imported.said
     assert "The file has no quadricopter" in imported.said
 
 
-ACTS = "function sysCall_actuation() end"
+CUSTOMIZES = """
+function sysCall_init() state = sim.getSimulationState() end
+function sysCall_beforeSimulation() sim.setInt32Signal('before', state == sim.simulation_stopped and 1 or 2) end
+function sysCall_actuation()
+    sim.setStringSignal('child', sim.callScriptFunction('own@' .. sim.getObjectAlias(sim.getObject('.'), 1), 1))
+end
+"""
 
 
-@pytest.mark.parametrize(
-    ("chunks", "hole"),
-    [
-        ((scene_object("DMY", 0, "Mover"), script(0, ACTS, kind=6)), "Mover: its customization script acts"),
-        ((scene_object("DMY", 0, "Mover"), script(0, "x = 1 --[[ sysCall_actuation ]]", kind=6)), ""),
-        ((scene_object("DMY", 0, "Mover"), script(0, ACTS)), ""),
-    ],
-)
-def test_what_will_not_work_after_an_import_is_a_warning_at_launch_and_in_the_diagnostics(
-    imported, caplog, chunks, hole
-):
-    imported(*chunks)
-    assert ("WILL NOT WORK: " in imported.said) == bool(hole) and hole in imported.said
+@pytest.mark.parametrize("child", [True, False])
+def test_a_customization_script_comes_with_its_object_and_its_child_script(imported, child):
+    own = [script(0, "function own() return 'own' end function sysCall_init() end", parameters=(("size", "3"),))]
+    text = CUSTOMIZES if child else CUSTOMIZES.replace("sim.callScriptFunction", "tostring")
+    content = imported(scene_object("DMY", 0, "Mover"), script(0, text, kind=6), *(own if child else ()))
+    (entry,) = content["scripts"]
+    assert set(entry) >= {"object", "customization"} and ("script" in entry) == child
     simulation = Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": {"drone": {}}}))
-    player = Player(simulation, simulation.step, lambda _: None, False)
-    diagnosis = Diagnosis(player, Pacer(0.05, lambda: 0.0, lambda _: None), dict, False, lambda: 0.0)
-    found = next(one for one in diagnosis.look() if one.name == "simulation")
-    simulation.start()
+    simulation.step()
+    signals = simulation.context.signals
+    assert signals.get(int, "before") == 1 and signals.get(str, "child").startswith("own")
     simulation.close()
-    warned = [one.getMessage() for one in caplog.records if one.levelno == logging.WARNING]
-    assert len([one for one in warned if hole and hole in one]) == bool(hole)
-    assert (found.level == WARN) == bool(hole) and hole in found.message
 
 
 def linked(tag_of_type=b""):

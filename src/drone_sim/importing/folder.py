@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from drone_sim.files import writing
-from drone_sim.files.resources import read_bytes, resolve
 from drone_sim.message_text import MAX_NAME
 from drone_sim.scene import entry
 
@@ -78,19 +77,6 @@ class Folder:
 
 
 LIST = "IMPORT.txt"
-_UNSUPPORTED_PREFIX = "WILL NOT WORK: "
-_MAX_LIST_SIZE = 1 << 20  # bytes
-
-
-def unsupported_features(scene_file: str) -> list[str]:
-    """Return what will not work in an imported scene, from its import report; [] if the scene was not imported."""
-    try:
-        text = read_bytes(resolve(scene_file).with_name(LIST), _MAX_LIST_SIZE).decode("utf-8", "replace")
-    except (OSError, ValueError):
-        return []
-    return [
-        line.removeprefix(_UNSUPPORTED_PREFIX) for line in text.splitlines() if line.startswith(_UNSUPPORTED_PREFIX)
-    ]
 
 
 class Report:
@@ -98,7 +84,6 @@ class Report:
 
     def __init__(self) -> None:
         self.notes: list[str] = []  # what works the same in another way
-        self.unsupported: list[str] = []  # what will not work in the scene
         self._names: dict[str, list[str]] = {}
 
     def add(self, name: str, what: str) -> None:
@@ -109,11 +94,10 @@ class Report:
 
     def __len__(self) -> int:
         """Return the number of lines, without notes."""
-        return len(self._names) + len(self.unsupported)
+        return len(self._names)
 
     def lines(self, most: int | None = None) -> Iterator[str]:
-        """Yield the lines, unsupported features first, each with its object names, at most `most` of them."""
-        yield from (f"{_UNSUPPORTED_PREFIX}{feature}" for feature in self.unsupported)
+        """Yield the lines, each with its object names, at most `most` of them."""
         for what, names in self._names.items():
             more = f" and {len(names) - most} more" if most is not None and len(names) > most else ""
             yield f"{', '.join(names[:most])}{more}: {what}" if names != [""] else what

@@ -13,7 +13,7 @@ from drone_sim.importing.entries import Entries, collection_entries
 from drone_sim.importing.folder import LIST, Folder, Report, label, number, pose_keys
 from drone_sim.importing.placing import Placed, floor_parts, floor_size, placed
 from drone_sim.importing.quadricopters import find, plain_name
-from drone_sim.importing.scripts import ScriptFiles, asked_for, bring, values, without_comments
+from drone_sim.importing.scripts import ScriptFiles, asked_for, bring, values
 from drone_sim.importing.shapes import MeshWriter
 from drone_sim.importing.vehicles import ImportedVehicle, suffixes, vehicle_names
 from drone_sim.mechanics import frames
@@ -83,12 +83,6 @@ _MAX_COORDINATE = 1e5  # m
 _IDLE_KINDS = ("light", "graph")
 
 
-# A customization script also has callbacks that run while no simulation runs; these are the ones that run in it.
-_SIMULATION_CALLBACK = re.compile(
-    r"\bsysCall_(?:actuation|sensing|thread|threadmain)\b|\bcustomizationscriptcall_simulation(?:actuation|sensing)\b"
-)
-
-
 class Imported(NamedTuple):
     """The result of an import: the scene file, counts, and the report."""
 
@@ -119,6 +113,7 @@ class _Import:
         self._objects = placed(file)
         self._by_handle = {node.object.handle: node for node in self._objects}
         self._floor = floor_parts(self._objects)
+        self._customizations: dict[int, VrepScript] = {}  # by the handle of their object
         self._scripts = self._child_scripts()
         quads = find(self._objects, self._scripts)
         self._vehicles = [ImportedVehicle(*pair) for pair in zip(quads, [self._scripts] * len(quads), suffixes(quads))]
@@ -144,7 +139,6 @@ class _Import:
         tools = self._folder, self._writer, self.script_files, self._report
         vehicles = {name: vehicle.entry(*tools) for name, vehicle in zip(self._vehicle_names, self._vehicles)}
         content["vehicles"] = vehicles
-        self._find_holes()
         if not vehicles:
             self._report.notes.append("The file has no quadricopter: nothing flies unless you add `vehicles`")
         entries = list(self._entries())
@@ -185,23 +179,10 @@ class _Import:
             self._report.add("", "the file has no floor at z = 0: drone_sim's floor is added")
         return world
 
-    # ---- what will not work
-
-    def _find_holes(self) -> None:
-        """Report customization scripts that act in a simulation."""
-        for script in self._file.scripts:
-            owner = self._by_handle.get(script.object)
-            if owner is None or not script.is_enabled:
-                continue
-            code = without_comments(script)
-            if script.kind == "customization" and _SIMULATION_CALLBACK.search(code):
-                problem = "its customization script acts in flight, and is not imported: nothing that it drives moves"
-                self._report.unsupported.append(f"{owner.name}: {problem}")
-
     # ---- scripts
 
     def _child_scripts(self) -> Mapping[int, list[VrepScript]]:
-        """Return the enabled child scripts, by the handle of their object."""
+        """Return the enabled child scripts, by the handle of their object; collect the customization scripts."""
         by_object: dict[int, list[VrepScript]] = defaultdict(list)
         for script in self._file.scripts:
             owner = self._by_handle.get(script.object)
@@ -214,10 +195,12 @@ class _Import:
                         "",
                         "its own main script is not imported: the phases run in V-REP's default order",
                     )
-            elif script.kind != "child" or owner is None:
+            elif script.kind not in ("child", "customization") or owner is None:
                 self._report.add(name, f"its {script.kind} script is not imported")
             elif not script.is_enabled or not owner.runs_scripts:
-                self._report.add(name, "its child script is disabled in the file, and is not imported")
+                self._report.add(name, f"its {script.kind} script is disabled in the file, and is not imported")
+            elif script.kind == "customization":
+                self._customizations.setdefault(script.object, script)
             else:
                 by_object[script.object].append(script)
         return by_object
@@ -234,12 +217,12 @@ class _Import:
         imported_ids = self._kept | self._of_vehicles
         scripted: set[int] = set()
         for node in self._objects:
-            scripts = self._scripts.get(node.object.handle, [])
-            if id(node) in built_in:
+            customization = self._customizations.get(node.object.handle)
+            scripts = [] if id(node) in built_in else self._scripts.get(node.object.handle, [])
+            if (scripts or customization) and id(node) not in imported_ids:
+                self._report.add(node.name, "its script is not imported, because the object is not")
                 continue
-            if scripts and id(node) not in imported_ids:
-                self._report.add(node.name, "its child script is not imported, because the object is not")
-                continue
+            entries = []
             for script in scripts:
                 candidates = (node, self._by_handle.get(script.own_object))  # the first may have a script already
                 target = next((place for place in candidates if place is not None and id(place) not in scripted), None)
@@ -248,10 +231,18 @@ class _Import:
                     continue
                 scripted.add(id(target))
                 if target is not node or id(node) not in roots:
-                    yield self._entry_of(script, target, target is not node or script.is_embedded)
+                    entries.append(self._entry_of(script, target, target is not node or script.is_embedded))
+            if customization is not None:
+                entry = self._entry_of(customization, node, customization.is_embedded, "customization")
+                own = next((other for other in entries if other["object"] == node.name), None)
+                if own is None:
+                    entries.append(entry)
+                else:
+                    own.update({**entry, **own})
+            yield from entries
 
-    def _entry_of(self, script: VrepScript, target: Placed, embedded: bool) -> dict[str, Any]:
-        entry: dict[str, Any] = {"object": target.name, "script": self.script_files.write(target.name, script)}
+    def _entry_of(self, script: VrepScript, target: Placed, embedded: bool, key: str = "script") -> dict[str, Any]:
+        entry: dict[str, Any] = {"object": target.name, key: self.script_files.write(target.name, script)}
         if embedded:
             entry["embedded"] = True
         parameters = values(script.parameters or target.object.parameters)
@@ -302,7 +293,8 @@ class _Import:
                 self._report.add(node.name, f"is left out: it is more than {_MAX_COORDINATE / 1e3:g} km away")
                 continue
             has_chosen_child = any(id(child) in chosen for child in node.children)
-            is_used = self._is_mentioned(node) or bool(self._scripts.get(node.object.handle)) or node in second
+            has_script = node.object.handle in self._customizations or bool(self._scripts.get(node.object.handle))
+            is_used = self._is_mentioned(node) or has_script or node in second
             if has_chosen_child or is_used or not (id(node) in drawn or self._is_idle(node)):
                 chosen.add(id(node))
         return self._limited(chosen)

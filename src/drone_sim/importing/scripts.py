@@ -41,13 +41,6 @@ class ScriptFiles:
         return self._written[text, suffix]
 
 
-def without_comments(script: VrepScript) -> str:
-    """Return a script's text without comments."""
-    if script.language == "python":
-        return re.sub(r"#[^\n]*", "", script.text)
-    return re.sub(r"--(?:\[(=*)\[.*?(?:\]\1\]|\Z)|[^\n]*)", "", script.text, flags=re.DOTALL)
-
-
 def values(parameters: Iterable[tuple[str, str]]) -> dict[str, Any]:
     """Return script parameters as YAML values: numbers, booleans and strings."""
     named = {name[:MAX_NAME]: _value(value) for name, value in parameters if name.isprintable() and name}

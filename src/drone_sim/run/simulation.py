@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 from drone_sim.hosting.child_scripts import ChildScript
 from drone_sim.hosting.script_scheduler import raise_first
-from drone_sim.importing.folder import unsupported_features
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.object_tree import NO_HANDLES, Handles
 from drone_sim.mechanics.saved_state import Restore
@@ -119,8 +118,6 @@ class Simulation:
         for path in (*flying_scripts, *of_scene):
             load.script_path(path)
         self._use(self._new_setup(parameters, _world(parameters, gui)))
-        self.unsupported: list[str] = []  # what does not work here in a scene imported from V-REP
-        self._warn_of_unsupported()
         self.document = SceneDocument(parameters, self.object_handles)
         try:
             if started:
@@ -253,18 +250,9 @@ class Simulation:
         replaced = (self.document, self.content()) if self._initial.is_edited else None
         self._rebuild(parameters, NO_HANDLES)
         self.replaced = replaced
-        self._warn_of_unsupported()
         self.document = SceneDocument(self.parameters, self.object_handles)
         self._initial = self._initial._replace(is_edited=False)
         self.scenes_read += 1
-
-    def _warn_of_unsupported(self) -> None:
-        """Warn of what does not work in a scene imported from V-REP, unless the same warning was given before."""
-        file, before = self.parameters.scene_file, self.unsupported
-        self.unsupported = unsupported_features(file) if file else []
-        for feature in self.unsupported:
-            if feature not in before:
-                LOG.warning("%s: %s", file, feature)
 
     def replace_scene(self, parameters: Parameters, rebuild: bool = True) -> None:
         """While stopped, replace the initial scene by that of `parameters`; objects keep present or former handles.

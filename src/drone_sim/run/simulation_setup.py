@@ -136,10 +136,12 @@ class SimulationSetup:
         Customization scripts come first, with what V-REP calls in them before the simulation starts.
         """
         customizing = [hosted for hosted in scripts if hosted.script_type == CUSTOMIZATION]
+        self.context.control.is_stopped = True
         self._load_all(customizing, script)
         for phase in ("nonSimulation", "beforeSimulation"):
             for hosted in customizing:
                 hosted.script.call(phase)
+        self.context.control.is_stopped = False
         self._load_all((hosted for hosted in scripts if hosted.script_type != CUSTOMIZATION), script)
 
     def _load_all(self, scripts: Iterable[AnyScript], script: str) -> None:

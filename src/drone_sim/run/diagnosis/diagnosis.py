@@ -16,7 +16,6 @@ from drone_sim.sensors.vision import TINY
 
 _ENOUGH = 0.9  # fraction of the nominal rate, and of the requested real-time factor
 _FEW = 2  # pictures that may be counted in this diagnosis or the next
-_MAX_UNSUPPORTED = 3  # messages about what an import left out
 _LATE = 0.1  # fraction of the steps; a few are late on any busy computer
 _SUSTAINED = 3  # diagnoses in a row that are too slow before that is a problem: a start, or a busy second, is none
 
@@ -145,8 +144,6 @@ class Diagnosis:
             problems.append(Problem(ERROR, f"stopped: {player.why_stopped}"))
         for name, error in simulation.failed_scripts.items():
             problems.append(Problem(ERROR, f"script of {name} failed: {error}"))
-        for feature in simulation.unsupported[:_MAX_UNSUPPORTED]:
-            problems.append(Problem(WARN, f"will not work here: {feature}"))
         if self._simulated_time and not player.playing:
             still = f"{player.state}: /clock stands still, and nodes that use simulated time wait"
             problems.append(Problem(WARN, still))

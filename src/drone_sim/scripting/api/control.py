@@ -25,6 +25,7 @@ class Control:
 
     def clear(self) -> None:
         self.asked = ""  # STOP, PAUSE or ''
+        self.is_stopped = False  # while customization scripts are called before the start
         self.is_stopping = False  # while threads have their last turns
         self.is_ending = False  # while cleanup is called
 
@@ -35,6 +36,8 @@ class Control:
 
     def state(self, time: float) -> int:
         """Return CoppeliaSim's state of the simulation at a simulated time in s."""
+        if self.is_stopped:
+            return CONSTANTS["simulation_stopped"]
         if self.is_ending:
             return CONSTANTS["simulation_advancing_lastbeforestop"]
         if self.asked == STOP or self.is_stopping:
