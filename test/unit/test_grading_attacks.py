@@ -475,6 +475,7 @@ objects:
 scripts:
   - {object: Lamp, script: lamp.lua}
   - {object: Post, script: post.py}
+  - {object: Drone, customization: lamp.lua}
 """
 POST = """
 from helper import run as helper
@@ -516,6 +517,18 @@ NOT_ITS_OWN = {  # what is called, and what is said of it
     "a function that is not listed": ("sim.callScriptFunction('door', post, 3)", "call door of the script of Post"),
     "a text in Python": ("sim.executeScriptString('1 + 1', post)", "run a text in the script of Post"),
     "a text in Lua": ("sim.executeScriptString('return 1@Lamp', 1)", "run a text in the script of Lamp"),
+    "a customization script": (
+        "sim.callScriptFunction('shine', sim.getScript(sim.scripttype_customizationscript, drone), 1)",
+        "call shine of the script of Drone",
+    ),
+    "its parameter": (
+        "sim.setScriptSimulationParameter(sim.getScript(sim.scripttype_customizationscript, drone), 'x', 1)",
+        "change",
+    ),
+    "a text in a customization script": (
+        "sim.executeScriptString('return 1@/Quadcopter', sim.scripttype_customizationscript)",
+        "run a text in the script of Drone",
+    ),
     "its parameters": ("sim.setUserParameter(sim.getObject('/Post'), 'x', 1)", "change"),
     "a signal": ("sim.setIntegerSignal('score', 5)", "change the signal score"),
     "a signal of another kind": ("sim.setStringSignal('score', 'x')", "change the signal score"),

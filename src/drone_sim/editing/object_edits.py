@@ -214,8 +214,8 @@ class ObjectEdits:
         parameters = values.pop("script_parameters", None)
         if parameters is not None:
             script = self._script_of(self._simulation.tree[handle].name)
-            values_now = {**script.model_dump(), "script": script.script, "parameters": parameters}
-            operations.attach_script(script_from(values_now))
+            files = {"script": script.script, "customization": script.customization}
+            operations.attach_script(script_from({**script.model_dump(), **files, "parameters": parameters}))
         entry = operations.entry(handle)
         values = {key: _default(entry, key) if value is None else value for key, value in values.items()}
         scene_parameters.find_files_beside(self._simulation.document.folder, {"scene": {"objects": [values]}})
@@ -261,7 +261,9 @@ class ObjectEdits:
         name = simulation.tree[simulation.tree.resolve(op.object)].name
         path = named_in(folder, op.script or _create_script(folder, name, op.language))
         script_path(str(path))
-        script = script_from({"object": name, "script": path, "parameters": dict(op.parameters)})
+        before = simulation.scene.scripts.get(name)
+        kept = {"customization": before.customization} if before is not None else {}
+        script = script_from({"object": name, "script": path, **kept, "parameters": dict(op.parameters)})
         simulation.operations.attach_script(script)
 
     def detach_script(self, op: records.DetachScript) -> None:
