@@ -512,6 +512,8 @@ OMPL = {
     "readState": [Example("NAME(TASK)", [near(0, 0)])],
     "getPathStateCount": [Example("NAME(TASK, {0,0, 1,0})", [2])],
     "getPathState": [Example("NAME(TASK, {0,0, 1,0}, 2)", [[1, 0]])],
+    "drawPath": [Example("REFUSED(NAME, TASK, {0,0, 1,0})", ["the states of the task have no position in space"])],
+    "removeDrawingObjects": [Example("NAME(TASK, {})", [])],
     "destroyStateSpace": [Example("NAME(SPACE)", [])],
     "destroyTask": [Example("NAME(TASK)", [])],
 }

@@ -23,6 +23,7 @@ SCENE = {
         {"name": "Leaf", "shape": "box", "size": [1, 0.1, 0.1], "mass": 1, "position": [0.5, 0, 0], "parent": "Hinge"},
         {"shape": "box", "size": [1, 1, 1], "position": [9, 9, 0.5]},
         {"name": "Near", "kind": "dummy", "position": [9, 9, 1.25]},
+        {"name": "Shell", "kind": "dummy", "position": [0, 0, 9], "parent": "Quadricopter_base", "part": True},
     ]
 }
 STILL = "def sysCall_init(): pass\n"
@@ -68,7 +69,7 @@ def test_nothing_is_nearer_than_the_threshold(sim):
 def test_a_drone_is_one_solid_and_whatever_of_it_is_named(simulation, sim):
     whole = between(sim, "/Quadcopter", "/Ball")[1]
     assert whole[6] == pytest.approx(3 - 0.1 - 0.2, abs=0.15)
-    for part in ("/Quadcopter/base", "/Quadcopter/propeller[0]/respondable", "/Quadcopter/propeller[0]"):
+    for part in ("/Quadcopter/base", "/Quadcopter/propeller[0]/respondable", "/Quadcopter/propeller[0]", "/Shell"):
         assert between(sim, part, "/Ball")[1] == whole
     simulation.drone.body.move(Pose((0.0, 0.0, 3.0)))
     assert between(sim, "/Quadcopter", "/Ball")[1][6] > whole[6] + 0.1

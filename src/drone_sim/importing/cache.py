@@ -20,7 +20,7 @@ from drone_sim.vrep_files.model import VrepFileError
 
 _LOG = logging.getLogger(__name__)
 _LOG.setLevel(logging.INFO)
-_FORMAT_VERSION = b"8"  # of the written files; after a change, every file is imported again
+_FORMAT_VERSION = b"9"  # of the written files; after a change, every file is imported again
 
 
 def imported_scene(path: Path) -> Path:

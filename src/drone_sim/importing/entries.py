@@ -66,7 +66,7 @@ class Entries:
     def frame(self, placed: Placed, parent: str) -> dict[str, Any]:
         """Return a dummy entry on `parent` for an object whose shape is drawn as part of the parent."""
         alias = {"alias": placed.alias} if placed.alias else {}
-        return {"name": placed.name, **alias, "parent": parent, "kind": "dummy", **size_factor(placed)}
+        return {"name": placed.name, **alias, "parent": parent, "kind": "dummy", "part": True, **size_factor(placed)}
 
     # ---- shapes
 

@@ -116,5 +116,5 @@ def _carrier(item: SceneObject) -> SceneObject:
     parent = item.parent
     if item.body is not None or parent is None:
         return item
-    is_part = plain(item.name).startswith(_PARTS)
+    is_part = plain(item.name).startswith(_PARTS) or getattr(item, "is_part", False)
     return _carrier(parent) if is_part or "force_sensor" in (item.kind, parent.kind) else item

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Literal
 
-from drone_sim.config.types import Label, Length, ParameterError
+from drone_sim.config.types import Label, Length, ParameterError, Switch
 from drone_sim.context import SimulationContext
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY
@@ -34,23 +34,26 @@ class ScriptParameters(KindParameters):
 class DummyParameters(KindParameters):
     """A dummy; `size` (m) is the diameter of its ball in rviz.
 
-    `linked`: name of another dummy; the dynamics keeps the bodies that carry the two rigidly together.
+    `linked`: name of another dummy; the dynamics keeps the bodies that carry the two rigidly together. `part`: it is a
+    part of the body that carries it, so that its distances and collisions are those of that body.
     """
 
     kind: Literal["dummy"]
     size: Length = 0.01
     linked: Label = ""
+    part: Switch = False
 
     def make(self, place: Place, context: SimulationContext) -> SceneObject:
-        return Dummy(place, self.size)
+        return Dummy(place, self.size, self.part)
 
 
 class Dummy(SceneObject):
     """A frame with a display size."""
 
-    def __init__(self, place: Place, size: float):
+    def __init__(self, place: Place, size: float, is_part: bool):
+        """Create the dummy; `size` in m. `is_part`: of the body that carries it."""
         super().__init__(*place, kind="dummy")
-        self.size = size  # m
+        self.size, self.is_part = size, is_part
 
 
 def check_links(objects: Iterable[EntryParameters]) -> None:

@@ -12,14 +12,16 @@ from typing import Any
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.joint import Joint
+from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.scripting.api.calls import Module
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.distances import DistanceFunctions
+from drone_sim.scripting.api.drawings import DrawingFunctions
 from drone_sim.scripting.api.host import Functions, Host, SceneServices
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.matrices import unit
 from drone_sim.scripting.api.planning_problem import SIZES, SUBSTITUTES, WITH_THREADS, Component, Problem
-from drone_sim.scripting.api.types import Callback, Handle, Name, Number, Numbers, WrongValue, numbers
+from drone_sim.scripting.api.types import Callback, Handle, Name, Number, Numbers, ThreeNumbers, WrongValue, numbers
 
 simOMPL = Module("simOMPL")
 _ALGORITHM, _KIND = "ompl_algorithm_", "ompl_statespacetype_"
@@ -65,6 +67,7 @@ class PathPlanning(Functions):
         """Create it without tasks; the arguments are those of Functions."""
         super().__init__(host, services, ignored)
         self._collisions = DistanceFunctions(self._objects, self._context.collections, services.nearest)
+        self._drawings = DrawingFunctions(self._context.drawings, self._objects, ignored)
         self._handles, self._seeds = itertools.count(1), itertools.count(1)
         self._tasks: dict[int, _Task] = {}
         self._spaces: dict[int, Component] = {}
@@ -385,6 +388,34 @@ class PathPlanning(Functions):
         if not 0 <= place < count:
             raise ValueError(f"a path of {count} states has no state {index}")
         return list(path[place * size : (place + 1) * size])
+
+    @simOMPL("5")
+    def drawPath(
+        self,
+        task: Handle,
+        path: Numbers,
+        lineSize: Number = 2,
+        color: ThreeNumbers = (1, 0, 0),
+        extraAttributes: int = 0,
+    ) -> list[int]:
+        """Draw the positions of a path in space as a line; return the handles of the drawing objects."""
+        parts = self._task(task).components
+        first = next((index for index, part in enumerate(parts) if SIZES[part.kind][1] == 3), None)
+        if first is None:
+            raise ValueError("the states of the task have no position in space")
+        start = sum(SIZES[part.kind][0] for part in parts[:first])
+        count, kind = self.getPathStateCount(task, path), CONSTANTS["drawing_linestrip"] + int(extraAttributes)
+        drawing = self._drawings.addDrawingObject(kind, lineSize, 0.0, WORLD, max(1, count), color)
+        for index in range(count):
+            self._drawings.addDrawingObjectItem(drawing, self.getPathState(task, path, index + 1)[start : start + 3])
+        return [drawing]
+
+    @simOMPL("5")
+    def removeDrawingObjects(self, task: Handle, dwos: Sequence[Handle]) -> None:
+        """Remove drawing objects."""
+        self._task(task)
+        for drawing in dwos:
+            self._drawings.removeDrawingObject(drawing)
 
     def _read(self, part: Component) -> Sequence[float]:
         if part.kind.endswith("joint_position"):
