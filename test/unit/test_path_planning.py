@@ -1,9 +1,14 @@
 """simOMPL: paths around obstacles in Lua and Python, without a trace in the flight."""
 
+import threading
+
 import pytest
 
 pytest.importorskip("ompl")
 
+from remote_client import official_client
+
+from drone_sim.remote.standalone import play
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.packing import Packing
@@ -133,6 +138,55 @@ def test_a_python_scripts_function_decides_which_states_are_valid(fly):
     assert solved and was_asked and not crosses(states) and states[-1] == pytest.approx([1, 0, 1])
 
 
+THREADS = {
+    "python": """
+def is_free(state):
+    self.times.add(sim.getSimulationTime())
+    saved = simOMPL.readState(self.task)
+    simOMPL.writeState(self.task, state)
+    hit, _ = sim.checkCollision(self.probe, sim.getObject("/Wall"))
+    simOMPL.writeState(self.task, saved)
+    return not hit
+
+def sysCall_thread():
+    self.times, self.probe, self.task = set(), sim.getObject("/Probe"), simOMPL.createTask("t")
+    space = simOMPL.createStateSpace("p", 50003, self.probe, [-2, -2, 0], [2, 2, 2])
+    simOMPL.setStateSpace(self.task, [space])
+    simOMPL.setStateValidationCallback(self.task, is_free)
+    simOMPL.setStartState(self.task, [-1, 0, 1])
+    simOMPL.setGoalState(self.task, [1, 0, 1])
+    solved, path = simOMPL.compute(self.task, 5, 0.1, 30)
+    sim.setStringSignal("path", sim.packTable([solved, path, len(self.times)]))
+""",
+    "lua": """
+function sysCall_thread()
+    probe, task = sim.getObject('/Probe'), simOMPL.createTask('t')
+    simOMPL.setStateSpace(task, {simOMPL.createStateSpace('p', 50003, probe, {-2, -2, 0}, {2, 2, 2})})
+    local times, different = {}, 0
+    simOMPL.setStateValidationCallback(task, function(state)
+        local time = sim.getSimulationTime()
+        if not times[time] then times[time], different = true, different + 1 end
+        local saved = simOMPL.readState(task)
+        simOMPL.writeState(task, state)
+        local hit = sim.checkCollision(probe, sim.getObject('/Wall'))
+        simOMPL.writeState(task, saved)
+        return hit == 0
+    end)
+    simOMPL.setStartState(task, {-1, 0, 1})
+    simOMPL.setGoalState(task, {1, 0, 1})
+    local solved, path = simOMPL.compute(task, 5, 0.1, 30)
+    sim.setStringSignal('path', sim.packTable({solved, path, different}))
+end
+""",
+}
+
+
+@pytest.mark.parametrize("language", THREADS)
+def test_a_thread_is_not_switched_while_its_function_checks_states(fly, language):
+    solved, states, different_times = planned(fly(THREADS[language], 20), 3)
+    assert solved and not crosses(states) and different_times == 1
+
+
 def test_the_names_and_numbers_of_v_rep_3_serve_old_scripts(fly, caplog):
     solved, states, _ = planned(fly(FLAT), 3)
     assert solved and not crosses(states)
@@ -222,3 +276,33 @@ def test_a_function_that_hangs_is_stopped(fly, caplog, algorithm):
     simulation = fly(CALLS.replace("CALL", call).replace("BODY", "while True: pass"), script_time_limit=0.2)
     assert "stopped after 0.2 s without returning" in caplog.text
     assert simulation.context.objects.named("Probe").matrix()[3] == -1
+
+
+def test_a_remote_client_plans_with_coppeliasims_own_library():
+    over, listening, found = threading.Event(), threading.Event(), []
+
+    def serve():
+        values = {"real_time_factor": 0, "remote_api": {"serve": True, "port": 0}, "scene": SCENE}
+        play(parameters.load(values), over.is_set, lambda server: (found.append(server.port), listening.set()))
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    try:
+        assert listening.wait(60)
+        client = official_client(found[0])
+        sim, planner = client.require("sim"), client.require("simOMPL")
+        probe, task = sim.getObject("/Probe"), planner.createTask("t")
+        space = planner.createStateSpace("p", planner.StateSpaceType.position3d, probe, [-2, -2, 0], [2, 2, 3])
+        planner.setStateSpace(task, [space])
+        planner.setAlgorithm(task, planner.Algorithm.RRTConnect)
+        planner.setCollisionPairs(task, [probe, sim.handle_all])
+        planner.setStartState(task, planner.readState(task))
+        planner.setGoalState(task, [1, 0, 1])
+        solved, path = planner.compute(task, 10, -1, 60)
+        assert solved and not crosses([path[index : index + 3] for index in range(0, len(path), 3)])
+        planner.setStateValidationCallback(task, lambda state: True)
+        with pytest.raises(Exception, match="a remote client has no functions that simOMPL can call"):
+            planner.solve(task, 60)
+    finally:
+        over.set()
+        thread.join()

@@ -345,10 +345,12 @@ class PathPlanning(Functions):
         task, problem = self._task(handle), self._problem(handle)
 
         def plan() -> Any:
-            restore = self._services.keep_places()
+            restore, turns = self._services.keep_places(), self._services.turns
+            leave, turns.leave = turns.leave, lambda: False  # a thread cannot be switched inside OMPL
             try:
                 return action(problem)
             finally:
+                turns.leave = leave
                 restore()
 
         result = plan() if task.callback else self._services.outside(plan)
