@@ -492,6 +492,7 @@ OMPL = {
     "getStateSpaceDimension": [Example("NAME(TASK)", [2])],
     "setAlgorithm": [Example("NAME(TASK, simOMPL.Algorithm.RRTConnect)", [])],
     "setCollisionPairs": [Example("NAME(TASK, {})", [])],
+    "printTaskInfo": [Example("NAME(TASK)", [])],
     "setVerboseLevel": [Example("NAME(TASK, 1)", [])],
     "setStateValidityCheckingResolution": [Example("NAME(TASK, 0.01)", [])],
     "setStateValidationCallback": [Example("NAME(TASK, '')", [])],

@@ -760,7 +760,7 @@ REACHES = {
         simRemoteApi: reset start status stop""",
     "plan": """
         simOMPL: addGoalState compute createStateSpace createStateSpaceForJoint createTask destroyStateSpace destroyTask
-        drawPath removeDrawingObjects
+        drawPath printTaskInfo removeDrawingObjects
         getPath getPathState getPathStateCount getStateSpaceDimension hasApproximateSolution hasExactSolution
         interpolatePath isStateValid readState setAlgorithm setCollisionPairs setDubinsParams setGoalState setGoalStates
         setStartState setStateSpace setStateSpaceForJoints setStateValidationCallback

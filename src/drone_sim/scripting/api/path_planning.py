@@ -22,6 +22,7 @@ from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.matrices import unit
 from drone_sim.scripting.api.planning_problem import SIZES, SUBSTITUTES, WITH_THREADS, Component, Problem
 from drone_sim.scripting.api.types import Callback, Handle, Name, Number, Numbers, ThreeNumbers, WrongValue, numbers
+from drone_sim.scripting.script_log import say
 
 simOMPL = Module("simOMPL")
 _ALGORITHM, _KIND = "ompl_algorithm_", "ompl_statespacetype_"
@@ -135,6 +136,7 @@ class PathPlanning(Functions):
         self._spaces[stateSpace] = after
         for task in self._tasks.values():
             task.components = [after if part is before else part for part in task.components]
+            task.problem = None
 
     def _space(self, handle: int) -> Component:
         if handle not in self._spaces:
@@ -153,6 +155,13 @@ class PathPlanning(Functions):
         """Remove a task."""
         self._changed(task)
         del self._tasks[task]
+
+    @simOMPL("345")
+    def printTaskInfo(self, task: Handle) -> None:
+        """Write a task to the log."""
+        it = self._task(task)
+        kinds = ", ".join(part.kind for part in it.components)
+        say(f"{it.name}: {it.algorithm} in {kinds}, from {it.start} to {it.goals}, collision pairs {it.pairs}")
 
     @simOMPL("345")
     def setVerboseLevel(self, task: Handle, level: int) -> None:
