@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
@@ -150,7 +150,8 @@ class SceneServices:
     masses: Callable[[], Mapping[str, float]] = dict  # kg, of a vehicle's shapes
     inertias: Callable[[], Mapping[str, Inertia]] = dict  # of a vehicle's shapes, in their frames
     nearest: MeasureDistance = lambda *_: None
-    keep_places: Callable[[], Restore] = lambda: lambda: None  # returns a function that undoes all movements
+    # Returns a function that undoes the movements of these objects, or of any (None).
+    keep_places: Callable[[Collection[int] | None], Restore] = lambda _: lambda: None
 
 
 class Functions:

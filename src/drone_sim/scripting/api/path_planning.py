@@ -353,8 +353,10 @@ class PathPlanning(Functions):
         """Return the result of a search; afterwards everything is where it was."""
         task, problem = self._task(handle), self._problem(handle)
 
+        moved = None if task.callback else [part.handle for part in task.components]
+
         def plan() -> Any:
-            restore, turns = self._services.keep_places(), self._services.turns
+            restore, turns = self._services.keep_places(moved), self._services.turns
             leave, turns.leave = turns.leave, lambda: False  # a thread cannot be switched inside OMPL
             try:
                 return action(problem)
