@@ -11,6 +11,7 @@ from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import SceneServices, ScriptContext
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_sim, make_sim_ros
+from drone_sim.scripting.api.registry import CHILD
 from drone_sim.scripting.api.windows import Windows
 from drone_sim.scripting.time_limit import TimeLimit
 
@@ -31,6 +32,7 @@ class Drone:
     """A Host."""
 
     sensors: ClassVar[dict] = {}
+    script_type = CHILD
 
     def __init__(self, scene, suffix="", own=None, also=()):
         self.context = scene
