@@ -222,7 +222,7 @@ class _Import:
             if (scripts or customization) and id(node) not in imported_ids:
                 self._report.add(node.name, "its script is not imported, because the object is not")
                 continue
-            entries = []
+            entries: dict[str, dict[str, Any]] = {}  # by object
             for script in scripts:
                 candidates = (node, self._by_handle.get(script.own_object))  # the first may have a script already
                 target = next((place for place in candidates if place is not None and id(place) not in scripted), None)
@@ -231,15 +231,11 @@ class _Import:
                     continue
                 scripted.add(id(target))
                 if target is not node or id(node) not in roots:
-                    entries.append(self._entry_of(script, target, target is not node or script.is_embedded))
+                    entries[target.name] = self._entry_of(script, target, target is not node or script.is_embedded)
             if customization is not None:
                 entry = self._entry_of(customization, node, customization.is_embedded, "customization")
-                own = next((other for other in entries if other["object"] == node.name), None)
-                if own is None:
-                    entries.append(entry)
-                else:
-                    own.update({**entry, **own})
-            yield from entries
+                entries[node.name] = {**entry, **entries.get(node.name, {})}
+            yield from entries.values()
 
     def _entry_of(self, script: VrepScript, target: Placed, embedded: bool, key: str = "script") -> dict[str, Any]:
         entry: dict[str, Any] = {"object": target.name, key: self.script_files.write(target.name, script)}
