@@ -47,10 +47,13 @@ def warn(path: str, functions: Collection[str], customizes: bool = False) -> Non
 
     `customizes`: whether it is a customization script.
     """
+    never = _ELSEWHERE if customizes else _ELSEWHERE | _IN_CUSTOMIZATION
+    found = sorted(never.intersection(functions))
+    if found:
+        are = "is" if len(found) == 1 else "are"
+        _LOG.warning("%s: %s %s never called here; these are: %s", path, ", ".join(found), are, _list_phases())
     for name in sorted(functions):
-        if name in _ELSEWHERE or (name in _IN_CUSTOMIZATION and not customizes):
-            _LOG.warning("%s: %s is never called here; these are: %s", path, name, _list_phases())
-        elif _intended_phase(name) is not None:
+        if name not in never and _intended_phase(name) is not None:
             _LOG.warning("%s: %s is never called; did you mean %s?", path, name, _intended_phase(name))
 
 
