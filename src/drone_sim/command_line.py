@@ -15,7 +15,7 @@ from drone_sim.scripting.errors import ScriptError
 FAILED, SIGNALLED = 1, 128  # exit statuses; shells add the signal's number: 130 after Ctrl-C
 EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # errors whose message is one line for the user
 # Packages that only some commands import, when they need them; `./dev.sh setup` does not install them.
-SEPARATE = ("av", "distributed", "jinja2", "matplotlib", "scipy")
+SEPARATE = ("av", "distributed", "jinja2", "matplotlib", "ompl", "scipy")
 
 
 class Parser(argparse.ArgumentParser):

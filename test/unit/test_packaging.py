@@ -30,6 +30,7 @@ KEYS = {
     "greenlet": "python3-greenlet-pip",
     "manifold3d": "python3-manifold3d-pip",
     "moderngl": "python3-moderngl-pip",
+    "ompl": "python3-ompl-pip",
     "pybullet": "python3-pybullet-pip",
     "pydantic": "python3-pydantic-pip",
     "tkinter": "python3-tk",

@@ -32,6 +32,7 @@ _EFFECTS = {  # of a missing module
     "av": "videos cannot be made",
     "jinja2": "`grade --html` writes no report",
     "distributed": "`--scheduler` does not work",
+    "ompl": "scripts have no simOMPL",
     "scipy": "`sweep --optimize` does not work",
     "tqdm": "`fly` does not work",
 }
