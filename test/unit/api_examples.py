@@ -509,6 +509,7 @@ OMPL = {
     "hasApproximateSolution": [Example("NAME(TASK)", [False])],
     "compute": [Example("NAME(TASK, 4, -1, 3)", [True, _STRAIGHT])],
     "isStateValid": [Example("NAME(TASK, {0,1})", [True])],
+    "isStateWithinBounds": [Example("NAME(TASK, {0,3})", [False])],
     "writeState": [Example("NAME(TASK, {0,0})", [])],
     "readState": [Example("NAME(TASK)", [near(0, 0)])],
     "getPathStateCount": [Example("NAME(TASK, {0,0, 1,0})", [2])],

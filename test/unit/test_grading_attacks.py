@@ -760,11 +760,11 @@ REACHES = {
         simRemoteApi: reset start status stop""",
     "plan": """
         simOMPL: addGoalState compute createStateSpace createStateSpaceForJoint createTask destroyStateSpace destroyTask
-        drawPath printTaskInfo removeDrawingObjects
-        getPath getPathState getPathStateCount getStateSpaceDimension hasApproximateSolution hasExactSolution
-        interpolatePath isStateValid readState setAlgorithm setCollisionPairs setDubinsParams setGoalState setGoalStates
-        setStartState setStateSpace setStateSpaceForJoints setStateValidationCallback
-        setStateValidityCheckingResolution setVerboseLevel setup simplifyPath solve writeState""",
+        drawPath printTaskInfo removeDrawingObjects getPath getPathState getPathStateCount getStateSpaceDimension
+        hasApproximateSolution hasExactSolution interpolatePath isStateValid isStateWithinBounds readState setAlgorithm
+        setCollisionPairs setDubinsParams setGoalState setGoalStates setStartState setStateSpace setStateSpaceForJoints
+        setStateValidationCallback setStateValidityCheckingResolution setVerboseLevel setup simplifyPath solve
+        writeState""",
 }
 
 

@@ -251,7 +251,7 @@ class PathPlanning(Functions):
 
     def _add(self, to: dict[int, Any], item: Any) -> int:
         if len(to) >= _MOST:
-            raise ValueError(f"a script may have at most {_MOST} of them")
+            raise ValueError(f"a script may have at most {_MOST} tasks, and {_MOST} state spaces")
         handle = next(self._handles)
         to[handle] = item
         return handle
@@ -352,7 +352,6 @@ class PathPlanning(Functions):
     def _plan(self, handle: int, action: Callable[[Problem], Any]) -> Any:
         """Return the result of a search; afterwards everything is where it was."""
         task, problem = self._task(handle), self._problem(handle)
-
         moved = None if task.callback else [part.handle for part in task.components]
 
         def plan() -> Any:
@@ -384,9 +383,14 @@ class PathPlanning(Functions):
 
     @simOMPL("345")
     def isStateValid(self, task: Handle, state: Numbers) -> Any:
-        """Return whether a state is within the bounds and valid: free of collisions, or as the callback says."""
+        """Return whether a state is valid: free of collisions, or as the script's function says."""
         values = self._state(task, state)
         return self._answer(self._plan(task, lambda problem: problem.is_state_valid(values)))
+
+    @simOMPL("45")
+    def isStateWithinBounds(self, task: Handle, state: Numbers) -> bool:
+        """Return whether a state is within the bounds of the state spaces."""
+        return self._problem(task).is_within_bounds(self._state(task, state))
 
     @simOMPL("45")
     def getPathStateCount(self, task: Handle, path: Numbers) -> int:

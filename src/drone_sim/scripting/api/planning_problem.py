@@ -121,9 +121,11 @@ class Problem:
         return [self._space.getValueAddressAtIndex(state, index) for index in range(self._size)]
 
     def is_state_valid(self, numbers: Sequence[float]) -> bool:
-        """Return whether a state is within the bounds, and valid."""
-        state = self._state(numbers)
-        return bool(self._info.satisfiesBounds(state) and self._info.isValid(state))
+        """Return whether a state is valid, also beyond the bounds."""
+        return bool(self._info.isValid(self._state(numbers)))
+
+    def is_within_bounds(self, numbers: Sequence[float]) -> bool:
+        return bool(self._info.satisfiesBounds(self._state(numbers)))
 
     # ---- paths
 
