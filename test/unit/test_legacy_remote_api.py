@@ -66,7 +66,10 @@ class Stage:
             "script": str(script),
             "vehicles": {"drone": {}, "other": {"position": [1, 1, 0.8]}},
             "cameras": {"floor": {"width": 6, "height": 4}},
-            "scene": {"objects": [{"shape": "box", "name": "Crate", "size": [0.2] * 3, "position": [3, 0, 0.09]}]},
+            "scene": {
+                "objects": [{"shape": "box", "name": "Crate", "size": [0.2] * 3, "position": [3, 0, 0.09]}],
+                "scripts": [{"object": "Crate", "customization": str(script.with_name("custom.py"))}],
+            },
             "remote_api": {"serve": True, "address": "127.0.0.1", "legacy_port": 0},
         }
         self.simulation = Simulation(parameters.load(values), started=False)
@@ -106,6 +109,7 @@ def free_port():
 def _theatre(tmp_path_factory):
     script, ports = tmp_path_factory.mktemp("legacy") / "script.py", [free_port(), free_port()]
     script.write_text(SCRIPT.replace("PORT", str(ports[0])).replace("OTHER", str(ports[1])))
+    script.with_name("custom.py").write_text("def sysCall_init(): pass\ndef same(*values): return values\n")
     stage = Stage(script)
     stage.ports = ports
     yield stage
@@ -508,8 +512,10 @@ def test_a_function_of_a_script_is_called(stage):
     given = ints(2, 1, 2, 3) + ints(1, 2) + floats(1.5) + text("ab") + text("c") + b"\xff\0x"
     key = ints(1) + text("Quadricopter") + text("turned")
     assert client.call(0x3401, key, given) == ints(2, 1, 2, 3, 2, 1) + floats(3) + text("AB") + text("C") + b"\xff\0x"
+    assert client.call(0x3401, ints(6) + text("Crate") + text("same"), given) == given
     nothing = ints(0, 0, 0, 0)
     for wrong, data in (
+        (ints(3) + text("Quadricopter") + text("turned"), nothing),
         (ints(6) + text("Quadricopter") + text("turned"), nothing),
         (ints(1) + text("Quadricopter") + text("wrong"), nothing),
         (ints(1) + text("Quadricopter") + text("absent"), nothing),
@@ -519,8 +525,9 @@ def test_a_function_of_a_script_is_called(stage):
     ):
         assert client.call(0x3401, wrong, data) == FAILED
     said = client.errors()
-    assert "must be sim_scripttype_childscript" in said[0] and "returned something else" in said[1]
-    assert len(said) == 6 and not any("\n" in one for one in said)
+    assert "must be sim_scripttype_childscript" in said[0] and "returned something else" in said[2]
+    assert "no customization script is attached to 'Drone'" in said[1]
+    assert len(said) == 7 and not any("\n" in one for one in said)
 
 
 def test_a_mistake_is_an_error_and_one_line_in_the_log(stage, caplog):

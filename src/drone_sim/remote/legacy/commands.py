@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from drone_sim.remote.legacy.request import Refused, Request, counted, floats, ints, raw, string, text, vector
+from drone_sim.scripting.api.registry import CHILD, CUSTOMIZATION
 
 _SCENE, _ALL, _PARENT, _WORLD = -12, -2, -11, -1  # sim.handle_...
 
@@ -396,16 +397,20 @@ _SIGNALS: Table = {
 # ---- simxCallScriptFunction: a call of a script with four lists of arguments and results
 
 _COUNTS = struct.Struct("<4i")
-_CHILD = 1  # sim.scripttype_childscript
 
 
 def _call_script(request: Request) -> bytes:
     kind, name, function = request.key
-    if kind & 0xF != _CHILD:
-        raise request.refused(f"type of script {kind}: must be sim_scripttype_childscript ({_CHILD})")
     function_name, _, object_name = function.partition("@")  # older programs append the object's name to the function's
-    script = request.sim("getScriptHandle", name or object_name)
-    returned = request.sim("callScriptFunction", function_name, script, *_arguments(request))
+    owner = name or object_name
+    if kind & 0xF == CUSTOMIZATION:
+        called: tuple[str, int] = f"{function_name}@{owner}", CUSTOMIZATION
+    elif kind & 0xF == CHILD:
+        called = function_name, request.sim("getScriptHandle", owner)
+    else:
+        allowed = f"sim_scripttype_childscript ({CHILD}) or sim_scripttype_customizationscript ({CUSTOMIZATION})"
+        raise request.refused(f"type of script {kind}: must be {allowed}")
+    returned = request.sim("callScriptFunction", *called, *_arguments(request))
     return _results(request, list(returned) if isinstance(returned, tuple) else [returned])
 
 
