@@ -107,7 +107,7 @@ class PathPlanning(Functions):
         if refObjectHandle != -1:
             self._objects[refObjectHandle]
         component = Component(kind, objectHandle, low, high, bool(useForProjection), weight, refObjectHandle)
-        return self._add(self._spaces, component)
+        return self._store(self._spaces, component)
 
     @simOMPL("45")
     def createStateSpaceForJoint(
@@ -148,7 +148,7 @@ class PathPlanning(Functions):
     @simOMPL("345")
     def createTask(self, name: Name) -> int:
         """Create a planning task; return its handle."""
-        return self._add(self._tasks, _Task(name))
+        return self._store(self._tasks, _Task(name))
 
     @simOMPL("345")
     def destroyTask(self, task: Handle) -> None:
@@ -249,7 +249,7 @@ class PathPlanning(Functions):
         """
         self._changed(task).callback = callback or ""
 
-    def _add(self, to: dict[int, Any], item: Any) -> int:
+    def _store(self, to: dict[int, Any], item: Any) -> int:
         if len(to) >= _MOST:
             raise ValueError(f"a script may have at most {_MOST} tasks, and {_MOST} state spaces")
         handle = next(self._handles)
