@@ -12,8 +12,8 @@ from drone_sim.context import SimulationContext
 from drone_sim.hosting.child_scripts import AttachedScript, ChildScript, HostedScript
 from drone_sim.mechanics.object_names import plain
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.scene import Scene
+from drone_sim.scene.scene_parameters import AttachedScriptParameters
 from drone_sim.scripting.api.host import Operations
 from drone_sim.scripting.api.registry import CHILD, CUSTOMIZATION
 from drone_sim.scripting.errors import ScriptError
