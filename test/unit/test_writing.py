@@ -145,9 +145,11 @@ KNOWN = {
     "editing/drafts.py": 3,  # its own draft
     "files/containment.py": 2,
     "files/writing.py": 3,  # its own temporary files
+    "grading/classroom.py": 2,  # two fixed names, and a temporary file
     "grading/jobs/job.py": 3,  # named by hashes
     "grading/submissions/archive.py": 1,  # a temporary folder, which is named by a hash
     "importing/cache.py": 1,  # a temporary folder, which is named by a hash
+    "ros/cockpit/classroom.py": 1,  # its own report
     "ros/cockpit/editor/script_store.py": 3,  # checked by `_checked` and `_place`
     "ros/cockpit/server/address.py": 3,  # named by the port, and a temporary file
     "world/assemblies.py": 1,  # temporary files of BulletFiles

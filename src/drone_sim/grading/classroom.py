@@ -6,7 +6,6 @@ teachers can list. Students can write whatever they like there, so only the owne
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import pwd
@@ -59,17 +58,14 @@ def report(path: Path, texts: dict[str, str], picture: str) -> None:
 
 
 def reports(room: Path) -> dict[str, dict[str, str]]:
-    """Return the latest report of each user, by the owner of the files; remove the reports of ended simulators."""
+    """Return the latest report of each user whose simulator runs, by the owner of the files."""
     latest: dict[int, tuple[float, dict[str, Any]]] = {}
     for path in (room / _REPORTS).glob("*.json"):
         try:
             owner, changed, content = _read(path)
         except (OSError, ValueError, RecursionError):
             continue
-        if time.time() - changed > _OUTDATED:
-            with contextlib.suppress(OSError):
-                path.unlink()
-        elif owner not in latest or latest[owner][0] < changed:
+        if time.time() - changed < _OUTDATED and latest.get(owner, (0.0,))[0] < changed:
             latest[owner] = changed, content
     return {_name_of(owner): _checked(content) for owner, (_, content) in latest.items()}
 
