@@ -1,5 +1,6 @@
-"""One renderer for all tests that draw: compiling its shaders takes longer than most of them. What needs ROS."""
+"""Fixtures of several test files, and the options of all."""
 
+import contextlib
 import signal
 from importlib.util import find_spec
 
@@ -7,6 +8,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from drone_sim.render.renderer import Renderer
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 # The same examples every time, however slow the machine.
 settings.register_profile("same", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
@@ -21,6 +24,7 @@ if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
 
 @pytest.fixture(name="shared_renderer", scope="session")
 def _shared_renderer():
+    """Return one renderer for all tests that draw: compiling its shaders takes longer than most of them."""
     renderer = Renderer()
     yield renderer
     renderer.close()
@@ -30,6 +34,24 @@ def _shared_renderer():
 def _renderer(shared_renderer):
     shared_renderer.set_visuals(())
     return shared_renderer
+
+
+@pytest.fixture
+def new_simulation():
+    """Return a function that builds a simulation from parameters, and advances it by some steps.
+
+    The simulations are closed after the test.
+    """
+    with contextlib.ExitStack() as after_the_test:
+
+        def build(values=None, steps=0, **options):
+            simulation = Simulation(parameters.load(values), **options)
+            after_the_test.callback(simulation.close)
+            for _ in range(steps):
+                simulation.step()
+            return simulation
+
+        yield build
 
 
 def pytest_collection_modifyitems(items):

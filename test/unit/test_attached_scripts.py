@@ -487,13 +487,12 @@ def test_without_scripts_nothing_is_otherwise(build):
 # ---- docs/scripts.md
 
 
-def test_the_example_leads_the_drone_along_a_circle(tmp_path):
+def test_the_example_leads_the_drone_along_a_circle(tmp_path, new_simulation):
     page = DOCS.read_text(encoding="utf-8")
     scene, circle = (re.findall(rf"```{kind}\n(.*?)```", page, re.DOTALL)[-1] for kind in ("yaml", "lua"))
     (tmp_path / "scene.yaml").write_text(scene, encoding="utf-8")
     (tmp_path / "circle.lua").write_text(circle, encoding="utf-8")
     (tmp_path / "gate.py").write_text("def sysCall_init(): pass", encoding="utf-8")
-    simulation = Simulation(parameters.load({"scene_file": str(tmp_path / "scene.yaml")}), script="target")
+    simulation = new_simulation({"scene_file": str(tmp_path / "scene.yaml")}, script="target")
     path = flown(simulation, 240)
-    simulation.close()
     assert max(x for x, _, _ in path) > 0.4 and path[-1][1] > 0.5

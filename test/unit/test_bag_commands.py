@@ -118,19 +118,18 @@ def test_twists_are_obeyed_in_their_order_however_late_they_were_heard_of():
 
 
 @pytest.mark.parametrize("began", [0.0, 1.7e9])
-def test_the_same_flight_to_the_bit(tmp_path, capsys, began):
+def test_the_same_flight_to_the_bit(tmp_path, capsys, began, new_simulation):
     states = record(tmp_path / "flight.bag", began)
     out = tmp_path / "flight.yaml"
     assert bag_commands.main([str(tmp_path / "flight.bag"), str(out)]) == 0
     assert "9 commands: fly" in capsys.readouterr().out
     assert out.read_text().startswith("# fly --commands --set start=landed\n- {at: 0.2, takeoff: {}}\n")
-    simulation = Simulation(parameters.load(SETTINGS))
+    simulation = new_simulation(SETTINGS)
     found = timeline.read(str(out), simulation.parameters)
     for step, state in enumerate(states):
         found.apply(step, simulation.vehicles)
         simulation.step()
         assert simulation.drone.body.state == state, f"step {step}"
-    simulation.close()
 
 
 def one_line(capsys, *arguments):

@@ -28,15 +28,11 @@ SCENE = {
 @pytest.fixture(
     name="simulation", params=[None, {"model": "plumb_bob", "coefficients": [-0.2, 0.05]}], ids=["pinhole", "lens"]
 )
-def _simulation(request, tmp_path):
+def _simulation(request, tmp_path, new_simulation):
     scene = tmp_path / "scene.yaml"
     scene.write_text(yaml.safe_dump(SCENE))
     cameras = {"front": {"lens": request.param}} if request.param else {}
-    simulation = Simulation(parameters.load({"scene_file": str(scene), "cameras": cameras}))
-    for _ in range(5):
-        simulation.step()
-    yield simulation
-    simulation.close()
+    return new_simulation({"scene_file": str(scene), "cameras": cameras}, steps=5)
 
 
 def by_name(truth):

@@ -209,8 +209,8 @@ def test_a_drone_that_slides_or_hangs_on_a_wall_says_so(looked):
     assert looked.look().values["does"] == "touches Wall"
 
 
-def test_the_pilots_own_states_count_and_its_flying_is_looked_at():
-    simulation = Simulation(parameters.load({"start": "landed"}))
+def test_the_pilots_own_states_count_and_its_flying_is_looked_at(new_simulation):
+    simulation = new_simulation({"start": "landed"})
     simulation.step()
     assert doing(simulation.drone) == "landed"
     simulation.drone.ask("takeoff")
@@ -219,7 +219,6 @@ def test_the_pilots_own_states_count_and_its_flying_is_looked_at():
     assert doing(simulation.drone) == "flying"
     simulation.drone.body.hold()
     assert doing(simulation.drone) == "held"
-    simulation.close()
 
 
 def test_a_script_error_is_told_until_the_next_start(looked):
@@ -315,11 +314,11 @@ def test_a_vehicle_whose_script_has_failed_says_so_until_it_starts_again(looked,
 
 
 @pytest.mark.parametrize(("on", "is_part"), [("DronePosition", True), ("Wall", False)])
-def test_a_script_on_an_object_that_has_failed_is_an_error_with_its_line(tmp_path, on, is_part):
+def test_a_script_on_an_object_that_has_failed_is_an_error_with_its_line(tmp_path, on, is_part, new_simulation):
     script = tmp_path / "attached.py"
     script.write_text("def sysCall_actuation():\n    if sim.getSimulationTime() > 0.08: lost()\n")
     scene = {"objects": [WALL], "scripts": [{"object": on, "script": str(script)}]}
-    simulation = Simulation(parameters.load({"scene": scene}))
+    simulation = new_simulation({"scene": scene})
     player = Player(simulation, simulation.step, lambda _: None, False)
     diagnosis = Diagnosis(player, Pacer(0.05, lambda: 0.0, lambda _: None), dict, False, lambda: 0.0)
     before, levels = simulation.snapshot(), []
@@ -334,7 +333,6 @@ def test_a_script_on_an_object_that_has_failed_is_an_error_with_its_line(tmp_pat
     assert len(lines) == 1 + is_part and all("attached.py:2: NameError" in one for one in lines)
     simulation.restore(before)
     assert doing(simulation.drone) == "flying"
-    simulation.close()
 
 
 def test_two_senders_at_once_are_named_and_a_change_of_the_sender_is_no_problem(looked):
@@ -389,7 +387,7 @@ ZEROS = """    -- update twist
 
 @pytest.mark.parametrize(("zeros", "follows"), [(ZEROS, False), ("", True)])
 @pytest.mark.parametrize("twist", [FORWARD, Twist(Vector3(0, 0, 0), Vector3(0, 0, 0.5))])
-def test_a_script_that_hears_commands_and_never_uses_them_is_told(tmp_path, zeros, follows, twist):
+def test_a_script_that_hears_commands_and_never_uses_them_is_told(tmp_path, zeros, follows, twist, new_simulation):
     """V-REP's tutorial, pasted literally, subscribes to cmd_vel and ignores every command."""
     lua = SCRIPT.with_name("tutorial_v3.lua").read_text()
     elevation = "    -- Elevation control\n"
@@ -397,7 +395,7 @@ def test_a_script_that_hears_commands_and_never_uses_them_is_told(tmp_path, zero
     seed = tmp_path / "seed.lua"
     seed.write_text(lua.replace(elevation, zeros + elevation))
     small = {"front": {"width": 16, "height": 12}}
-    simulation = Simulation(parameters.load({"script": str(seed), "cameras": small}))
+    simulation = new_simulation({"script": str(seed), "cameras": small})
     player, log, now = Player(simulation, simulation.step, lambda _: None, False), CommandLog(lambda: now), 0.0
     diagnosis = Diagnosis(player, Pacer(0.05, lambda: now, lambda _: None), lambda: {"drone": log}, False, lambda: now)
     simulation.drone.commands.receive(twist)
@@ -411,7 +409,6 @@ def test_a_script_that_hears_commands_and_never_uses_them_is_told(tmp_path, zero
             (found,) = (one for one in diagnosis.look() if one.name == "vehicle drone")
             levels.append(found.level)
     moved = simulation.drone.body.state.position[0], simulation.drone.body.state.angular_velocity[2]
-    simulation.close()
     assert (max(moved) > 0.1) == follows
     assert levels == ([OK] * 5 if follows else [OK, OK, OK, WARN, WARN])
     assert ("not followed" in found.message) == (not follows)

@@ -14,9 +14,7 @@ from matplotlib.figure import Figure
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.offline.fly import main, settings
 from drone_sim.offline.recording import COLUMNS
-from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
-from drone_sim.run.simulation import Simulation
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = """
@@ -56,14 +54,14 @@ def environment(**more):
 # ---- CSV
 
 
-def test_csv_holds_the_flight_to_the_last_bit(tmp_path, commands):
+def test_csv_holds_the_flight_to_the_last_bit(tmp_path, commands, new_simulation):
     out = tmp_path / "out.csv"
     assert main(["--commands", commands, "--duration", "1", "--csv", str(out)]) == 0
     header, rows = read_csv(out)
     assert header == list(COLUMNS)
     assert len(rows) == 21
 
-    simulation = Simulation(parameters.load())
+    simulation = new_simulation()
     for step, row in enumerate(rows):
         drone, state = simulation.drone, simulation.drone.body.state
         assert row[:14] == [simulation.time, *(number for part in state for number in part)]
@@ -75,7 +73,6 @@ def test_csv_holds_the_flight_to_the_last_bit(tmp_path, commands):
         if step == 3:
             drone.commands.receive(Twist(Vector3(1, 0, 0.2), Vector3(0, 0, 0.5)))
         simulation.step()
-    simulation.close()
 
 
 def test_numbers_are_as_short_as_they_can_be(tmp_path):

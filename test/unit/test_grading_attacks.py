@@ -14,8 +14,6 @@ from drone_sim.grading.jobs.flyer import Flyer
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.ownership import SceneValues
 from drone_sim.message_text import printable
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting import load
 from drone_sim.scripting.api.calls import contents
 from drone_sim.scripting.api.ignored import MODULES
@@ -778,14 +776,14 @@ def entered():
                 yield f"{module[:-1]}.{word}", reached
 
 
-def test_it_is_known_of_every_function_what_a_submission_reaches_by_it():
+def test_it_is_known_of_every_function_what_a_submission_reaches_by_it(new_simulation):
     found = {}
 
     def note(path, modules, *others):
         found.update({f"{name}.{key}": one for name, api in modules.items() for key, one in contents(api)[1].items()})
         return load.load(path, modules, *others)
 
-    simulation = Simulation(parameters.load(), load_script=note)
+    simulation = new_simulation(load_script=note)
     drone = simulation.drone
     actions = permissions.Actions(simulation, [drone], {drone.object_name})
     values = SceneValues(simulation, set())
@@ -814,4 +812,3 @@ def test_it_is_known_of_every_function_what_a_submission_reaches_by_it():
         else:
             assert needs is None and name not in values.checks, name
     assert {*reached} <= {*found}
-    simulation.close()

@@ -30,11 +30,9 @@ def test_the_drone_lands_on_floor_and_ground_alike(x):
     simulation.close()
 
 
-def test_it_slides_over_the_rim_of_the_floor():
-    simulation = Simulation(
-        parameters.load(
-            {"scene": {"objects": [{"shape": "sphere", "size": [0.1], "mass": 1, "position": [4, 0, 0.1]}]}}
-        )
+def test_it_slides_over_the_rim_of_the_floor(new_simulation):
+    simulation = new_simulation(
+        {"scene": {"objects": [{"shape": "sphere", "size": [0.1], "mass": 1, "position": [4, 0, 0.1]}]}}
     )
     simulation.drone.body.move(Pose((0.0, 3.0, 0.8)))
     ball = simulation.scene.things()["Sphere"].body
@@ -43,7 +41,6 @@ def test_it_slides_over_the_rim_of_the_floor():
         simulation.step()
         assert ball.state.position[2] == pytest.approx(0.1, abs=0.002)
     assert ball.state.position[0] > 6.0
-    simulation.close()
 
 
 def test_at_an_edge_it_falls_and_is_told_so_once(caplog):

@@ -241,14 +241,14 @@ def test_a_circle_of_joints_in_the_drone_is_refused(tmp_path):
         Simulation(parameters.load({"drone": {"urdf": str(tmp_path / "drone.urdf")}}))
 
 
-def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
+def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch, new_simulation):
     """By the check, by the world, by the renderer, and by the next start."""
     ball = trimesh.creation.icosphere()
     ball.export(str(tmp_path / "ball.stl"))
     (tmp_path / "scene.yaml").write_text("objects: [{shape: mesh, file: ball.stl, position: [9, 0, 1]}]")
     read, loaded = [], trimesh.load
     monkeypatch.setattr(trimesh, "load", lambda *given, **how: read.append(how["file_type"]) or loaded(*given, **how))
-    simulation = Simulation(parameters.load({"scene_file": str(tmp_path / "scene.yaml")}))
+    simulation = new_simulation({"scene_file": str(tmp_path / "scene.yaml")})
     for visual in simulation.world.pictures.visuals():
         load(visual)
     simulation.start()
@@ -258,21 +258,17 @@ def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
     os.utime(tmp_path / "ball.stl", ns=(1, 1))
     simulation.start()
     assert read.count("stl") == 2
-    simulation.close()
 
 
-def test_a_moving_mesh_of_80000_triangles_does_not_hold_up_a_step(tmp_path):
+def test_a_moving_mesh_of_80000_triangles_does_not_hold_up_a_step(tmp_path, new_simulation):
     """Bullet asks each of a hull's corners again and again: it is given few."""
     ball = trimesh.creation.icosphere(subdivisions=6)
     ball.export(str(tmp_path / "ball.stl"))
     corners = np.frombuffer(mesh_files.as_stl(str(tmp_path / "ball.stl"), hull=True)[84:], np.uint8)
     assert len(corners) / 50 * 3 < 300, "corners of the hull"
     (tmp_path / "scene.yaml").write_text("objects: [{shape: mesh, file: ball.stl, position: [5, 0, 3], mass: 1}]")
-    simulation = Simulation(parameters.load({"scene_file": str(tmp_path / "scene.yaml")}))
-    for _ in range(40):
-        simulation.step()
+    simulation = new_simulation({"scene_file": str(tmp_path / "scene.yaml")}, steps=40)
     assert simulation.scene.visuals()[1][0, 2, 3] == pytest.approx(1.0, abs=0.05), "it lies on the floor"
-    simulation.close()
 
 
 def test_a_disc_of_20000_triangles_is_flat_to_the_eye(tmp_path):

@@ -183,8 +183,8 @@ def test_automatic_exposure_is_the_same_whoever_looks():
     assert (decoded(flown(steady)[0][5]).mean() / decoded(always[5]).mean()) > 1.5, "it is bright, and follows that"
 
 
-def test_blades_blur_at_the_speed_at_which_they_are_seen_to_turn():
-    simulation = Simulation(parameters.load({}))
+def test_blades_blur_at_the_speed_at_which_they_are_seen_to_turn(new_simulation):
+    simulation = new_simulation({})
     drone, shutter = simulation.drone, Shutter(0.03, 0.0)
     track = drone.cameras["track"]
     for _ in range(10):
@@ -208,11 +208,10 @@ def test_blades_blur_at_the_speed_at_which_they_are_seen_to_turn():
     for number in range(1, 5):
         drone.propulsion.blades.turn(f"Quadricopter_propeller_joint{number}", 0.3)
     assert blurred() == 0
-    simulation.close()
 
 
-def test_it_is_tuned_in_flight_and_fails():
-    simulation = Simulation(parameters.load({"cameras": {"front": {"width": 80, "height": 60}}}))
+def test_it_is_tuned_in_flight_and_fails(new_simulation):
+    simulation = new_simulation({"cameras": {"front": {"width": 80, "height": 60}}})
     camera, tuning = simulation.drone.cameras["front"], simulation.child_scripts["drone"].tuning
     perfect = camera.take()
     tuning.change({"cameras/front/exposure/time": 0.0025, "cameras/front/noise/full_well": 1e6})
@@ -231,7 +230,6 @@ def test_it_is_tuned_in_flight_and_fails():
     assert not np.array_equal(camera.look(), kept), "noise is another one at another time"
     simulation.drone.change_faults({"sensors": {"front": "silent"}})
     assert not camera.look().any()
-    simulation.close()
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,7 @@ def objects(content):
 # ---- objects
 
 
-def test_shapes_in_their_tree(imported):
+def test_shapes_in_their_tree(imported, new_simulation):
     sphere = shape(
         1,
         "Ball",
@@ -90,11 +90,8 @@ def test_shapes_in_their_tree(imported):
     assert found["Ball"]["alias"] == "ball" and found["Ball"]["size"] == [0.1] and found["Ball"]["mass"] == 0.5
     assert found["Ball"]["inertia"] == {"moments": [0.005, 0.01, 0.015], "position": [0.0, 0.0, 0.05]}
     assert found["Ball"]["position"] == [0.0, 0.0, 1.0] and found["Ball"]["parent"] == "Box"
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
-    for _ in range(40):
-        simulation.step()
+    simulation = new_simulation({"scene_file": str(imported.scene)}, steps=40)
     matrix = simulation.scene.things()["Ball"].matrix()
-    simulation.close()
     assert matrix[11] == pytest.approx(0.1, abs=0.01), "the tree does not weld"
 
 
@@ -215,13 +212,11 @@ def test_the_floor_the_step_and_gravity(imported):
         parameters.load().in_scene(str(imported.scene))
 
 
-def test_nobody_flies_in_a_file_without_a_quadricopter_unless_that_is_asked_for(imported, tmp_path):
+def test_nobody_flies_in_a_file_without_a_quadricopter_unless_that_is_asked_for(imported, tmp_path, new_simulation):
     ball = shape(1, "Ball", mesh("sphere", (0.2, 0.2, 0.2)), at=(0, 0, 2), dynamic=True, wrapper=weight(1.0))
     imported(ball, script(1, "sim.setFloatSignal('height', sim.getObjectPosition(sim.getObject('/Ball'), -1)[3])"))
     scene = {"scene_file": str(imported.scene)}
-    simulation = Simulation(parameters.load(scene))
-    for _ in range(20):
-        simulation.step()
+    simulation = new_simulation(scene, steps=20)
     assert not simulation.vehicles
     assert simulation.scene.things()["Ball"].matrix()[11] == pytest.approx(0.1, abs=0.01), "on the floor"
     assert simulation.context.signals.get(float, "height") == 2.0
@@ -231,7 +226,6 @@ def test_nobody_flies_in_a_file_without_a_quadricopter_unless_that_is_asked_for(
     simulation.step()
     assert simulation.drone.name == "guest"
     assert simulation.set_vehicles({}) == ([], ["guest"])
-    simulation.close()
     assert parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).fleet == ()
     assert [one.name for one in parameters.load({**scene, "vehicles": 1}).fleet] == ["drone1"]
     with pytest.raises(parameters.ParameterError, match=r"scene\.yaml: the scene has no vehicle \(vehicles: {}\)"):
@@ -256,7 +250,7 @@ def test_of_two_objects_of_one_name_the_second_gets_a_free_one(imported, objects
     Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False).close()
 
 
-def test_scripts_on_each_other_have_an_object_each(imported):
+def test_scripts_on_each_other_have_an_object_each(imported, new_simulation):
     def scripted(handle, name, parent):
         own = script(99, f"function sysCall_init() sim.setInt32Signal('{name}', 1) end", tag="Soo")
         return scene_object("SCT", handle, name, parent=parent, own=own, alias="Script")
@@ -266,9 +260,8 @@ def test_scripts_on_each_other_have_an_object_each(imported):
     )
     assert sorted(one["object"] for one in content["scripts"]) == ["D", "on", "two"]
     values = {"scene_file": str(imported.scene), "vehicles": {"drone": {}}}
-    simulation = Simulation(parameters.load(values))
+    simulation = new_simulation(values)
     found = [simulation.context.signals.get(int, name) for name in ("one", "two", "on")]
-    simulation.close()
     assert found == [1, 1, 1]
 
 
@@ -345,14 +338,13 @@ def _rigid(end=""):
 
 
 @pytest.mark.parametrize("end", ["", "#0", "#3"])
-def test_a_model_whose_names_a_drone_has_is_a_copy_and_its_scripts_find_its_own_objects(imported, end):
+def test_a_model_whose_names_a_drone_has_is_a_copy_and_its_scripts_find_its_own_objects(imported, end, new_simulation):
     copy = end or "#0"
     found = objects(imported(*_rigid(end), suffix=".ttm"))
     assert [*found] == [f"Quadricopter{copy}", *(f"Quadricopter_propeller_respondable{n}{copy}" for n in (1, 2))]
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": 1}))
+    simulation = new_simulation({"scene_file": str(imported.scene), "vehicles": 1})
     simulation.step()
     told = [simulation.context.signals.find(str(n)) for n in (1, 2)]
-    simulation.close()
     assert told == [f"Quadricopter_propeller_respondable{n}{copy} of Quadricopter{copy}" for n in (1, 2)]
 
 
@@ -364,13 +356,12 @@ def test_a_propeller_without_a_drone_finds_none_of_another_ones(imported, caplog
     assert "no object named 'Quadricopter_base#0'" in caplog.text
 
 
-def test_names_of_a_tree_that_has_a_suffix_here_are_found_from_outside_of_it(imported):
+def test_names_of_a_tree_that_has_a_suffix_here_are_found_from_outside_of_it(imported, new_simulation):
     code = "sim.setStringSignal('found', sim.getObjectName(sim.getObjectHandle('Arm')))"
     robot = scene_object("DMY", 0, "Drone"), scene_object("DMY", 1, "Arm", 0), scene_object("DMY", 2, "Eye")
     imported(*robot, script(2, f"function sysCall_init() {code} end"))
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": 1}))
+    simulation = new_simulation({"scene_file": str(imported.scene), "vehicles": 1})
     found = simulation.context.signals.find("found")
-    simulation.close()
     assert found == "Arm#0"
 
 
@@ -441,7 +432,7 @@ def test_paths_of_a_script_of_4_9_begin_at_the_script_which_is_an_object(importe
     assert told[".."] == "/Robot[1]/Arm" and told["../Eye"] == "/Robot[1]/Arm/Eye" and told[":"] == "/Robot[1]"
 
 
-def test_a_script_object_is_a_script_where_one_is_asked_for(imported):
+def test_a_script_object_is_a_script_where_one_is_asked_for(imported, new_simulation):
     own = script(99, "function twice(x) return 2 * x end", tag="Soo")
     scripted = scene_object("SCT", 20, "Script", parent=11, own=own, alias="Script")
     code = """
@@ -455,15 +446,14 @@ def test_a_script_object_is_a_script_where_one_is_asked_for(imported):
     end
     """
     imported(*_robots(scripted, script(0, code)))
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    simulation = new_simulation({"scene_file": str(imported.scene)})
     simulation.step()
     signals = simulation.context.signals
     found = [signals.get(int, name) for name in ("type", "by handle", "by path", "by object")]
-    simulation.close()
     assert found == [1, 8, 10, 12]
 
 
-def test_collections_are_found_by_their_names(imported, tmp_path):
+def test_collections_are_found_by_their_names(imported, tmp_path, new_simulation):
     items = collection_item(0, 1) + collection_item(2, 0, removes=True) + collection_item(77, 0)
     arm = chunk("GRP", chunk("Grn", text("arm")) + items + b"EOO")
     code = """
@@ -481,21 +471,20 @@ def test_collections_are_found_by_their_names(imported, tmp_path):
         }
     ]
     assert "arm: a collection: some of its objects are not imported" in imported.said
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    simulation = new_simulation({"scene_file": str(imported.scene)})
     simulation.save_scene(tmp_path / "saved.yaml")
     found = [name for name in simulation.context.objects.names if simulation.context.signals.find(name)]
     simulation.stop()
     simulation.start()
     assert found == ["Robot", "Arm", "Left", "Right"]
     assert [name for name in simulation.context.objects.names if simulation.context.signals.find(name)] == found
-    simulation.close()
     assert parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.collections[0].name == "arm"
 
 
 # ---- quadricopters
 
 
-def test_a_quadricopter_is_a_vehicle_with_its_own_masses_and_flies(imported):
+def test_a_quadricopter_is_a_vehicle_with_its_own_masses_and_flies(imported, new_simulation):
     """V-REP's own: its built-in law hovers at the velocity at which V-REP's does."""
     content = imported(*quadricopter(code=HOVER), compressed=True)
     vehicle = content["vehicles"]["drone"]
@@ -506,11 +495,8 @@ def test_a_quadricopter_is_a_vehicle_with_its_own_masses_and_flies(imported):
     assert rigid.mass == pytest.approx(0.52) and np.diag(rigid.inertia) == pytest.approx(
         [4.04e-3, 4.94e-3, 8.93e-3], rel=2e-3
     )
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
-    for _ in range(40):
-        simulation.step()
+    simulation = new_simulation({"scene_file": str(imported.scene)}, steps=40)
     height = simulation.drone.body.state.position[2]
-    simulation.close()
     assert height == pytest.approx(1.0, abs=0.02)
 
 
@@ -523,31 +509,27 @@ def test_a_scaled_one_has_the_propellers_of_its_size(imported):
     assert rigid.links["propeller_front_left"][3::4] == pytest.approx((0.119496, 0.119496, 0.0026), abs=1e-6)
 
 
-def test_a_script_of_a_scaled_propeller_reads_its_size_factor(imported):
+def test_a_script_of_a_scaled_propeller_reads_its_size_factor(imported, new_simulation):
     """The force goes with the cube of the size factor, as the mass does: it hovers at the unscaled one's velocity."""
     own = PROPELLER.replace("function sysCall_actuation()", "function sysCall_actuation()\n  local own = 'setObject'")
     content = imported(*quadricopter(scale=0.5, code=HOVER, propeller=own))
     assert len(content["scripts"]) == 4
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
-    for _ in range(40):
-        simulation.step()
+    simulation = new_simulation({"scene_file": str(imported.scene)}, steps=40)
     tree, operations = simulation.context.objects, simulation.operations
     factor = operations.factors(tree.handle("Quadricopter_propeller1"))
     height, begun = simulation.drone.body.state.position[2], simulation.drone.parameters.position[2]
-    simulation.close()
     assert factor == (0.5, 0.5, 0.5)
     assert height == pytest.approx(begun, abs=0.02)
 
 
-def test_a_scaled_object_of_the_scene_keeps_its_size_factor(imported):
+def test_a_scaled_object_of_the_scene_keeps_its_size_factor(imported, new_simulation):
     content = imported(shape(0, "Box", mesh(), base=numbers("_fa", "Sfa", 2.0)), shape(1, "Plain", mesh()))
     found = objects(content)
     assert found["Box"]["size_factor"] == 2 and "size_factor" not in found["Plain"]
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
+    simulation = new_simulation({"scene_file": str(imported.scene)}, started=False)
     handle = simulation.context.objects.handle("Box")
     simulation.operations.scale([handle], (1.5, 1.5, 1.5))
     assert simulation.operations.factors(handle) == (3, 3, 3)
-    simulation.close()
 
 
 def test_propellers_with_scripts_of_their_own_keep_them(imported):
@@ -558,7 +540,7 @@ def test_propellers_with_scripts_of_their_own_keep_them(imported):
     assert "propellers" not in content["vehicles"]["drone"]
 
 
-def test_a_target_in_the_world_is_the_target(imported):
+def test_a_target_in_the_world_is_the_target(imported, new_simulation):
     target = shape(90, "Quadricopter_target", mesh("sphere", (0.1,) * 3), at=(1, 2, 3), respondable=False)
     chunks = quadricopter()
     del chunks[2]  # the one that hangs on it
@@ -568,10 +550,9 @@ def test_a_target_in_the_world_is_the_target(imported):
         "parent": "",
         "position": [1.0, 2.0, 3.0],
     }
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
+    simulation = new_simulation({"scene_file": str(imported.scene)}, started=False)
     tree = simulation.context.objects
     place = tree.matrix(tree.handle("Quadricopter_target"))
-    simulation.close()
     assert place[3::4] == (1.0, 2.0, 3.0)
 
 
@@ -585,17 +566,16 @@ def test_names_without_a_suffix_mean_the_objects_of_the_copy(imported):
     Simulation(parameters.load({"scene_file": str(imported.scene)})).close()
 
 
-def test_several_keep_their_names_whatever_they_are_called(imported):
+def test_several_keep_their_names_whatever_they_are_called(imported, new_simulation):
     content = imported(*quadricopter(), *quadricopter(40, "#3", (2, 0, 1), "UAV"))
     first, second = content["vehicles"]["Quadricopter"], content["vehicles"]["UAV_3"]
     assert (first["suffix"], second["suffix"]) == (-1, 3)
     assert second["objects"]["Drone"] == {"name": "UAV#3"}
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
+    simulation = new_simulation({"scene_file": str(imported.scene)}, started=False)
     tree = simulation.context.objects
     found = [
         tree[tree.handle(name)] for name in ("UAV_propeller_respondable2#3", "Quadricopter_propeller_respondable2#3")
     ]
-    simulation.close()
     assert found[0] is found[1] and tree.matrix(tree.handle("UAV#3"))[3] == pytest.approx(2.0)
 
 
@@ -671,7 +651,7 @@ def test_one_that_begins_tilted_and_without_a_script(imported):
     assert "Quadricopter: has no child script" in imported.said
 
 
-def test_a_target_that_the_file_has_not_is_where_the_base_is(imported):
+def test_a_target_that_the_file_has_not_is_where_the_base_is(imported, new_simulation):
     """A body that lies on its side has a base that stands upright; so does the target that its scripts follow."""
     _root, base, _, *others = quadricopter()
     upright = (np.cos(0.75), 0, np.sin(0.75), 0)
@@ -686,10 +666,9 @@ def test_a_target_that_the_file_has_not_is_where_the_base_is(imported):
     )
     base = scene_object("DMY", 1, "Quadricopter_base", 0, (0, 0, 0.1), turned=upright)
     imported(side, base, *others)
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
+    simulation = new_simulation({"scene_file": str(imported.scene)}, started=False)
     tree = simulation.context.objects
     found, wanted = (tree.matrix(tree.handle(f"Quadricopter_{name}")) for name in ("target", "base"))
-    simulation.close()
     assert np.allclose(found, wanted, atol=1e-5) and wanted[10] == pytest.approx(1.0, abs=1e-5)
 
 
@@ -739,14 +718,13 @@ def test_files_of_lua_beside_a_scene_are_brought(beside, capsys):
     ]
 
 
-def test_a_script_is_not_called_as_the_helper_that_it_asks_for(imported, tmp_path, caplog):
+def test_a_script_is_not_called_as_the_helper_that_it_asks_for(imported, tmp_path, caplog, new_simulation):
     (tmp_path / "blimp.lua").write_text("return {lift = 3}")
     code = "function sysCall_init() sim.setInt32Signal('lift', require('blimp').lift) end"
     content = imported(scene_object("DMY", 0, "blimp"), script(0, code))
     assert content["scripts"][0]["script"] == "blimp_2.lua"
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    simulation = new_simulation({"scene_file": str(imported.scene)})
     assert simulation.context.signals.get(int, "lift") == 3
-    simulation.close()
     for folder in (tmp_path, tmp_path / "out"):
         (folder / "blimp.lua").unlink()
     imported(scene_object("DMY", 0, "blimp"), script(0, code))

@@ -48,12 +48,10 @@ objects:
 
 
 @pytest.fixture(name="simulation")
-def _simulation(tmp_path):
+def _simulation(tmp_path, new_simulation):
     file = tmp_path / "scene.yaml"
     file.write_text(SCENE, encoding="utf-8")
-    simulation = Simulation(parameters.load({"scene_file": str(file), "drone": {"position": [-5, 0, 1]}}))
-    yield simulation
-    simulation.close()
+    return new_simulation({"scene_file": str(file), "drone": {"position": [-5, 0, 1]}})
 
 
 def found(simulation, name):
@@ -215,7 +213,7 @@ def test_a_load_is_taken_up_and_let_go(simulation):
         found(simulation, "Beam").set_static(False)
 
 
-def test_what_hangs_on_a_chain_that_a_vehicle_carries_goes_with_it(tmp_path):
+def test_what_hangs_on_a_chain_that_a_vehicle_carries_goes_with_it(tmp_path, new_simulation):
     scene = tmp_path / "scene.yaml"
     scene.write_text("""
 objects:
@@ -226,7 +224,7 @@ objects:
   - {name: Hand, shape: box, size: [0.02, 0.02, 0.02], mass: 0.001, parent: Elbow, position: [0, 0, 0]}
   - {name: Ring, shape: box, size: [0.02, 0.02, 0.02], respondable: false, parent: Hand, position: [0, 0, -0.1]}
 """)
-    simulation = Simulation(parameters.load({"scene_file": str(scene)}))
+    simulation = new_simulation({"scene_file": str(scene)})
     tree, world = simulation.context.objects, simulation.world
     world.set_velocity(simulation.drone.body.number, (2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     for _ in range(3):
@@ -235,7 +233,6 @@ objects:
             there = world.state(tree[tree.handle(name)].number).position
             assert there == pytest.approx(frames.position(tree.matrix(tree.handle(name))), abs=1e-9)
     assert there[0] > 0.2
-    simulation.close()
 
 
 def caterpillar(count):
@@ -249,9 +246,8 @@ def caterpillar(count):
         yield {"name": f"Link{number}", **link, "position": [0, 0, 0]}
 
 
-def test_as_many_joints_hang_together_as_pybullet_counts():
-    simulation = Simulation(parameters.load({"scene": {"objects": list(caterpillar(127))}}))
+def test_as_many_joints_hang_together_as_pybullet_counts(new_simulation):
+    simulation = new_simulation({"scene": {"objects": list(caterpillar(127))}})
     simulation.step()
-    simulation.close()
     with pytest.raises(ParameterError, match="128 joints and force sensors in a chain from 'Body': at most 127"):
         Simulation(parameters.load({"scene": {"objects": list(caterpillar(128))}}))

@@ -16,9 +16,8 @@ from remote_client import official_client
 
 from drone_sim.editing.editor import SceneEditor
 from drone_sim.remote.server import RemoteApiServer
-from drone_sim.run import parameters
 from drone_sim.run.player import Player
-from drone_sim.run.simulation import Simulation, give_back_memory
+from drone_sim.run.simulation import give_back_memory
 
 TIMES = int(os.environ.get("DRONE_SIM_TIMES", "2"))
 OFTEN = 50  # from where on memory is flat
@@ -87,7 +86,7 @@ exec(CHANGES, given)  # what the client does
 
 
 @pytest.fixture(name="simulation")
-def _simulation(tmp_path, monkeypatch):
+def _simulation(tmp_path, monkeypatch, new_simulation):
     """Give a stopped simulation of a scene with one object of each kind, flown by a script that changes them."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "changes.py").write_text(SCRIPT, encoding="utf-8")
@@ -100,9 +99,8 @@ def _simulation(tmp_path, monkeypatch):
     scene = {**gate, "objects": [*SCENE["objects"], *gate["objects"], {"name": "Way", **KINDS["path"]}]}
     (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene), encoding="utf-8")
     values = {"scene_file": str(tmp_path / "scene.yaml"), "drone": {"position": [0, 0, 2]}, "script_time_limit": 0.0}
-    made = Simulation(parameters.load(values), script=str(tmp_path / "changes.py"), started=False)
-    yield made
-    made.close()
+    made = new_simulation(values, script=str(tmp_path / "changes.py"), started=False)
+    return made
 
 
 def resources():

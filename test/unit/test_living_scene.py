@@ -8,9 +8,6 @@ import pytest
 import yaml
 from living import KINDS, SCENE, picture, simulate, sizes
 
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
-
 TIMES = 20
 
 
@@ -228,14 +225,12 @@ def sysCall_sensing():
 """
 
 
-def test_a_script_makes_and_changes_objects(tmp_path, caplog, monkeypatch):
+def test_a_script_makes_and_changes_objects(tmp_path, caplog, monkeypatch, new_simulation):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     caplog.set_level("INFO")
     path = tmp_path / "makes.py"
     path.write_text(SCRIPT, encoding="utf-8")
-    simulation = Simulation(
-        parameters.load({"drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}), script=str(path)
-    )
+    simulation = new_simulation({"drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}, script=str(path))
     simulation.step()
     assert caplog.messages == [
         "(1, [1.0, 0.0, 0.0]) 1.0 [0.2, 0.2, 0.2]",
@@ -251,4 +246,3 @@ def test_a_script_makes_and_changes_objects(tmp_path, caplog, monkeypatch):
     simulation.stop()
     assert "Box" not in simulation.context.objects and pybullet.getNumBodies(simulation.world._client) == bodies - 2
     assert math.isfinite(simulation.drone.body.state.position[2])
-    simulation.close()

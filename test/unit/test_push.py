@@ -11,13 +11,11 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 @pytest.fixture(name="floating")
-def _floating(tmp_path):
+def _floating(tmp_path, new_simulation):
     """Give a drone at rest without weight and with its propellers off."""
     script = tmp_path / "idle.py"
     script.write_text("def sysCall_init(): pass\n")
-    simulation = Simulation(parameters.load({"gravity": 0.0, "drone": {"position": [0, 0, 5]}}), script=str(script))
-    yield simulation
-    simulation.close()
+    return new_simulation({"gravity": 0.0, "drone": {"position": [0, 0, 5]}}, script=str(script))
 
 
 def step(simulation, count):

@@ -24,8 +24,6 @@ from drone_sim.ros.node import diagnostics, scene_editing, services
 from drone_sim.ros.rviz import handles
 from drone_sim.ros.vehicle import cameras
 from drone_sim.ros.vehicle.inputs import VehicleInputs
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.commands import EMPTY, REQUESTS
 
 
@@ -41,10 +39,9 @@ class OwnThreadOnly:
 
 
 @pytest.fixture
-def simulation():
-    made = Simulation(parameters.load({"script": ""}))
-    yield OwnThreadOnly(made)
-    made.close()
+def simulation(new_simulation):
+    made = new_simulation({"script": ""})
+    return OwnThreadOnly(made)
 
 
 @pytest.fixture
@@ -143,8 +140,8 @@ def test_a_handle_is_dragged_without_the_simulation(simulation, callbacks, made)
     assert simulation.drone.body.state.position[0] == pytest.approx(2.0 if is_moved else 0.0, abs=1e-3)
 
 
-def test_faults_checked_for_a_vehicle_that_was_replaced_are_refused_in_one_line(callbacks, caplog):
-    simulation = Simulation(parameters.load({"vehicles": {"drone": {"sensors": {"imu": {"kind": "imu", "rate": 20}}}}}))
+def test_faults_checked_for_a_vehicle_that_was_replaced_are_refused_in_one_line(callbacks, caplog, new_simulation):
+    simulation = new_simulation({"vehicles": {"drone": {"sensors": {"imu": {"kind": "imu", "rate": 20}}}}})
     inbox = Inbox()
     inputs = VehicleInputs(simulation, simulation.drone.parameters, inbox)
     callbacks["drone/faults"](KeyValue("sensors/imu", "silent"))
@@ -152,13 +149,12 @@ def test_faults_checked_for_a_vehicle_that_was_replaced_are_refused_in_one_line(
     for vehicles in ({"other": {}}, {"drone": {}}):
         simulation.set_vehicles(vehicles)
     inbox.run_jobs()
-    simulation.close()
     assert inputs.log.is_refusing("faults") and "imu" in inputs.log.refused["faults"].why
     assert not [one for one in caplog.records if one.exc_info]
 
 
-def test_every_propeller_of_a_hexacopter_may_fail_by_a_message(callbacks):
-    simulation = Simulation(parameters.load({"config": "package://drone_sim/config/hexacopter.yaml"}))
+def test_every_propeller_of_a_hexacopter_may_fail_by_a_message(callbacks, new_simulation):
+    simulation = new_simulation({"config": "package://drone_sim/config/hexacopter.yaml"})
     inbox = Inbox()
     inputs = VehicleInputs(simulation, simulation.drone.parameters, inbox)
     callbacks["drone/faults"](KeyValue("propellers", "[1, 1, 1, 1, 1, 0]"))
@@ -166,7 +162,6 @@ def test_every_propeller_of_a_hexacopter_may_fail_by_a_message(callbacks):
     assert simulation.drone.faults.now.propellers == (1, 1, 1, 1, 1, 0)
     callbacks["drone/faults"](KeyValue("propellers", "[1, 1, 1, 1, 1]"))
     assert inputs.log.is_refusing("faults")
-    simulation.close()
 
 
 def test_a_picture_that_cannot_be_encoded_does_not_end_the_encoder(monkeypatch):

@@ -9,8 +9,6 @@ import numpy as np
 
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.render.renderer import Renderer
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 STEPS = 600
 # SHA-256 of position, orientation and velocities after every step. The same with the wheel of PyBullet for Python 3.11
@@ -19,8 +17,8 @@ FLIGHT = "e5a9ffa0127df7472a5f05fa496d9263adc83439b838267748897c588c9e382e"
 PICTURE = Path(__file__).parent / "front_camera.png"  # made by Mesa 22.3 with LLVM 15, and by Mesa 25.0 with LLVM 19
 
 
-def test_the_tutorials_flight_is_the_same_to_the_last_bit():
-    simulation = Simulation(parameters.load())
+def test_the_tutorials_flight_is_the_same_to_the_last_bit(new_simulation):
+    simulation = new_simulation()
     flown = hashlib.sha256()
     for step in range(STEPS):
         if step == 20:
@@ -29,15 +27,13 @@ def test_the_tutorials_flight_is_the_same_to_the_last_bit():
             simulation.drone.commands.receive(Twist())
         simulation.step()
         flown.update(struct.pack("13d", *(number for part in simulation.drone.body.state for number in part)))
-    simulation.close()
     assert flown.hexdigest() == FLIGHT
 
 
-def test_a_picture_is_the_same():
+def test_a_picture_is_the_same(new_simulation):
     size = {"width": 160, "height": 120}
-    simulation = Simulation(parameters.load({"cameras": {"front": size}}))
+    simulation = new_simulation({"cameras": {"front": size}})
     shown = simulation.drone.cameras["front"].look().astype(int)
-    simulation.close()
     expected = cv2.cvtColor(cv2.imread(str(PICTURE)), cv2.COLOR_BGR2RGB).astype(int)
     differences = np.abs(shown - expected)
     # Exact where llvmpipe draws with the vectors that it drew with. Others filter the floor in their own way: on arm64,

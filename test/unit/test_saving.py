@@ -13,7 +13,6 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
-from drone_sim.run.simulation import Simulation
 
 SCENE = """
 floor: {size: 20, texture: pictures/tile.png}
@@ -35,10 +34,8 @@ def _scene(tmp_path):
 
 
 @pytest.fixture(name="simulation")
-def _simulation(scene):
-    simulation = Simulation(parameters.load({"scene_file": str(scene)}))
-    yield simulation
-    simulation.close()
+def _simulation(scene, new_simulation):
+    return new_simulation({"scene_file": str(scene)})
 
 
 def files(path):
@@ -65,15 +62,14 @@ def test_what_its_author_wrote_stays_and_another_file_stays_beside_it(simulation
     assert not scene.with_name("scene.yaml.bak").exists()
 
 
-def test_what_was_taken_off_and_put_upright_is_so_when_it_is_loaded(tmp_path):
+def test_what_was_taken_off_and_put_upright_is_so_when_it_is_loaded(tmp_path, new_simulation):
     above = {"name": "Above", "kind": "dummy", "position": [0, 0, 1]}
     below = {"name": "Below", "kind": "dummy", "position": [0, 0, 1], "rpy": [0, 0, 1], "parent": "Above"}
-    simulation = Simulation(parameters.load({"scene": {"objects": [above, below]}}))
+    simulation = new_simulation({"scene": {"objects": [above, below]}})
     one = simulation.scene.things()["Below"]
     one.parent = None
     one.put(frames.from_rpy((1, 2, 3), (0, 0, 0)))
     simulation.save_scene(tmp_path / "saved.yaml")
-    simulation.close()
     again = parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.objects[1]
     assert (again.parent, again.position, again.rpy) == ("", (1, 2, 3), (0, 0, 0))
 
@@ -87,12 +83,11 @@ def test_saved_elsewhere_they_are_found_all_the_same(simulation, scene, tmp_path
     assert parameters.load({"scene_file": str(there)}).scene == parameters.load({"scene_file": str(scene)}).scene
 
 
-def test_names_given_beside_a_file_are_found_from_another_folder(tmp_path, monkeypatch, scene):
+def test_names_given_beside_a_file_are_found_from_another_folder(tmp_path, monkeypatch, scene, new_simulation):
     monkeypatch.chdir(tmp_path)
     ball = {"shape": "mesh", "file": "ball.stl", "position": [3, 0, 1]}
-    simulation = Simulation(parameters.load({"scene": {"objects": [ball]}}))
+    simulation = new_simulation({"scene": {"objects": [ball]}})
     simulation.save_scene(tmp_path / "there" / "scene.yaml")
-    simulation.close()
     monkeypatch.chdir("/")
     (again,) = parameters.load({"scene_file": str(tmp_path / "there" / "scene.yaml")}).scene.objects
     assert again.file == str(tmp_path / "ball.stl")
@@ -132,8 +127,7 @@ def test_a_full_disk_leaves_the_last_scene(simulation, scene, monkeypatch):
     "path", sorted((package_path() / "config" / "scenes").glob("*.yaml")), ids=lambda one: one.stem
 )
 @pytest.mark.parametrize("started", [False, True])
-def test_a_shipped_scene_is_saved_as_it_was_written(path, started, tmp_path):
-    simulation = Simulation(parameters.load({"scene_file": str(path)}), started=started)
+def test_a_shipped_scene_is_saved_as_it_was_written(path, started, tmp_path, new_simulation):
+    simulation = new_simulation({"scene_file": str(path)}, started=started)
     simulation.save_scene(tmp_path / path.name)
-    simulation.close()
     assert (tmp_path / path.name).read_bytes() == path.read_bytes()

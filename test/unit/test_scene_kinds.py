@@ -218,18 +218,17 @@ def test_a_vision_sensor_sees_one_entity_alone_or_handles(simulate):
     assert sim.getObjectInt32Param(eye, sim.visionintparam_entity_to_render) == finger
 
 
-def test_it_begins_anew_is_saved_and_comes_back_with_a_snapshot(simulate, tmp_path):
+def test_it_begins_anew_is_saved_and_comes_back_with_a_snapshot(simulate, tmp_path, new_simulation):
     simulation = simulate(SCENE)
     sim, objects = sim_of(simulation), simulation.context.objects
     sim.setJointPosition(objects.handle("Slide"), 1)
     sim.setObjectParent(objects.handle("Finger"), objects.handle("Quadricopter_base"), True)
     simulation.step()
     simulation.save_scene(tmp_path / "saved.yaml")
-    again = Simulation(parameters.load({"scene_file": str(tmp_path / "saved.yaml")}))
+    again = new_simulation({"scene_file": str(tmp_path / "saved.yaml")})
     for handle in objects:
         name = objects[handle].name
         assert found(again, name).matrix() == pytest.approx(objects[handle].matrix(), abs=1e-6), name
-    again.close()
     snapshot, before = simulation.snapshot(), place(simulation, "Finger")
     sim.setJointPosition(objects.handle("Slide"), 0)
     sim.setObjectPosition(objects.handle("Finger"), WORLD, [0, 0, 9])
@@ -342,21 +341,20 @@ def test_rviz_shows_dummies_as_balls_and_paths_as_lines(simulate):
     np.testing.assert_allclose(points, [(0, 9, 1.85), (3, 9, 1.85), (3, 13, 1.85)])
 
 
-def test_what_hung_on_a_vehicle_that_has_gone_stays_where_it_was(tmp_path):
+def test_what_hung_on_a_vehicle_that_has_gone_stays_where_it_was(tmp_path, new_simulation):
     file = tmp_path / "scene.yaml"
     file.write_text(
         "objects: [{name: Flag, shape: box, size: [0.1, 0.1, 0.1], parent: Drone#0, position: [0, 0, 0.3]}]",
         encoding="utf-8",
     )
     two = {"a": {"position": [0, 0, 1]}, "b": {"position": [2, 0, 1]}}
-    simulation = Simulation(parameters.load({"vehicles": two, "scene_file": str(file)}))
+    simulation = new_simulation({"vehicles": two, "scene_file": str(file)})
     simulation.step()
     simulation.set_vehicles({"a": two["a"]})
     simulation.step()
     assert place(simulation, "Flag") == pytest.approx((2, 0, 1.3), abs=1e-3)
     simulation.stop()
     assert place(simulation, "Flag") == pytest.approx((2, 0, 1.3))
-    simulation.close()
 
 
 DOCS = (Path(__file__).parents[2] / "docs/scenes.md").read_text(encoding="utf-8")

@@ -332,12 +332,12 @@ def test_pictures_follow_what_is_added_painted_moved_and_removed(renderer):
     world.close()
 
 
-def test_a_mesh_written_anew_is_seen_anew(tmp_path):
+def test_a_mesh_written_anew_is_seen_anew(tmp_path, new_simulation):
     """Its file is the same; what is in it is another thing after the next start."""
     mesh, scene = tmp_path / "thing.stl", tmp_path / "scene.yaml"
     scene.write_text("objects: [{shape: mesh, file: thing.stl, position: [2, 0, 0.8], color: [1, 0, 0, 1]}]\n")
     trimesh.creation.box((0.2, 0.2, 0.2)).export(mesh)
-    simulation = Simulation(parameters.load({"scene_file": str(scene)}))
+    simulation = new_simulation({"scene_file": str(scene)})
 
     def red():
         picture = simulation.drone.cameras["front"].look().astype(int)
@@ -347,7 +347,6 @@ def test_a_mesh_written_anew_is_seen_anew(tmp_path):
     trimesh.creation.box((0.8, 0.8, 0.8)).export(mesh)
     simulation.start()
     assert red() > 8 * small > 0
-    simulation.close()
 
 
 def test_a_heap_that_would_take_seconds_a_step_is_refused():
@@ -366,13 +365,12 @@ def test_a_heap_that_would_take_seconds_a_step_is_refused():
             Simulation(parameters.load({"scene": {"objects": [one] * 31}}))
 
 
-def test_copies_are_grouped_under_the_name_of_the_first():
+def test_copies_are_grouped_under_the_name_of_the_first(new_simulation):
     cuboid = {"name": "Cuboid", "shape": "box", "size": [1, 1, 1], "position": [2, 0, 1]}
-    simulation = Simulation(parameters.load({"scene": {"objects": [cuboid]}}))
+    simulation = new_simulation({"scene": {"objects": [cuboid]}})
     operations, tree = simulation.operations, simulation.tree
     copies = [operations.copy([tree.handle("Cuboid")])[0] for _ in range(2)]
     assert tree[operations.group(copies)].name == "Cuboid#0"
-    simulation.close()
 
 
 CHAIN = [
@@ -386,8 +384,8 @@ def position_of(simulation, name):
     return list(simulation.tree.matrix(simulation.tree.handle(name))[3::4])
 
 
-def test_an_operation_that_fails_in_flight_does_not_move_where_objects_start(monkeypatch):
-    simulation = Simulation(parameters.load({"scene": {"objects": CHAIN}}))
+def test_an_operation_that_fails_in_flight_does_not_move_where_objects_start(monkeypatch, new_simulation):
+    simulation = new_simulation({"scene": {"objects": CHAIN}})
     simulation.start()
     mark = simulation.tree.handle("Mark")
     simulation.tree.set_position(mark, WORLD, (5.0, 5.0, 5.0))
@@ -400,11 +398,10 @@ def test_an_operation_that_fails_in_flight_does_not_move_where_objects_start(mon
         simulation.operations.remove([simulation.tree.handle("Rod")])
     simulation.stop()
     assert position_of(simulation, "Mark") == [1, 1, 1]
-    simulation.close()
 
 
-def test_edits_made_while_stopped_stay_if_the_scene_cannot_be_rebuilt(monkeypatch):
-    simulation = Simulation(parameters.load({"scene": {"objects": CHAIN[:1]}}))
+def test_edits_made_while_stopped_stay_if_the_scene_cannot_be_rebuilt(monkeypatch, new_simulation):
+    simulation = new_simulation({"scene": {"objects": CHAIN[:1]}})
     simulation.start()
     simulation.stop()
     simulation.tree.set_position(simulation.tree.handle("Mark"), WORLD, (5.0, 5.0, 5.0))
@@ -416,4 +413,3 @@ def test_edits_made_while_stopped_stay_if_the_scene_cannot_be_rebuilt(monkeypatc
     monkeypatch.setattr(simulation, "_rebuild", fail)
     simulation.stop()
     assert position_of(simulation, "Mark") == [5, 5, 5]
-    simulation.close()

@@ -7,8 +7,6 @@ import pytest
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.calls import UnknownName
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import SceneServices
@@ -19,12 +17,10 @@ PICTURE = np.array([[[255, 0, 0]] * 3, [[0, 0, 255]] * 3], dtype=np.uint8)  # re
 
 
 @pytest.fixture(name="simulation")
-def _simulation(tmp_path):
+def _simulation(tmp_path, new_simulation):
     script = tmp_path / "still.py"
     script.write_text("", encoding="utf-8")
-    simulation = Simulation(parameters.load({"cameras": SMALL, "gravity": 0.0}), script=str(script))
-    yield simulation
-    simulation.close()
+    return new_simulation({"cameras": SMALL, "gravity": 0.0}, script=str(script))
 
 
 @pytest.fixture(name="sim")
@@ -224,17 +220,16 @@ def test_what_cannot_be_drawn_is_refused(drawings, sim):
         sim.addDrawingObject(31, 1)
 
 
-def test_the_next_run_begins_with_nothing_drawn(tmp_path):
+def test_the_next_run_begins_with_nothing_drawn(tmp_path, new_simulation):
     script = tmp_path / "draws.py"
     script.write_text(
         "def sysCall_init():\n    sim.addDrawingObjectItem(sim.addDrawingObject(sim.drawing_points, 1), [1, 2, 3])"
     )
     drawings = Drawings()
-    simulation = Simulation(parameters.load(), script=str(script), drawings=drawings)
+    simulation = new_simulation(script=str(script), drawings=drawings)
     assert len(drawings.objects) == 1
     simulation.stop()
     assert not drawings.objects
-    simulation.close()
 
 
 def test_unknown_functions_and_constants_list_the_near_ones(sim):
@@ -243,11 +238,11 @@ def test_unknown_functions_and_constants_list_the_near_ones(sim):
     assert not hasattr(sim, "nothing_of_the_kind")
 
 
-def test_a_script_sees_each_step_once(tmp_path):
+def test_a_script_sees_each_step_once(tmp_path, new_simulation):
     script = tmp_path / "look.py"
     look = "sim.getVisionSensorCharImage(sim.getObject('/FrontVision'))"
     script.write_text(f"def sysCall_sensing():\n    assert {look} == {look}", encoding="utf-8")
-    simulation = Simulation(parameters.load({"cameras": SMALL}), script=str(script))
+    simulation = new_simulation({"cameras": SMALL}, script=str(script))
     camera, taken = simulation.drone.cameras["front"], []
     take = camera.take
     camera.take = lambda *kind: taken.append(simulation.steps) or take(*kind)
@@ -255,5 +250,4 @@ def test_a_script_sees_each_step_once(tmp_path):
     simulation.step()
     camera.viewers.add(lambda: True)
     simulation.step()
-    simulation.close()
     assert taken == [1, 2, 3]

@@ -79,12 +79,10 @@ def sysCall_sensing():
 
 
 @pytest.fixture(name="simulation")
-def _simulation(tmp_path):
+def _simulation(tmp_path, new_simulation):
     script = tmp_path / "leaves.py"
     script.write_text(LEAVES, encoding="utf-8")
-    simulation = Simulation(parameters.load({"gravity": 0.0}), script=str(script), drawings=Drawings())
-    yield simulation
-    simulation.close()
+    return new_simulation({"gravity": 0.0}, script=str(script), drawings=Drawings())
 
 
 def test_a_parent_carries_what_is_drawn(simulation):

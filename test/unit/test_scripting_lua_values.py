@@ -5,8 +5,6 @@ import random
 import pytest
 
 from drone_sim.mechanics import frames
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.calls import Api
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.lua.script import LuaScript
@@ -101,7 +99,7 @@ def test_what_lua_cannot_take_is_an_error(call, result, words):
 
 
 @pytest.mark.parametrize("prologue", PROLOGUE.values())
-def test_lua_multiplies_matrices_as_python_does(tmp_path, prologue):
+def test_lua_multiplies_matrices_as_python_does(tmp_path, prologue, new_simulation):
     dice = random.Random(1)
     m = [dice.uniform(-2, 2) for _ in range(12)]
     v = [dice.uniform(-2, 2) for _ in range(3)]
@@ -116,10 +114,9 @@ def test_lua_multiplies_matrices_as_python_does(tmp_path, prologue):
     )
     path = tmp_path / "script.lua"
     path.write_text(source, encoding="utf-8")
-    simulation = Simulation(parameters.load(), script=str(path))
+    simulation = new_simulation(script=str(path))
     found = simulation.child_scripts["drone"].parameters
     assert found["product"] == list(frames.transform(m, v)) and found["inverse"] == list(frames.invert(m))
-    simulation.close()
 
 
 def test_what_counts_in_a_loop_may_be_set():

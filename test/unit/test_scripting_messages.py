@@ -163,11 +163,11 @@ def heard(msg):
 
 
 @pytest.mark.parametrize("ending, source", [("lua", LUA), ("py", PYTHON)])
-def test_messages_pass_through_a_script(tmp_path, ending, source):
+def test_messages_pass_through_a_script(tmp_path, ending, source, new_simulation):
     path = tmp_path / f"script.{ending}"
     path.write_text(source, encoding="utf-8")
     backend = FakeBackend()
-    simulation = Simulation(parameters.load(), script=str(path), backend=backend)
+    simulation = new_simulation(script=str(path), backend=backend)
     simulation.drone.bus.post(
         "/in",
         SimpleNamespace(
@@ -196,7 +196,7 @@ def test_messages_pass_through_a_script(tmp_path, ending, source):
     assert sender.ended
 
 
-def test_twists_reach_the_script(tmp_path):
+def test_twists_reach_the_script(tmp_path, new_simulation):
     path = tmp_path / "script.lua"
     path.write_text(
         "simROS.subscribe('/drone/cmd_vel', 'geometry_msgs/Twist', 'f')\n"
@@ -204,10 +204,9 @@ def test_twists_reach_the_script(tmp_path):
         "function sysCall_cleanup() assert(heard) end",
         encoding="utf-8",
     )
-    simulation = Simulation(parameters.load(), script=str(path))
+    simulation = new_simulation(script=str(path))
     simulation.drone.commands.receive(Twist(Vector3(1, 0, 0), Vector3(0, 0, 0.5)))
     simulation.step()
-    simulation.close()
 
 
 def test_scripts_leave_nothing_behind(tmp_path):

@@ -6,8 +6,6 @@ import pytest
 from recorder import Recorder
 
 from drone_sim.mechanics.state import Twist, Vector3
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.errors import ScriptError
@@ -45,10 +43,10 @@ def flight(simulation, steps=4):
     return path, list(backend.published), drawn
 
 
-def test_commands_on_their_way_are_delivered_again(tmp_path):
+def test_commands_on_their_way_are_delivered_again(tmp_path, new_simulation):
     path = tmp_path / "script.lua"
     path.write_text(LUA, encoding="utf-8")
-    simulation = Simulation(parameters.load(), script=str(path), drawings=Drawings(), backend=Recorder())
+    simulation = new_simulation(script=str(path), drawings=Drawings(), backend=Recorder())
     flights = []
     for x in (1, 2):
         simulation.drone.commands.receive(Twist(Vector3(x)))
@@ -61,12 +59,11 @@ def test_commands_on_their_way_are_delivered_again(tmp_path):
     assert flights[0] == flights[1] == flights[2]
     assert [one.message for one in flights[0][1]] == [{"count": 3, "x": 3}]
     assert flights[0][2] == {1: [(1, 0, 0), (2, 0, 0), (3, 0, 0)], 2: []}
-    simulation.close()
 
 
 @pytest.mark.parametrize("script", ["", "target"])
-def test_flights_go_on_to_the_bit(script):
-    simulation = Simulation(parameters.load(), script=script, drawings=Drawings(), backend=Recorder())
+def test_flights_go_on_to_the_bit(script, new_simulation):
+    simulation = new_simulation(script=script, drawings=Drawings(), backend=Recorder())
     simulation.step()
     simulation.drone.commands.receive(Twist(Vector3(1, 0.5, 0.2), Vector3(0, 0, 0.3)))
     snapshot = simulation.snapshot()
@@ -74,7 +71,6 @@ def test_flights_go_on_to_the_bit(script):
     simulation.drone.commands.receive(Twist(Vector3(-1)))
     simulation.restore(snapshot)
     assert flight(simulation, 50) == first
-    simulation.close()
 
 
 class Counted:
@@ -121,38 +117,36 @@ def test_topics_come_back_under_their_handles():
     assert bus.advertise("/new", "std_msgs/String") == 3
 
 
-def test_a_stopped_script_has_no_snapshots(tmp_path):
+def test_a_stopped_script_has_no_snapshots(tmp_path, new_simulation):
     path = tmp_path / "script.lua"
     path.write_text("function sysCall_sensing() string.find(('x'):rep(1e5), '.-.-.-.-.-y') end", encoding="utf-8")
     limit = {"script_time_limit": 2.0}  # s, more than a snapshot takes on a busy machine
-    simulation = Simulation(parameters.load(limit), script=str(path))
+    simulation = new_simulation(limit, script=str(path))
     snapshot = simulation.snapshot()
     for attempt in (simulation.step, simulation.step, simulation.snapshot, lambda: simulation.restore(snapshot)):
         with pytest.raises(ScriptError, match="stopped after"):
             attempt()
-    simulation.close()
 
 
-def test_the_time_between_calls_is_not_the_scripts(tmp_path):
+def test_the_time_between_calls_is_not_the_scripts(tmp_path, new_simulation):
     """A script with nothing to do in a step, and a snapshot after a pause, have no old deadline over them."""
     path = tmp_path / "script.lua"
     path.write_text("x = {} for i = 1, 20000 do x[i] = {i} end function sysCall_init() end", encoding="utf-8")
-    simulation = Simulation(parameters.load({"script_time_limit": 5}), script=str(path))
+    simulation = new_simulation({"script_time_limit": 5}, script=str(path))
     simulation.child_scripts["drone"].script._limit._deadline = 0.0  # as after a long pause
     for _ in range(5):
         simulation.step()
     simulation.restore(simulation.snapshot())
-    simulation.close()
 
 
-def test_a_script_that_keeps_itself_has_snapshots(tmp_path):
+def test_a_script_that_keeps_itself_has_snapshots(tmp_path, new_simulation):
     path = tmp_path / "script.py"
     path.write_text(
         "self.me, self.too, self.list, self.count = self, [self], [], 0\n"
         "def sysCall_sensing(): self.me.count += 1; self.list.append(self)\n",
         encoding="utf-8",
     )
-    simulation = Simulation(parameters.load(), script=str(path))
+    simulation = new_simulation(script=str(path))
     simulation.step()
     snapshot = simulation.snapshot()
     simulation.step()
@@ -160,18 +154,17 @@ def test_a_script_that_keeps_itself_has_snapshots(tmp_path):
     simulation.step()
     me = simulation.child_scripts["drone"].script._globals["self"]
     assert (me.me is me, me.too[0] is me, me.count, len(me.list)) == (True, True, 2, 2)
-    simulation.close()
 
 
 @pytest.mark.parametrize("phase", ["init", "actuation", "sensing"])
-def test_a_script_that_has_lost_its_globals_has_snapshots(tmp_path, phase):
+def test_a_script_that_has_lost_its_globals_has_snapshots(tmp_path, phase, new_simulation):
     path = tmp_path / "script.py"
     path.write_text(
         "def sysCall_init(): self.count = 0\ndef sysCall_actuation(): self.count += 1\ndef sysCall_sensing(): pass\n"
         f"before = sysCall_{phase}\ndef sysCall_{phase}(before=before):\n    before()\n    globals().clear()\n",
         encoding="utf-8",
     )
-    simulation = Simulation(parameters.load(), script=str(path))
+    simulation = new_simulation(script=str(path))
     first = simulation.snapshot()
     for _ in range(2):
         simulation.step()
@@ -179,7 +172,6 @@ def test_a_script_that_has_lost_its_globals_has_snapshots(tmp_path, phase):
     simulation.step()
     simulation.restore(first)
     simulation.step()
-    simulation.close()
 
 
 @pytest.mark.parametrize(
@@ -191,11 +183,10 @@ def test_a_script_that_has_lost_its_globals_has_snapshots(tmp_path, phase):
          "def sysCall_init(): globals()[A('x')] = 1", "script.py:2: ZeroDivisionError"),
     ],
 )  # fmt: skip
-def test_what_a_script_does_while_it_is_copied_is_its_own_error(tmp_path, has, said):
+def test_what_a_script_does_while_it_is_copied_is_its_own_error(tmp_path, has, said, new_simulation):
     path = tmp_path / "script.py"
     path.write_text(f"{has}\ndef sysCall_sensing(): pass\n", encoding="utf-8")
     limit = 0.2 if "stopped" in said else 60.0
-    simulation = Simulation(parameters.load({"script_time_limit": limit}), script=str(path))
+    simulation = new_simulation({"script_time_limit": limit}, script=str(path))
     with pytest.raises(ScriptError, match=rf"^\[snapshot\] .*{said}"):
         simulation.snapshot()
-    simulation.close()

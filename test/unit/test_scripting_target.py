@@ -23,8 +23,8 @@ def hover_offset(law):
 @pytest.mark.parametrize(
     "script, law", [("target", "3.x"), ("target", "4.x"), ("target_v3", "3.x"), ("target_v4", "4.x")]
 )
-def test_settles_on_a_target_moved_aside_and_turned(script, law):
-    simulation = Simulation(parameters.load({"propellers": {"law": law}}), script=script)
+def test_settles_on_a_target_moved_aside_and_turned(script, law, new_simulation):
+    simulation = new_simulation({"propellers": {"law": law}}, script=script)
     objects = simulation.context.objects
     target, base = objects.handle("Quadricopter_target"), objects.handle("Quadricopter_base")
     simulation.step()
@@ -34,7 +34,6 @@ def test_settles_on_a_target_moved_aside_and_turned(script, law):
         simulation.step()
     there = objects.matrix(base)
     speed = simulation.drone.body.state.linear_velocity
-    simulation.close()
     x, y, z = frames.position(there)
     assert math.hypot(x, y - 1) < 2e-3
     assert z - height == pytest.approx(hover_offset(law), abs=3e-4)  # the 3.x law's carry ripples by 0.2 mm

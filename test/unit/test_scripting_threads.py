@@ -186,14 +186,13 @@ def test_one_that_does_not_want_to_end_is_ended(fly, rest):
     assert fly(text, 2) == [None, None]
 
 
-def test_what_is_restored_says_that_threads_go_on(tmp_path, caplog):
+def test_what_is_restored_says_that_threads_go_on(tmp_path, caplog, new_simulation):
     path = tmp_path / "script.lua"
     path.write_text(WAITS["4.3"], encoding="utf-8")
-    simulation = Simulation(parameters.load(), script=str(path))
+    simulation = new_simulation(script=str(path))
     simulation.step()
     simulation.restore(simulation.snapshot())
     simulation.step()
-    simulation.close()
     assert [record.getMessage() for record in caplog.records if "coroutine" in record.getMessage()] == [
         f"{path}: its thread continues where it is now, because a coroutine cannot be restored"
     ]

@@ -114,13 +114,12 @@ def test_a_datum_that_is_nowhere(datum):
     assert f"scene/datum/{next(iter(datum))}" in refused({"scene": {"datum": datum}})
 
 
-def test_a_scene_file_has_its_datum_and_its_field(tmp_path):
+def test_a_scene_file_has_its_datum_and_its_field(tmp_path, new_simulation):
     file = tmp_path / "scene.yaml"
     file.write_text("datum: {latitude: -33.5, altitude: 10}\nmagnetic_field: [0, 2.4e-5, 5.1e-5]\n")
     read = parameters.load({"scene_file": str(file)}).scene
     assert (read.datum.latitude, read.datum.longitude, read.datum.altitude) == (-33.5, 8.545594, 10.0)
     assert read.magnetic_field == (0.0, 2.4e-5, 5.1e-5)
-    simulation = Simulation(parameters.load({"scene_file": str(file)}))
+    simulation = new_simulation({"scene_file": str(file)})
     simulation.save_scene(tmp_path / "saved.yaml")
-    simulation.close()
     assert parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.datum == read.datum

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from drone_sim.mechanics import frames
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.modules import make_sim
 
@@ -28,12 +26,11 @@ ALONG_WORLD = [2.0, 0.3, 0.1, 0.3, 3.0, 0.2, 0.1, 0.2, 4.0]  # kg m²
 
 
 @pytest.fixture(name="simulation")
-def _simulation(tmp_path):
+def _simulation(tmp_path, new_simulation):
     file = tmp_path / "scene.yaml"
     file.write_text(SCENE)
-    made = Simulation(parameters.load({"scene_file": str(file)}))
-    yield made
-    made.close()
+    made = new_simulation({"scene_file": str(file)})
+    return made
 
 
 @pytest.fixture(name="sim")

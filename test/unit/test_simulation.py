@@ -271,10 +271,10 @@ def test_a_world_with_a_window_is_filled_anew_and_flies_alike(simulate, tmp_path
     assert fly(simulation, 10) == path
 
 
-def test_what_a_script_held_goes_back_to_the_system(tmp_path):
+def test_what_a_script_held_goes_back_to_the_system(tmp_path, new_simulation):
     script = tmp_path / "eats.lua"
     script.write_text("t = {}\nfor i = 1, 500000 do t[i] = {i} end\nfunction sysCall_init() end\n")
-    simulation = Simulation(parameters.load({"script_time_limit": 0.0}))
+    simulation = new_simulation({"script_time_limit": 0.0})
     simulation.start()
     before = resources()[0]
     simulation.script = str(script)
@@ -282,7 +282,6 @@ def test_what_a_script_held_goes_back_to_the_system(tmp_path):
     eaten = resources()[0] - before
     simulation.script = ""
     simulation.start()
-    simulation.close()
     assert eaten > 30e6
     assert resources()[0] - before < eaten / 4
 

@@ -106,17 +106,16 @@ def test_landing_touches_softly_and_stops_the_propellers(flying, height):
     assert flying.drone.propulsion.particle_velocities == (0, 0, 0, 0)
 
 
-def test_landing_ends_on_what_it_meets():
+def test_landing_ends_on_what_it_meets(new_simulation):
     table = {"shape": "box", "size": [1, 1, 0.4], "position": [0, 0, 0.2]}
-    simulation = Simulation(parameters.load({"scene": {"objects": [table]}}))
+    simulation = new_simulation({"scene": {"objects": [table]}})
     simulation.drone.ask("land")
     assert until(simulation, "landed")[-1].position[2] == pytest.approx(0.411, abs=0.01)
-    simulation.close()
 
 
-def test_landed_stands_on_what_is_below(caplog):
+def test_landed_stands_on_what_is_below(caplog, new_simulation):
     table = {"shape": "box", "size": [1, 1, 0.4], "position": [0, 0, 0.2]}
-    simulation = Simulation(parameters.load({"start": "landed", "scene": {"objects": [table]}}))
+    simulation = new_simulation({"start": "landed", "scene": {"objects": [table]}})
     simulation.drone.ask("takeoff")
     until(simulation, "flying")
     simulation.drone.ask("reset")
@@ -130,7 +129,6 @@ def test_landed_stands_on_what_is_below(caplog):
     ]
     simulation.start()
     assert str(simulation.drone.flight_state) == "landed"
-    simulation.close()
 
 
 def test_a_landing_is_broken_off(flying):
@@ -196,8 +194,8 @@ def test_a_crash_stops_the_propellers_until_reset(flying, caplog):
 
 
 @pytest.mark.parametrize("start", ["flying", "landed"])
-def test_every_flight_after_a_reset_is_the_first_one(start):
-    simulation = Simulation(parameters.load({"start": start}))
+def test_every_flight_after_a_reset_is_the_first_one(start, new_simulation):
+    simulation = new_simulation({"start": start})
     drone = simulation.drone
 
     def flight():
@@ -220,11 +218,10 @@ def test_every_flight_after_a_reset_is_the_first_one(start):
         (lambda: None, upside_down, half_landed)[number % 3]()
         drone.ask("reset")
         assert flight() == first, f"after reset {number + 1}"
-    simulation.close()
 
 
-def test_a_reset_leaves_others_where_they_are():
-    simulation = Simulation(parameters.load({"vehicles": 2}))
+def test_a_reset_leaves_others_where_they_are(new_simulation):
+    simulation = new_simulation({"vehicles": 2})
     one, other = simulation.vehicles.values()
     for vehicle in (one, other):
         vehicle.commands.receive(FORWARD)
@@ -234,7 +231,6 @@ def test_a_reset_leaves_others_where_they_are():
     fly(simulation, 0.05)
     assert one.body.state.position == pytest.approx(one.parameters.position, abs=0.01)
     assert other.body.state.position == pytest.approx(before, abs=0.05)
-    simulation.close()
 
 
 def fleet_flights(resets):
@@ -313,8 +309,8 @@ def test_a_snapshot_brings_back_the_pilot_too(landed):
     landed.forget(snapshot)
 
 
-def test_another_script_has_no_states_and_that_is_said(caplog):
-    simulation = Simulation(parameters.load(), script="tutorial")
+def test_another_script_has_no_states_and_that_is_said(caplog, new_simulation):
+    simulation = new_simulation(script="tutorial")
     assert str(simulation.drone.flight_state) == "unknown"
     for topic in ("takeoff", "land", "reset", "land"):
         simulation.drone.ask(topic)
@@ -324,10 +320,9 @@ def test_another_script_has_no_states_and_that_is_said(caplog):
         "land: no effect: the child script does not subscribe to this topic; `pilot` does",
         "reset: no effect: the child script does not subscribe to this topic; `pilot` does",
     ]
-    simulation.close()
 
 
-def test_a_lua_script_may_have_states(tmp_path):
+def test_a_lua_script_may_have_states(tmp_path, new_simulation):
     script = tmp_path / "own.lua"
     script.write_text("""
 function sysCall_init()
@@ -340,27 +335,25 @@ function on_land(message) simROS.publish(publisher, {data = 'landing'}) end
 function on_goto(message) simROS.publish(publisher, {data = 'at ' .. message.pose.position.x}) end
 function sysCall_actuation() end
 """)
-    simulation = Simulation(parameters.load(), script=str(script))
+    simulation = new_simulation(script=str(script))
     said = [str(simulation.drone.flight_state)]
     for topic, pose in (("land", None), ("goto", Pose((1.5, 0, 1)))):
         simulation.drone.ask(topic, pose)
         simulation.step()
         said.append(str(simulation.drone.flight_state))
     assert said == ["waiting", "landing", "at 1.5"]
-    simulation.close()
 
 
-def test_the_timeline_asks(tmp_path: Path):
+def test_the_timeline_asks(tmp_path: Path, new_simulation):
     file = tmp_path / "flight.yaml"
     file.write_text("- {at: 0, takeoff: {}}\n- {at: 3, goto: {position: [0.5, 0, 1]}}\n- {at: 8, land: }\n")
-    simulation = Simulation(parameters.load({"start": "landed"}))
+    simulation = new_simulation({"start": "landed"})
     found = timeline.read(str(file), simulation.parameters)
     for step in range(14 * 20):
         found.apply(step, simulation.vehicles)
         simulation.step()
     assert str(simulation.drone.flight_state) == "landed"
     assert simulation.drone.body.state.position == pytest.approx((0.5, 0, 0.011), abs=0.05)
-    simulation.close()
 
 
 def test_a_timeline_with_more_than_it_takes(tmp_path: Path):
@@ -396,8 +389,8 @@ def test_an_emergency_stops_the_propellers(flying):
 
 
 @pytest.mark.parametrize("yaw", [0.0, 2.0])
-def test_a_tilt_is_held_whatever_the_speed(yaw):
-    simulation = Simulation(parameters.load({"profile": "ardrone", "start": "flying", "drone": {"yaw": yaw}}))
+def test_a_tilt_is_held_whatever_the_speed(yaw, new_simulation):
+    simulation = new_simulation({"profile": "ardrone", "start": "flying", "drone": {"yaw": yaw}})
     drone = simulation.drone
     meaning = drone.parameters.cmd_vel_meaning
     drone.commands.receive(Twist(*(Vector3(*one) for one in meaning.converted((1.0, -0.5, 0.0), (0.0, 0.0, 0.0)))))
@@ -410,15 +403,13 @@ def test_a_tilt_is_held_whatever_the_speed(yaw):
     assert speed == pytest.approx(9.81 * math.tan(tilt) / 0.58, rel=0.1)  # as tum_ardrone measured
     drone.commands.receive(Twist())
     assert math.hypot(*fly(simulation, 6.0)[-1].linear_velocity) < 0.05  # it hovers
-    simulation.close()
 
 
-def test_a_command_upwards_lifts_off_if_the_driver_does(landed):
+def test_a_command_upwards_lifts_off_if_the_driver_does(landed, new_simulation):
     again(landed)
     landed.drone.commands.receive(Twist(Vector3(0.0, 0.0, 0.5)))
     fly(landed, 1.0)
     assert str(landed.drone.flight_state) == "landed"
-    simulation = Simulation(parameters.load({"profile": "hector"}))
+    simulation = new_simulation({"profile": "hector"})
     simulation.drone.commands.receive(Twist(Vector3(0.0, 0.0, 0.5)))
     assert fly(simulation, 3.0)[-1].position[2] > 0.8
-    simulation.close()

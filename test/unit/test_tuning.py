@@ -275,10 +275,9 @@ def test_only_what_the_script_reads_is_offered(simulate, tmp_path):
     assert set(gains_of(simulation)) == {"Kzref"}
 
 
-def test_before_the_first_flight_everything_is_offered():
-    simulation = Simulation(parameters.load({"cameras": SMALL}), started=False)
+def test_before_the_first_flight_everything_is_offered(new_simulation):
+    simulation = new_simulation({"cameras": SMALL}, started=False)
     assert set(gains_of(simulation)) == READ
-    simulation.close()
 
 
 def test_a_parameter_that_is_asked_for_later_is_counted(simulate, tmp_path):

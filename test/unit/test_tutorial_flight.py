@@ -6,8 +6,6 @@ import math
 import pytest
 
 from drone_sim.mechanics.state import Pose, Twist, Vector3
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 pytestmark = pytest.mark.long
 
@@ -24,10 +22,8 @@ STARTS = list(
 
 
 @pytest.fixture(name="simulation")
-def _simulation():
-    simulation = Simulation(parameters.load())
-    yield simulation
-    simulation.close()
+def _simulation(new_simulation):
+    return new_simulation()
 
 
 def fly(simulation, seconds):
@@ -69,15 +65,14 @@ BARE = {"thrust_limits": "none", "recovery_margin": "none"}
         (BARE, {"velocity_limits": "none"}, 129, 139),
     ],
 )
-def test_displaced_starts_return_to_rest(control, propellers, lowest, highest):
+def test_displaced_starts_return_to_rest(control, propellers, lowest, highest, new_simulation):
     own = {"control": control, "propellers": propellers}
-    simulation = Simulation(parameters.load({**own, "drone": {"position": [0, 0, 5]}}))
+    simulation = new_simulation({**own, "drone": {"position": [0, 0, 5]}})
     begin = simulation.snapshot()
     returned = 0
     for start in STARTS:
         simulation.restore(begin)
         returned += returns(simulation, *start)
-    simulation.close()
     assert lowest <= returned <= highest
 
 

@@ -8,7 +8,6 @@ from drone_sim.grading import plan as plans
 from drone_sim.ros.grading.simulator import scene_file
 from drone_sim.ros.vehicle import vehicle_topics
 from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 PLAN = """
 duration: 1
@@ -39,13 +38,12 @@ class Transforms:
 
 
 @pytest.fixture(name="fleet")
-def _fleet(monkeypatch, tmp_path):
+def _fleet(monkeypatch, tmp_path, new_simulation):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(vehicle_topics, "VehicleTopics", Topics)
     monkeypatch.setattr(vehicle_topics, "Transforms", Transforms)
-    simulation = Simulation(parameters.load(), started=False)
-    yield vehicle_topics.FleetTopics(simulation, None, None)
-    simulation.close()
+    simulation = new_simulation(started=False)
+    return vehicle_topics.FleetTopics(simulation, None, None)
 
 
 def test_a_vehicle_that_begins_elsewhere_keeps_its_topics(fleet, tmp_path):

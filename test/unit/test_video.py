@@ -11,8 +11,6 @@ from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.offline import hud, video
 from drone_sim.offline.fly import main
 from drone_sim.offline.pictures import to_color
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 LEVEL = hud.HudState(time=1.0, state="flying", height=0.8, speed=0.0, roll=0.0, pitch=0.0, yaw=0.0)
 SKY, GROUND = [200, 130, 60], [50, 90, 130]  # BGR
@@ -41,7 +39,7 @@ def differences(first, second):
 # ---- the flight's
 
 
-def test_a_flight_is_filmed_as_its_camera_saw_it(tmp_path):
+def test_a_flight_is_filmed_as_its_camera_saw_it(tmp_path, new_simulation):
     out, commands = tmp_path / "out.mp4", tmp_path / "commands.yaml"
     commands.write_text("[{at: 0, twist: {linear: [1, 0, 0.5]}}]")
     flight = ["--commands", str(commands), "--duration", "1.0"]
@@ -54,7 +52,7 @@ def test_a_flight_is_filmed_as_its_camera_saw_it(tmp_path):
         assert (codec.name, codec.pix_fmt) == ("h264", "yuv420p"), "what browsers play"
     assert not list(tmp_path.glob(".*"))
 
-    simulation = Simulation(parameters.load({"cameras": {"track": {"width": 320, "height": 240}}}))
+    simulation = new_simulation({"cameras": {"track": {"width": 320, "height": 240}}})
     simulation.drone.commands.receive(Twist(Vector3(1, 0, 0.5)))
     for _ in range(19):
         simulation.step()
@@ -62,7 +60,6 @@ def test_a_flight_is_filmed_as_its_camera_saw_it(tmp_path):
     track.viewers.add(lambda: True)
     simulation.step()
     seen = cv2.cvtColor(track.image, cv2.COLOR_RGB2BGR)
-    simulation.close()
     rows = differences(pictures[-1], seen)
     assert rows[20:150].mean() < 6  # but for what the codec leaves out
     assert min(rows[:15].mean(), rows[-15:].mean()) > 40  # the strips of the display

@@ -69,8 +69,8 @@ def test_without_egl_pybullet_draws_the_same_view_after_one_warning(tmp_path):
     assert np.isnan(drawn["depth"][0]).all()
 
 
-def test_a_picture_is_taken_only_while_somebody_looks():
-    simulation = Simulation(parameters.load())
+def test_a_picture_is_taken_only_while_somebody_looks(new_simulation):
+    simulation = new_simulation()
     front = simulation.drone.cameras["front"]
     simulation.step()
     assert front.image is None
@@ -80,14 +80,12 @@ def test_a_picture_is_taken_only_while_somebody_looks():
     front.viewers.clear()
     simulation.step()
     assert front.image is None
-    simulation.close()
 
 
-def test_the_own_body_is_not_in_the_front_picture():
-    simulation = Simulation(parameters.load())
+def test_the_own_body_is_not_in_the_front_picture(new_simulation):
+    simulation = new_simulation()
     depth = simulation.drone.cameras["depth"].take()
     assert np.nanmin(depth) > 0.5
-    simulation.close()
 
 
 def test_an_unknown_parent_of_a_camera_is_named():
@@ -124,12 +122,10 @@ def as_script(picture):
 
 
 @pytest.fixture(name="simulation")
-def _simulation(tmp_path):
+def _simulation(tmp_path, new_simulation):
     script = tmp_path / "sees.py"
     script.write_text(SEES)
-    simulation = Simulation(parameters.load(SMALL), script=str(script))
-    yield simulation
-    simulation.close()
+    return new_simulation(SMALL, script=str(script))
 
 
 def test_a_camera_sees_what_is_there_now(simulation):
@@ -240,8 +236,8 @@ def test_an_image_of_a_large_sensor_comes_as_numbers(tmp_path):
         simulation.close()
 
 
-def test_the_right_camera_of_the_stereo_pair_projects_what_is_in_the_left_one_s_frame():
-    simulation = Simulation(parameters.load({"config": str(package_path() / "config" / "stereo.yaml")}))
+def test_the_right_camera_of_the_stereo_pair_projects_what_is_in_the_left_one_s_frame(new_simulation):
+    simulation = new_simulation({"config": str(package_path() / "config" / "stereo.yaml")})
     left, right = (simulation.drone.cameras[name] for name in ("left", "right"))
     point = np.array([0.3, -0.2, 2.0, 1.0])  # m, in the left one's frame
     poses = [np.reshape((*one.pose(), 0, 0, 0, 1), (4, 4)) for one in (left, right)]
@@ -249,4 +245,3 @@ def test_the_right_camera_of_the_stereo_pair_projects_what_is_in_the_left_one_s_
     u, v, w = np.reshape(right.intrinsics.P, (3, 4)) @ point
     np.testing.assert_allclose((u / w, v / w), right.intrinsics.project(own[:3]), atol=1e-9)
     assert left.intrinsics.P[3] == 0
-    simulation.close()
