@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+"""Mutants of the source, drawn at random, that the unit tests must kill: test/mutants.py [COUNT] [SEED].
+
+A mutant has one changed operator or constant. The test files that concern its module run on it, in a temporary copy of
+the tree, up to the first failure or the time limit. A test that also fails without the mutant kills nothing.
+"""
+
+import ast
+import copy
+import functools
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ["world", "forces", "scene", "scripting", "grading"]  # as many mutants of each
+FILES = 5  # of tests for a mutant
+LIMIT = 180  # s for the tests of a mutant
+OTHER = {
+    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
+    ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In,
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Mod: ast.Mult, ast.FloorDiv: ast.Mult,
+    ast.And: ast.Or, ast.Or: ast.And,
+}  # fmt: skip
+
+
+def change(node):
+    """Change `node` into a mutant; return whether there is one of it."""
+    if isinstance(node, ast.Compare):
+        node.ops[0] = OTHER[type(node.ops[0])]()
+    elif isinstance(node, ast.BinOp | ast.BoolOp | ast.AugAssign) and type(node.op) in OTHER:
+        node.op = OTHER[type(node.op)]()
+    elif isinstance(node, ast.Constant) and isinstance(node.value, bool | int | float):
+        node.value = not node.value if isinstance(node.value, bool) else node.value + 1
+    else:
+        return False
+    return True
+
+
+@functools.cache
+def mutants(package):
+    """List (path, index of the node, line, before, after) of each mutant of a package."""
+    found = []
+    for path in sorted((ROOT / "src/drone_sim" / package).rglob("*.py")):
+        for index, node in enumerate(ast.walk(ast.parse(path.read_text()))):
+            before, mutant = ast.unparse(node), copy.deepcopy(node)
+            if change(mutant):
+                found.append((path.relative_to(ROOT), index, node.lineno, before, ast.unparse(mutant)))
+    return found
+
+
+def tests_of(path):
+    """Choose the test files that import the module at `path`, are called like it, or name most of what it defines."""
+    dotted = ".".join(path.with_suffix("").parts[1:]).removesuffix(".__init__")
+    package, _, module = dotted.rpartition(".")
+    imported = re.compile(rf"{re.escape(dotted)}\b|from {re.escape(package)} import [^\n]*\b{module}\b")
+    nodes = ast.walk(ast.parse((ROOT / path).read_text()))
+    names = {node.name for node in nodes if isinstance(node, ast.ClassDef | ast.FunctionDef)}
+    words = {test: set(re.findall(r"\w+", test.read_text())) for test in sorted(ROOT.glob("test/unit/test_*.py"))}
+    rarity = {name: 1 / max(1, sum(name in found for found in words.values())) for name in names if len(name) > 3}
+    topics = [word.rstrip("s") for word in module.split("_") if len(word) > 3]
+    score = {
+        test: bool(imported.search(test.read_text()))
+        + sum(topic in test.stem for topic in topics)
+        + sum(rarity[name] for name in rarity.keys() & found)
+        for test, found in words.items()
+    }
+    best = sorted(score, key=lambda test: (-score[test], test.name))[:FILES]
+    return [str(test.relative_to(ROOT)) for test in best if score[test] > 0.25 or test in best[:2]]
+
+
+def failing_test(tree, tests):
+    """Return the name of the first test that fails or hangs in `tree`; empty if all pass."""
+    options = ["-x", "-q", "-rfE", "-o", "addopts=", "-p", "no:randomly", "-p", "no:cacheprovider"]
+    try:
+        run = subprocess.run(
+            [sys.executable, "-m", "pytest", *options, *tests], cwd=tree, capture_output=True, text=True, timeout=LIMIT
+        )
+    except subprocess.TimeoutExpired:
+        return tests[0] if len(tests) == 1 else "the time limit"
+    failed = re.search(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", run.stdout, re.MULTILINE)
+    return failed[1] if failed else ""
+
+
+def kills(tree, path, index, tests):
+    """Return the test of `tests` that fails on this mutant, and passes without it; empty if there is none."""
+    original = (tree / path).read_text()
+    module = ast.parse(original)
+    change(list(ast.walk(module))[index])
+    try:
+        (tree / path).write_text(ast.unparse(module))
+        failed = failing_test(tree, tests)
+    finally:
+        (tree / path).write_text(original)
+    return failed if failed in ("", "the time limit") or not failing_test(tree, [failed]) else ""
+
+
+def main(count=40, seed=1):
+    draw = random.Random(seed)
+    killed = 0
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Path(folder, "tree")
+        shutil.copytree(ROOT, tree, symlinks=True, ignore=shutil.ignore_patterns(".git", "build", "devel", "html"))
+        for number in range(count):
+            path, index, line, before, after = draw.choice(mutants(PACKAGES[number % len(PACKAGES)]))
+            tests = tests_of(path)
+            killer = kills(tree, path, index, tests)
+            killed += killer not in ("", "the time limit")
+            print(f"{path}:{line}: {before} -> {after}: {f'ended by {killer}' if killer else 'lives'}", flush=True)
+    print(f"{killed} of {count} killed")
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
