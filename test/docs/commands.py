@@ -134,5 +134,4 @@ def _without_comment(text: str) -> str:
 
 
 def everything() -> list[Command]:
-    """Return the commands of all pages."""
     return [one for page in PAGES for one in commands(page)]

@@ -54,8 +54,6 @@ class Failed(Exception):
 
 
 class Background:
-    """A process that goes on, and what it has said."""
-
     def __init__(self, command: Command, folder: Path, environment: dict[str, str]):
         self.command = command
         self._said: list[str] = []
@@ -107,24 +105,19 @@ class Background:
 
 
 def needs_simulator(command: Command) -> bool:
-    """Tell whether a command is for a simulator that runs."""
     return command.text.startswith(NEEDS_ONE) or not command.text.startswith(NEEDS_NONE)
 
 
 def failed(command: Command, why: str, said: str) -> Failed:
-    """Return the error of a command."""
     place = f"{command.page.relative_to(ROOT)}:{command.line}"
     return Failed(f"{place}: $ {command.text}\n  {why}\n" + "".join(f"  | {one}\n" for one in said.splitlines()[-30:]))
 
 
 def where(command: Command, folder: Path) -> Path:
-    """Return where a command is typed."""
     return ROOT if command.text.startswith(("./dev.sh", "source ")) else folder
 
 
 class Page:
-    """Its commands, one after another."""
-
     def __init__(self, page: Path, folder: Path, port: int, everything: bool):
         self._commands = [one for one in commands(page) if one.text not in NOT_RUN]
         self._everything = everything
@@ -272,8 +265,6 @@ def free_port() -> int:
 
 
 def run(pages: Sequence[Path], everything: bool) -> list[str]:
-    """Run the commands of pages; return what failed."""
-
     def one(page: Path) -> str:
         with tempfile.TemporaryDirectory(prefix="drone_sim_docs_") as name:
             folder = Path(name)

@@ -32,7 +32,6 @@ class Trier:
         self._resident = self._last = 0
 
     def run(self, case: Case) -> Answer:
-        """Try a case."""
         answer = self._attempt(case)
         if not answer.fault and answer.seconds > HANGS:
             return answer._replace(fault=f"slow: {answer.seconds:.1f} s")
@@ -97,7 +96,6 @@ class Trier:
         self._resident = self._last = first.resident
 
     def _lost(self, fault: str) -> Answer:
-        """Say how the worker ended."""
         assert self._process is not None
         if not fault:
             self._process.wait(_FIRST)

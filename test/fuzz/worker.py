@@ -74,7 +74,6 @@ def _said(error: BaseException) -> str:
 
 
 def main() -> None:
-    """Serve."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     faulthandler.enable()

@@ -167,8 +167,6 @@ def make_users(folder, names):
 
 
 class Student:
-    """A browser of a student."""
-
     def __init__(self, name):
         self.name, self.session = name, requests.Session()
 
@@ -179,7 +177,6 @@ class Student:
         until(lambda: self.sees(self.name))
 
     def log_in(self):
-        """Log in at the hub."""
         login = self.session.get(f"http://{HOST}/hub/login")
         token = re.search(r'name="_xsrf" value="([^"]+)"', login.text)[1]
         form = {"username": self.name, "password": self.name, "_xsrf": token}

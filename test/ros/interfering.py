@@ -42,18 +42,15 @@ def push():
 
 
 def edit(request=None):
-    """Build a gate."""
     answer = rospy.ServiceProxy("/drone_sim/edit_scene", AddDiagnostics)(json.dumps(request or {"edit": [GATE]}))
     assert answer.success, answer
 
 
 def tune():
-    """Change a gain."""
     rospy.ServiceProxy("/drone/set_parameters", Reconfigure)(Config(doubles=[DoubleParameter("Kzref", 4.0)]))
 
 
 def main():
-    """Wait for the flight, and do it."""
     does = {one.__name__: one for one in (fly, push, edit, tune)}[sys.argv[1]]
     rospy.init_node(does.__name__, disable_signals=True)
     end_on_signals()

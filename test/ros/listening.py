@@ -20,7 +20,6 @@ class Listener:
             self._came.notify_all()
 
     def close(self):
-        """Stop listening."""
         self._subscriber.unregister()
 
     def wait_for(self, condition=lambda message: True, after=None, timeout=90.0):
@@ -33,7 +32,6 @@ class Listener:
 
 
 def connected(publisher, listeners=1):
-    """Wait until so many listen, and return the publisher."""
     patience, end = threading.Event(), time.monotonic() + 120.0
     while publisher.get_num_connections() < listeners:
         assert not rospy.is_shutdown() and time.monotonic() < end, f"nobody hears {publisher.resolved_name}"

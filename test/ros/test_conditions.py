@@ -50,7 +50,6 @@ class Conditions(unittest.TestCase):
 
     @classmethod
     def run_node(cls):
-        """Make and run it in one thread."""
         cls.node = Node(parameters.load({"sensors": WIND, "cameras": SMALL, "real_time_factor": 5.0}))
         cls.node.run(cls.over.is_set)
         cls.node.close()

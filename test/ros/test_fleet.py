@@ -31,8 +31,6 @@ def forward(speed):
 
 
 class Fleet(unittest.TestCase):
-    """One running simulation."""
-
     @classmethod
     def setUpClass(cls):
         cls.odometry = {name: Listener(f"{name}/odom", Odometry) for name in THREE}

@@ -29,8 +29,6 @@ def off(follower, leader, wing):
 
 
 class Formation(unittest.TestCase):
-    """One flight."""
-
     def test_the_followers_keep_their_wings(self):
         odometry = {name: Listener(f"{name}/odom", Odometry) for name in ("drone1", *WINGS)}
         commands = connected(rospy.Publisher("/drone1/cmd_vel", Twist, queue_size=1))

@@ -66,7 +66,6 @@ COMMANDS, STAMPED = "_lockstep/wait_for:=cmd_vel", "_lockstep/wait_for:=cmd_vel_
 
 
 def state(message):
-    """Return the numbers of an odometry."""
     pose, twist = message.pose.pose, message.twist.twist
     parts = pose.position, pose.orientation, twist.linear, twist.angular
     return message.header.stamp.to_nsec(), *(getattr(one, axis) for one in parts for axis in one.__slots__)
@@ -122,7 +121,6 @@ class Simulator:
                 self._came.notify_all()
 
     def wait_for(self, text, timeout=HANGS):
-        """Wait for a line with a text."""
         with self._came:
             assert self._came.wait_for(lambda: any(text in line for line in self.lines), timeout), "".join(self.lines)
 

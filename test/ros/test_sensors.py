@@ -57,7 +57,6 @@ class Sensors(unittest.TestCase):
 
     @classmethod
     def run_node(cls):
-        """Make and run it in one thread."""
         file = str(package_path() / "config" / "sensors.yaml")
         cls.node = Node(parameters.load({"config": file, "cameras": SMALL, "real_time_factor": 5.0}))
         cls.node.run(cls.over.is_set)

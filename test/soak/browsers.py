@@ -54,7 +54,6 @@ class Door:
             connection.close()
 
     def open(self) -> Any:
-        """Open a socket."""
         return connect(
             f"ws://{self.host}:{self.port}/",
             subprotocols=["drone_sim"],  # type: ignore[list-item]
@@ -98,7 +97,6 @@ class Browser:
         return markers
 
     async def say(self, **message: Any) -> None:
-        """Tell the node something."""
         await self.wire.send(json.dumps(message))
 
     async def ask(self, ask: str, **more: Any) -> dict[str, Any]:
@@ -130,7 +128,6 @@ class Browser:
 
 
 async def watch(browser: Browser) -> None:
-    """Look on."""
     await browser.stay(browser.dice.uniform(1.0, LONGEST))
 
 

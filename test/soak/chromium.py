@@ -50,7 +50,6 @@ def visit(driver: Any, chromium: str, address: str, dice: random.Random) -> floa
 
 
 def main() -> None:
-    """Come and go."""
     address, seed, folder = sys.argv[1], int(sys.argv[2]), Path(sys.argv[3])
     dice, chromium = random.Random(f"chromium {seed}"), str(shutil.which("chromium"))
     with sync_playwright() as driver:

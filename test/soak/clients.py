@@ -74,11 +74,9 @@ class Diary:
     """What a role saw."""
 
     def __init__(self, path: Path):
-        """Write to a file."""
         self._file = path.open("a", encoding="utf-8", buffering=1)
 
     def add(self, what: str, seconds: float, well: bool, said: str) -> None:
-        """Note one thing."""
         self._file.write(json.dumps([what, round(seconds, 3), well, said]) + "\n")
 
 
@@ -212,7 +210,6 @@ TOPICS: tuple[tuple[str, Any], ...] = (
 
 
 def look(dice: random.Random, _folder: Path, _diary: Diary) -> None:
-    """Subscribe and unsubscribe."""
     subscribers: dict[str, rospy.Subscriber] = {}
     while True:
         topic, kind = dice.choice(TOPICS)
@@ -270,7 +267,6 @@ ROLES = {
 
 
 def main() -> None:
-    """Play a role."""
     role, seed, folder = sys.argv[1], int(sys.argv[2]), Path(sys.argv[3])
     rospy.init_node(f"soak_{role}_{seed}", disable_signals=True)
     ROLES[role](random.Random(f"{role} {seed}"), folder, Diary(folder / f"{role}-{seed}.jsonl"))

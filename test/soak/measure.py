@@ -88,7 +88,6 @@ def faults(lines: list[str], diary: list[Any], samples: list[Sample]) -> list[st
 
 
 def report(samples: list[Sample], lines: list[str], diary: list[Any], began: float) -> str:
-    """Return the line of now."""
     now, calls = samples[-1], [entry for entry in diary if entry[0] != "odom"]
     odometry = [int(text) for what, _, well, text in diary if what == "odom" and well][-10:]
     refused = sum(not well for _, _, well, _ in calls)

@@ -87,11 +87,9 @@ class Launch:
             return None
 
     def __enter__(self) -> Launch:
-        """Return itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End it, if that has not been done."""
         if self.process.poll() is None:
             self.end()
 
@@ -114,7 +112,6 @@ class Crowd:
     """The clients, a process each, and what they have seen."""
 
     def __init__(self, folder: Path, seed: int):
-        """Start them."""
         self._folder = folder
         self._dice = random.Random(f"crowd {seed}")
         roles = ["services"] * 3 + ["commands"] * 2 + ["looker"] * 2 + ["odometry", "silent", "sleeper"]
@@ -154,11 +151,9 @@ class Crowd:
         return [f"{one.args}" for one in self._processes if one.poll() is not None]
 
     def __enter__(self) -> Crowd:
-        """Return itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End them."""
         for one in self._processes:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(one.pid, signal.SIGKILL)
@@ -166,7 +161,6 @@ class Crowd:
             one.wait()
 
     def diary(self) -> list[Any]:
-        """Return all that they have noted."""
         noted: list[Any] = []
         for path in sorted(self._folder.glob("*.jsonl")):
             for line in path.read_text(encoding="utf-8").splitlines():
@@ -177,7 +171,6 @@ class Crowd:
 
 @contextlib.contextmanager
 def home(keep: bool) -> Iterator[Path]:
-    """Make a folder for all that is written."""
     folder = Path(tempfile.mkdtemp(prefix="soak"))
     for name, text in {**clients.SCRIPTS, **clients.SCENES}.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -253,7 +246,6 @@ def finish(launch: Launch, crowd: Crowd, folder: Path, samples: list[Sample]) ->
 
 
 def main() -> int:
-    """Run."""
     parser = argparse.ArgumentParser(
         prog="./dev.sh soak", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

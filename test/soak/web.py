@@ -63,14 +63,12 @@ def registrations(node: str) -> int:
 
 
 def pid_of(node: str) -> int:
-    """Return the process of a node."""
     answer: Any = ServerProxy(os.environ["ROS_MASTER_URI"]).lookupNode("/soak", f"/{node}")
     process: Any = ServerProxy(answer[2]).getPid("/soak")
     return int(process[2])
 
 
 def address(launch: Launch) -> str:
-    """Return where the cockpit is, when it has said so."""
     end = time.monotonic() + STARTS
     while time.monotonic() < end:
         for line in launch.lines:
@@ -126,7 +124,6 @@ def diary(folder: Path) -> list[Any]:
 
 
 def line(seen: dict[str, list[State]], launch: Launch, visits: list[Any], time_: float) -> str:
-    """Return the line of now."""
     parts = [f"{time_ / 60:5.1f} min"]
     for node, states in seen.items():
         (_, memory, threads, descriptors), registered = states[-1]
@@ -191,7 +188,6 @@ def verdict(launch: Launch, seen: dict[str, list[State]], visits: list[Any]) -> 
 
 
 def main() -> int:
-    """Run."""
     parser = argparse.ArgumentParser(
         prog="./dev.sh soak-web", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

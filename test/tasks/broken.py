@@ -32,7 +32,6 @@ class Case(NamedTuple):
 
 
 def cases(folder):
-    """Write the scripts into a folder; return all cases."""
     return [*_stages(folder), Case("stability", "the bare law", "", ("guard",), ALL_LOOPS, BARE), *_slips(folder)]
 
 

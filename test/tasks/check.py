@@ -103,12 +103,10 @@ def check_starts(pool):
 
 
 def fly(pool, task, script, seeds, changes=None):
-    """Return a result for each seed."""
     return pool.starmap(one_flight, [(task, script, seed, changes) for seed in range(seeds)], chunksize=5)
 
 
 def one_flight(task, script, seed, changes):
-    """Return how a flight came out."""
     logging.disable(logging.WARNING)
     return flight.grade(read(task), script, seed, changes)
 
@@ -131,7 +129,6 @@ def said(result):
 
 
 def count(results):
-    """Return how many passed."""
     return f"{sum(one.passed for one in results)} of {len(results)} seeds"
 
 

@@ -44,8 +44,6 @@ class _Seen:
 
 
 class Student:
-    """The node."""
-
     def __init__(self) -> None:
         """Begin to fly and to watch."""
         self._seen = _Seen()

@@ -127,7 +127,6 @@ class Panel:
         wait_until(self.page, lambda: answer in self.message)
 
     def show(self, name):
-        """Unfold a panel."""
         button = self.page.locator("#rail").get_by_role("button", name=name, exact=True)
         if button.get_attribute("aria-expanded") != "true":
             button.click()
@@ -145,7 +144,6 @@ def ready(page):
 
 
 def switch_camera(page, name="front"):
-    """Switch a camera on, or off."""
     Panel(page).show("Cameras")
     page.locator("#camera-list").get_by_label(name, exact=True).click()
 

@@ -18,7 +18,6 @@ DRAFT = "drone_sim/draft/mine/edited.py"
 
 @contextlib.contextmanager
 def page_at_once(cockpit, browser):
-    """Give the page before its scene is there."""
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     context.add_init_script(STARTED)
     page = context.new_page()

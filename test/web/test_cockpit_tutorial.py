@@ -33,7 +33,6 @@ def choose(page, lesson, script):
 
 
 def is_there(page, called):
-    """Tell whether the page, or one of its menus, has it."""
     roles = ("button", "tab", "menuitem")
     return any(page.get_by_role(role, name=called, include_hidden=role == "menuitem").count() for role in roles)
 

@@ -90,7 +90,6 @@ _WRITTEN = st.tuples(
 
 
 def _bag(written: list, compression: str) -> bytes:
-    """Return the bytes of a bag."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "one.bag"
         with rosbag.Bag(str(path), "w", compression=compression, chunk_threshold=2000) as bag:

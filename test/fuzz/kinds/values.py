@@ -54,7 +54,6 @@ junk = st.recursive(
 
 
 def one_of_words(text: str) -> st.SearchStrategy:
-    """Return one of the words of a text."""
     return st.sampled_from(text.split())
 
 
