@@ -57,8 +57,6 @@ class Scene:
 
 
 class Asked:
-    """What a browser asks."""
-
     def __init__(self, store):
         self.node = Node()
         self.player = TimelinePlayer()

@@ -37,14 +37,18 @@ def _renderer(shared_renderer):
 
 
 @pytest.fixture
-def new_simulation():
+def new_simulation(tmp_path):
     """Return a function that builds a simulation from parameters, and advances it by some steps.
 
-    The simulations are closed after the test.
+    The drone's script may be given as text, `lua` or `python`. The simulations are closed after the test.
     """
     with contextlib.ExitStack() as after_the_test:
 
-        def build(values=None, steps=0, **options):
+        def build(values=None, steps=0, lua=None, python=None, **options):
+            for ending, text in (("lua", lua), ("py", python)):
+                if text is not None:
+                    (tmp_path / f"script.{ending}").write_text(text, encoding="utf-8")
+                    options["script"] = str(tmp_path / f"script.{ending}")
             simulation = Simulation(parameters.load(values), **options)
             after_the_test.callback(simulation.close)
             for _ in range(steps):

@@ -19,8 +19,6 @@ PARTS = ("Drone", "Quadricopter_base", "Quadricopter_propeller1", "Quadricopter_
 
 
 class Scene(ScriptContext):
-    """What drones share."""
-
     def __init__(self, shown=True):
         clock, objects = Clock(0.05), ObjectTree()
         measured = {"objects": objects, "velocities": VelocityMeter(objects, clock)}

@@ -10,7 +10,6 @@ import pytest
 from drone_sim.config.types import ParameterError
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
 
 SCRIPTS = Path(__file__).parent / "scripts"
@@ -37,9 +36,8 @@ def sysCall_sensing(): tell("sensing")
 
 
 @pytest.fixture(name="build")
-def _build(tmp_path):
+def _build(tmp_path, new_simulation):
     """Give a function that builds a simulation with scripts, a text for each object's name."""
-    built = []
 
     def build(scripts, own="", values=None, **overrides):
         entries = []
@@ -52,12 +50,9 @@ def _build(tmp_path):
         if own:
             script.write_text(own, encoding="utf-8")
         given = {**overrides, "scene": {**overrides.get("scene", {}), "scripts": entries}}
-        built.append(Simulation(parameters.load(given), script=str(script) if own else ""))
-        return built[-1]
+        return new_simulation(given, script=str(script) if own else "")
 
-    yield build
-    for one in built:
-        one.close()
+    return build
 
 
 def order(simulation):

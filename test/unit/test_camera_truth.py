@@ -12,8 +12,6 @@ from test_renderer_outputs import inner
 
 from drone_sim.mechanics.state import Pose
 from drone_sim.offline.fly import main as fly
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 SCENE = {
     "drone": {"position": [0, 0, 1]},
@@ -88,20 +86,17 @@ def hidden(camera, seen):
 
 
 @pytest.fixture(name="picture_of")
-def _picture_of(tmp_path):
+def _picture_of(tmp_path, new_simulation):
     """Return what takes a picture of objects with the front camera, 1 m above the floor; as its objects, and it."""
-    simulations = []
 
     def take(objects, **camera):
         scene = tmp_path / "scene.yaml"
         scene.write_text(yaml.safe_dump({"objects": objects, "drone": {"position": [0, 0, 1]}}))
-        simulations.append(Simulation(parameters.load({"scene_file": str(scene), "cameras": {"front": camera}})))
-        front = simulations[-1].drone.cameras["front"]
+        simulation = new_simulation({"scene_file": str(scene), "cameras": {"front": camera}})
+        front = simulation.drone.cameras["front"]
         return by_name(front.truth()), front
 
-    yield take
-    for one in simulations:
-        one.close()
+    return take
 
 
 def test_nothing_is_hidden_of_a_compound_whose_parts_overlap(picture_of):

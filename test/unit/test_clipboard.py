@@ -13,7 +13,6 @@ LAMP = {"name": "Lamp", "kind": "dummy", "parent": "Crate", "position": [0, 0, 0
 
 
 def editor_in(folder):
-    """Return the editor of a scene that is a file in a folder."""
     made = editor_of()
     folder.mkdir()
     made.answer({"save": str(folder / "scene.yaml")})

@@ -6,23 +6,16 @@ import pytest
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, Twist, Vector3
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 FRONT_LEFT, BACK_LEFT, BACK_RIGHT, FRONT_RIGHT = range(4)
 
 
 @pytest.fixture(name="fly")
-def _fly():
-    flying = []
-
+def _fly(new_simulation):
     def start(**overrides):
-        flying.append(Simulation(parameters.load(overrides)))
-        return flying[-1]
+        return new_simulation(overrides)
 
-    yield start
-    for simulation in flying:
-        simulation.close()
+    return start
 
 
 def velocities_after(simulation, twist):

@@ -59,7 +59,6 @@ def files(folder):
 
 
 def run(script, package):
-    """Run a script with this package; return what it says."""
     paths = [str(package / "src"), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
     return subprocess.run(

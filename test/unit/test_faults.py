@@ -13,7 +13,6 @@ from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.offline import timeline
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
-from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.types import QUADRICOPTER
 
 FORWARD = Twist(Vector3(0.5, 0.0, 0.0))
@@ -26,16 +25,11 @@ WIFI = {"latency": 0.2, "jitter": 0.1, "loss": 0.2}
 
 
 @pytest.fixture(name="simulate")
-def _simulate():
-    made = []
-
+def _simulate(new_simulation):
     def simulate(**overrides):
-        made.append(Simulation(parameters.load({"cameras": SMALL, "drone": {"position": [0, 0, 5]}, **overrides})))
-        return made[-1]
+        return new_simulation({"cameras": SMALL, "drone": {"position": [0, 0, 5]}, **overrides})
 
-    yield simulate
-    for simulation in made:
-        simulation.close()
+    return simulate
 
 
 def fly(simulation, steps, each=lambda: None):

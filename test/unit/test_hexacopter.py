@@ -14,16 +14,11 @@ HEXACOPTER = "package://drone_sim/config/hexacopter.yaml"
 
 
 @pytest.fixture(name="simulate")
-def _simulate():
-    made = []
-
+def _simulate(new_simulation):
     def simulate(**overrides):
-        made.append(Simulation(parameters.load({"config": HEXACOPTER, **overrides})))
-        return made[-1]
+        return new_simulation({"config": HEXACOPTER, **overrides})
 
-    yield simulate
-    for simulation in made:
-        simulation.close()
+    return simulate
 
 
 def fly(simulation, seconds):

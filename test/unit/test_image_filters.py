@@ -5,9 +5,6 @@ import math
 import pytest
 from pytest import approx
 
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
-
 # A camera that looks down from 2 m on a red box beside the middle of its picture.
 OBJECTS = [
     {"name": "Eye", "kind": "vision_sensor", "position": [50, 0, 2], "rpy": [math.pi, 0, 0],
@@ -41,22 +38,18 @@ end
 
 
 @pytest.fixture(name="simulate")
-def _simulate(tmp_path):
-    built = []
-
+def _simulate(tmp_path, new_simulation):
     def simulate(text, steps=2):
         path, own = tmp_path / f"eye.{'py' if 'def ' in text else 'lua'}", tmp_path / "own.lua"
         path.write_text(text, encoding="utf-8")
         own.write_text(READ, encoding="utf-8")
         scene = {"objects": OBJECTS, "scripts": [{"object": "Eye", "script": str(path)}]}
-        built.append(Simulation(parameters.load({"scene": scene}), script=str(own)))
+        simulation = new_simulation({"scene": scene}, script=str(own))
         for _ in range(steps):
-            built[-1].step()
-        return built[-1]
+            simulation.step()
+        return simulation
 
-    yield simulate
-    for one in built:
-        one.close()
+    return simulate
 
 
 @pytest.mark.parametrize(

@@ -39,8 +39,6 @@ OUTSIDE = "by a client of the remote API"
 
 
 class Stage:
-    """A simulation that flies, and what is said of it."""
-
     def __init__(self, monkeypatch):
         self.said, self.callbacks = [], {}
         topic = mock.MagicMock()

@@ -228,9 +228,7 @@ def sysCall_sensing():
 def test_a_script_makes_and_changes_objects(tmp_path, caplog, monkeypatch, new_simulation):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     caplog.set_level("INFO")
-    path = tmp_path / "makes.py"
-    path.write_text(SCRIPT, encoding="utf-8")
-    simulation = new_simulation({"drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}, script=str(path))
+    simulation = new_simulation({"drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}, python=SCRIPT)
     simulation.step()
     assert caplog.messages == [
         "(1, [1.0, 0.0, 0.0]) 1.0 [0.2, 0.2, 0.2]",

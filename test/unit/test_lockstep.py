@@ -75,7 +75,6 @@ class Stage:
             self.connections.sent[topic] = self.connections.sent_count(topic) + 1
 
     def close_connections(self):
-        """End the node."""
         self.connections.is_there = False
         for each in self.connections.opened:
             each.done = True

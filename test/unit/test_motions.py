@@ -302,14 +302,13 @@ def test_joints_of_3_x_arrive_together_or_each_for_itself(fly):
     assert values[-1][:2] == (1.0, 0.5)
 
 
-def test_what_a_snapshot_brings_back(tmp_path, new_simulation):
-    path = tmp_path / "script.lua"
-    path.write_text(
-        "function sysCall_init() r = sim.ruckigPos(1, 0.0001, -1, {0,0,0}, {1,2,10}, {1}, {1,0})\n"
+def test_what_a_snapshot_brings_back(new_simulation):
+    simulation = new_simulation(
+        {"scene": SCENE},
+        lua="function sysCall_init() r = sim.ruckigPos(1, 0.0001, -1, {0,0,0}, {1,2,10}, {1}, {1,0})\n"
         "h = sim.getObject('/Hinge') end\nfunction sysCall_actuation()\n"
-        "local _, state = sim.ruckigStep(r, 0.05) sim.setJointPosition(h, state[1]) end"
+        "local _, state = sim.ruckigStep(r, 0.05) sim.setJointPosition(h, state[1]) end",
     )
-    simulation = new_simulation({"scene": SCENE}, script=str(path))
 
     def values(steps):
         seen = []

@@ -2,10 +2,8 @@
 
 import pytest
 
-from drone_sim.run import parameters
 from drone_sim.run import player as player_module
 from drone_sim.run.player import Player
-from drone_sim.run.simulation import Simulation
 from drone_sim.run.stepping import Diverged
 from drone_sim.scripting.errors import ScriptError
 
@@ -17,22 +15,19 @@ def sysCall_sensing():
 
 
 @pytest.fixture(name="begin")
-def _begin(tmp_path):
+def _begin(tmp_path, new_simulation):
     """Return a function that makes a paused player; its script is in script.py."""
-    simulations = []
 
     def begin(text="", step=None):
         path = tmp_path / "script.py"
         path.write_text(text or SCRIPT, encoding="utf-8")
-        simulations.append(Simulation(parameters.load(), script=str(path), started=False))
-        player = Player(simulations[-1], step or simulations[-1].step, lambda _state: None, simulated_time=False)
+        simulation = new_simulation(script=str(path), started=False)
+        player = Player(simulation, step or simulation.step, lambda _state: None, simulated_time=False)
         player.start()
         player.pause(True)
         return player, str(path)
 
-    yield begin
-    for simulation in simulations:
-        simulation.close()
+    return begin
 
 
 def test_orders_are_executed_one_after_the_other(begin):

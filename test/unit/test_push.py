@@ -11,11 +11,9 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 @pytest.fixture(name="floating")
-def _floating(tmp_path, new_simulation):
+def _floating(new_simulation):
     """Give a drone at rest without weight and with its propellers off."""
-    script = tmp_path / "idle.py"
-    script.write_text("def sysCall_init(): pass\n")
-    return new_simulation({"gravity": 0.0, "drone": {"position": [0, 0, 5]}}, script=str(script))
+    return new_simulation({"gravity": 0.0, "drone": {"position": [0, 0, 5]}}, python="def sysCall_init(): pass\n")
 
 
 def step(simulation, count):

@@ -161,7 +161,6 @@ def test_shadows_do_not_add_up(renderer):
 
 
 def renderer_floor(picture):
-    """Where a picture is grey, as only the floor is."""
     return np.ptp(picture.astype(int), axis=2) < 12
 
 

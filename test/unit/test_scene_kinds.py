@@ -11,9 +11,7 @@ import yaml
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.mechanics.state import Pose, Twist, Vector3
-from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.modules import make_sim
 
@@ -46,18 +44,13 @@ objects:
 
 
 @pytest.fixture(name="simulate")
-def _simulate(tmp_path):
-    made = []
-
+def _simulate(tmp_path, new_simulation):
     def simulate(text):
         file = tmp_path / "scene.yaml"
         file.write_text(text, encoding="utf-8")
-        made.append(Simulation(parameters.load({"scene_file": str(file)})))
-        return made[-1]
+        return new_simulation({"scene_file": str(file)})
 
-    yield simulate
-    for one in made:
-        one.close()
+    return simulate
 
 
 def found(simulation, name):

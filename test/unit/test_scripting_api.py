@@ -17,10 +17,8 @@ PICTURE = np.array([[[255, 0, 0]] * 3, [[0, 0, 255]] * 3], dtype=np.uint8)  # re
 
 
 @pytest.fixture(name="simulation")
-def _simulation(tmp_path, new_simulation):
-    script = tmp_path / "still.py"
-    script.write_text("", encoding="utf-8")
-    return new_simulation({"cameras": SMALL, "gravity": 0.0}, script=str(script))
+def _simulation(new_simulation):
+    return new_simulation({"cameras": SMALL, "gravity": 0.0}, python="")
 
 
 @pytest.fixture(name="sim")
@@ -220,13 +218,10 @@ def test_what_cannot_be_drawn_is_refused(drawings, sim):
         sim.addDrawingObject(31, 1)
 
 
-def test_the_next_run_begins_with_nothing_drawn(tmp_path, new_simulation):
-    script = tmp_path / "draws.py"
-    script.write_text(
-        "def sysCall_init():\n    sim.addDrawingObjectItem(sim.addDrawingObject(sim.drawing_points, 1), [1, 2, 3])"
-    )
+def test_the_next_run_begins_with_nothing_drawn(new_simulation):
     drawings = Drawings()
-    simulation = new_simulation(script=str(script), drawings=drawings)
+    draw = "sim.addDrawingObjectItem(sim.addDrawingObject(sim.drawing_points, 1), [1, 2, 3])"
+    simulation = new_simulation(python=f"def sysCall_init(): {draw}", drawings=drawings)
     assert len(drawings.objects) == 1
     simulation.stop()
     assert not drawings.objects
@@ -238,11 +233,9 @@ def test_unknown_functions_and_constants_list_the_near_ones(sim):
     assert not hasattr(sim, "nothing_of_the_kind")
 
 
-def test_a_script_sees_each_step_once(tmp_path, new_simulation):
-    script = tmp_path / "look.py"
+def test_a_script_sees_each_step_once(new_simulation):
     look = "sim.getVisionSensorCharImage(sim.getObject('/FrontVision'))"
-    script.write_text(f"def sysCall_sensing():\n    assert {look} == {look}", encoding="utf-8")
-    simulation = new_simulation({"cameras": SMALL}, script=str(script))
+    simulation = new_simulation({"cameras": SMALL}, python=f"def sysCall_sensing():\n    assert {look} == {look}")
     camera, taken = simulation.drone.cameras["front"], []
     take = camera.take
     camera.take = lambda *kind: taken.append(simulation.steps) or take(*kind)

@@ -65,19 +65,16 @@ end
 
 
 @pytest.fixture(name="begin")
-def _begin(tmp_path):
+def _begin(tmp_path, new_simulation):
     """Give a function that returns a simulation of a script's text, and its file; all are closed in the end."""
-    begun = []
 
     def begin(text, name="script.py", **overrides):
         path = tmp_path / name
         path.write_text(text, encoding="utf-8")
-        begun.append(Simulation(parameters.load(overrides), script=str(path), started=False))
-        return begun[-1], str(path)
+        simulation = new_simulation(overrides, script=str(path), started=False)
+        return simulation, str(path)
 
-    yield begin
-    for one in begun:
-        one.close()
+    return begin
 
 
 def table(scopes):

@@ -79,10 +79,8 @@ def sysCall_sensing():
 
 
 @pytest.fixture(name="simulation")
-def _simulation(tmp_path, new_simulation):
-    script = tmp_path / "leaves.py"
-    script.write_text(LEAVES, encoding="utf-8")
-    return new_simulation({"gravity": 0.0}, script=str(script), drawings=Drawings())
+def _simulation(new_simulation):
+    return new_simulation({"gravity": 0.0}, python=LEAVES, drawings=Drawings())
 
 
 def test_a_parent_carries_what_is_drawn(simulation):
@@ -111,8 +109,6 @@ def test_custom_data_and_tubes_are_of_a_snapshot_and_of_a_run(simulation):
 
 
 class Ros:
-    """A backend that remembers."""
-
     def __init__(self):
         self.parameters, self.sent = {"/drone/gain": 2}, []
 

@@ -231,10 +231,8 @@ def test_memory_is_limited(tmp_path):
     assert "not enough memory" in said
 
 
-def test_the_limit_can_be_switched_off(tmp_path, new_simulation):
-    path = tmp_path / "script.py"
-    path.write_text("import time\ntime.sleep(0.3)\ndef sysCall_init(): pass", encoding="utf-8")
-    new_simulation({"script_time_limit": 0}, script=str(path))
+def test_the_limit_can_be_switched_off(new_simulation):
+    new_simulation({"script_time_limit": 0}, python="import time\ntime.sleep(0.3)\ndef sysCall_init(): pass")
 
 
 def test_drawing_a_picture_is_not_the_scripts_time(monkeypatch):

@@ -22,7 +22,6 @@ def _call(request):
     scripts = []
 
     def call(arguments, give=lambda *values: None, then=""):
-        """Call test.f(arguments) in Lua; return what it was called with."""
         given = []
 
         def f(*values):
@@ -99,7 +98,7 @@ def test_what_lua_cannot_take_is_an_error(call, result, words):
 
 
 @pytest.mark.parametrize("prologue", PROLOGUE.values())
-def test_lua_multiplies_matrices_as_python_does(tmp_path, prologue, new_simulation):
+def test_lua_multiplies_matrices_as_python_does(prologue, new_simulation):
     dice = random.Random(1)
     m = [dice.uniform(-2, 2) for _ in range(12)]
     v = [dice.uniform(-2, 2) for _ in range(3)]
@@ -112,9 +111,7 @@ def test_lua_multiplies_matrices_as_python_does(tmp_path, prologue, new_simulati
         "assert(sim.multiplyVector({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, {1, 2, 3})[3] == 3)\n"
         "function sysCall_init() end"
     )
-    path = tmp_path / "script.lua"
-    path.write_text(source, encoding="utf-8")
-    simulation = new_simulation(script=str(path))
+    simulation = new_simulation(lua=source)
     found = simulation.child_scripts["drone"].parameters
     assert found["product"] == list(frames.transform(m, v)) and found["inverse"] == list(frames.invert(m))
 

@@ -196,15 +196,12 @@ def test_messages_pass_through_a_script(tmp_path, ending, source, new_simulation
     assert sender.ended
 
 
-def test_twists_reach_the_script(tmp_path, new_simulation):
-    path = tmp_path / "script.lua"
-    path.write_text(
-        "simROS.subscribe('/drone/cmd_vel', 'geometry_msgs/Twist', 'f')\n"
+def test_twists_reach_the_script(new_simulation):
+    simulation = new_simulation(
+        lua="simROS.subscribe('/drone/cmd_vel', 'geometry_msgs/Twist', 'f')\n"
         "function f(m) assert(m.linear.x == 1 and m.linear.z == 0 and m.angular.z == 0.5) heard = true end\n"
-        "function sysCall_cleanup() assert(heard) end",
-        encoding="utf-8",
+        "function sysCall_cleanup() assert(heard) end"
     )
-    simulation = new_simulation(script=str(path))
     simulation.drone.commands.receive(Twist(Vector3(1, 0, 0), Vector3(0, 0, 0.5)))
     simulation.step()
 

@@ -43,10 +43,8 @@ def flight(simulation, steps=4):
     return path, list(backend.published), drawn
 
 
-def test_commands_on_their_way_are_delivered_again(tmp_path, new_simulation):
-    path = tmp_path / "script.lua"
-    path.write_text(LUA, encoding="utf-8")
-    simulation = new_simulation(script=str(path), drawings=Drawings(), backend=Recorder())
+def test_commands_on_their_way_are_delivered_again(new_simulation):
+    simulation = new_simulation(lua=LUA, drawings=Drawings(), backend=Recorder())
     flights = []
     for x in (1, 2):
         simulation.drone.commands.receive(Twist(Vector3(x)))
@@ -117,36 +115,31 @@ def test_topics_come_back_under_their_handles():
     assert bus.advertise("/new", "std_msgs/String") == 3
 
 
-def test_a_stopped_script_has_no_snapshots(tmp_path, new_simulation):
-    path = tmp_path / "script.lua"
-    path.write_text("function sysCall_sensing() string.find(('x'):rep(1e5), '.-.-.-.-.-y') end", encoding="utf-8")
+def test_a_stopped_script_has_no_snapshots(new_simulation):
     limit = {"script_time_limit": 2.0}  # s, more than a snapshot takes on a busy machine
-    simulation = new_simulation(limit, script=str(path))
+    simulation = new_simulation(limit, lua="function sysCall_sensing() string.find(('x'):rep(1e5), '.-.-.-.-.-y') end")
     snapshot = simulation.snapshot()
     for attempt in (simulation.step, simulation.step, simulation.snapshot, lambda: simulation.restore(snapshot)):
         with pytest.raises(ScriptError, match="stopped after"):
             attempt()
 
 
-def test_the_time_between_calls_is_not_the_scripts(tmp_path, new_simulation):
+def test_the_time_between_calls_is_not_the_scripts(new_simulation):
     """A script with nothing to do in a step, and a snapshot after a pause, have no old deadline over them."""
-    path = tmp_path / "script.lua"
-    path.write_text("x = {} for i = 1, 20000 do x[i] = {i} end function sysCall_init() end", encoding="utf-8")
-    simulation = new_simulation({"script_time_limit": 5}, script=str(path))
+    simulation = new_simulation(
+        {"script_time_limit": 5}, lua="x = {} for i = 1, 20000 do x[i] = {i} end function sysCall_init() end"
+    )
     simulation.child_scripts["drone"].script._limit._deadline = 0.0  # as after a long pause
     for _ in range(5):
         simulation.step()
     simulation.restore(simulation.snapshot())
 
 
-def test_a_script_that_keeps_itself_has_snapshots(tmp_path, new_simulation):
-    path = tmp_path / "script.py"
-    path.write_text(
-        "self.me, self.too, self.list, self.count = self, [self], [], 0\n"
-        "def sysCall_sensing(): self.me.count += 1; self.list.append(self)\n",
-        encoding="utf-8",
+def test_a_script_that_keeps_itself_has_snapshots(new_simulation):
+    simulation = new_simulation(
+        python="self.me, self.too, self.list, self.count = self, [self], [], 0\n"
+        "def sysCall_sensing(): self.me.count += 1; self.list.append(self)\n"
     )
-    simulation = new_simulation(script=str(path))
     simulation.step()
     snapshot = simulation.snapshot()
     simulation.step()
@@ -157,14 +150,13 @@ def test_a_script_that_keeps_itself_has_snapshots(tmp_path, new_simulation):
 
 
 @pytest.mark.parametrize("phase", ["init", "actuation", "sensing"])
-def test_a_script_that_has_lost_its_globals_has_snapshots(tmp_path, phase, new_simulation):
-    path = tmp_path / "script.py"
-    path.write_text(
-        "def sysCall_init(): self.count = 0\ndef sysCall_actuation(): self.count += 1\ndef sysCall_sensing(): pass\n"
-        f"before = sysCall_{phase}\ndef sysCall_{phase}(before=before):\n    before()\n    globals().clear()\n",
-        encoding="utf-8",
+def test_a_script_that_has_lost_its_globals_has_snapshots(phase, new_simulation):
+    simulation = new_simulation(
+        python="def sysCall_init(): self.count = 0\n"
+        "def sysCall_actuation(): self.count += 1\n"
+        "def sysCall_sensing(): pass\n"
+        f"before = sysCall_{phase}\ndef sysCall_{phase}(before=before):\n    before()\n    globals().clear()\n"
     )
-    simulation = new_simulation(script=str(path))
     first = simulation.snapshot()
     for _ in range(2):
         simulation.step()
@@ -183,10 +175,8 @@ def test_a_script_that_has_lost_its_globals_has_snapshots(tmp_path, phase, new_s
          "def sysCall_init(): globals()[A('x')] = 1", "script.py:2: ZeroDivisionError"),
     ],
 )  # fmt: skip
-def test_what_a_script_does_while_it_is_copied_is_its_own_error(tmp_path, has, said, new_simulation):
-    path = tmp_path / "script.py"
-    path.write_text(f"{has}\ndef sysCall_sensing(): pass\n", encoding="utf-8")
+def test_what_a_script_does_while_it_is_copied_is_its_own_error(has, said, new_simulation):
     limit = 0.2 if "stopped" in said else 60.0
-    simulation = new_simulation({"script_time_limit": limit}, script=str(path))
+    simulation = new_simulation({"script_time_limit": limit}, python=f"{has}\ndef sysCall_sensing(): pass\n")
     with pytest.raises(ScriptError, match=rf"^\[snapshot\] .*{said}"):
         simulation.snapshot()

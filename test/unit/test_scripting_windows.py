@@ -6,8 +6,6 @@ import re
 import pytest
 
 from drone_sim.files.resources import package_path
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.windows import MOST, Dialog, Windows, read_answer
 
 OPENS = """
@@ -34,17 +32,12 @@ def sysCall_actuation():
 
 
 @pytest.fixture(name="fly")
-def _fly(tmp_path):
-    made = []
-
+def _fly(tmp_path, new_simulation):
     def fly(text, name="script.py"):
         (tmp_path / name).write_text(text, encoding="utf-8")
-        made.append(Simulation(parameters.load(), script=str(tmp_path / name)))
-        return made[-1]
+        return new_simulation(script=str(tmp_path / name))
 
-    yield fly
-    for one in made:
-        one.close()
+    return fly
 
 
 def handles(simulation, kind):

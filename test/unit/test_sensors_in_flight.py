@@ -10,7 +10,6 @@ from drone_sim.forces.pushes import Push
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.run.stepping import Diverged
 from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.modules import make_sim
@@ -21,16 +20,11 @@ FLYING = Twist(Vector3(0.8, -0.4, 0.1), Vector3(0, 0, 0.5))
 
 
 @pytest.fixture(name="simulate")
-def _simulate():
-    made = []
-
+def _simulate(new_simulation):
     def simulate(overrides=None, **others):
-        made.append(Simulation(parameters.load(overrides or ALL), **others))
-        return made[-1]
+        return new_simulation(overrides or ALL, **others)
 
-    yield simulate
-    for one in made:
-        one.close()
+    return simulate
 
 
 @pytest.fixture(name="still")

@@ -32,16 +32,11 @@ def sysCall_cleanup(): print('cleanup')
 
 
 @pytest.fixture(name="simulate")
-def _simulate():
-    made = []
-
+def _simulate(new_simulation):
     def simulate(script="", **overrides):
-        made.append(Simulation(parameters.load({"cameras": SMALL, **overrides}), script=str(script)))
-        return made[-1]
+        return new_simulation({"cameras": SMALL, **overrides}, script=str(script))
 
-    yield simulate
-    for simulation in made:
-        simulation.close()
+    return simulate
 
 
 def everything(simulation):

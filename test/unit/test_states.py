@@ -322,9 +322,9 @@ def test_another_script_has_no_states_and_that_is_said(caplog, new_simulation):
     ]
 
 
-def test_a_lua_script_may_have_states(tmp_path, new_simulation):
-    script = tmp_path / "own.lua"
-    script.write_text("""
+def test_a_lua_script_may_have_states(new_simulation):
+    simulation = new_simulation(
+        lua="""
 function sysCall_init()
     publisher = simROS.advertise('state', 'std_msgs/String', 1, true)
     simROS.publish(publisher, {data = 'waiting'})
@@ -334,8 +334,8 @@ end
 function on_land(message) simROS.publish(publisher, {data = 'landing'}) end
 function on_goto(message) simROS.publish(publisher, {data = 'at ' .. message.pose.position.x}) end
 function sysCall_actuation() end
-""")
-    simulation = new_simulation(script=str(script))
+"""
+    )
     said = [str(simulation.drone.flight_state)]
     for topic, pose in (("land", None), ("goto", Pose((1.5, 0, 1)))):
         simulation.drone.ask(topic, pose)

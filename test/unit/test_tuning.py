@@ -11,7 +11,6 @@ from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
-from drone_sim.run.simulation import Simulation
 
 SMALL = {name: {"width": 16, "height": 12} for name in ("front", "depth", "track", "floor")}
 SENSORS = {"imu": {"kind": "imu", "rate": 20}, "fix": {"kind": "fix", "rate": 20, "noise": {"vertical": {"bias": 2.0}}}}
@@ -44,16 +43,11 @@ def tuning_of(simulation):
 
 
 @pytest.fixture(name="simulate")
-def _simulate():
-    made = []
-
+def _simulate(new_simulation):
     def simulate(script="", **overrides):
-        made.append(Simulation(parameters.load({"cameras": SMALL, "sensors": SENSORS, **overrides}), script=script))
-        return made[-1]
+        return new_simulation({"cameras": SMALL, "sensors": SENSORS, **overrides}, script=script)
 
-    yield simulate
-    for simulation in made:
-        simulation.close()
+    return simulate
 
 
 def fly(simulation, steps):

@@ -122,10 +122,8 @@ def as_script(picture):
 
 
 @pytest.fixture(name="simulation")
-def _simulation(tmp_path, new_simulation):
-    script = tmp_path / "sees.py"
-    script.write_text(SEES)
-    return new_simulation(SMALL, script=str(script))
+def _simulation(new_simulation):
+    return new_simulation(SMALL, python=SEES)
 
 
 def test_a_camera_sees_what_is_there_now(simulation):

@@ -14,7 +14,6 @@ from drone_sim.forces.weather import Weather, WeatherParameters
 from drone_sim.mechanics.frames import to_euler
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
-from drone_sim.run.simulation import Simulation
 
 CALM = {"deviation": (0, 0, 0), "length": (20, 20, 5), "speed": 2, "seed": 1}
 GUSTS = {**CALM, "deviation": (3, 2, 1)}
@@ -26,16 +25,11 @@ def weather(wind=(0, 0, 0), gusts=CALM, now=0.0):
 
 
 @pytest.fixture(name="simulate")
-def _simulate():
-    made = []
-
+def _simulate(new_simulation):
     def simulate(**overrides):
-        made.append(Simulation(parameters.load(overrides)))
-        return made[-1]
+        return new_simulation(overrides)
 
-    yield simulate
-    for simulation in made:
-        simulation.close()
+    return simulate
 
 
 def fly(simulation, steps):
