@@ -36,26 +36,40 @@ def _renderer(shared_renderer):
     return shared_renderer
 
 
-@pytest.fixture
-def new_simulation(tmp_path):
-    """Return a function that builds a simulation from parameters, and advances it by some steps.
+def simulations(folder):
+    """Yield a function that builds a simulation from parameters, and advances it by some steps; close all in the end.
 
-    The drone's script may be given as text, `lua` or `python`. The simulations are closed after the test.
+    The drone's script may be given as text, `lua` or `python`, and so may the scene's file.
     """
-    with contextlib.ExitStack() as after_the_test:
+    with contextlib.ExitStack() as in_the_end:
 
-        def build(values=None, steps=0, lua=None, python=None, **options):
-            for ending, text in (("lua", lua), ("py", python)):
+        def build(values=None, steps=0, *, lua=None, python=None, scene=None, **options):
+            values = dict(values or {})
+            for name, text in (("script.lua", lua), ("script.py", python), ("scene.yaml", scene)):
                 if text is not None:
-                    (tmp_path / f"script.{ending}").write_text(text, encoding="utf-8")
-                    options["script"] = str(tmp_path / f"script.{ending}")
+                    (folder / name).write_text(text, encoding="utf-8")
+            if scene is not None:
+                values["scene_file"] = str(folder / "scene.yaml")
+            if lua is not None or python is not None:
+                options["script"] = str(folder / ("script.py" if lua is None else "script.lua"))
             simulation = Simulation(parameters.load(values), **options)
-            after_the_test.callback(simulation.close)
+            in_the_end.callback(simulation.close)
             for _ in range(steps):
                 simulation.step()
             return simulation
 
         yield build
+
+
+@pytest.fixture
+def new_simulation(tmp_path):
+    yield from simulations(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def new_shared_simulation(tmp_path_factory):
+    """Do what new_simulation does, for a simulation that the tests of a file share."""
+    yield from simulations(tmp_path_factory.mktemp("shared"))
 
 
 def pytest_collection_modifyitems(items):

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 from api_examples import ANY, Example
 
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scene.distances import Distances
 from drone_sim.scripting import load
 from drone_sim.scripting.api import ignored
@@ -108,15 +106,11 @@ def REFUSED(f, *values):
 
 
 @pytest.fixture(name="simulation", scope="module")
-def _simulation(tmp_path_factory):
-    script = tmp_path_factory.mktemp("api") / "still.py"
-    script.write_text("def sysCall_init(): pass\n", encoding="utf-8")
+def _simulation(new_shared_simulation):
     mount = {"position": [0.0, 0.0, 0.0], "rpy": [0.0, 1.57, 0.0]}
     height = {"kind": "range", "rate": 20.0, "min_range": 0.1, "max_range": 4.0, "mount": mount}
     own = {"script_parameters": {"gain": 1.0}, "sensors": {"height": height}, "scene": SCENE}
-    simulation = Simulation(parameters.load({"gravity": 0.0, **own}), script=str(script), drawings=Drawings())
-    yield simulation
-    simulation.close()
+    return new_shared_simulation({"gravity": 0.0, **own}, python="def sysCall_init(): pass\n", drawings=Drawings())
 
 
 @pytest.fixture(name="modules")
@@ -289,10 +283,11 @@ def test_in_lua_a_packet_that_is_not_there_is_nil(modules, tmp_path):
     ("graph", "draw"),
     [("simHandleGraph", "simAddDrawingObject"), ("sim.handleGraph", "sim.addDrawingObject")],
 )
-def test_what_is_ignored_is_told_as_the_script_writes_it_and_drawings_at_debug_level(tmp_path, caplog, graph, draw):
-    (tmp_path / "script.lua").write_text(f"function sysCall_init()\n{graph}(1, 2)\n{draw}(0, 1)\n{draw}(0, 1)\nend")
+def test_what_is_ignored_is_told_as_the_script_writes_it_and_drawings_at_debug_level(
+    new_simulation, caplog, graph, draw
+):
     with caplog.at_level(logging.DEBUG), caplog.at_level(logging.DEBUG, "drone_sim.script"):
-        Simulation(parameters.load(), script=str(tmp_path / "script.lua")).close()
+        new_simulation(lua=f"function sysCall_init()\n{graph}(1, 2)\n{draw}(0, 1)\n{draw}(0, 1)\nend")
     told = [
         (one.getMessage().partition(":")[0], one.levelno) for one in caplog.records if "accepted and" in one.message
     ]

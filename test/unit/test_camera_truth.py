@@ -26,11 +26,9 @@ SCENE = {
 @pytest.fixture(
     name="simulation", params=[None, {"model": "plumb_bob", "coefficients": [-0.2, 0.05]}], ids=["pinhole", "lens"]
 )
-def _simulation(request, tmp_path, new_simulation):
-    scene = tmp_path / "scene.yaml"
-    scene.write_text(yaml.safe_dump(SCENE))
+def _simulation(request, new_simulation):
     cameras = {"front": {"lens": request.param}} if request.param else {}
-    return new_simulation({"scene_file": str(scene), "cameras": cameras}, steps=5)
+    return new_simulation({"cameras": cameras}, steps=5, scene=yaml.safe_dump(SCENE))
 
 
 def by_name(truth):
@@ -90,10 +88,8 @@ def _picture_of(tmp_path, new_simulation):
     """Return what takes a picture of objects with the front camera, 1 m above the floor; as its objects, and it."""
 
     def take(objects, **camera):
-        scene = tmp_path / "scene.yaml"
-        scene.write_text(yaml.safe_dump({"objects": objects, "drone": {"position": [0, 0, 1]}}))
-        simulation = new_simulation({"scene_file": str(scene), "cameras": {"front": camera}})
-        front = simulation.drone.cameras["front"]
+        scene = yaml.safe_dump({"objects": objects, "drone": {"position": [0, 0, 1]}})
+        front = new_simulation({"cameras": {"front": camera}}, scene=scene).drone.cameras["front"]
         return by_name(front.truth()), front
 
     return take

@@ -4,7 +4,7 @@ import re
 
 import pytest
 import yaml
-from scene_edits import edit, editor_of, place
+from living import edit, editor_of, place
 
 from drone_sim.files.resources import package_path
 

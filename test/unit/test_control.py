@@ -12,10 +12,7 @@ FRONT_LEFT, BACK_LEFT, BACK_RIGHT, FRONT_RIGHT = range(4)
 
 @pytest.fixture(name="fly")
 def _fly(new_simulation):
-    def start(**overrides):
-        return new_simulation(overrides)
-
-    return start
+    return lambda **overrides: new_simulation(overrides)
 
 
 def velocities_after(simulation, twist):

@@ -9,12 +9,12 @@ import pytest
 import yaml
 from vrep_encoder import chunk, file, integers, numbers, scene_object
 
+from drone_sim.importing import entries
 from drone_sim.importing.main import main
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.path import ControlledPath, PathRules
 from drone_sim.mechanics.path_curves import ControlPoint, Station
 from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 CLOSED, AUTOMATIC, FLAT, X_UP = 0x04, 0x08, 0x40, 0x800
 CORNER = [(0, 0, 0), (1, 0, 0), (1, 1, 0)]
@@ -240,11 +240,12 @@ def test_what_is_not_brought_of_a_path_is_said(imported):
     assert "Way: a path: its velocity profile is not imported" in imported.said
 
 
-def test_more_points_than_can_be_kept_are_brought_as_fewer(imported):
-    points = [control_point((index % 2, index, 0), count=100) for index in range(1500)]
+def test_more_points_than_can_be_kept_are_brought_as_fewer(imported, monkeypatch):
+    monkeypatch.setattr(entries, "MAX_LINE", 10_000)
+    points = [control_point((index % 2, index, 0), count=100) for index in range(150)]
     scene = imported(path_object(0, "Way", *points))
     (entry,) = yaml.safe_load(scene.read_text())["objects"]
-    assert len(entry["control_points"]) == 1500 and entry["control_points"][7]["count"] == 66
+    assert len(entry["control_points"]) == 150 and entry["control_points"][7]["count"] == 66
     assert "Way: a path: its curves are drawn with fewer points" in imported.said
     parameters.load({"scene_file": str(scene)})
 
@@ -289,24 +290,13 @@ end
 """
 
 
-def test_3x_scripts_read_and_change_it(imported, tmp_path):
+def test_3x_scripts_read_and_change_it(imported, new_simulation):
     points = [control_point(point) for point in ((0, 0, 0), (4, 0, 0), (8, 0, 0))]
     scene = imported(path_object(0, "Way", *points, at=(1, 0, 2)))
-    script = tmp_path / "follow.lua"
-    script.write_text(FOLLOW)
-    values = {"scene_file": str(scene), "vehicles": {"drone": {}}}
-    simulation = Simulation(parameters.load(values), script=str(script))
-    try:
-        simulation.step()
-        found = {name: simulation.context.signals.get(float, name) for name in ("length", "begins", "middle", "beta")}
-        assert found == pytest.approx({"length": 8, "begins": 0.25, "middle": 5, "beta": math.pi / 2})
-        names = ("position", "data", "near", "empty", "triangle", "cut", "made")
-        found = {name: simulation.context.signals.get(float, name) for name in names}
-        assert found == pytest.approx(
-            {"position": 8, "data": 4.5, "near": 0.5, "empty": 0, "triangle": 12, "cut": 3, "made": 0}
-        )
-    finally:
-        simulation.close()
+    simulation = new_simulation({"scene_file": str(scene), "vehicles": {"drone": {}}}, steps=1, lua=FOLLOW)
+    expected = {"length": 8, "begins": 0.25, "middle": 5, "beta": math.pi / 2}
+    expected |= {"position": 8, "data": 4.5, "near": 0.5, "empty": 0, "triangle": 12, "cut": 3, "made": 0}
+    assert {name: simulation.context.signals.get(float, name) for name in expected} == pytest.approx(expected)
 
 
 ALONG = """
@@ -323,20 +313,16 @@ threadFunction()
 
 
 @pytest.mark.parametrize(("velocity", "end"), [(2.0, 9.0), (-2.0, 1.0)])
-def test_an_object_follows_it_to_its_end_or_to_its_beginning(imported, tmp_path, velocity, end):
+def test_an_object_follows_it_to_its_end_or_to_its_beginning(imported, new_simulation, velocity, end):
     points = [control_point(point) for point in ((0, 0, 0), (4, 0, 0), (8, 0, 0))]
     scene = imported(path_object(0, "Way", *points, at=(1, 0, 2)))
-    script = tmp_path / "along.lua"
-    script.write_text(ALONG.replace("VELOCITY", str(velocity)))
-    simulation = Simulation(parameters.load({"scene_file": str(scene), "vehicles": {"drone": {}}}), script=str(script))
-    try:
-        places = []
-        for _ in range(60):
-            simulation.step()
-            box = simulation.context.signals.get(int, "box")
-            places.append(frames.position(simulation.context.objects.matrix(box))[0] if box is not None else 0.0)
-        assert places[-1] == pytest.approx(end)
-        assert simulation.context.signals.get(float, "took") == pytest.approx(2.0, abs=0.15)
-        assert abs(places[20] - 5) == pytest.approx(2 * 20 * 0.05, abs=0.25)
-    finally:
-        simulation.close()
+    values, along = {"scene_file": str(scene), "vehicles": {"drone": {}}}, ALONG.replace("VELOCITY", str(velocity))
+    simulation = new_simulation(values, lua=along)
+    places = []
+    for _ in range(60):
+        simulation.step()
+        box = simulation.context.signals.get(int, "box")
+        places.append(frames.position(simulation.context.objects.matrix(box))[0] if box is not None else 0.0)
+    assert places[-1] == pytest.approx(end)
+    assert simulation.context.signals.get(float, "took") == pytest.approx(2.0, abs=0.15)
+    assert abs(places[20] - 5) == pytest.approx(2 * 20 * 0.05, abs=0.25)

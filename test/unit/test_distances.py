@@ -6,8 +6,6 @@ import pytest
 
 from drone_sim.hosting.child_scripts import services
 from drone_sim.mechanics.state import Pose
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.api.modules import make_sim
 from drone_sim.scripting.time_limit import TimeLimit
@@ -30,13 +28,9 @@ STILL = "def sysCall_init(): pass\n"
 
 
 @pytest.fixture(name="simulation", scope="module")
-def _simulation(tmp_path_factory):
-    script = tmp_path_factory.mktemp("still") / "still.py"
-    script.write_text(STILL, encoding="utf-8")
+def _simulation(new_shared_simulation):
     fleet = {"drone": {"position": [0, 0, 1]}, "other": {"position": [0, 1, 1]}}
-    simulation = Simulation(parameters.load({"scene": SCENE, "vehicles": fleet, "gravity": 0.0}), script=str(script))
-    yield simulation
-    simulation.close()
+    return new_shared_simulation({"scene": SCENE, "vehicles": fleet, "gravity": 0.0}, python=STILL)
 
 
 @pytest.fixture(name="sim")

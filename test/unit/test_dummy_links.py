@@ -7,8 +7,6 @@ import yaml
 
 from drone_sim.config.types import ParameterError
 from drone_sim.mechanics import frames
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 STEP, SUB_STEP = 0.05, 0.005  # s
 BOX = {"shape": "box", "size": [0.2, 0.2, 0.2]}
@@ -40,23 +38,16 @@ def sysCall_actuation():
 
 
 @pytest.fixture(name="fly")
-def _fly(tmp_path):
+def _fly(new_simulation):
     """Start a simulation of SCENE with links of dummies (by name), flown by a script."""
-    started = []
 
     def fly(text=PUSH, links=(), scene=SCENE):
         linked = {name: {"linked": other} for name, other in dict(links).items()}
         objects = [{**one, **linked.get(one["name"], {})} for one in scene["objects"]]
         text_of_scene = yaml.safe_dump({**scene, "objects": objects}, sort_keys=False)
-        (tmp_path / "scene.yaml").write_text(text_of_scene, encoding="utf-8")
-        (tmp_path / "script.py").write_text(text, encoding="utf-8")
-        read = parameters.load({"scene_file": str(tmp_path / "scene.yaml")})
-        started.append(Simulation(read, script=str(tmp_path / "script.py")))
-        return started[-1]
+        return new_simulation(python=text, scene=text_of_scene)
 
-    yield fly
-    for simulation in started:
-        simulation.close()
+    return fly
 
 
 def place(simulation, name):

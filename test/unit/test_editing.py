@@ -6,8 +6,7 @@ import os
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from living import picture
-from scene_edits import assert_same, edit, editor_of, place, state, text_of
+from living import assert_same, edit, editor_of, picture, place, state, text_of
 
 from drone_sim.editing import drafts, records
 from drone_sim.files import yaml_files

@@ -12,23 +12,13 @@ import yaml
 
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 THREE = {"drone1": {"position": [0, 0, 0.8]}, "drone2": {"position": [0, 3, 1.2]}, "drone3": {"position": [2, -3, 2]}}
 
 
 @pytest.fixture(name="fly")
-def _fly():
-    """Return a function that opens a simulation; all are closed at the end."""
-    opened = []
-
-    def fly(**overrides):
-        opened.append(Simulation(parameters.load(overrides)))
-        return opened[-1]
-
-    yield fly
-    for simulation in opened:
-        simulation.close()
+def _fly(new_simulation):
+    return lambda **overrides: new_simulation(overrides)
 
 
 def path(simulation, name, steps):
@@ -202,16 +192,16 @@ def test_what_they_took_is_given_back(fly):
             simulation.set_vehicles({"drone1": {}})
         gc.collect()
 
-    come_and_go(10)
+    come_and_go(5)
     files = sorted(folder.iterdir())
     growth = []
     for _ in range(3):
         before = allocated()
-        come_and_go(30)
+        come_and_go(15)
         growth.append(allocated() - before)
     assert sorted(folder.iterdir()) == files
     # What leaks grows in every round. A table of the process that doubles, whoever's it is, grows in one.
-    assert min(growth) < 30 * 16_000
+    assert min(growth) < 15 * 16_000
 
 
 class Mallinfo(ctypes.Structure):

@@ -1,11 +1,15 @@
 """Results that can be held against the flights that they are of: hashes, a signature, and the same flights again."""
 
+import contextlib
 import json
+from types import SimpleNamespace
 
 import pytest
 
 from drone_sim.grading import grade
 from drone_sim.grading import plan as plans
+from drone_sim.grading.jobs import pool, settings
+from drone_sim.grading.jobs.flyer import Flyer
 from drone_sim.grading.outputs import as_json
 
 PLAN = """
@@ -15,6 +19,16 @@ criteria:
   - {kind: no_contact}
 """
 KEY = bytes(range(32))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_fork_server():
+    """All gradings use one fork server: to start it takes longer than their flights."""
+    patch = pytest.MonkeyPatch()
+    with contextlib.closing(Flyer(settings.load({}).limits, sandboxed=False)) as flyer:
+        patch.setattr(pool, "Flyer", lambda *_: SimpleNamespace(fly=flyer.fly, close=lambda: None))
+        yield
+        patch.undo()
 
 
 @pytest.fixture(scope="module")

@@ -15,10 +15,7 @@ HEXACOPTER = "package://drone_sim/config/hexacopter.yaml"
 
 @pytest.fixture(name="simulate")
 def _simulate(new_simulation):
-    def simulate(**overrides):
-        return new_simulation({"config": HEXACOPTER, **overrides})
-
-    return simulate
+    return lambda **overrides: new_simulation({"config": HEXACOPTER, **overrides})
 
 
 def fly(simulation, seconds):

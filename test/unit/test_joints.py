@@ -48,10 +48,8 @@ objects:
 
 
 @pytest.fixture(name="simulation")
-def _simulation(tmp_path, new_simulation):
-    file = tmp_path / "scene.yaml"
-    file.write_text(SCENE, encoding="utf-8")
-    return new_simulation({"scene_file": str(file), "drone": {"position": [-5, 0, 1]}})
+def _simulation(new_simulation):
+    return new_simulation({"drone": {"position": [-5, 0, 1]}}, scene=SCENE)
 
 
 def found(simulation, name):
@@ -213,9 +211,9 @@ def test_a_load_is_taken_up_and_let_go(simulation):
         found(simulation, "Beam").set_static(False)
 
 
-def test_what_hangs_on_a_chain_that_a_vehicle_carries_goes_with_it(tmp_path, new_simulation):
-    scene = tmp_path / "scene.yaml"
-    scene.write_text("""
+def test_what_hangs_on_a_chain_that_a_vehicle_carries_goes_with_it(new_simulation):
+    simulation = new_simulation(
+        scene="""
 objects:
   - {name: Hinge, kind: joint, type: revolute, mode: position, parent: Drone, position: [0, 0, -0.3]}
   - {name: Arm, shape: box, size: [0.02, 0.02, 0.02], mass: 0.001, parent: Hinge, position: [0, 0, 0]}
@@ -223,8 +221,8 @@ objects:
   - {name: Elbow, kind: joint, type: revolute, mode: position, parent: Flag}
   - {name: Hand, shape: box, size: [0.02, 0.02, 0.02], mass: 0.001, parent: Elbow, position: [0, 0, 0]}
   - {name: Ring, shape: box, size: [0.02, 0.02, 0.02], respondable: false, parent: Hand, position: [0, 0, -0.1]}
-""")
-    simulation = new_simulation({"scene_file": str(scene)})
+"""
+    )
     tree, world = simulation.context.objects, simulation.world
     world.set_velocity(simulation.drone.body.number, (2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     for _ in range(3):

@@ -5,6 +5,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 from drone_sim.files.resources import package_path
+from drone_sim.ros.core.launch_parameters import from_shell
 from drone_sim.ros.node.start_checks import check
 from drone_sim.run.parameters import ParameterError
 
@@ -43,3 +44,21 @@ def test_a_wrong_argument_is_told_with_near_names(command):
 )
 def test_everything_else_is_left_alone(command, tmp_path):
     check(command, tmp_path)
+
+
+# ---- files are found from the user's folder
+
+
+@pytest.mark.parametrize("name", ["", "target", "/a/b.py", "~/a.py", "package://drone_sim/a.yaml"])
+def test_what_is_not_relative_stays(name, monkeypatch):
+    monkeypatch.setenv("PWD", "/home/somebody")
+    assert from_shell(name) == name
+
+
+@pytest.mark.parametrize("name", ["a.lua", "./a.lua", "folder/a.yaml", "../a.yaml"])
+def test_relative_to_the_shell_and_not_to_the_process(name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PWD", "/home/somebody")
+    assert from_shell(name) == f"/home/somebody/{name.replace('./', '') if name.startswith('./') else name}"
+    monkeypatch.delenv("PWD")
+    assert from_shell(name).startswith(str(tmp_path))

@@ -2,8 +2,7 @@
 
 import pytest
 
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
+from drone_sim.scene import operations
 from drone_sim.scripting.errors import ScriptError
 
 MADE = """
@@ -20,35 +19,31 @@ def sysCall_actuation():
 """
 
 
-def simulate(tmp_path, text):
-    path = tmp_path / "made.py"
-    path.write_text(text, encoding="utf-8")
-    loaded = {"gravity": 0.0, "drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}
-    return Simulation(parameters.load(loaded), script=str(path))
+VALUES = {"gravity": 0.0, "drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}
 
 
-def test_a_script_makes_dummies_and_takes_them_away(tmp_path, caplog):
+def test_a_script_makes_dummies_and_takes_them_away(new_simulation, caplog):
     caplog.set_level("INFO")
-    simulation = simulate(tmp_path, MADE)
+    simulation = new_simulation(VALUES, python=MADE)
     assert "Dummy0" in simulation.context.objects
     simulation.step()
     assert "Dummy0" not in simulation.context.objects and "Dummy" in simulation.context.objects
     simulation.stop()
     simulation.start()
     assert caplog.messages == ["Dummy Dummy0 Dummy", "-1 [0.0, 0.0, 3.0]", "Dummy Dummy0 Dummy"]
-    simulation.close()
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        ("[sim.createDummy(0.01) for _ in range(3000)]", "a scene has at most 2000 objects"),
+        ("[sim.createDummy(0.01) for _ in range(30)]", "a scene has at most 20 objects"),
         ("sim.removeObject(sim.getObject('/Floor'))", "'Floor' is the floor"),
         ("sim.removeObjects(3)", "expected a table of handles"),
         ("sim.createDummy('large')", "a number is expected"),
         ("sim.createPureShape(3, 0, [1, 1, 1], 1)", "primitiveType = 3: must be one of"),
     ],
 )
-def test_what_is_refused(tmp_path, call, words):
+def test_what_is_refused(new_simulation, monkeypatch, call, words):
+    monkeypatch.setattr(operations, "MAX_OBJECTS", 20)
     with pytest.raises(ScriptError, match=words):
-        simulate(tmp_path, f"def sysCall_init():\n    {call}\n")
+        new_simulation(VALUES, python=f"def sysCall_init():\n    {call}\n")

@@ -9,8 +9,6 @@ from pytest import approx
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.trajectory import NONE, PHASE, TIME, Limits, State, Trajectory
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
 
 STEP = 0.05
@@ -104,16 +102,11 @@ def test_limits_are_greater_than_zero(limits):
 
 
 @pytest.fixture(name="fly")
-def _fly(tmp_path):
+def _fly(new_simulation):
     """Give a function that flies a thread until it sets the signal `end`; it returns simulation and `out` strings."""
-    simulations = []
 
     def fly(text, steps=400):
-        lua = "def " not in text
-        path = tmp_path / f"script{len(simulations)}.{'lua' if lua else 'py'}"
-        path.write_text(text, encoding="utf-8")
-        simulation = Simulation(parameters.load({"scene": SCENE}), script=str(path))
-        simulations.append(simulation)
+        simulation = new_simulation({"scene": SCENE}, **{"python" if "def " in text else "lua": text})
         values = []
         for _ in range(steps):
             simulation.step()
@@ -123,9 +116,7 @@ def _fly(tmp_path):
                 return simulation, values
         raise AssertionError("it has not ended")
 
-    yield fly
-    for one in simulations:
-        one.close()
+    return fly
 
 
 def found(simulation, name):

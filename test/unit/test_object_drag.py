@@ -6,8 +6,6 @@ import pytest
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import from_rpy
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 SCENE = """
 floor: {size: 20}
@@ -27,12 +25,8 @@ objects:
 
 
 @pytest.fixture(name="simulation", scope="module")
-def _simulation(tmp_path_factory):
-    file = tmp_path_factory.mktemp("drag") / "scene.yaml"
-    file.write_text(SCENE, encoding="utf-8")
-    simulation = Simulation(parameters.load({"scene_file": str(file)}))
-    yield simulation
-    simulation.close()
+def _simulation(new_shared_simulation):
+    return new_shared_simulation(scene=SCENE)
 
 
 @pytest.fixture(name="drag")

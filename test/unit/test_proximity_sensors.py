@@ -4,8 +4,6 @@ import math
 
 import pytest
 
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.host import SceneServices
 from drone_sim.scripting.api.modules import make_sim
 
@@ -30,13 +28,8 @@ objects:
 
 
 @pytest.fixture(name="simulation", scope="module")
-def _simulation(tmp_path_factory):
-    file = tmp_path_factory.mktemp("scenes") / "scene.yaml"
-    file.write_text(SCENE, encoding="utf-8")
-    simulation = Simulation(parameters.load({"scene_file": str(file)}))
-    simulation.step()
-    yield simulation
-    simulation.close()
+def _simulation(new_shared_simulation):
+    return new_shared_simulation(steps=1, scene=SCENE)
 
 
 @pytest.fixture(name="sim")

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from living import KINDS, SCENE, sizes
-from scene_edits import assert_same, editor_of, state, text_of
+from living import KINDS, SCENE, assert_same, editor_of, sizes, state, text_of
 
 from drone_sim.editing.changes import change_between
 
@@ -73,7 +72,6 @@ class RandomEdits:
         return choose([entry for entry in operations if tree is not None])
 
     def vehicle_operation(self, place):
-        """Return an operation on a vehicle other than the first, or what makes one."""
         choose = self.dice.choice
         others = [one.object_name for one in self.editor.simulation.vehicles.values()][1:]
         if not others:
@@ -207,7 +205,7 @@ def held():
 def test_edits_that_are_taken_back_leave_nothing_in_the_process():
     editor = editor_of({"scene": SCENE, "drone": {"position": [0.0, 0.0, 2.0]}})
     measured = []
-    for _ in range(10):
+    for _ in range(6):
         edits = RandomEdits(editor, 7)
         for _ in range(25):
             edits.step()

@@ -44,13 +44,8 @@ objects:
 
 
 @pytest.fixture(name="simulate")
-def _simulate(tmp_path, new_simulation):
-    def simulate(text):
-        file = tmp_path / "scene.yaml"
-        file.write_text(text, encoding="utf-8")
-        return new_simulation({"scene_file": str(file)})
-
-    return simulate
+def _simulate(new_simulation):
+    return lambda text: new_simulation(scene=text)
 
 
 def found(simulation, name):
@@ -334,14 +329,10 @@ def test_rviz_shows_dummies_as_balls_and_paths_as_lines(simulate):
     np.testing.assert_allclose(points, [(0, 9, 1.85), (3, 9, 1.85), (3, 13, 1.85)])
 
 
-def test_what_hung_on_a_vehicle_that_has_gone_stays_where_it_was(tmp_path, new_simulation):
-    file = tmp_path / "scene.yaml"
-    file.write_text(
-        "objects: [{name: Flag, shape: box, size: [0.1, 0.1, 0.1], parent: Drone#0, position: [0, 0, 0.3]}]",
-        encoding="utf-8",
-    )
+def test_what_hung_on_a_vehicle_that_has_gone_stays_where_it_was(new_simulation):
     two = {"a": {"position": [0, 0, 1]}, "b": {"position": [2, 0, 1]}}
-    simulation = new_simulation({"vehicles": two, "scene_file": str(file)})
+    flag = "{name: Flag, shape: box, size: [0.1, 0.1, 0.1], parent: Drone#0, position: [0, 0, 0.3]}"
+    simulation = new_simulation({"vehicles": two}, scene=f"objects: [{flag}]")
     simulation.step()
     simulation.set_vehicles({"a": two["a"]})
     simulation.step()

@@ -54,18 +54,9 @@ def _write(tmp_path):
 
 
 @pytest.fixture(name="simulate")
-def _simulate():
-    made = []
-
-    def simulate(file):
-        made.append(
-            Simulation(parameters.load({"scene_file": file, "cameras": {"front": {"width": 16, "height": 12}}}))
-        )
-        return made[-1]
-
-    yield simulate
-    for simulation in made:
-        simulation.close()
+def _simulate(new_simulation):
+    small = {"front": {"width": 16, "height": 12}}
+    return lambda file: new_simulation({"scene_file": file, "cameras": small})
 
 
 @pytest.mark.parametrize("mass", [0, 2])

@@ -25,16 +25,8 @@ def _write(tmp_path):
 
 
 @pytest.fixture(name="simulate")
-def _simulate():
-    made = []
-
-    def simulate(path):
-        made.append(Simulation(PARAMETERS, script=path))
-        return made[-1]
-
-    yield simulate
-    for simulation in made:
-        simulation.close()
+def _simulate(new_simulation):
+    return lambda path: new_simulation(script=path)
 
 
 @pytest.fixture(name="printed")

@@ -4,16 +4,12 @@ import pytest
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.names import NameFunctions
 
 
 @pytest.fixture(name="simulation", scope="module")
-def _simulation():
-    simulation = Simulation(parameters.load())
-    yield simulation
-    simulation.close()
+def _simulation(new_shared_simulation):
+    return new_shared_simulation()
 
 
 @pytest.fixture(name="objects")

@@ -1,19 +1,26 @@
 """A script in another process: it flies the same to the last bit, and what comes from there is checked."""
 
+import contextlib
 import json
 import marshal
 import math
+import os
+import random
+import signal
+import socket
 import struct
 from pathlib import Path
 
+import numpy as np
 import pytest
-import remote_script
 
 from drone_sim.grading import flight, tasks
 from drone_sim.grading import plan as plans
+from drone_sim.grading.flight import Flight, script_seed
 from drone_sim.mechanics.state import Pose, Twist
 from drone_sim.scripting.api.control import Turns
-from drone_sim.scripting.rpc import api_stubs, connection, effects, script_proxy, values
+from drone_sim.scripting.rpc import api_stubs, connection, effects, script_process, script_proxy, values
+from drone_sim.scripting.rpc.connection import ScriptConnection
 from drone_sim.vehicles.commands import Empty, request
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -124,6 +131,40 @@ end
 """
 
 
+@contextlib.contextmanager
+def process_of(serve):
+    """Give the end of a connection whose other end a process has, which calls `serve` with it."""
+    here, there = socket.socketpair()
+    process = os.fork()
+    if not process:
+        try:
+            here.close()
+            serve(there)
+        finally:
+            os._exit(0)
+    there.close()
+    try:
+        yield here
+    finally:
+        here.close()
+        os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)
+
+
+def flown_elsewhere(plan, script, seed=0, serve=None):
+    """Return the result of a flight whose script is elsewhere, and whether its door was closed by then."""
+
+    def serve_script(end):
+        random.seed(script_seed(seed))
+        np.random.seed(script_seed(seed) % 2**32)
+        script_process.serve(script_process.ScriptWorker(), end, script)
+
+    with process_of(serve or serve_script) as end:
+        door = ScriptConnection(end)
+        result = Flight(plan, script, seed, {}, door).grade()
+        return result, door.why_closed
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("rpc")
@@ -145,7 +186,7 @@ def quick(folder):
 
 def same(plan, script, seed=0):
     """Return the result, which is the same in this process and in one of its own."""
-    elsewhere, why_closed = remote_script.flown(plan, str(script), seed)
+    elsewhere, why_closed = flown_elsewhere(plan, str(script), seed)
     assert elsewhere == flight.grade(plan, str(script), seed) and not why_closed
     return elsewhere
 
@@ -228,7 +269,7 @@ def test_a_controller_asks_nothing_that_can_be_told_before(plan, monkeypatch):
     receive = connection.Channel.receive
     monkeypatch.setattr(connection.Channel, "receive", lambda self: came.append(receive(self)) or came[-1])
     longer = plan.model_copy(update={"timeline": [], "duration": 10.0})
-    remote_script.flown(longer, "pilot")
+    flown_elsewhere(longer, "pilot")
     assert len([one for one in came if one]) < 1.5 * 200 + 100  # messages of 200 steps, and the beginning
 
 
@@ -310,19 +351,19 @@ def test_what_is_no_message_ends_the_flight_in_one_line(plan, what):
         end.sendall(struct.pack("<I", len(message)) + message)
         end.recv(2**20)
 
-    result, why_closed = remote_script.flown(plan, "pilot", serve=serve)
+    result, why_closed = flown_elsewhere(plan, "pilot", serve=serve)
     assert not result.passed and result.points == 0
     assert said in result.error and said in why_closed and "\n" not in result.error
 
 
 def test_a_message_without_end_is_not_waited_for(plan):
-    result, _ = remote_script.flown(plan, "pilot", serve=lambda end: end.sendall(struct.pack("<I", 2**32 - 1)))
+    result, _ = flown_elsewhere(plan, "pilot", serve=lambda end: end.sendall(struct.pack("<I", 2**32 - 1)))
     assert result.error.endswith("its process has ended")
 
 
 def test_a_process_that_is_silent_is_not_waited_for(quick, monkeypatch):
     monkeypatch.setattr(script_proxy, "GRACE", 0.2)
-    result, _ = remote_script.flown(quick, "pilot", serve=lambda end: end.recv(1) and end.recv(2**20) and end.recv(1))
+    result, _ = flown_elsewhere(quick, "pilot", serve=lambda end: end.recv(1) and end.recv(2**20) and end.recv(1))
     assert "did not return after 0.2 s (script_time_limit)" in result.error
 
 
@@ -334,5 +375,5 @@ def test_a_process_that_floods_is_not_heard_out(quick, monkeypatch):
         while True:
             end.sendall(struct.pack("<I", len(message)) + message)
 
-    result, _ = remote_script.flown(quick, "pilot", serve=serve)
+    result, _ = flown_elsewhere(quick, "pilot", serve=serve)
     assert "did not return after 0.2 s (script_time_limit)" in result.error

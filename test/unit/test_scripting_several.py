@@ -1,7 +1,85 @@
 """Several drones in one scene: what the names in each one's script mean."""
 
+from typing import ClassVar
+
+import numpy as np
 import pytest
-from several_drones import Drone, Scene
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.clock import Clock
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.velocity_meter import VelocityMeter
+from drone_sim.scripting import load
+from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.api.host import SceneServices, ScriptContext
+from drone_sim.scripting.api.messages import MessageBus
+from drone_sim.scripting.api.modules import make_sim, make_sim_ros
+from drone_sim.scripting.api.registry import CHILD
+from drone_sim.scripting.api.windows import Windows
+from drone_sim.scripting.time_limit import TimeLimit
+
+PARTS = ("Drone", "Quadricopter_base", "Quadricopter_propeller1", "Quadricopter_propeller_respondable1")
+
+
+class Scene(ScriptContext):
+    def __init__(self, shown=True):
+        clock, objects = Clock(0.05), ObjectTree()
+        measured = {"objects": objects, "velocities": VelocityMeter(objects, clock)}
+        super().__init__(clock=clock, gravity=-9.81, drawings=Drawings(shown), windows=Windows(), **measured)
+        self.objects.add("Floor", also=("ResizableFloor_5_25",))
+
+
+class Drone:
+    """A Host."""
+
+    sensors: ClassVar[dict] = {}
+    script_type = CHILD
+
+    def __init__(self, scene, suffix="", own=None, also=()):
+        self.context = scene
+        self.own_script, base, propeller, respondable, *others = (f"{name}{suffix}" for name in (*PARTS, *also))
+        add = scene.objects.add
+        self.handles = [
+            add(self.own_script, alias="Quadcopter", also=(f"Quadricopter{suffix}",)),
+            add(base, self.own_script, frames.from_rpy((0, 0, -0.01), (0, 0, 0)), alias="base"),
+            add(propeller, self.own_script, alias="propeller"),
+            add(respondable, propeller, alias="respondable"),
+            *(add(name, self.own_script) for name in others),
+        ]
+        scene.objects[self.handles[0]].is_model = True
+        self.script_parameters = {
+            self.own_script: {"gain": 2.0, **(own or {})},
+            respondable: {"particleVelocity": 0.0},
+        }
+        for name, parameters in self.script_parameters.items():
+            scene.scripts.add(name, parameters, is_law=name != self.own_script)
+        self.forces = []
+        self.bus = MessageBus(self.own_script)
+
+    @property
+    def parameters(self):
+        return self.script_parameters[self.own_script]
+
+    @property
+    def velocity(self):
+        return list(self.script_parameters.values())[1]["particleVelocity"]
+
+    def add_force(self, shape, force, torque, offset):
+        if shape not in self.script_parameters:
+            raise ValueError(f"'{shape}' is not a dynamic shape")
+        self.forces.append((shape, force))
+
+    def turn_joint(self, joint, angle):
+        return 0.0
+
+    def sim(self):
+        return make_sim(self, SceneServices())
+
+    def load(self, path):
+        return load.load(
+            str(path), {"sim": self.sim(), "simROS": make_sim_ros(self.bus, self.context.clock)}, TimeLimit(20)
+        )
+
 
 LUA = """
 function sysCall_init()
@@ -218,3 +296,88 @@ def test_when_a_drone_is_gone_the_others_stay_what_they_are(drones):
     assert name_of(second, "Floor") == "Floor"
     with pytest.raises(ValueError, match="no object named 'Quadricopter_base#1'"):
         sim.getObject("Quadricopter_base#1")
+
+
+# ---- a script's own parameters
+
+
+OWN = {"MyGain": 0.25, "steps": 3, "isBold": True, "mode": "slow", "route": (1.0, 2.0, 3.5), "limits": [4, 5]}
+
+LUA_SETS = """
+local function get(name) return sim.getScriptSimulationParameter(sim.handle_self, name) end
+local function set(name, value) simSetScriptSimulationParameter(sim_handle_self, name, value) end
+function sysCall_init()
+    assert(get('MyGain') == 0.25 and get('steps') == 3 and get('isBold') == true and get('mode') == 'slow')
+    local route, limits = get('route'), get('limits')
+    assert(#route == 3 and route[1] == 1 and route[3] == 3.5 and #limits == 2 and limits[2] == 5)
+    route[1] = 100
+    assert(get('route')[1] == 1)
+    assert(sim.getUserParameter(sim.getObject('.'), 'MyGain') == 0.25)
+    assert(not pcall(get, 'MyGian'))
+    set('MyGain', 0.5) set('steps', '4') set('isBold', 'false') set('mode', 'fast') set('route', {9, 8})
+    sim.setUserParameter(sim.handle_self, 'limits', {7})
+end
+"""
+PYTHON_SETS = """
+def get(name): return sim.getScriptSimulationParameter(sim.handle_self, name)
+def put(name, value): sim.setScriptSimulationParameter(sim.handle_self, name, value)
+def sysCall_init():
+    assert [get(name) for name in ("MyGain", "steps", "isBold", "mode")] == [0.25, 3, True, "slow"]
+    route = get("route")
+    assert route == [1, 2, 3.5] and get("limits") == [4, 5]
+    route[0] = 100
+    assert get("route")[0] == 1
+    assert sim.getUserParameter(sim.getObject("."), "MyGain") == 0.25
+    mine = [9, 8]
+    put("MyGain", 0.5); put("steps", "4"); put("isBold", "false"); put("mode", "fast"); put("route", mine)
+    mine.append(7)
+    sim.setUserParameter(sim.handle_self, "limits", [7])
+"""
+
+
+@pytest.mark.parametrize("ending, source", [("lua", LUA_SETS), ("py", PYTHON_SETS)])
+def test_a_script_reads_and_sets_its_own(tmp_path, caplog, ending, source):
+    path = tmp_path / f"script.{ending}"
+    path.write_text(source, encoding="utf-8")
+    drone = Drone(Scene(), own=OWN)
+    script = drone.load(path)
+    script.call("init")
+    script.close()
+    assert {name: drone.parameters[name] for name in OWN} == {
+        "MyGain": 0.5,
+        "steps": 4.0,
+        "isBold": False,
+        "mode": "fast",
+        "route": [9, 8],
+        "limits": [7],
+    }
+    assert not caplog.records
+
+
+def test_mistakes(caplog):
+    sim = Drone(Scene(), own=OWN).sim()
+    with pytest.raises(ValueError, match="no script parameter 'MyGian'; near names are MyGain"):
+        sim.getScriptSimulationParameter(sim.handle_self, "MyGian")
+    with pytest.raises(TypeError, match="expected a number"):
+        sim.setScriptSimulationParameter(sim.handle_self, "MyGain", "much")
+    with pytest.raises(ValueError, match="no script is attached to 'Floor'"):
+        sim.getUserParameter(sim.getObject("/Floor"), "MyGain")
+    assert not caplog.records
+
+
+def test_a_parameter_for_all_scripts_is_one_that_the_own_script_has(caplog):
+    drone = Drone(Scene(), own=OWN)
+    sim = drone.sim()
+    sim.setScriptSimulationParameter(sim.handle_tree, "MyGain", 2)
+    assert [one["MyGain"] for one in drone.script_parameters.values()] == [2, 2]
+    assert not caplog.records
+    sim.setScriptSimulationParameter(sim.handle_tree, "nobodys", 2)
+    assert "nothing reads 'nobodys'" in caplog.text
+
+
+def test_a_number_of_numpys_is_a_number():
+    sim = Drone(Scene(), own=OWN).sim()
+    sim.setScriptSimulationParameter(sim.handle_self, "MyGain", np.float64(2.5))
+    assert type(sim.getScriptSimulationParameter(sim.handle_self, "MyGain")) is float
+    with pytest.raises(TypeError, match="expected a finite number"):
+        sim.setScriptSimulationParameter(sim.handle_self, "MyGain", np.float64("nan"))

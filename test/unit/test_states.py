@@ -21,17 +21,13 @@ ON_ITS_BACK = Pose((0.3, 0.2, 0.03), (1.0, 0.0, 0.0, 0.0))
 
 
 @pytest.fixture(scope="module")
-def flying():
-    simulation = Simulation(parameters.load())
-    yield simulation
-    simulation.close()
+def flying(new_shared_simulation):
+    return new_shared_simulation()
 
 
 @pytest.fixture(scope="module")
-def landed():
-    simulation = Simulation(parameters.load({"start": "landed"}))
-    yield simulation
-    simulation.close()
+def landed(new_shared_simulation):
+    return new_shared_simulation({"start": "landed"})
 
 
 def fly(simulation, seconds):

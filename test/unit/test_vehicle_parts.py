@@ -2,7 +2,7 @@
 
 import pytest
 import yaml
-from scene_edits import edit, editor_of, text_of
+from living import edit, editor_of, text_of
 
 from drone_sim.editing.properties import properties
 from drone_sim.editing.rows import SceneRows

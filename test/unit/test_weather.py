@@ -26,10 +26,7 @@ def weather(wind=(0, 0, 0), gusts=CALM, now=0.0):
 
 @pytest.fixture(name="simulate")
 def _simulate(new_simulation):
-    def simulate(**overrides):
-        return new_simulation(overrides)
-
-    return simulate
+    return lambda **overrides: new_simulation(overrides)
 
 
 def fly(simulation, steps):
