@@ -87,10 +87,7 @@ def errors(recording: flights.Recording, states: np.ndarray) -> tuple[np.ndarray
 def table(compared) -> list[str]:
     """Return the rows of a Markdown table: the largest errors until so many seconds."""
     spans = " | ".join(f"{span} s" for span in SPANS)
-    lines = [
-        f"| | position, until {spans} | roll, pitch, yaw in all |",
-        "|---|" + "---|" * (len(SPANS) + 1),
-    ]
+    lines = [f"| | position, until {spans} | roll, pitch, yaw in all |", "|---|" + "---|" * (len(SPANS) + 1)]
     for (name, way), (recording, states) in compared.items():
         far, turned = errors(recording, states)
         lasts = recording.times[-1]

@@ -72,11 +72,7 @@ def started(*command, **environment):
     """Begin a process; what it prints goes into a pipe, which no surroundings make unbuffered."""
     surroundings = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     return subprocess.Popen(
-        command,
-        env={**surroundings, **environment},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
+        command, env={**surroundings, **environment}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
 
 

@@ -207,7 +207,7 @@ SIM: dict[str, list[Example]] = {
         Example(
             f"sim.getEulerAnglesFromMatrix(NAME(sim.buildIdentityMatrix(), {TURNED}, 0.5))",
             [near(0, 0, 0.7853981633974483)],
-        ),
+        )
     ],
     "getRotationAxis": [
         Example(f"NAME(sim.buildIdentityMatrix(), {TURNED})", [near(0, 0, 1), approx(1.5707963267948966)])
@@ -217,10 +217,7 @@ SIM: dict[str, list[Example]] = {
             "NAME({1,0,0,2, 0,1,0,0, 0,0,1,0}, {0,0,2}, {1,0,0}, 1.5707963267948966)",
             [near(0, -1, 0, 1, 1, 0, 0, 1, 0, 0, 1, 0)],
         ),
-        Example(
-            "NAME({2,0,0, 0,0,0,1}, {0,0,2}, {1,0,0}, 1.5707963267948966)",
-            [near(1, 1, 0, 0, 0, HALF, HALF)],
-        ),
+        Example("NAME({2,0,0, 0,0,0,1}, {0,0,2}, {1,0,0}, 1.5707963267948966)", [near(1, 1, 0, 0, 0, HALF, HALF)]),
     ],
     "alphaBetaGammaToYawPitchRoll": [Example("NAME(0.1, 0, 0)", [approx(0), approx(0), approx(0.1)])],
     "yawPitchRollToAlphaBetaGamma": [Example("NAME(0.3, 0, 0)", [approx(0), approx(0), approx(0.3)])],
@@ -250,7 +247,7 @@ SIM: dict[str, list[Example]] = {
     "unpackTable": [Example("NAME(sim.packTable({1.5}))", [[1.5]])],
     "copyTable": [Example("NAME({1,{2,3}})", [[1, [2, 3]]]), Example("NAME('x')", ["x"])],
     "transformBuffer": [
-        Example("sim.unpackFloatTable(NAME('AB', sim.buffer_uint8, 2, 1, sim.buffer_float))", [[131, 133]]),
+        Example("sim.unpackFloatTable(NAME('AB', sim.buffer_uint8, 2, 1, sim.buffer_float))", [[131, 133]])
     ],
     "addLog": [Example("NAME(sim.verbosity_scriptinfos, 'a line')", [])],
     "addStatusbarMessage": [Example("NAME('a line')", [])],
@@ -433,16 +430,14 @@ SIM: dict[str, list[Example]] = {
     "createPureShape": [Example("sim.getShapeMass(NAME(0, 8, {0.1,0.1,0.1}, 2))", [2])],
     "createPrimitiveShape": [Example("sim.getShapeMass(NAME(sim.primitiveshape_cuboid, {1,1,1}))", [approx(1000)])],
     "createMeshShape": [
-        Example("sim.getShapeBB(NAME(0, 0, {0,0,0, 1,0,0, 0,1,0, 0,0,1}, {0,2,1, 0,1,3, 0,3,2, 1,2,3}))", BOX),
+        Example("sim.getShapeBB(NAME(0, 0, {0,0,0, 1,0,0, 0,1,0, 0,0,1}, {0,2,1, 0,1,3, 0,3,2, 1,2,3}))", BOX)
     ],
     "createJoint": [Example("sim.getJointType(NAME(11, 0, 0)) == sim.joint_prismatic_subtype", [True])],
     "createForceSensor": [Example("sim.getObjectType(NAME(0, {0,0,0,0,0}, {0,0,0,0,0}))", [12])],
     "createProximitySensor": [
-        Example("sim.getObjectType(NAME(34, 16, 0, {0,0,0,0,0,0,0,0}, {0,2,0,0,0,0,0,0,0,0,0,0,0,0,0}))", [5]),
+        Example("sim.getObjectType(NAME(34, 16, 0, {0,0,0,0,0,0,0,0}, {0,2,0,0,0,0,0,0,0,0,0,0,0,0,0}))", [5])
     ],
-    "createVisionSensor": [
-        Example("sim.getObjectType(NAME(2, {16,16,0,0}, {0.1,10,1,0,0,0,0,0,0,0,0}))", [9]),
-    ],
+    "createVisionSensor": [Example("sim.getObjectType(NAME(2, {16,16,0,0}, {0.1,10,1,0,0,0,0,0,0,0,0}))", [9])],
     "copyPasteObjects": [Example("sim.getObjectType(NAME({HINGE}, 0) [FIRST])", [1])],
     "setObjectName": [Example("NAME(HINGE, 'Hinge')", [1])],
     "setObjectAlias": [Example("NAME(HINGE, 'Hinge')", [])],
@@ -451,19 +446,17 @@ SIM: dict[str, list[Example]] = {
     "setShapeColor": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 0), '', 0, {1,0,0})", [1])],
     "getShapeColor": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 0), '', 0)", [1, near(0.7, 0.7, 0.7)])],
     "setShapeMassAndInertia": [
-        Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), 2, {1,0,0, 0,2,0, 0,0,3}, {0,0,0.1})", [1]),
+        Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), 2, {1,0,0, 0,2,0, 0,0,3}, {0,0,0.1})", [1])
     ],
     "setShapeInertia": [
-        Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), {1,0,0, 0,2,0, 0,0,3}, {1,0,0,0, 0,1,0,0, 0,0,1,0})", [1]),
+        Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), {1,0,0, 0,2,0, 0,0,3}, {1,0,0,0, 0,1,0,0, 0,0,1,0})", [1])
     ],
     "getShapeGeomInfo": [
         Example("NAME(sim.createPureShape(2, 0, {0.2,0.2,3}, 1))", [6, 5, near(0.2, 0.2, 3, 0)]),
         Example("NAME(DRONE)", [0, 0, near(0, 0, 0, 0)]),
     ],
     "setShapeMass": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), 2)", [])],
-    "getShapeBB": [
-        Example("NAME(sim.createPureShape(0, 0, {1,2,3}, 1))", [near(1, 2, 3), near(0, 0, 0, 0, 0, 0, 1)]),
-    ],
+    "getShapeBB": [Example("NAME(sim.createPureShape(0, 0, {1,2,3}, 1))", [near(1, 2, 3), near(0, 0, 0, 0, 0, 0, 1)])],
     "setShapeBB": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), {1,2,3})", [1])],
     "scaleObject": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), 1, 2, 3)", [])],
     "scaleObjects": [Example("NAME({HINGE}, 1, false)", [])],
@@ -471,7 +464,7 @@ SIM: dict[str, list[Example]] = {
         Example(
             "sim.getShapeMass(NAME({sim.createPureShape(0, 0, {1,1,1}, 1), sim.createPureShape(0, 0, {1,1,1}, 1)}))",
             [2],
-        ),
+        )
     ],
     "ungroupShape": [Example("REFUSED(NAME, FLOOR)", ["only objects of the scene can be changed"])],
 }

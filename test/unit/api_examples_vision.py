@@ -49,7 +49,5 @@ VISION: dict[str, list[Example]] = {
         ),
     ],
     "changedPixelsOnWorkImg": [Example(WORK, []), Example("NAME(CAMERA, 0.5)", [ANY, ANY])],
-    "coordinatesFromWorkImg": [
-        Example("REFUSED(NAME, CAMERA, {1,1}, true)", [ANY]),
-    ],
+    "coordinatesFromWorkImg": [Example("REFUSED(NAME, CAMERA, {1,1}, true)", [ANY])],
 }

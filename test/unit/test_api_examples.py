@@ -280,8 +280,7 @@ def test_in_lua_a_packet_that_is_not_there_is_nil(modules, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("graph", "draw"),
-    [("simHandleGraph", "simAddDrawingObject"), ("sim.handleGraph", "sim.addDrawingObject")],
+    ("graph", "draw"), [("simHandleGraph", "simAddDrawingObject"), ("sim.handleGraph", "sim.addDrawingObject")]
 )
 def test_what_is_ignored_is_told_as_the_script_writes_it_and_drawings_at_debug_level(
     new_simulation, caplog, graph, draw

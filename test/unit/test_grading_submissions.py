@@ -57,10 +57,7 @@ def found(given, tmp_path):
 def test_a_folder_holds_scripts_and_folders_with_one(tmp_path):
     folder = tmp_path / "class"
     laid(
-        folder,
-        alice_dot_py=SCRIPT,
-        bob__deep__main_dot_lua="function sysCall_init() end\n",
-        bob__pid_dot_py="x = 1\n",
+        folder, alice_dot_py=SCRIPT, bob__deep__main_dot_lua="function sysCall_init() end\n", bob__pid_dot_py="x = 1\n"
     )
     laid(folder, helper_dot_py="x = 1\n", notes_dot_txt=SCRIPT, empty__notes_dot_txt="")
     laid(folder, **{".git__hook_dot_py": SCRIPT})

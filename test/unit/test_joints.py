@@ -141,11 +141,7 @@ def test_scripts_command_joints(simulation):
 def test_parameters_of_joints_and_shapes(simulation):
     sim, handle = sim_of(simulation), simulation.context.objects.handle
     left, cabin, loose = handle("Left"), handle("Cabin"), handle("Loose")
-    motor, control, static = (
-        sim.jointintparam_motor_enabled,
-        sim.jointintparam_ctrl_enabled,
-        sim.shapeintparam_static,
-    )
+    motor, control, static = (sim.jointintparam_motor_enabled, sim.jointintparam_ctrl_enabled, sim.shapeintparam_static)
     assert [sim.getObjectInt32Param(left, one) for one in (motor, control)] == [1, 0]
     sim.setObjectInt32Param(left, control, 1)
     assert found(simulation, "Left").control.mode == "position"

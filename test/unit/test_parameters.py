@@ -123,11 +123,7 @@ def test_every_wrong_key_of_a_config_file_is_named_with_its_line(tmp_path):
         ("gravity: -9\ntime_step: 0.012", 2, "parameter time_step = 0.012: must be a whole multiple"),
         ("cameras:\n  front:\n    near: 200", 3, "parameter cameras/front/near = 200.0: must be less than far"),
         ("scene:\n  objects:\n  - {shape: cone}", 3, "parameter scene/objects/0/shape = 'cone': must be one of 'box'"),
-        (
-            "scene:\n  boxes: 1",
-            2,
-            "parameter scene/boxes: unknown key; near names are objects",
-        ),
+        ("scene:\n  boxes: 1", 2, "parameter scene/boxes: unknown key; near names are objects"),
     ],
 )
 def test_a_mistake_in_a_config_file_has_its_line(tmp_path, text, line, words):

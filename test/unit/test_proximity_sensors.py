@@ -79,11 +79,7 @@ def nearest(x, y, z):
 
 @pytest.mark.parametrize(
     "name, centre, tolerance",
-    [
-        ("Cone", (0.5, -0.3, 1.5), 1e-3),
-        ("Pyramid", (0.4, -0.4, 1.5), 1e-3),
-        ("Cylinder", (0.3, -0.3, 1.5), 1e-3),
-    ],
+    [("Cone", (0.5, -0.3, 1.5), 1e-3), ("Pyramid", (0.4, -0.4, 1.5), 1e-3), ("Cylinder", (0.3, -0.3, 1.5), 1e-3)],
 )
 def test_the_nearest_point_in_a_volume(simulation, sim, name, centre, tolerance):
     handle = simulation.context.objects.handle

@@ -340,10 +340,7 @@ def test_the_silhouette_is_that_of_pybullets_picture(renderer, bullet, tmp_path,
         "sphere": (Sphere((0.6,)), trimesh.creation.icosphere(5, 0.6)),
         "cylinder": (Cylinder((0.4, 1.0)), trimesh.creation.cylinder(0.4, 1.0, sections=128)),
         "capsule": (Capsule((0.3, 0.8)), trimesh.creation.capsule(0.8, 0.3, count=[128, 64])),
-        "mesh": (
-            Mesh(path, (1.5, 1.0, 1.0)),
-            trimesh.creation.torus(0.5, 0.2, major_sections=24, minor_sections=12),
-        ),
+        "mesh": (Mesh(path, (1.5, 1.0, 1.0)), trimesh.creation.torus(0.5, 0.2, major_sections=24, minor_sections=12)),
     }[word]
     theirs.export(path)
     scale = shape.size if word == "mesh" else (1.0, 1.0, 1.0)

@@ -123,10 +123,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
     [
         ("", "must hold `key: value` lines"),
         ("objects: [", "scene.yaml: while parsing"),
-        (
-            "boxes: []",
-            "line 1: parameter boxes: unknown key; near names are objects",
-        ),
+        ("boxes: []", "line 1: parameter boxes: unknown key; near names are objects"),
         ("1: 2", "key '1' must be a string (line 1, column 1)"),
         ("objects: {}", "scene.yaml: line 1: parameter objects = {}: input should be a valid list"),
         (

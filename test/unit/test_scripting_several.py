@@ -47,10 +47,7 @@ class Drone:
             *(add(name, self.own_script) for name in others),
         ]
         scene.objects[self.handles[0]].is_model = True
-        self.script_parameters = {
-            self.own_script: {"gain": 2.0, **(own or {})},
-            respondable: {"particleVelocity": 0.0},
-        }
+        self.script_parameters = {self.own_script: {"gain": 2.0, **(own or {})}, respondable: {"particleVelocity": 0.0}}
         for name, parameters in self.script_parameters.items():
             scene.scripts.add(name, parameters, is_law=name != self.own_script)
         self.forces = []

@@ -58,10 +58,7 @@ def refused(overrides):
         ({"range": {**RANGE, "min_range": 4.0}}, "sensors/range/min_range = 4: must be less than max_range = 4"),
         ({"range": {**RANGE, "radiation": "sound"}}, "radiation = 'sound': input should be 'ultrasound' or 'infrared'"),
         ({"battery": {**BATTERY, "empty": 5.0}}, "sensors/battery/empty = 5: must be at most full = 4.2"),
-        (
-            {"battery": {**BATTERY, "idle_power": 99}},
-            "sensors/battery/idle_power = 99: must be at most hover_power",
-        ),
+        ({"battery": {**BATTERY, "idle_power": 99}}, "sensors/battery/idle_power = 99: must be at most hover_power"),
         ({"battery": {"kind": "battery", "rate": 10}}, "sensors/battery: cells, capacity, full, empty, resistance"),
         (
             {"a": IMU, "b": {**IMU, "topic": "b", "mount": DOWN}},

@@ -141,14 +141,8 @@ def test_end_counts_the_longest_push():
         ("[{at: 0, twist: {}}, 3]", "entry 2: 3: must be a mapping"),
         ("[{twist: {}}]", "entry 1: at: missing"),
         ("[{at: 1}]", f"entry 1: must hold one of {KINDS}; it holds none"),
-        (
-            "[{at: 1, twist: {}, pose: {}}]",
-            f"entry 1: must hold one of {KINDS}; it holds twist and pose",
-        ),
-        (
-            "[{at: 1, twsit: {}}]",
-            f"entry 1: twsit: unknown key; known are at, vehicle, {KINDS}",
-        ),
+        ("[{at: 1, twist: {}, pose: {}}]", f"entry 1: must hold one of {KINDS}; it holds twist and pose"),
+        ("[{at: 1, twsit: {}}]", f"entry 1: twsit: unknown key; known are at, vehicle, {KINDS}"),
         ("[{at: 1, twist: }]", "entry 1: twist = None: must be a mapping of linear, angular"),
         ("[{at: -0.1, twist: {}}]", "entry 1: at = -0.1: input should be greater than or equal to 0"),
         ("[{at: .nan, twist: {}}]", "entry 1: at = nan: input should be a finite number"),

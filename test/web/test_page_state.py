@@ -185,12 +185,7 @@ MESSAGES = json.loads("[" + ",".join(
 
 @pytest.mark.parametrize("kind", MESSAGES)
 def test_every_message_ends_with_each_of_its_events(feed, kind):
-    contents = {
-        "opened": OPEN[1],
-        "failure": failure()[1],
-        "flown": "mine/b.py",
-        "saved": "saved as mine/a.py",
-    }
+    contents = {"opened": OPEN[1], "failure": failure()[1], "flown": "mine/b.py", "saved": "saved as mine/a.py"}
     ends = next(line for line in (SOURCE / "state" / "messages.js").read_text().splitlines() if f" {kind}:" in line)
     names = ends.partition("ends: [")[2].partition("]")[0].replace("...LEFT", '"opened", "run"')
     events = json.loads(f"[{names}]")

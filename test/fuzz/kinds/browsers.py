@@ -106,8 +106,5 @@ _MESSAGE = st.one_of(
 )
 
 CASES = st.builds(
-    Case,
-    st.just("browsers"),
-    st.just({}),
-    st.tuples(st.lists(_REQUEST, max_size=3), st.lists(_MESSAGE, max_size=5)),
+    Case, st.just("browsers"), st.just({}), st.tuples(st.lists(_REQUEST, max_size=3), st.lists(_MESSAGE, max_size=5))
 )

@@ -139,7 +139,4 @@ _CUBE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4
 _LINK = b"""<robot name="one"><link name="a">
 <inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
 <collision><geometry><box size="1 1 1"/></geometry></collision></link></robot>"""
-CASES = st.builds(
-    lambda text: Case("scene", {"scene.yaml": text, "one.obj": _CUBE, "one.urdf": _LINK}),
-    _TEXTS,
-)
+CASES = st.builds(lambda text: Case("scene", {"scene.yaml": text, "one.obj": _CUBE, "one.urdf": _LINK}), _TEXTS)
