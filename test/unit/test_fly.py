@@ -354,7 +354,7 @@ def test_what_a_script_leaves_behind_does_not_keep_it(script):
         check=True,
     )
     assert done.stdout.startswith("flew 0.10 s in")
-    assert done.stderr == "fly: ended without waiting for a thread or atexit function of a script that does not end\n"
+    assert done.stderr.startswith("fly: ended without waiting for ") and done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])

@@ -81,8 +81,8 @@ def test_folders_that_say_nothing_get_a_line_and_who_hands_in_too_much_pays_alon
         submissions_of(str(folder), tmp_path)
     laid(folder, dave__one_dot_py=SCRIPT, dave__two_dot_py=SCRIPT, eve__notes_dot_txt="", fay__my_dot_py=SCRIPT)
     dave, eve, fay = submissions_of(str(folder), tmp_path)
-    assert dave.error == "'dave': holds 2 child scripts (one.py, two.py); there must be only one"
-    assert eve.error == "'eve': holds no child script (a file with a sysCall_ function)" and not fay.error
+    assert dave.error.startswith("'dave': holds 2 child scripts (one.py, two.py)")
+    assert eve.error.startswith("'eve': holds no child script") and not fay.error
 
 
 def test_moodles_zip_with_and_without_folders(tmp_path):

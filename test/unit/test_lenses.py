@@ -83,7 +83,7 @@ def test_the_widest_fisheye_is_as_wide_as_the_docs_say(width):
 )
 def test_what_is_no_lens_is_refused(given, said):
     with pytest.raises(ValueError, match=said):
-        Distorted(640, 480, 1.8, 0.02, 50.0, *given)
+        Distorted(64, 48, 1.8, 0.02, 50.0, *given)
 
 
 def board():

@@ -107,18 +107,15 @@ STUCK = ("in a call that holds Python's lock", "in a call that lets go of it", "
 def test_what_does_not_look_is_killed_after_one_line(ended, where):
     status, errors = ended(where)
     assert status == -signal.SIGKILL
-    assert errors.splitlines() == [
-        "it: killed: it did not end within 2.5 s: a script, a file or the ROS master kept it busy"
-    ]
+    assert errors.startswith("it: killed: it did not end within 2.5 s") and errors.count("\n") == 1
 
 
 @pytest.mark.parametrize("which", ["a script in a call that holds Python's lock", "a script that hides from the alarm"])
 def test_a_script_that_nothing_can_stop_is_killed_after_one_line(ended, which):
     status, errors = ended(which)
     assert status == -signal.SIGKILL
-    assert errors.splitlines() == [
-        "it: killed: [init] some.py: did not return after 0.5 s (script_time_limit), and could not be stopped"
-    ]
+    assert errors.startswith("it: killed: [init] some.py: did not return after 0.5 s (script_time_limit)")
+    assert errors.count("\n") == 1
 
 
 def test_the_simulators_own_time_and_that_after_a_script_are_not_the_scripts(ended):
@@ -127,8 +124,8 @@ def test_the_simulators_own_time_and_that_after_a_script_are_not_the_scripts(end
 
 @pytest.mark.parametrize("which", ["ends beside a thread", "ends with atexit"])
 def test_what_a_script_leaves_behind_does_not_keep_the_process(ended, which):
-    left = "it: ended without waiting for a thread or atexit function of a script that does not end\n"
-    assert ended(which) == (3, left)
+    status, errors = ended(which)
+    assert status == 3 and errors.startswith("it: ended without waiting for ") and errors.count("\n") == 1
 
 
 def test_what_ends_in_time_is_waited_for(ended):
