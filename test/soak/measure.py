@@ -5,25 +5,22 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
-MOST_MEMORY = 1.0  # MB a minute over the last half, and
-LEAST_MEMORY = 15.0  # MB in all, below which nothing is said of a slope
-JUDGED = 90.0  # s of a run's last half, below which growth is not judged
-MOST_MORE = 8  # threads, descriptors
-_Sampled = TypeVar("_Sampled")
+MOST_MORE = 8  # threads, descriptors, registrations
 _TIDY = re.compile(r"\d[\d.e+-]*|'[^']*'|/\S+")
 
 
 class Sample(NamedTuple):
-    """The node's process at a moment (s): resident memory in MB, threads, open descriptors."""
+    """A node at a moment (s): memory in MB, threads, open descriptors, and its registrations with the master."""
 
     at: float
     memory: float
     threads: int
     descriptors: int
+    registrations: int = 0
 
 
 def slope(samples: Sequence[Sample]) -> float:
@@ -35,23 +32,28 @@ def slope(samples: Sequence[Sample]) -> float:
     return float(np.median(slopes) * 60.0) if len(slopes) else 0.0
 
 
-def last_half(samples: Sequence[_Sampled]) -> Sequence[_Sampled]:
+def last_half(samples: Sequence[Sample]) -> Sequence[Sample]:
     """Return the later half: in the first one, dozens of threads fill what the allocator keeps for each of them."""
     return samples[len(samples) // 2 :]
 
 
-def growth(samples: list[Sample]) -> list[str]:
-    """Name what grew over the last half, if that was long enough."""
+def growth(
+    samples: list[Sample], most_slope: float = 1.0, least_memory: float = 15.0, judged: float = 90.0
+) -> list[str]:
+    """Name what grew over the last half, if that had `judged` seconds.
+
+    Memory grows where it does by more than `most_slope` (MB a minute) and by more than `least_memory` (MB) in all.
+    """
     rest = last_half(samples)
-    if rest[-1].at - rest[0].at < JUDGED:
+    if not rest or rest[-1].at - rest[0].at < judged:
         return []
     found = []
     third = len(rest) // 3
     early, late = rest[:third], rest[-third:]
     risen = min(s.memory for s in late) - min(s.memory for s in early)
-    if slope(rest) > MOST_MEMORY and risen > LEAST_MEMORY:
-        found.append(f"memory grows by {slope(rest):.1f} MB a minute")
-    for name in ("threads", "descriptors"):
+    if slope(rest) > most_slope and risen > least_memory:
+        found.append(f"memory grows by {slope(rest):.2f} MB a minute")
+    for name in ("threads", "descriptors", "registrations"):
         more = min(getattr(s, name) for s in late) - min(getattr(s, name) for s in early)
         if more > MOST_MORE:
             found.append(f"{name} grow: {more} more")

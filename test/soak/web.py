@@ -24,36 +24,27 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from xmlrpc.client import ServerProxy
 
-from measure import Sample, last_half, late_steps, slope
+from measure import MOST_MORE, Sample, growth, last_half, late_steps, slope
 from run import ENDS, STARTS, Launch
 
 OFTEN, EVERY = 10.0, 60.0  # s between two samples, two lines
-MOST_MEMORY, LEAST_MEMORY = 0.3, 6.0  # MB a minute over the last half, and MB in all below which no slope is judged
-MOST_MORE = 8  # threads, descriptors, registrations
-JUDGED = 300.0  # s of a run's last half, below which growth is not judged
+LIMITS = (0.3, 6.0, 300.0)  # of growth
 SETTLES = 5.0  # s until the cockpit has found the vehicle, and may command it
 QUIET = 90.0  # s after the last browser in which the cockpit becomes quiet: a deaf one is given up after 40
 HERE = Path(__file__).parent
 NODES = ("cockpit", "drone_sim")
 
 
-class State(NamedTuple):
-    """A node at a moment: its process (memory is its share of what it uses), and its registrations with the master."""
-
-    process: Sample
-    registrations: int
-
-
-def look(pid: int, node: str) -> State:
-    """Look at a node now. Raises OSError where it has died."""
+def look(pid: int, node: str) -> Sample:
+    """Look at a node now, whose memory is its share of what it uses. Raises OSError where it has died."""
     folder = Path(f"/proc/{pid}")
     share = re.search(r"^Pss:\s+(\d+)", (folder / "smaps_rollup").read_text(), re.MULTILINE)
     threads, descriptors = len(os.listdir(folder / "task")), len(os.listdir(folder / "fd"))
     memory = int(share[1]) * 1024 / 1e6 if share else 0.0
-    return State(Sample(time.monotonic(), memory, threads, descriptors), registrations(node))
+    return Sample(time.monotonic(), memory, threads, descriptors, registrations(node))
 
 
 def registrations(node: str) -> int:
@@ -101,10 +92,10 @@ def browsers(where: str, seed: int, folder: Path) -> Iterator[list[subprocess.Po
             one.wait()
 
 
-def soak(launch: Launch, pids: dict[str, int], folder: Path, minutes: float) -> dict[str, list[State]]:
+def soak(launch: Launch, pids: dict[str, int], folder: Path, minutes: float) -> dict[str, list[Sample]]:
     """Look for so long, and say every minute how it is; return what was seen of each node."""
     began = time.monotonic()
-    seen: dict[str, list[State]] = {node: [] for node in NODES}
+    seen: dict[str, list[Sample]] = {node: [] for node in NODES}
     due = began + EVERY
     with contextlib.suppress(OSError):
         while time.monotonic() < began + 60 * minutes:
@@ -123,11 +114,11 @@ def diary(folder: Path) -> list[Any]:
     return [json.loads(one) for one in lines]
 
 
-def line(seen: dict[str, list[State]], launch: Launch, visits: list[Any], time_: float) -> str:
+def line(seen: dict[str, list[Sample]], launch: Launch, visits: list[Any], time_: float) -> str:
     parts = [f"{time_ / 60:5.1f} min"]
     for node, states in seen.items():
-        (_, memory, threads, descriptors), registered = states[-1]
-        grows = slope([one.process for one in last_half(states)])
+        _, memory, threads, descriptors, registered = states[-1]
+        grows = slope(last_half(states))
         parts.append(
             f"{node} {memory:6.1f} MB {grows:+5.2f} MB/min {threads:3d} threads {descriptors:3d} descriptors "
             f"{registered:3d} registrations"
@@ -135,32 +126,12 @@ def line(seen: dict[str, list[State]], launch: Launch, visits: list[Any], time_:
     return "   ".join([*parts, f"{late_steps(launch.lines)} late   {len(visits)} visits"])
 
 
-def growth(node: str, states: list[State]) -> list[str]:
-    """Name what grew over the last half, if that was long enough."""
-    rest = last_half(states)
-    samples = [one.process for one in rest]
-    if not samples or samples[-1].at - samples[0].at < JUDGED:
-        return []
-    third = len(rest) // 3
-    early, late = rest[:third], rest[-third:]
-    found = []
-    risen = min(one.process.memory for one in late) - min(one.process.memory for one in early)
-    if slope(samples) > MOST_MEMORY and risen > LEAST_MEMORY:
-        found.append(f"{node}: memory grows by {slope(samples):.2f} MB a minute")
-    for what in ("threads", "descriptors"):
-        more = min(getattr(one.process, what) for one in late) - min(getattr(one.process, what) for one in early)
-        if more > MOST_MORE:
-            found.append(f"{node}: {more} {what} more")
-    more = min(one.registrations for one in late) - min(one.registrations for one in early)
-    return [*found, f"{node}: {more} registrations more"] if more > MOST_MORE else found
-
-
-def quiet(pid: int, before: State) -> list[str]:
+def quiet(pid: int, before: Sample) -> list[str]:
     """Wait until the cockpit listens to no more than before the first browser; name what it still has."""
     end = time.monotonic() + QUIET
     while time.monotonic() < end:
         now = look(pid, "cockpit")
-        if now.registrations <= before.registrations and now.process.threads <= before.process.threads + MOST_MORE:
+        if now.registrations <= before.registrations and now.threads <= before.threads + MOST_MORE:
             return []
         time.sleep(1.0)
     return [f"nobody looks, and the cockpit has {now}; it began with {before}"]
@@ -172,7 +143,7 @@ def dead(pids: dict[str, int], launch: Launch) -> list[str]:
     return [*found, "printed last:", *launch.lines[-10:]] if found else []
 
 
-def verdict(launch: Launch, seen: dict[str, list[State]], visits: list[Any]) -> list[str]:
+def verdict(launch: Launch, seen: dict[str, list[Sample]], visits: list[Any]) -> list[str]:
     """Say what there was of visits; return what went wrong."""
     done = [one for one in visits if not one[2]]
     for role in sorted({one[0] for one in visits}):
@@ -184,7 +155,7 @@ def verdict(launch: Launch, seen: dict[str, list[State]], visits: list[Any]) -> 
     for role, _, trouble in [one for one in visits if one[2]][:10]:
         print(f"{role}: {trouble[:200]}")
     printed = [f"printed: {one[:200]}" for one in launch.lines if "Traceback" in one]
-    return [*printed[:5], *(fault for node, states in seen.items() for fault in growth(node, states))]
+    return [*printed[:5], *(f"{node}: {one}" for node, states in seen.items() for one in growth(states, *LIMITS))]
 
 
 def main() -> int:

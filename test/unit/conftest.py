@@ -36,6 +36,19 @@ def _renderer(shared_renderer):
     return shared_renderer
 
 
+class Clock:
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def clock():
+    """Return a clock whose `now` the test sets."""
+    return Clock()
+
+
 def simulations(folder):
     """Yield a function that builds a simulation from parameters, and advances it by some steps; close all in the end.
 

@@ -38,18 +38,6 @@ def _heard(monkeypatch):
     return heard
 
 
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
-
-
-@pytest.fixture(name="clock")
-def _clock():
-    return Clock()
-
-
 @pytest.fixture(name="board")
 def _board():
     return Board(lambda _: None)

@@ -12,13 +12,6 @@ ARROWS = {"ArrowUp": UP, "ArrowDown": DOWN, "ArrowLeft": LEFT, "ArrowRight": RIG
 PAGE = Path(__file__).parents[2] / "web" / "src" / "teleop.js"
 
 
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
-
-
 def press(in_force, key):
     command = in_force.next.after(key, COCKPIT)
     in_force.on_sent(command)
@@ -60,8 +53,7 @@ def test_the_keys_are_those_of_the_page():
         assert {name: change * sign > 0 for name, change in COCKPIT[key]._asdict().items() if change} == {axis: True}
 
 
-def test_quick_presses_add_up_before_the_simulator_has_answered():
-    clock = Clock()
+def test_quick_presses_add_up_before_the_simulator_has_answered(clock):
     in_force = CommandInForce(clock)
     in_force.on_published(Command())
     press(in_force, UP)
@@ -76,8 +68,7 @@ def test_quick_presses_add_up_before_the_simulator_has_answered():
     assert press(in_force, UP) == Command(vx=0.1)
 
 
-def test_a_command_that_never_comes_into_force_is_forgotten():
-    clock = Clock()
+def test_a_command_that_never_comes_into_force_is_forgotten(clock):
     in_force = CommandInForce(clock)
     in_force.on_published(Command(vy=1.0))
     press(in_force, UP)
@@ -88,8 +79,8 @@ def test_a_command_that_never_comes_into_force_is_forgotten():
     assert in_force.next == Command(vy=1.0)
 
 
-def test_without_an_answer_the_last_one_sent_counts():
-    in_force = CommandInForce(Clock())
+def test_without_an_answer_the_last_one_sent_counts(clock):
+    in_force = CommandInForce(clock)
     press(in_force, UP)
     assert press(in_force, UP) == Command(vx=0.2)
     in_force.reset()

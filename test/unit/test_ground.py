@@ -7,27 +7,28 @@ import pybullet
 import pytest
 
 from drone_sim.mechanics.state import Pose, Twist, Vector3
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.shapes.visual import GROUND
 
 DOWN, FORWARD = Twist(Vector3(0, 0, -1)), Twist(Vector3(1, 0, 0))
 
 
-def simulation_at(x, **floor):
-    simulation = Simulation(parameters.load({"scene": {"floor": floor}}))
-    simulation.drone.body.move(Pose((x, 0.0, 0.8)))
-    return simulation
+@pytest.fixture
+def simulation_at(new_simulation):
+    def build(x, **floor):
+        simulation = new_simulation({"scene": {"floor": floor}})
+        simulation.drone.body.move(Pose((x, 0.0, 0.8)))
+        return simulation
+
+    return build
 
 
 @pytest.mark.parametrize("x", [3.0, 5.0, 6.0, 300.0, -900.0])
-def test_the_drone_lands_on_floor_and_ground_alike(x):
+def test_the_drone_lands_on_floor_and_ground_alike(x, simulation_at):
     simulation = simulation_at(x)
     simulation.drone.commands.receive(DOWN)
     for _ in range(200):
         simulation.step()
     assert simulation.drone.body.state.position[2] == pytest.approx(0.01, abs=0.003)
-    simulation.close()
 
 
 def test_it_slides_over_the_rim_of_the_floor(new_simulation):
@@ -43,7 +44,7 @@ def test_it_slides_over_the_rim_of_the_floor(new_simulation):
     assert ball.state.position[0] > 6.0
 
 
-def test_at_an_edge_it_falls_and_is_told_so_once(caplog):
+def test_at_an_edge_it_falls_and_is_told_so_once(caplog, simulation_at):
     simulation = simulation_at(4.9, edge=True)
     with caplog.at_level(logging.WARNING):
         simulation.drone.commands.receive(FORWARD)
@@ -56,28 +57,25 @@ def test_at_an_edge_it_falls_and_is_told_so_once(caplog):
     assert [record.getMessage() for record in caplog.records if "left the floor" in record.getMessage()] == [
         caplog.records[0].getMessage()
     ]
-    simulation.close()
 
 
-def test_a_drone_that_begins_beside_the_floor_has_not_left_it(caplog):
+def test_a_drone_that_begins_beside_the_floor_has_not_left_it(caplog, simulation_at):
     simulation = simulation_at(8.0, edge=True)
     with caplog.at_level(logging.WARNING):
         simulation.step()
     assert not [record for record in caplog.records if "left the floor" in record.getMessage()]
-    simulation.close()
 
 
-def test_pictures_and_depth_show_the_ground():
+def test_pictures_and_depth_show_the_ground(simulation_at):
     simulation = simulation_at(8.0)  # looking away from the floor
     picture, depth = (simulation.drone.cameras[name].look() for name in ("front", "depth"))
     bottom = picture[-1].astype(float) / 255
     assert np.abs(bottom - GROUND).max() < 0.01
     assert np.isnan(depth[0]).all()
-    simulation.close()
 
 
 @pytest.mark.parametrize("x", [0.0, 4.0, 8.0, -1000.0], ids=["floor", "rim", "ground", "far ground"])
-def test_floor_and_ground_are_seen_in_the_plane_where_bodies_rest(x):
+def test_floor_and_ground_are_seen_in_the_plane_where_bodies_rest(x, simulation_at):
     simulation = simulation_at(x)
     camera = simulation.drone.cameras["front"]
     eye = np.reshape((*camera.pose(), 0, 0, 0, 1), (4, 4))
@@ -88,13 +86,11 @@ def test_floor_and_ground_are_seen_in_the_plane_where_bodies_rest(x):
         truth.want(outputs)
         np.testing.assert_allclose(truth.output("depth")[near], eye[2, 3] / down[near], rtol=1e-5)
         assert (truth.output("instance")[near] == 1).all(), "the floor, and no gap at its rim"
-    simulation.close()
 
 
-def test_the_shadow_falls_on_the_ground():
+def test_the_shadow_falls_on_the_ground(simulation_at):
     simulation = simulation_at(9.0)
     simulation.step()  # the tracking camera comes along
     picture = simulation.drone.cameras["track"].look().astype(float) / 255
     dark = np.abs(picture - np.multiply(GROUND, 0.55)).max(axis=2) < 0.02
     assert 200 < dark.sum() < 20000
-    simulation.close()

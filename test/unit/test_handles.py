@@ -151,20 +151,12 @@ TAKEN, HELD, LET_GO = (
 )
 
 
-class Clock:
-    def __init__(self):
-        self.now = 5.0
-
-    def __call__(self):
-        return self.now
-
-
 def told(held, kind, client):
     held.on_feedback(InteractiveMarkerFeedback(marker_name="Drone", client_id=client, event_type=kind))
 
 
-def test_a_handle_is_held_until_it_is_let_go_of():
-    held = HeldHandles(Clock())
+def test_a_handle_is_held_until_it_is_let_go_of(clock):
+    held = HeldHandles(clock)
     told(held, TAKEN, "rviz 1")
     told(held, TAKEN, "rviz 2")
     told(held, LET_GO, "rviz 1")
@@ -173,8 +165,7 @@ def test_a_handle_is_held_until_it_is_let_go_of():
     assert held.names() == set()
 
 
-def test_a_hand_that_says_nothing_has_let_go():
-    clock = Clock()
+def test_a_hand_that_says_nothing_has_let_go(clock):
     held = HeldHandles(clock)
     told(held, TAKEN, "rviz")
     for _ in range(10):

@@ -16,18 +16,6 @@ from drone_sim.ros.tools.commands import (
 )
 
 
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
-
-
-@pytest.fixture
-def clock():
-    return Clock()
-
-
 @pytest.fixture
 def decoder(clock):
     return KeyDecoder(clock)

@@ -79,6 +79,18 @@ STARTED = "localStorage['drone_sim/started'] = 'true';"  # the start page has be
 
 
 @contextlib.contextmanager
+def left_as_found(cockpit):
+    """Let the pilot fly from the start, now and in the end, when what has been written meanwhile goes."""
+    cockpit.start_afresh()
+    cockpit.scripts.mkdir(exist_ok=True)
+    before = set(cockpit.scripts.glob("*"))
+    yield
+    cockpit.start_afresh()
+    for script in set(cockpit.scripts.glob("*")) - before:
+        script.unlink()
+
+
+@contextlib.contextmanager
 def open_page(cockpit, browser, init="", started=True, **options):
     """Give the page in a browser of its own, with the flown script in the editor.
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import rospy
-from cockpit_page import Drone, Panel, open_page
+from cockpit_page import Drone, Panel, left_as_found, open_page
 from launched import launched
 from playwright.sync_api import sync_playwright
 
@@ -57,13 +57,8 @@ def _cockpit(browser):
 @pytest.fixture(name="opened")
 def _opened(cockpit, browser):
     """The cockpit's page in a browser of its own, while the pilot flies; what is written in it is gone afterwards."""
-    cockpit.start_afresh()
-    before = set(cockpit.scripts.glob("*"))
-    with open_page(cockpit, browser) as page:
+    with left_as_found(cockpit), open_page(cockpit, browser) as page:
         yield page
-    cockpit.start_afresh()
-    for script in set(cockpit.scripts.glob("*")) - before:
-        script.unlink()
 
 
 @pytest.fixture(name="panel", scope="module")

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import let_pass, open_page, requests_held, wait_until
+from cockpit_page import left_as_found, let_pass, open_page, requests_held, wait_until
 
 COUNTS = """\
 import helper
@@ -30,17 +30,9 @@ HELPER = "def check(count):\n    if count > LIMIT:\n        raise ValueError('to
 
 @pytest.fixture(name="desk", scope="module")
 def _desk(cockpit, browser):
-    """A page that these tests share; what they have written and flown is gone in the end."""
-    cockpit.start_afresh()
-    cockpit.scripts.mkdir(exist_ok=True)
-    before = {path.name for path in cockpit.scripts.glob("*")}
-    with open_page(cockpit, browser) as page:
-        page.set_viewport_size({"width": 1280, "height": 720})
+    """A page that these tests share."""
+    with left_as_found(cockpit), open_page(cockpit, browser) as page:
         yield page
-    cockpit.start_afresh()
-    for path in cockpit.scripts.glob("*"):
-        if path.name not in before:
-            path.unlink()
 
 
 def text(page):

@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import Panel, let_pass, open_page, ready, wait_until
+from cockpit_page import Panel, left_as_found, let_pass, open_page, ready, wait_until
 
 STAGES = ("1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros", "7_camera", "8_gate")
 GAIN = 'self.thrust = gain("thrust_gravity")'
@@ -15,17 +15,12 @@ GAIN = 'self.thrust = gain("thrust_gravity")'
 
 @pytest.fixture(name="student")
 def _student(cockpit, browser):
-    """A page that is opened for the first time; what is written there is gone in the end."""
-    before = {path.name for path in cockpit.scripts.glob("*")}
-    cockpit.start_afresh()
-    with open_page(cockpit, browser, started=False, viewport={"width": 1440, "height": 900}) as page:
-        yield page
-    rospy.set_param("/drone_sim/scene_file", "")  # lessons and tasks bring scenes of their own
-    cockpit.call("load_scene")
-    cockpit.start_afresh()
-    for path in cockpit.scripts.glob("*"):
-        if path.name not in before:
-            path.unlink()
+    """A page that is opened for the first time."""
+    with left_as_found(cockpit):
+        with open_page(cockpit, browser, started=False, viewport={"width": 1440, "height": 900}) as page:
+            yield page
+        rospy.set_param("/drone_sim/scene_file", "")  # lessons and tasks bring scenes of their own
+        cockpit.call("load_scene")
 
 
 def door(page, name):

@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-from cockpit_page import STARTED, WAIT, let_pass, open_page, ready, wait_for, wait_until
+from cockpit_page import STARTED, WAIT, left_as_found, let_pass, open_page, ready, wait_for, wait_until
 from launched import free_port
 
 STEPS = "def sysCall_actuation():\n    height = 1\n    again = 2\n"
@@ -20,16 +20,9 @@ WRONG = "def sysCall_init():\n    pass\n\n\nx = = 1\n" + "\n" * 22 + "def sysCal
 
 @pytest.fixture(name="desk", scope="module")
 def _desk(cockpit, browser):
-    """A page that these tests share; what they have written and flown is gone in the end."""
-    cockpit.start_afresh()
-    cockpit.scripts.mkdir(exist_ok=True)
-    before = {path.name for path in cockpit.scripts.glob("*")}
-    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+    """A page that these tests share."""
+    with left_as_found(cockpit), open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
         yield page
-    cockpit.start_afresh()
-    for path in cockpit.scripts.glob("*"):
-        if path.name not in before:
-            path.unlink()
 
 
 def said(page):

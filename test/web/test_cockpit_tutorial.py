@@ -7,23 +7,16 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 from cockpit_controls import CONTROLS
-from cockpit_page import open_page, wait_until
+from cockpit_page import left_as_found, open_page, wait_until
 
 SQUARE = "solutions/5_square.py"
 
 
 @pytest.fixture(name="reader", scope="module")
 def _reader(cockpit, browser):
-    """A page that these tests share; what they have written is gone in the end."""
-    before = {path.name for path in cockpit.scripts.glob("*")}
-    cockpit.start_afresh()
-    with open_page(cockpit, browser) as page:
-        page.set_viewport_size({"width": 1440, "height": 900})
+    """A page that these tests share."""
+    with left_as_found(cockpit), open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
         yield page
-    cockpit.start_afresh()
-    for path in cockpit.scripts.glob("*"):
-        if path.name not in before:
-            path.unlink()
 
 
 def choose(page, lesson, script):
