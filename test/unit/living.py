@@ -2,7 +2,6 @@
 
 import numpy as np
 import pybullet
-import yaml
 
 from drone_sim.editing.editor import SceneEditor
 from drone_sim.run import parameters
@@ -71,18 +70,6 @@ KINDS = {
     "vision sensor": {"kind": "vision_sensor"},
     "force sensor": {"kind": "force_sensor"},
 }
-
-
-def simulate(tmp_path, started=True):
-    """Return a simulation of the scene, flown by a script that does nothing."""
-    script = tmp_path / "still.py"
-    script.write_text("def sysCall_init(): pass\n", encoding="utf-8")
-    scene = tmp_path / "scene.yaml"
-    scene.write_text(yaml.safe_dump(SCENE), encoding="utf-8")
-    loaded = parameters.load(
-        {"scene_file": str(scene), "drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}
-    )
-    return Simulation(loaded, script=str(script), started=started)
 
 
 def sizes(simulation):

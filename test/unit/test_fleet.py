@@ -222,27 +222,18 @@ def open_files():
     return len(os.listdir("/proc/self/fd"))
 
 
-def test_a_new_one_whose_script_fails_goes_again(fly, tmp_path):
-    script = tmp_path / "broken.py"
-    script.write_text("def sysCall_init():\n    no_such_name\n", encoding="utf-8")
-    simulation = fly(vehicles=2)
-    simulation.step()
-    with pytest.raises(Exception, match="no_such_name"):
-        simulation.set_vehicles({"drone1": {}, "drone2": {}, "guest": {"script": str(script), "position": [3, 3, 1]}})
-    assert list(simulation.vehicles) == ["drone1", "drone2"] and simulation.running
-    simulation.step()
-
-
-def test_a_failing_vehicle_takes_back_those_added_before_it(fly, tmp_path):
+def test_one_whose_script_fails_goes_again_and_takes_back_those_added_before_it(fly, tmp_path):
     script = tmp_path / "broken.py"
     script.write_text("def sysCall_init():\n    no_such_name\n", encoding="utf-8")
     simulation = fly(vehicles=1)
+    simulation.step()
     names = set(simulation.context.objects.names)
     with pytest.raises(Exception, match="no_such_name"):
         simulation.set_vehicles(
             {"drone1": {}, "sound": {"position": [2, 0, 1]}, "guest": {"script": str(script), "position": [3, 3, 1]}}
         )
     assert list(simulation.vehicles) == ["drone1"] == [vehicle.name for vehicle in simulation.parameters.fleet]
+    assert simulation.running
     assert set(simulation.context.objects.names) == names
     simulation.step()
 
@@ -315,16 +306,13 @@ def test_a_wrong_vehicle_of_a_scene_is_named_with_its_line(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "vehicles, prefixes",
+    "given, prefixes",
     [
-        ({"drone": {"position": [1, 0, 1]}}, [""]),
-        ({"drone1": {}}, ["drone1/"]),
-        ({"drone": {}, "drone1": {"position": [1, 0, 1]}}, ["drone/", "drone1/"]),
+        ({"vehicles": {"drone": {"position": [1, 0, 1]}}}, [""]),
+        ({"vehicles": {"drone1": {}}}, ["drone1/"]),
+        ({"vehicles": {"drone": {}, "drone1": {"position": [1, 0, 1]}}}, ["drone/", "drone1/"]),
+        ({"drone": {"name": "red"}}, ["red/"]),
     ],
 )
-def test_the_only_one_has_the_frames_of_the_drone_if_it_has_its_name(vehicles, prefixes):
-    assert [one.frame_prefix for one in parameters.load({"vehicles": vehicles}).fleet] == prefixes
-
-
-def test_the_only_one_has_frames_of_its_own_where_it_has_another_name():
-    assert parameters.load({"drone": {"name": "red"}}).fleet[0].frame_prefix == "red/"
+def test_the_only_one_has_the_frames_of_the_drone_if_it_has_its_name(given, prefixes):
+    assert [one.frame_prefix for one in parameters.load(given).fleet] == prefixes

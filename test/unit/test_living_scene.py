@@ -6,9 +6,26 @@ import numpy as np
 import pybullet
 import pytest
 import yaml
-from living import KINDS, SCENE, picture, simulate, sizes
+from living import KINDS, SCENE, picture, sizes
 
 TIMES = 20
+
+
+def simulate_with(build):
+    """Return what builds the scene, flown by a script that does nothing."""
+    values = {"drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}
+    still = "def sysCall_init(): pass\n"
+    return lambda **options: build(values, scene=yaml.safe_dump(SCENE), python=still, **options)
+
+
+@pytest.fixture
+def simulate(new_simulation):
+    return simulate_with(new_simulation)
+
+
+@pytest.fixture(name="simulation", scope="module")
+def _simulation(new_shared_simulation):
+    return simulate_with(new_shared_simulation)(started=False)
 
 
 def do_all(operations, tree, kind):
@@ -27,8 +44,8 @@ def do_all(operations, tree, kind):
 
 
 @pytest.mark.parametrize("started", [True, False], ids=["running", "stopped"])
-def test_nothing_leaks(tmp_path, started):
-    simulation = simulate(tmp_path, started)
+def test_nothing_leaks(simulate, started):
+    simulation = simulate(started=started)
     operations, tree = simulation.operations, simulation.context.objects
     before = sizes(simulation)
     for kind in KINDS.values():
@@ -37,11 +54,10 @@ def test_nothing_leaks(tmp_path, started):
         assert sizes(simulation) == before, kind
         if started:
             simulation.step()
-    simulation.close()
 
 
-def test_reading_a_moved_object_does_not_make_its_place_the_initial_one(tmp_path):
-    simulation = simulate(tmp_path, started=False)
+def test_reading_a_moved_object_does_not_make_its_place_the_initial_one(simulate):
+    simulation = simulate(started=False)
     before = picture(simulation)
     simulation.load_scripts()
     tree = simulation.context.objects
@@ -50,11 +66,10 @@ def test_reading_a_moved_object_does_not_make_its_place_the_initial_one(tmp_path
     simulation.operations.color(box)
     simulation.stop()
     assert picture(simulation) == before
-    simulation.close()
 
 
-def test_stop_undoes_what_was_done_in_flight(tmp_path):
-    simulation = simulate(tmp_path, started=False)
+def test_stop_undoes_what_was_done_in_flight(simulate):
+    simulation = simulate(started=False)
     before = picture(simulation)
     simulation.load_scripts()
     operations, tree = simulation.operations, simulation.context.objects
@@ -70,11 +85,10 @@ def test_stop_undoes_what_was_done_in_flight(tmp_path):
     assert picture(simulation) == before
     simulation.start()
     assert picture(simulation) == before
-    simulation.close()
 
 
-def test_what_was_done_while_stopped_stays_and_is_saved(tmp_path):
-    simulation = simulate(tmp_path, started=False)
+def test_what_was_done_while_stopped_stays_and_is_saved(simulate, tmp_path):
+    simulation = simulate(started=False)
     operations, tree = simulation.operations, simulation.context.objects
     made, _ = do_all(operations, tree, KINDS["free"])
     operations.remove([tree.handle("Sign")])
@@ -93,11 +107,10 @@ def test_what_was_done_while_stopped_stays_and_is_saved(tmp_path):
     again = picture(simulation)
     assert list(again[0].values()) == list(before[0].values()) and again[1] == before[1]
     assert np.allclose(again[2], before[2], atol=1e-6) and np.allclose(again[3], before[3], atol=1e-5)
-    simulation.close()
 
 
-def test_joints_hold_what_is_hung_on_them_and_let_go(tmp_path):
-    simulation = simulate(tmp_path)
+def test_joints_hold_what_is_hung_on_them_and_let_go(simulate):
+    simulation = simulate()
     operations, tree = simulation.operations, simulation.context.objects
     hinge, rod = tree.handle("Hinge"), tree.handle("Rod")
     for _ in range(10):
@@ -116,11 +129,10 @@ def test_joints_hold_what_is_hung_on_them_and_let_go(tmp_path):
     assert tree[hinge].drive is not None and tree[rod].is_held
     operations.remove([hinge])
     assert tree[rod].parent is None and not tree[rod].is_held
-    simulation.close()
 
 
-def test_shapes_without_a_name_come_with_a_model(tmp_path):
-    simulation = simulate(tmp_path, started=False)
+def test_shapes_without_a_name_come_with_a_model(simulate, tmp_path):
+    simulation = simulate(started=False)
     operations, tree = simulation.operations, simulation.context.objects
     box = {"shape": "box", "size": [0.1, 0.1, 0.1], "position": [0, 0, 1]}
     (tmp_path / "boxes.yaml").write_text(yaml.safe_dump({"objects": [box, box]}), encoding="utf-8")
@@ -130,11 +142,10 @@ def test_shapes_without_a_name_come_with_a_model(tmp_path):
     ]  # the scene has one
     assert {"Cuboid0#0", "Cuboid0#1"} <= set(tree.names), "a model's names have one suffix"
     assert tree[tree.handle("Cuboid0#0")].alias == "Cuboid"
-    simulation.close()
 
 
-def test_shapes_are_grouped_and_parted(tmp_path):
-    simulation = simulate(tmp_path, started=False)
+def test_shapes_are_grouped_and_parted(simulate, tmp_path):
+    simulation = simulate(started=False)
     operations, tree = simulation.operations, simulation.context.objects
     ball, sign = tree.handle("Ball"), tree.handle("Sign")
     whole = operations.group([ball, sign])
@@ -153,7 +164,6 @@ def test_shapes_are_grouped_and_parted(tmp_path):
     with pytest.raises(ValueError, match=r"scene\.yaml: is not overwritten"):
         operations.save_model(top, "scene.yaml")
     assert yaml.safe_load((tmp_path / "scene.yaml").read_text(encoding="utf-8")) == SCENE
-    simulation.close()
 
 
 @pytest.mark.parametrize(
@@ -184,13 +194,6 @@ def test_what_cannot_be_is_refused_in_one_line_and_nothing_is_done(simulation, c
         call(simulation.operations, simulation.context.objects)
     assert "\n" not in str(refused.value)
     assert (picture(simulation), sizes(simulation)) == before
-
-
-@pytest.fixture(name="simulation", scope="module")
-def _simulation(tmp_path_factory):
-    simulation = simulate(tmp_path_factory.mktemp("living"), started=False)
-    yield simulation
-    simulation.close()
 
 
 SCRIPT = """
