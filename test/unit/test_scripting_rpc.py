@@ -25,13 +25,13 @@ from drone_sim.vehicles.commands import Empty, request
 
 ROOT = Path(__file__).resolve().parents[2]
 PLAN = """
-duration: 4.0
+duration: 2.0
 config: {sensors: {imu: {kind: imu, rate: 20}}, script_time_limit: 30.0}
 timeline:
-  - {at: 0.5, twist: {linear: [1, 0, 0]}}
-  - {at: 1.5, twist: {linear: [0, 0.5, 0.2], angular: [0, 0, 0.5]}}
-  - {at: 2.5, object: {name: Ball, position: [1, 0, 2]}}
-  - {at: 3.0, twist: {}}
+  - {at: 0.25, twist: {linear: [1, 0, 0]}}
+  - {at: 0.5, twist: {linear: [0, 0.5, 0.2], angular: [0, 0, 0.5]}}
+  - {at: 0.75, object: {name: Ball, position: [1, 0, 2]}}
+  - {at: 0.9, twist: {}}
 scene: scene.yaml
 criteria:
   - {kind: signal, signal: said, equals: 1}
@@ -202,7 +202,7 @@ def test_a_script_flies_the_same_behind_a_door(plan, script):
 @pytest.mark.parametrize("task", TASKS)
 def test_a_solution_of_a_task_flies_the_same_behind_a_door(task):
     task_plan = plans.read(tasks.find(task))
-    shorter = task_plan.model_copy(update={"duration": min(4.0, task_plan.duration)})
+    shorter = task_plan.model_copy(update={"duration": min(2.0, task_plan.duration)})
     result = same(shorter, tasks.folder() / task / "solution.py", seed=1)
     assert result.error is None
 
@@ -215,8 +215,8 @@ def test_what_a_script_does_comes_out_the_same_behind_a_door(plan, tmp_path, wha
         text = text.replace(other, "pass")
     path = tmp_path / "does.py"
     path.write_text(text + HELPERS)
-    result = same(plan, path)
-    assert result.error is None and result.flown == 4.0
+    result = same(plan.model_copy(update={"duration": 1.0}), path)
+    assert result.error is None and result.flown == 1.0
 
 
 def test_a_callback_hears_the_same_behind_a_door(plan, tmp_path):

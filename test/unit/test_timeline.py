@@ -1,6 +1,7 @@
 """Timelines: which step an entry takes effect in, and what a mistake in the file says."""
 
 import random
+import re
 from contextlib import closing
 
 import pytest
@@ -187,14 +188,14 @@ def test_every_wrong_key_is_named_with_its_line(tmp_path):
 """
     with pytest.raises(TimelineError) as caught:
         read(tmp_path, text)
-    assert str(caught.value).split("; line ") == [
-        f"{tmp_path}/commands.yaml: line 2: entry 1: twist.angular = 3: "
-        "must be three finite numbers, such as [1, 0, 0]",
-        "2: entry 1: twist.liner: unknown key; known are linear, angular",
-        "3: entry 2: at = 'soon': input should be a valid number",
-        "4: entry 2: push.duration: missing; it is a number of seconds",
-        "8: entry 4: pose.position.z = -1.0: must lie between 0.0 and 1000.0 m",
-        f"9: entry 5: pusch: unknown key; known are at, vehicle, {KINDS}",
+    assert str(caught.value).startswith(f"{tmp_path}/commands.yaml: line 2: ")
+    assert re.findall(r"line (\d+): entry (\d+): ([\w.]+)", str(caught.value)) == [
+        ("2", "1", "twist.angular"),
+        ("2", "1", "twist.liner"),
+        ("3", "2", "at"),
+        ("4", "2", "push.duration"),
+        ("8", "4", "pose.position.z"),
+        ("9", "5", "pusch"),
     ]
 
 
