@@ -1,10 +1,9 @@
 """Scene files: what a structure says as YAML, that text damaged, and YAML that is an attack by itself."""
 
-import yaml
 from case import Case
 from hypothesis import strategies as st
 
-from kinds.values import junk, mostly, mutated, numbers, small, texts, vectors, words
+from kinds.values import as_yaml, junk, mostly, mutated, numbers, small, texts, vectors, words
 
 _SIZES = {"box": 3, "cylinder": 2, "sphere": 1, "mesh": 3, "urdf": 0}
 _COUNT = st.one_of(st.integers(0, 4), st.sampled_from([30]))
@@ -85,13 +84,6 @@ def _scene(draw):
     return scene
 
 
-def _dump(scene):
-    try:
-        return yaml.safe_dump(scene, allow_unicode=True).encode("utf-8", "surrogatepass")
-    except (yaml.YAMLError, ValueError, TypeError):
-        return repr(scene).encode("utf-8", "replace")
-
-
 @st.composite
 def _bomb(draw):
     """Aliases that double and double, deep nesting, a long list, duplicate keys, foreign tags."""
@@ -132,8 +124,8 @@ _GOOD = b"""objects:
 - {name: Box, shape: box, size: [1, 1, 1], position: [3, 0, 4], mass: 1}
 drone: {position: [1, 2, 3], yaw: 0.5}
 """
-_WHOLE = _scene().map(_dump)
-_ODD = st.one_of(_bomb(), mutated(_GOOD), junk.map(_dump), st.binary(max_size=40))
+_WHOLE = _scene().map(as_yaml)
+_ODD = st.one_of(_bomb(), mutated(_GOOD), junk.map(as_yaml), st.binary(max_size=40))
 _TEXTS = st.one_of(_WHOLE, _WHOLE, _WHOLE, _ODD)
 _CUBE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 _LINK = b"""<robot name="one"><link name="a">

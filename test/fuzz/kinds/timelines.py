@@ -1,10 +1,9 @@
 """Timelines for `fly`, and its other arguments."""
 
-import yaml
 from case import Case
 from hypothesis import strategies as st
 
-from kinds.values import junk, mostly, mutated, numbers, texts, vectors, words
+from kinds.values import as_yaml, junk, mostly, mutated, numbers, texts, vectors, words
 
 _ACTIONS = {
     "twist": ("linear", "angular"),
@@ -33,15 +32,8 @@ def _entry(draw):
     return entry
 
 
-def _dump(value):
-    try:
-        return yaml.safe_dump(value, allow_unicode=True).encode("utf-8", "surrogatepass")
-    except (yaml.YAMLError, ValueError, TypeError):
-        return repr(value).encode("utf-8", "replace")
-
-
 _TEXTS = st.one_of(
-    st.lists(mostly(_entry(), junk), max_size=5).map(_dump),
+    st.lists(mostly(_entry(), junk), max_size=5).map(as_yaml),
     mutated(_GOOD),
     st.sampled_from(
         [b"- " * 2000, b"&x [*x]", b"[" * 5000, b"- {at: 1:30, pose: {}}", b"\xff", b"- {at: 0, at: 1, pose: {}}"]

@@ -3,6 +3,7 @@
 import datetime
 import math
 
+import yaml
 from hypothesis import strategies as st
 
 ODD_NUMBERS = (
@@ -85,3 +86,10 @@ def mutated(draw: st.DrawFn, content: bytes) -> bytes:
             odd = draw(st.sampled_from(ODD_NUMBERS[:-1] + ODD_TEXTS))
             content = content[:at] + str(odd).encode("utf-8", "replace") + content[at:]
     return content
+
+
+def as_yaml(value):
+    try:
+        return yaml.safe_dump(value, allow_unicode=True).encode("utf-8", "surrogatepass")
+    except (yaml.YAMLError, ValueError, TypeError):
+        return repr(value).encode("utf-8", "replace")
