@@ -39,10 +39,18 @@ def make(period=0.05):
     return Pacer(period, clock, clock.sleep), clock
 
 
-def test_one_pass_per_period():
-    pacer, clock = make()
-    assert passes(pacer, clock, [0.01] * 4) == [0.05, 0.1, 0.15, 0.2]
-    assert pacer.overruns == 0
+@pytest.mark.parametrize(
+    "period, works, times, overruns",
+    [
+        (0.05, [0.01] * 4, [0.05, 0.1, 0.15, 0.2], 0),
+        (0.0, [0.01] * 4, [0.0, 0.01, 0.02, 0.03], 0),  # as fast as it can
+        (0.05, [0.01, 0.12, 0.01, 0.01], [0.05, 0.1, 0.22, 0.27], 1),
+    ],
+)
+def test_one_pass_per_period_and_an_overrun_is_counted_and_not_caught_up(period, works, times, overruns):
+    pacer, clock = make(period)
+    assert passes(pacer, clock, works) == times
+    assert (pacer.overruns, round(pacer.worst, 9)) == (overruns, 0.07 * overruns)
 
 
 def test_late_wake_ups_do_not_add_up():
@@ -52,13 +60,6 @@ def test_late_wake_ups_do_not_add_up():
     assert pacer.overruns == 0
 
 
-def test_an_overrun_is_counted_and_not_caught_up():
-    pacer, clock = make()
-    assert passes(pacer, clock, [0.01, 0.12, 0.01, 0.01]) == [0.05, 0.1, 0.22, 0.27]
-    assert pacer.overruns == 1
-    assert round(pacer.worst, 9) == 0.07
-
-
 def test_a_step_that_others_held_up_is_not_late():
     pacer, clock = make()
     passes(pacer, clock, [0.12])
@@ -66,12 +67,6 @@ def test_a_step_that_others_held_up_is_not_late():
     assert pacer.wait() == 0.0 and pacer.overruns == 0
     assert passes(pacer, clock, [0.0, 0.12, 0.0]) == [0.22, 0.27, 0.39]
     assert pacer.overruns == 1
-
-
-def test_as_fast_as_it_can():
-    pacer, clock = make(period=0.0)
-    assert passes(pacer, clock, [0.01] * 4) == [0.0, 0.01, 0.02, 0.03]
-    assert pacer.overruns == 0
 
 
 def test_a_long_sleep_ends_when_interrupted():

@@ -118,20 +118,25 @@ def test_every_wrong_key_of_a_config_file_is_named_with_its_line(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text, line, words",
+    "text, words",
     [
-        ("gravity: -9\ntime_step: 0.012", 2, "parameter time_step = 0.012: must be a whole multiple"),
-        ("cameras:\n  front:\n    near: 200", 3, "parameter cameras/front/near = 200.0: must be less than far"),
-        ("scene:\n  objects:\n  - {shape: cone}", 3, "parameter scene/objects/0/shape = 'cone': must be one of 'box'"),
-        ("scene:\n  boxes: 1", 2, "parameter scene/boxes: unknown key; near names are objects"),
+        ("gravity: -9\ntime_step: 0.012", "line 2: parameter time_step = 0.012: must be a whole multiple"),
+        ("cameras:\n  front:\n    near: 200", "line 3: parameter cameras/front/near = 200.0: must be less than far"),
+        ("scene:\n  objects:\n  - {shape: cone}", "line 3: parameter scene/objects/0/shape = 'cone': must be one of"),
+        ("scene:\n  boxes: 1", "line 2: parameter scene/boxes: unknown key; near names are objects"),
+        ("gravity: 1:30", "line 1: parameter gravity = '1:30'"),
+        ("gravity: 1\ngravity: 2", "key 'gravity' is given twice (line 2, column 1)"),
+        ("gravty: 1", "line 1: parameter gravty: unknown key; near names are gravity"),
+        ("config: other.yaml", "a config file must not have the key `config`"),
+        ("- 1", "must hold `key: value` lines"),
     ],
 )
-def test_a_mistake_in_a_config_file_has_its_line(tmp_path, text, line, words):
+def test_a_mistake_in_a_config_file_has_its_line(tmp_path, text, words):
     file = tmp_path / "my.yaml"
     file.write_text(text)
     with pytest.raises(parameters.ParameterError) as refused:
         parameters.load({"config": str(file)})
-    assert str(refused.value).startswith(f"{file}: line {line}: {words}")
+    assert str(refused.value).startswith(f"{file}: {words}") and "\n" not in str(refused.value)
 
 
 def test_all_mistakes_of_a_command_line_are_named():
@@ -202,23 +207,6 @@ def test_the_files_that_a_config_file_names_lie_beside_it(tmp_path):
     assert loaded.script == str(tmp_path / "own.py")
     config.write_text("script: target\n")
     assert parameters.load({"config": str(config)}).script == "target"
-
-
-@pytest.mark.parametrize(
-    "text, words",
-    [
-        ("gravity: 1:30", "config.yaml: line 1: parameter gravity = '1:30'"),
-        ("gravity: 1\ngravity: 2", "config.yaml: key 'gravity' is given twice (line 2, column 1)"),
-        ("gravty: 1", "config.yaml: line 1: parameter gravty: unknown key; near names are gravity"),
-        ("config: other.yaml", "config.yaml: a config file must not have the key `config`"),
-        ("- 1", "config.yaml: must hold `key: value` lines"),
-    ],
-)
-def test_a_mistake_in_a_config_file_names_it(tmp_path, text, words):
-    (tmp_path / "config.yaml").write_text(text)
-    with pytest.raises(parameters.ParameterError) as refused:
-        parameters.load({"config": str(tmp_path / "config.yaml")})
-    assert words in str(refused.value) and "\n" not in str(refused.value)
 
 
 # ---- choices by one word of a YAML file

@@ -48,22 +48,17 @@ def test_a_force_at_the_centre_of_mass_does_not_turn(space):
     assert space.state(drone).linear_velocity == pytest.approx(np.array([1, -2, 3]) / 0.52 * 0.05, abs=1e-9)
 
 
-def test_a_torque_turns_by_the_inertia_in_the_world(space):
+@pytest.mark.parametrize(
+    "force, torque, point",
+    [((0, 0, 0), (1e-3, -2e-3, 3e-3), (0, 0, 0)), ((0.1, 0.2, -0.3), (0, 0, 0), (0.09, -0.09, 0.001))],
+    ids=["a torque", "a force off the centre"],
+)
+def test_it_turns_by_the_inertia_in_the_world(space, force, torque, point):
     drone = space.add_rigid_body(BODY, Pose((0, 0, 1), TILTED))
-    torque = np.array([1e-3, -2e-3, 3e-3])
-    space.advance({drone: wrench(torque=torque)}, 1)
+    space.advance({drone: wrench(force, torque, point)}, 1)
     turn = np.reshape(Pose((0, 0, 0), TILTED).matrix, (3, 4))[:, :3]
-    expected = np.linalg.inv(turn @ BODY.inertia @ turn.T) @ torque * SUB_STEP
-    assert space.state(drone).angular_velocity == pytest.approx(expected, rel=1e-5)
-
-
-def test_a_force_off_the_centre_turns_with_the_body_s_point(space):
-    drone = space.add_rigid_body(BODY, Pose((0, 0, 1), TILTED))
-    force, point = np.array([0.1, 0.2, -0.3]), np.array([0.09, -0.09, 0.001])
-    space.advance({drone: wrench(force=force, point=point)}, 1)
-    turn = np.reshape(Pose((0, 0, 0), TILTED).matrix, (3, 4))[:, :3]
-    torque = np.cross(turn @ point, force)
-    expected = np.linalg.inv(turn @ BODY.inertia @ turn.T) @ torque * SUB_STEP
+    whole = np.cross(turn @ point, force) + torque  # the point turns with the body
+    expected = np.linalg.inv(turn @ BODY.inertia @ turn.T) @ whole * SUB_STEP
     assert space.state(drone).angular_velocity == pytest.approx(expected, rel=1e-5)
 
 
