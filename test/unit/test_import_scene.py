@@ -44,8 +44,12 @@ end
 
 
 @pytest.fixture
-def imported(tmp_path, capsys):
-    """Import a file of these chunks; return what the scene file says, and leave its path in `imported.scene`."""
+def imported(tmp_path, capsys, new_simulation):
+    """Import a file of these chunks; return what the scene file says.
+
+    What was said, the scene file's path, and the parameters that name it are left in `said`, `scene` and `values`;
+    `fly` makes a simulation of it.
+    """
 
     def do(*chunks, suffix=".ttt", **given):
         path = tmp_path / f"Thing{suffix}"
@@ -53,8 +57,13 @@ def imported(tmp_path, capsys):
         assert main([str(path), str(tmp_path / "out"), "--force"]) == 0
         do.said = capsys.readouterr().out
         do.scene = tmp_path / "out" / "scene.yaml"
+        do.values = {"scene_file": str(do.scene)}
         return yaml.safe_load(do.scene.read_text())
 
+    def fly(steps=0, started=True, **more):
+        return new_simulation({**do.values, **more}, steps, started=started)
+
+    do.fly = fly
     return do
 
 
@@ -65,7 +74,7 @@ def objects(content):
 # ---- objects
 
 
-def test_shapes_in_their_tree(imported, new_simulation):
+def test_shapes_in_their_tree(imported):
     sphere = shape(
         1,
         "Ball",
@@ -90,9 +99,9 @@ def test_shapes_in_their_tree(imported, new_simulation):
     assert found["Ball"]["alias"] == "ball" and found["Ball"]["size"] == [0.1] and found["Ball"]["mass"] == 0.5
     assert found["Ball"]["inertia"] == {"moments": [0.005, 0.01, 0.015], "position": [0.0, 0.0, 0.05]}
     assert found["Ball"]["position"] == [0.0, 0.0, 1.0] and found["Ball"]["parent"] == "Box"
-    simulation = new_simulation({"scene_file": str(imported.scene)}, steps=40)
-    matrix = simulation.scene.things()["Ball"].matrix()
-    assert matrix[11] == pytest.approx(0.1, abs=0.01), "the tree does not weld"
+    assert imported.fly(40).scene.things()["Ball"].matrix()[11] == pytest.approx(0.1, abs=0.01), (
+        "the tree does not weld"
+    )
 
 
 def test_a_compound_keeps_its_parts_and_what_is_no_simple_form_is_a_mesh(imported):
@@ -165,11 +174,8 @@ def test_joints_and_what_hangs_on_them(imported):
         "position": [0.0, 0.0, 0.0],
     }
     assert found["Door"]["parent"] == "Hinge"
-    loaded = parameters.load({"scene_file": str(imported.scene)})
-    simulation = Simulation(loaded, started=False)
-    door = simulation.context.objects.handle("Door")
-    place = simulation.context.objects.matrix(door)
-    simulation.close()
+    tree = imported.fly(started=False).context.objects
+    place = tree.matrix(tree.handle("Door"))
     assert np.allclose(place[3::4], [np.cos(0.5), np.sin(0.5), 0], atol=1e-6)
 
 
@@ -187,7 +193,7 @@ def test_a_path_of_4_x_is_a_path(imported):
         "turns": list(map(list, turns)),
         "position": [0.0, 0.0, 0.0],
     }
-    loaded = parameters.load({"scene_file": str(imported.scene)})
+    loaded = parameters.load(imported.values)
     path = loaded.scene.objects[0].make(Place(("Track",), "Track", None, frames.IDENTITY), None)
     assert struct.pack("<21d", *path.table) == content
 
@@ -197,7 +203,7 @@ def test_bodies_tumble_as_in_the_files_engine(imported, engine, turns):
     imported(
         shape(0, "Mark", mesh(size=(1, 1, 1))), chunk("DYN", chunk("En3", struct.pack("<i3fi", engine, 0, 0, -9.81, 0)))
     )
-    assert parameters.load({"scene_file": str(imported.scene)}).physics.gyroscopic == turns
+    assert parameters.load(imported.values).physics.gyroscopic == turns
 
 
 def test_the_floor_the_step_and_gravity(imported):
@@ -206,17 +212,16 @@ def test_the_floor_the_step_and_gravity(imported):
     moon = chunk("DYN", chunk("En3", struct.pack("<i3fi", 0, 0, 0, -1.62, 0)))
     content = imported(*chunks, moon, chunk("SIM", integers("Spi", 4)))
     assert content == {"time_step": 0.01, "gravity": -1.62, "floor": {"size": 2.0}, "vehicles": {}, "objects": []}
-    loaded = parameters.load({"scene_file": str(imported.scene)})
+    loaded = parameters.load(imported.values)
     assert (loaded.time_step, loaded.sub_steps, loaded.gravity) == (0.01, 2, -1.62)
     with pytest.raises(parameters.ParameterError, match=r"time_step = 0\.01: the time step cannot change"):
         parameters.load().in_scene(str(imported.scene))
 
 
-def test_nobody_flies_in_a_file_without_a_quadricopter_unless_that_is_asked_for(imported, tmp_path, new_simulation):
+def test_nobody_flies_in_a_file_without_a_quadricopter_unless_that_is_asked_for(imported, tmp_path):
     ball = shape(1, "Ball", mesh("sphere", (0.2, 0.2, 0.2)), at=(0, 0, 2), dynamic=True, wrapper=weight(1.0))
     imported(ball, script(1, "sim.setFloatSignal('height', sim.getObjectPosition(sim.getObject('/Ball'), -1)[3])"))
-    scene = {"scene_file": str(imported.scene)}
-    simulation = new_simulation(scene, steps=20)
+    simulation = imported.fly(20)
     assert not simulation.vehicles
     assert simulation.scene.things()["Ball"].matrix()[11] == pytest.approx(0.1, abs=0.01), "on the floor"
     assert simulation.context.signals.get(float, "height") == 2.0
@@ -227,9 +232,9 @@ def test_nobody_flies_in_a_file_without_a_quadricopter_unless_that_is_asked_for(
     assert simulation.drone.name == "guest"
     assert simulation.set_vehicles({}) == ([], ["guest"])
     assert parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).fleet == ()
-    assert [one.name for one in parameters.load({**scene, "vehicles": 1}).fleet] == ["drone1"]
+    assert [one.name for one in parameters.load({**imported.values, "vehicles": 1}).fleet] == ["drone1"]
     with pytest.raises(parameters.ParameterError, match=r"scene\.yaml: the scene has no vehicle \(vehicles: {}\)"):
-        parameters.load(scene).first  # noqa: B018
+        parameters.load(imported.values).first  # noqa: B018
 
 
 TWICE = {
@@ -247,10 +252,10 @@ def test_of_two_objects_of_one_name_the_second_gets_a_free_one(imported, objects
     names = [one["name"] for one in content["objects"]]
     assert len({*names}) == len(names) and "water12" in names
     assert ": is called water12" in imported.said
-    Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False).close()
+    imported.fly(started=False)
 
 
-def test_scripts_on_each_other_have_an_object_each(imported, new_simulation):
+def test_scripts_on_each_other_have_an_object_each(imported):
     def scripted(handle, name, parent):
         own = script(99, f"function sysCall_init() sim.setInt32Signal('{name}', 1) end", tag="Soo")
         return scene_object("SCT", handle, name, parent=parent, own=own, alias="Script")
@@ -259,10 +264,8 @@ def test_scripts_on_each_other_have_an_object_each(imported, new_simulation):
         scene_object("DMY", 0, "D"), scripted(1, "one", 0), scripted(2, "two", 0), scripted(3, "on", 2), version=25
     )
     assert sorted(one["object"] for one in content["scripts"]) == ["D", "on", "two"]
-    values = {"scene_file": str(imported.scene), "vehicles": {"drone": {}}}
-    simulation = new_simulation(values)
-    found = [simulation.context.signals.get(int, name) for name in ("one", "two", "on")]
-    assert found == [1, 1, 1]
+    signals = imported.fly(vehicles={"drone": {}}).context.signals
+    assert [signals.get(int, name) for name in ("one", "two", "on")] == [1, 1, 1]
 
 
 def test_what_cannot_be_brought_is_said_object_by_object(imported):
@@ -311,11 +314,9 @@ def linked(tag_of_type=b""):
 
 def test_an_overlap_constraint_of_two_dummies_holds_their_bodies_together(imported):
     imported(*linked())
-    loaded = parameters.load({"scene_file": str(imported.scene), "vehicles": {"drone": {}}})
-    simulation = Simulation(loaded)
+    simulation = imported.fly(vehicles={"drone": {}})
     tip, other = (simulation.context.objects.handle(name) for name in ("Tip0", "Tip2"))
     assert simulation.operations.linked(tip) == other
-    simulation.close()
     imported(*linked(integers("Dl2", 5)))
     assert "Tip0, Tip2: its link to another dummy is not imported" in (imported.scene.parent / "IMPORT.txt").read_text()
 
@@ -338,12 +339,11 @@ def _rigid(end=""):
 
 
 @pytest.mark.parametrize("end", ["", "#0", "#3"])
-def test_a_model_whose_names_a_drone_has_is_a_copy_and_its_scripts_find_its_own_objects(imported, end, new_simulation):
+def test_a_model_whose_names_a_drone_has_is_a_copy_and_its_scripts_find_its_own_objects(imported, end):
     copy = end or "#0"
     found = objects(imported(*_rigid(end), suffix=".ttm"))
     assert [*found] == [f"Quadricopter{copy}", *(f"Quadricopter_propeller_respondable{n}{copy}" for n in (1, 2))]
-    simulation = new_simulation({"scene_file": str(imported.scene), "vehicles": 1})
-    simulation.step()
+    simulation = imported.fly(1, vehicles=1)
     told = [simulation.context.signals.find(str(n)) for n in (1, 2)]
     assert told == [f"Quadricopter_propeller_respondable{n}{copy} of Quadricopter{copy}" for n in (1, 2)]
 
@@ -352,17 +352,15 @@ def test_a_propeller_without_a_drone_finds_none_of_another_ones(imported, caplog
     """V-REP's rule: the script of a copy does not find the original's objects."""
     code = "function sysCall_init() sim.getObjectHandle('Quadricopter_base') end"
     imported(*_rigid("#0"), scene_object("DMY", 7, "Eye"), script(0, code))
-    Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": 1})).close()
+    imported.fly(vehicles=1)
     assert "no object named 'Quadricopter_base#0'" in caplog.text
 
 
-def test_names_of_a_tree_that_has_a_suffix_here_are_found_from_outside_of_it(imported, new_simulation):
+def test_names_of_a_tree_that_has_a_suffix_here_are_found_from_outside_of_it(imported):
     code = "sim.setStringSignal('found', sim.getObjectName(sim.getObjectHandle('Arm')))"
     robot = scene_object("DMY", 0, "Drone"), scene_object("DMY", 1, "Arm", 0), scene_object("DMY", 2, "Eye")
     imported(*robot, script(2, f"function sysCall_init() {code} end"))
-    simulation = new_simulation({"scene_file": str(imported.scene), "vehicles": 1})
-    found = simulation.context.signals.find("found")
-    assert found == "Arm#0"
+    assert imported.fly(vehicles=1).context.signals.find("found") == "Arm#0"
 
 
 def test_scripts_lie_on_their_objects(imported):
@@ -432,7 +430,7 @@ def test_paths_of_a_script_of_4_9_begin_at_the_script_which_is_an_object(importe
     assert told[".."] == "/Robot[1]/Arm" and told["../Eye"] == "/Robot[1]/Arm/Eye" and told[":"] == "/Robot[1]"
 
 
-def test_a_script_object_is_a_script_where_one_is_asked_for(imported, new_simulation):
+def test_a_script_object_is_a_script_where_one_is_asked_for(imported):
     own = script(99, "function twice(x) return 2 * x end", tag="Soo")
     scripted = scene_object("SCT", 20, "Script", parent=11, own=own, alias="Script")
     code = """
@@ -446,14 +444,11 @@ def test_a_script_object_is_a_script_where_one_is_asked_for(imported, new_simula
     end
     """
     imported(*_robots(scripted, script(0, code)))
-    simulation = new_simulation({"scene_file": str(imported.scene)})
-    simulation.step()
-    signals = simulation.context.signals
-    found = [signals.get(int, name) for name in ("type", "by handle", "by path", "by object")]
-    assert found == [1, 8, 10, 12]
+    signals = imported.fly(1).context.signals
+    assert [signals.get(int, name) for name in ("type", "by handle", "by path", "by object")] == [1, 8, 10, 12]
 
 
-def test_collections_are_found_by_their_names(imported, tmp_path, new_simulation):
+def test_collections_are_found_by_their_names(imported, tmp_path):
     items = collection_item(0, 1) + collection_item(2, 0, removes=True) + collection_item(77, 0)
     arm = chunk("GRP", chunk("Grn", text("arm")) + items + b"EOO")
     code = """
@@ -471,7 +466,7 @@ def test_collections_are_found_by_their_names(imported, tmp_path, new_simulation
         }
     ]
     assert "arm: a collection: some of its objects are not imported" in imported.said
-    simulation = new_simulation({"scene_file": str(imported.scene)})
+    simulation = imported.fly()
     simulation.save_scene(tmp_path / "saved.yaml")
     found = [name for name in simulation.context.objects.names if simulation.context.signals.find(name)]
     simulation.stop()
@@ -484,7 +479,7 @@ def test_collections_are_found_by_their_names(imported, tmp_path, new_simulation
 # ---- quadricopters
 
 
-def test_a_quadricopter_is_a_vehicle_with_its_own_masses_and_flies(imported, new_simulation):
+def test_a_quadricopter_is_a_vehicle_with_its_own_masses_and_flies(imported):
     """V-REP's own: its built-in law hovers at the velocity at which V-REP's does."""
     content = imported(*quadricopter(code=HOVER), compressed=True)
     vehicle = content["vehicles"]["drone"]
@@ -495,9 +490,7 @@ def test_a_quadricopter_is_a_vehicle_with_its_own_masses_and_flies(imported, new
     assert rigid.mass == pytest.approx(0.52) and np.diag(rigid.inertia) == pytest.approx(
         [4.04e-3, 4.94e-3, 8.93e-3], rel=2e-3
     )
-    simulation = new_simulation({"scene_file": str(imported.scene)}, steps=40)
-    height = simulation.drone.body.state.position[2]
-    assert height == pytest.approx(1.0, abs=0.02)
+    assert imported.fly(40).drone.body.state.position[2] == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_scaled_one_has_the_propellers_of_its_size(imported):
@@ -509,12 +502,12 @@ def test_a_scaled_one_has_the_propellers_of_its_size(imported):
     assert rigid.links["propeller_front_left"][3::4] == pytest.approx((0.119496, 0.119496, 0.0026), abs=1e-6)
 
 
-def test_a_script_of_a_scaled_propeller_reads_its_size_factor(imported, new_simulation):
+def test_a_script_of_a_scaled_propeller_reads_its_size_factor(imported):
     """The force goes with the cube of the size factor, as the mass does: it hovers at the unscaled one's velocity."""
     own = PROPELLER.replace("function sysCall_actuation()", "function sysCall_actuation()\n  local own = 'setObject'")
     content = imported(*quadricopter(scale=0.5, code=HOVER, propeller=own))
     assert len(content["scripts"]) == 4
-    simulation = new_simulation({"scene_file": str(imported.scene)}, steps=40)
+    simulation = imported.fly(40)
     tree, operations = simulation.context.objects, simulation.operations
     factor = operations.factors(tree.handle("Quadricopter_propeller1"))
     height, begun = simulation.drone.body.state.position[2], simulation.drone.parameters.position[2]
@@ -522,11 +515,11 @@ def test_a_script_of_a_scaled_propeller_reads_its_size_factor(imported, new_simu
     assert height == pytest.approx(begun, abs=0.02)
 
 
-def test_a_scaled_object_of_the_scene_keeps_its_size_factor(imported, new_simulation):
+def test_a_scaled_object_of_the_scene_keeps_its_size_factor(imported):
     content = imported(shape(0, "Box", mesh(), base=numbers("_fa", "Sfa", 2.0)), shape(1, "Plain", mesh()))
     found = objects(content)
     assert found["Box"]["size_factor"] == 2 and "size_factor" not in found["Plain"]
-    simulation = new_simulation({"scene_file": str(imported.scene)}, started=False)
+    simulation = imported.fly(started=False)
     handle = simulation.context.objects.handle("Box")
     simulation.operations.scale([handle], (1.5, 1.5, 1.5))
     assert simulation.operations.factors(handle) == (3, 3, 3)
@@ -540,7 +533,7 @@ def test_propellers_with_scripts_of_their_own_keep_them(imported):
     assert "propellers" not in content["vehicles"]["drone"]
 
 
-def test_a_target_in_the_world_is_the_target(imported, new_simulation):
+def test_a_target_in_the_world_is_the_target(imported):
     target = shape(90, "Quadricopter_target", mesh("sphere", (0.1,) * 3), at=(1, 2, 3), respondable=False)
     chunks = quadricopter()
     del chunks[2]  # the one that hangs on it
@@ -550,10 +543,8 @@ def test_a_target_in_the_world_is_the_target(imported, new_simulation):
         "parent": "",
         "position": [1.0, 2.0, 3.0],
     }
-    simulation = new_simulation({"scene_file": str(imported.scene)}, started=False)
-    tree = simulation.context.objects
-    place = tree.matrix(tree.handle("Quadricopter_target"))
-    assert place[3::4] == (1.0, 2.0, 3.0)
+    tree = imported.fly(started=False).context.objects
+    assert tree.matrix(tree.handle("Quadricopter_target"))[3::4] == (1.0, 2.0, 3.0)
 
 
 def test_names_without_a_suffix_mean_the_objects_of_the_copy(imported):
@@ -563,16 +554,15 @@ def test_names_without_a_suffix_mean_the_objects_of_the_copy(imported):
         for first, name in ((0, "Left"), (40, "Right"))
     )
     imported(*one, *other)
-    Simulation(parameters.load({"scene_file": str(imported.scene)})).close()
+    imported.fly()
 
 
-def test_several_keep_their_names_whatever_they_are_called(imported, new_simulation):
+def test_several_keep_their_names_whatever_they_are_called(imported):
     content = imported(*quadricopter(), *quadricopter(40, "#3", (2, 0, 1), "UAV"))
     first, second = content["vehicles"]["Quadricopter"], content["vehicles"]["UAV_3"]
     assert (first["suffix"], second["suffix"]) == (-1, 3)
     assert second["objects"]["Drone"] == {"name": "UAV#3"}
-    simulation = new_simulation({"scene_file": str(imported.scene)}, started=False)
-    tree = simulation.context.objects
+    tree = imported.fly(started=False).context.objects
     found = [
         tree[tree.handle(name)] for name in ("UAV_propeller_respondable2#3", "Quadricopter_propeller_respondable2#3")
     ]
@@ -582,7 +572,7 @@ def test_several_keep_their_names_whatever_they_are_called(imported, new_simulat
 def test_one_may_be_called_as_objects_of_another_are_here(imported):
     content = imported(*quadricopter(), *quadricopter(40, "", (2, 0, 1), "Drone"))
     assert [one.get("suffix") for one in content["vehicles"].values()] == [-1, 0]
-    Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False).close()
+    imported.fly(started=False)
 
 
 def test_what_hangs_on_a_quadricopter_goes_with_it(imported):
@@ -602,7 +592,7 @@ def test_what_hangs_on_a_quadricopter_goes_with_it(imported):
     assert (camera["object"], camera["width"], camera["mount"]["position"]) == ("FrontVision", 64, [0.2, 0.0, 0.0])
     assert camera["mount"]["rpy"] == pytest.approx([0, 0, 0], abs=1e-5), "along +x"
     assert [(one["name"], one["parent"]) for one in content["objects"]] == [("Sonar", "Quadricopter_base")]
-    parameters.load({"scene_file": str(imported.scene)})
+    parameters.load(imported.values)
 
 
 def test_a_vision_sensor_that_is_called_like_a_camera_of_v_reps_sees(imported):
@@ -651,7 +641,7 @@ def test_one_that_begins_tilted_and_without_a_script(imported):
     assert "Quadricopter: has no child script" in imported.said
 
 
-def test_a_target_that_the_file_has_not_is_where_the_base_is(imported, new_simulation):
+def test_a_target_that_the_file_has_not_is_where_the_base_is(imported):
     """A body that lies on its side has a base that stands upright; so does the target that its scripts follow."""
     _root, base, _, *others = quadricopter()
     upright = (np.cos(0.75), 0, np.sin(0.75), 0)
@@ -666,8 +656,7 @@ def test_a_target_that_the_file_has_not_is_where_the_base_is(imported, new_simul
     )
     base = scene_object("DMY", 1, "Quadricopter_base", 0, (0, 0, 0.1), turned=upright)
     imported(side, base, *others)
-    simulation = new_simulation({"scene_file": str(imported.scene)}, started=False)
-    tree = simulation.context.objects
+    tree = imported.fly(started=False).context.objects
     found, wanted = (tree.matrix(tree.handle(f"Quadricopter_{name}")) for name in ("target", "base"))
     assert np.allclose(found, wanted, atol=1e-5) and wanted[10] == pytest.approx(1.0, abs=1e-5)
 
@@ -718,17 +707,16 @@ def test_files_of_lua_beside_a_scene_are_brought(beside, capsys):
     ]
 
 
-def test_a_script_is_not_called_as_the_helper_that_it_asks_for(imported, tmp_path, caplog, new_simulation):
+def test_a_script_is_not_called_as_the_helper_that_it_asks_for(imported, tmp_path, caplog):
     (tmp_path / "blimp.lua").write_text("return {lift = 3}")
     code = "function sysCall_init() sim.setInt32Signal('lift', require('blimp').lift) end"
     content = imported(scene_object("DMY", 0, "blimp"), script(0, code))
     assert content["scripts"][0]["script"] == "blimp_2.lua"
-    simulation = new_simulation({"scene_file": str(imported.scene)})
-    assert simulation.context.signals.get(int, "lift") == 3
+    assert imported.fly().context.signals.get(int, "lift") == 3
     for folder in (tmp_path, tmp_path / "out"):
         (folder / "blimp.lua").unlink()
     imported(scene_object("DMY", 0, "blimp"), script(0, code))
-    Simulation(parameters.load({"scene_file": str(imported.scene)})).close()
+    imported.fly()
     assert "no module 'blimp': there is no file blimp.lua" in caplog.text
 
 
@@ -770,4 +758,4 @@ def test_a_name_that_cannot_be_is_changed(imported):
         scene_object("DMY", 0, "x" * 200), scene_object("DMY", 1, "a\nb", base=chunk("Ali", text("a\nb")))
     )
     assert [len(one["name"]) for one in content["objects"]] == [64, 3]
-    parameters.load({"scene_file": str(imported.scene)})
+    parameters.load(imported.values)
