@@ -13,21 +13,18 @@ from drone_sim.forces.pushes import Push
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.rviz import handles
 from drone_sim.ros.rviz.handles import TIMEOUT, HeldHandles
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 
 @pytest.fixture
-def dragged(monkeypatch):
+def dragged(monkeypatch, new_simulation):
     """Return a simulation, and the inbox in which a drag to x = 2 m waits."""
     monkeypatch.setattr(handles, "MarkerServer", mock.MagicMock())
-    simulation, inbox = Simulation(parameters.load({"script": ""})), Inbox()
+    simulation, inbox = new_simulation({"script": ""}), Inbox()
     shown = handles.VehicleHandles(simulation, inbox)
     feedback = InteractiveMarkerFeedback(event_type=InteractiveMarkerFeedback.POSE_UPDATE, marker_name="Drone")
     feedback.pose.position.x, feedback.pose.position.z, feedback.pose.orientation.w = 2.0, 1.0, 1.0
     shown._on_feedback(feedback)
-    yield simulation, inbox
-    simulation.close()
+    return simulation, inbox
 
 
 def test_it_moves_the_vehicle_that_is_there_by_then(dragged):
@@ -69,11 +66,10 @@ class Hand:
 
 
 @pytest.fixture(name="hand")
-def _hand(monkeypatch):
+def _hand(monkeypatch, new_simulation):
     monkeypatch.setattr(handles, "MarkerServer", mock.MagicMock())
-    simulation, inbox = Simulation(parameters.load({"script": "", "weather": {"wind": [5, 0, 0]}})), Inbox()
-    yield Hand(handles.VehicleHandles(simulation, inbox), simulation, inbox)
-    simulation.close()
+    simulation, inbox = new_simulation({"script": "", "weather": {"wind": [5, 0, 0]}}), Inbox()
+    return Hand(handles.VehicleHandles(simulation, inbox), simulation, inbox)
 
 
 DOWN, MOVED, UP = (

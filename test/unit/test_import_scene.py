@@ -99,9 +99,8 @@ def test_shapes_in_their_tree(imported):
     assert found["Ball"]["alias"] == "ball" and found["Ball"]["size"] == [0.1] and found["Ball"]["mass"] == 0.5
     assert found["Ball"]["inertia"] == {"moments": [0.005, 0.01, 0.015], "position": [0.0, 0.0, 0.05]}
     assert found["Ball"]["position"] == [0.0, 0.0, 1.0] and found["Ball"]["parent"] == "Box"
-    assert imported.fly(40).scene.things()["Ball"].matrix()[11] == pytest.approx(0.1, abs=0.01), (
-        "the tree does not weld"
-    )
+    ball = imported.fly(40).scene.things()["Ball"]
+    assert ball.matrix()[11] == pytest.approx(0.1, abs=0.01), "the tree does not weld"
 
 
 def test_a_compound_keeps_its_parts_and_what_is_no_simple_form_is_a_mesh(imported):
@@ -297,11 +296,10 @@ def test_a_customization_script_comes_with_its_object_and_its_child_script(impor
     content = imported(scene_object("DMY", 0, "Mover"), script(0, text, kind=6), *(own if child else ()))
     (entry,) = content["scripts"]
     assert set(entry) >= {"object", "customization"} and ("script" in entry) == child
-    simulation = Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": {"drone": {}}}))
+    simulation = imported.fly(vehicles={"drone": {}})
     simulation.step()
     signals = simulation.context.signals
     assert signals.get(int, "before") == 1 and signals.get(str, "child").startswith("own")
-    simulation.close()
 
 
 def linked(tag_of_type=b""):

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from drone_sim.forces.pushes import Push
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -94,23 +92,17 @@ def sysCall_actuation():
 """
 
 
-def test_scripts_push_shapes_of_the_scene_and_take_it_back(tmp_path):
+def test_scripts_push_shapes_of_the_scene_and_take_it_back(new_simulation):
     """A sphere of 2 kg and 0.1 m has 0.008 kg m²; what is pushed in one step is not pushed in the next."""
-    script, scene = tmp_path / "pushes.py", tmp_path / "scene.yaml"
-    script.write_text(PUSHES)
-    scene.write_text(SCENE)
-    simulation = Simulation(parameters.load({"gravity": 0.0, "scene_file": str(scene)}), script=str(script))
+    simulation = new_simulation({"gravity": 0.0}, scene=SCENE, python=PUSHES)
     things, drone = simulation.scene.things(), simulation.drone
-    try:
-        for count in (1, 2):
-            simulation.step()
-            ball, rod = things["Ball"].velocity(), things["Rod"].velocity()
-            assert ball[0] == pytest.approx((count * 2 / 2 * 0.05, 0, 0), abs=1e-9)
-            assert ball[1] == pytest.approx((0, 0, 0), abs=1e-9), "0.1 N m from the force, -0.1 as a torque"
-            assert rod[1] == pytest.approx((0, 0, count * 0.1 / INERTIA * 0.05), rel=1e-3)
-            assert drone.body.state.linear_velocity[0] == pytest.approx(count * 0.52 / drone.body.mass * 0.05, rel=0.05)
-            assert drone.body.state.angular_velocity[2] > 0
-        assert not any(map(any, things["Post"].velocity()))
-        assert not simulation.world.shape_forces.sums
-    finally:
-        simulation.close()
+    for count in (1, 2):
+        simulation.step()
+        ball, rod = things["Ball"].velocity(), things["Rod"].velocity()
+        assert ball[0] == pytest.approx((count * 2 / 2 * 0.05, 0, 0), abs=1e-9)
+        assert ball[1] == pytest.approx((0, 0, 0), abs=1e-9), "0.1 N m from the force, -0.1 as a torque"
+        assert rod[1] == pytest.approx((0, 0, count * 0.1 / INERTIA * 0.05), rel=1e-3)
+        assert drone.body.state.linear_velocity[0] == pytest.approx(count * 0.52 / drone.body.mass * 0.05, rel=0.05)
+        assert drone.body.state.angular_velocity[2] > 0
+    assert not any(map(any, things["Post"].velocity()))
+    assert not simulation.world.shape_forces.sums

@@ -7,9 +7,7 @@ from functools import partial
 import pytest
 
 from drone_sim.files.resources import package_path
-from drone_sim.run import parameters
 from drone_sim.run.player import Player
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.breakpoints import LONGEST_VALUE, MOST_INSIDE, MOST_ROWS, read_breakpoints
 from drone_sim.scripting.errors import ScriptError
 
@@ -296,16 +294,13 @@ def test_variables_of_lua_are_bounded_and_odd_ones_are_shown(begin):
 
 
 @pytest.mark.parametrize("script", ["pilot", "tutorial_v4", "tutorial_v3"])
-def test_whoever_looks_changes_nothing(script):
+def test_whoever_looks_changes_nothing(new_simulation, script):
     flights = []
     for looks in (False, True):
-        simulation = Simulation(parameters.load(), script=script, started=False)
-        try:
-            if looks:
-                file = str(package_path() / "src/drone_sim/child_scripts/pilot.py") if script == "pilot" else script
-                simulation.set_breakpoints({file: frozenset(range(1, 400))})
-            simulation.load_scripts()
-            flights.append(flown(simulation, 60, partial(looked_at, simulation) if looks else int))
-        finally:
-            simulation.close()
+        simulation = new_simulation(script=script, started=False)
+        if looks:
+            file = str(package_path() / "src/drone_sim/child_scripts/pilot.py") if script == "pilot" else script
+            simulation.set_breakpoints({file: frozenset(range(1, 400))})
+        simulation.load_scripts()
+        flights.append(flown(simulation, 60, partial(looked_at, simulation) if looks else int))
     assert flights[0] == flights[1]

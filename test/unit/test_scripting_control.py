@@ -5,9 +5,7 @@ import pytest
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.clock import Clock
-from drone_sim.run import parameters
 from drone_sim.run.player import Player
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_sim_ros
@@ -27,39 +25,37 @@ end
 """
 
 
-def played(tmp_path, text):
-    script = tmp_path / "asks.lua"
-    script.write_text(text, encoding="utf-8")
-    simulation = Simulation(parameters.load(), script=str(script))
-    told = []
-    player = Player(simulation, simulation.step, told.append, simulated_time=False)
-    while player.playing and simulation.steps < 10:
-        player.step()
-    return simulation, told
+@pytest.fixture
+def played(new_simulation):
+    def play(text):
+        simulation, told = new_simulation(lua=text), []
+        player = Player(simulation, simulation.step, told.append, simulated_time=False)
+        while player.playing and simulation.steps < 10:
+            player.step()
+        return simulation, told
+
+    return play
 
 
-def test_a_script_stops_the_simulation(tmp_path, caplog):
-    simulation, told = played(tmp_path, ASKS % "stopSimulation")
+def test_a_script_stops_the_simulation(played, caplog):
+    simulation, told = played(ASKS % "stopSimulation")
     assert told == ["flying", "stopped"] and not simulation.running
     assert "16 17 17 17 22 true" in caplog.messages, "first after stop, running, last before stop"
     assert simulation.context.control.asked == ""
-    simulation.close()
 
 
-def test_a_script_pauses_the_simulation(tmp_path):
-    simulation, told = played(tmp_path, ASKS % "pauseSimulation")
+def test_a_script_pauses_the_simulation(played):
+    simulation, told = played(ASKS % "pauseSimulation")
     assert told == ["flying", "paused"] and simulation.steps == 3
-    simulation.close()
 
 
-def test_an_error_that_follows_in_cleanup_does_not_hide_the_first(tmp_path, caplog):
+def test_an_error_that_follows_in_cleanup_does_not_hide_the_first(played, caplog):
     """Who shows the last error of the log, as the cockpit does, shows the cause."""
     fails = "function sysCall_actuation() x.y = 1 end function sysCall_cleanup() z.y = 1 end"
-    simulation, _ = played(tmp_path, fails)
+    simulation, _ = played(fails)
     said = {record.levelname: record.getMessage() for record in caplog.records if "script error" in record.getMessage()}
     assert "[actuation]" in said["ERROR"] and "[cleanup]" in said["WARNING"]
     assert simulation.running is False
-    simulation.close()
 
 
 LEAVES = """

@@ -5,8 +5,6 @@ import math
 import pytest
 
 from drone_sim.mechanics import frames
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 MASS, GRAVITY, STEP = 0.52, 9.81, 0.05
 THRUST = {"3.x": 5.335, "4.x": 5.45}  # m/s, what the controller takes for hovering
@@ -46,17 +44,16 @@ def test_the_offsets_have_the_known_size():
     assert hover_offset("4.x") == pytest.approx(-0.004, abs=5e-4)
 
 
-def test_scripted_forces_fly_as_particles_do():
+def test_scripted_forces_fly_as_particles_do(new_simulation):
     """addForceAndTorque with the law's own numbers is the law."""
     flights = []
     for script in ("target", "target_v4"):
-        simulation = Simulation(parameters.load({"propellers": {"law": "4.x"}}), script=script)
+        simulation = new_simulation({"propellers": {"law": "4.x"}}, script=script)
         objects = simulation.context.objects
         objects.set_matrix(objects.handle("target"), -1, frames.from_euler((0.5, 0.5, 1), (0, 0, 1)))
         for _ in range(200):
             simulation.step()
         flights.append(simulation.drone.body.state.position)
         angles = simulation.drone.propulsion.blades.angles
-        simulation.close()
     assert flights[0] == pytest.approx(flights[1], abs=1e-9)
     assert set(angles.values()) == {199 * STEP * 10 % (2 * math.pi)}, "setJointPosition turns the blades"

@@ -2,9 +2,6 @@
 
 import pytest
 
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
-
 OBJECTS = [
     {"name": "Sender", "kind": "dummy", "position": [0, 0, 5]},
     {"name": "Below", "kind": "dummy", "parent": "Sender", "position": [3, 0, 0]},
@@ -27,9 +24,8 @@ ALL = "sim.receiveData()"
 
 
 @pytest.fixture(name="heard")
-def _heard(tmp_path):
+def _heard(tmp_path, new_simulation):
     """Give a function that lets Sender call something in its first step; it returns what the others have heard."""
-    built = []
 
     def heard(call, asks=ALL, steps=3, before=""):
         texts = {"Sender": f"function sysCall_actuation() if not sent then sent = true {call} end end"}
@@ -39,16 +35,10 @@ def _heard(tmp_path):
             path = tmp_path / f"{name}.lua"
             path.write_text(before + text, encoding="utf-8")
             entries.append({"object": name, "script": str(path)})
-        simulation = Simulation(parameters.load({"scene": {"objects": OBJECTS, "scripts": entries}}))
-        built.append(simulation)
-        for _ in range(steps):
-            simulation.step()
-        signals = simulation.context.signals
+        signals = new_simulation({"scene": {"objects": OBJECTS, "scripts": entries}}, steps).context.signals
         return [signals.get(str, name) for name in ("Below", "Beside", "Above")]
 
-    yield heard
-    for one in built:
-        one.close()
+    return heard
 
 
 GOT = "Sender3pingx "

@@ -7,8 +7,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from drone_sim.mechanics import frames
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 STEP, GRAVITY = 0.05, 9.81  # s, m/s²
 SCENE = {
@@ -52,17 +50,13 @@ BASE, PAD, ROD, TIP = range(4)
 
 
 @pytest.fixture(name="told", scope="module")
-def _told(tmp_path_factory):
-    script = tmp_path_factory.mktemp("script") / "looks.py"
-    script.write_text(PYTHON)
-    simulation = Simulation(parameters.load({"scene": SCENE}), script=str(script))
+def _told(new_shared_simulation):
+    simulation = new_shared_simulation({"scene": SCENE}, python=PYTHON)
     rod = simulation.context.objects[simulation.context.objects.handle("Rod")]
     simulation.world.set_velocity(rod.number, (0.0, 0.0, 0.0), (4.0, 7.0, 4.0))
     for _ in range(6):
         simulation.step()
-    told = json.loads(simulation.context.signals.get(str, "told"))
-    simulation.close()
-    return told
+    return json.loads(simulation.context.signals.get(str, "told"))
 
 
 def sensed(told, index):

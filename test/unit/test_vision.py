@@ -94,15 +94,14 @@ def test_an_unknown_parent_of_a_camera_is_named():
         Simulation(parameters.load(wrong))
 
 
-def test_the_track_camera_stays_level_while_its_parent_is_the_track_frame():
+def test_the_track_camera_stays_level_while_its_parent_is_the_track_frame(new_simulation):
     level = {}
     for parent in ("Track_base", "Quadricopter_base"):
-        simulation = Simulation(parameters.load({"cameras": {"track": {"mount": {"parent": parent}}}}))
+        simulation = new_simulation({"cameras": {"track": {"mount": {"parent": parent}}}})
         simulation.drone.body.move(simulation.drone.body.state._replace(orientation=(0.2, 0.0, 0.0, 0.98)))
         simulation.step()
         across = simulation.drone.cameras["track"].pose()[8]  # z of the optical x axis in the world
         level[parent] = abs(across) < 1e-6
-        simulation.close()
     assert level == {"Track_base": True, "Quadricopter_base": False}
 
 
@@ -180,7 +179,7 @@ def depths_and_colours(sim, handle):
     return np.frombuffer(image, np.uint8).reshape(*size[::-1], 3), np.frombuffer(depth, "<f4").reshape(size[::-1])
 
 
-def test_every_sensor_gives_colours_and_depths():
+def test_every_sensor_gives_colours_and_depths(new_simulation):
     eye = {
         "name": "Eye",
         "kind": "vision_sensor",
@@ -188,25 +187,20 @@ def test_every_sensor_gives_colours_and_depths():
         "rpy": [np.pi / 2, 0, np.pi / 2],
         "width": 64,
     }
-    scene = {"scene": {"objects": [*SCENE["scene"]["objects"], {**eye, "height": 48}]}}
-    simulation = Simulation(parameters.load(scene))
-    try:
-        script = simulation.child_scripts["drone"]
-        around = services([simulation.drone], simulation.context, simulation.operations, TimeLimit(0.0), Turns())
-        sim = make_sim(script, around)
-        for name in ("FrontVision", "DepthVision", "Eye"):
-            handle = sim.getObjectHandle(name)
-            colours, depths = depths_and_colours(sim, handle)
-            box = red(colours)
-            assert box.sum() > 20 and box[box.shape[0] // 2, box.shape[1] // 2]
-            near = depths[box].min()
-            assert 1.4 < near < 1.8 and depths[box].max() < near + 0.01
-            assert np.isinf(depths[-1]).all(), "the sky"
-            _, values, _ = sim.readVisionSensor(handle)
-            assert values[4] == pytest.approx(sim.getVisionSensorDepthBuffer(handle)[depths.argmin()])
-            assert values[6] > 0.5, "the reddest"
-    finally:
-        simulation.close()
+    simulation = new_simulation({"scene": {"objects": [*SCENE["scene"]["objects"], {**eye, "height": 48}]}})
+    around = services([simulation.drone], simulation.context, simulation.operations, TimeLimit(0.0), Turns())
+    sim = make_sim(simulation.child_scripts["drone"], around)
+    for name in ("FrontVision", "DepthVision", "Eye"):
+        handle = sim.getObjectHandle(name)
+        colours, depths = depths_and_colours(sim, handle)
+        box = red(colours)
+        assert box.sum() > 20 and box[box.shape[0] // 2, box.shape[1] // 2]
+        near = depths[box].min()
+        assert 1.4 < near < 1.8 and depths[box].max() < near + 0.01
+        assert np.isinf(depths[-1]).all(), "the sky"
+        _, values, _ = sim.readVisionSensor(handle)
+        assert values[4] == pytest.approx(sim.getVisionSensorDepthBuffer(handle)[depths.argmin()])
+        assert values[6] > 0.5, "the reddest"
 
 
 LARGE = """
@@ -222,16 +216,11 @@ end
 """
 
 
-def test_an_image_of_a_large_sensor_comes_as_numbers(tmp_path):
-    (tmp_path / "large.lua").write_text(LARGE)
+def test_an_image_of_a_large_sensor_comes_as_numbers(new_simulation):
     eye = {"name": "Eye", "kind": "vision_sensor", "width": 640, "height": 560}  # more than a million numbers
-    loaded = parameters.load({"scene": {"objects": [eye]}, "script_time_limit": 0.0})
-    simulation = Simulation(loaded, script=str(tmp_path / "large.lua"))
-    try:
-        numbers = [simulation.context.signals.get(int, name) for name in ("numbers", "depths", "bytes")]
-        assert numbers == [3 * 640 * 560, 640 * 560, 3 * 640 * 560]
-    finally:
-        simulation.close()
+    signals = new_simulation({"scene": {"objects": [eye]}, "script_time_limit": 0.0}, lua=LARGE).context.signals
+    numbers = [signals.get(int, name) for name in ("numbers", "depths", "bytes")]
+    assert numbers == [3 * 640 * 560, 640 * 560, 3 * 640 * 560]
 
 
 def test_the_right_camera_of_the_stereo_pair_projects_what_is_in_the_left_one_s_frame(new_simulation):
