@@ -7,8 +7,6 @@ import pytest
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, Twist, Vector3
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.world.queries import Queries
 
 force_markers = pytest.importorskip("drone_sim.ros.rviz.force_markers")
@@ -36,22 +34,18 @@ class Topic:
 
 
 @pytest.fixture(name="shown")
-def _shown(monkeypatch):
+def _shown(monkeypatch, new_simulation):
     monkeypatch.setattr(marker_topics, "MarkerTopic", Topic)
-    made = []
 
     def shown(steps=0, **overrides):
-        simulation = Simulation(parameters.load(overrides))
+        simulation = new_simulation(overrides)
         markers = force_markers.ForceMarkers(simulation)
-        made.append(simulation)
         for _ in range(steps):
             simulation.step()
         markers.update()
         return simulation, markers
 
-    yield shown
-    for simulation in made:
-        simulation.close()
+    return shown
 
 
 def arrows(marker):

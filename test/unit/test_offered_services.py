@@ -5,8 +5,6 @@ import threading
 
 import pytest
 
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.service_servers import ServiceServer, Unanswered
 from drone_sim.scripting.errors import ScriptError
 
@@ -74,20 +72,20 @@ class Ros:
         return thread, answers
 
 
-def flying(tmp_path, text, suffix):
-    script = tmp_path / f"serves{suffix}"
-    script.write_text(text, encoding="utf-8")
-    ros = Ros()
-    simulation = Simulation(parameters.load(), script=str(script), backend=ros)
-    ros.buses = [simulation.drone.bus]
-    return simulation, ros
+@pytest.fixture
+def flying(new_simulation):
+    def fly(**script):
+        ros = Ros()
+        simulation = new_simulation(**script, backend=ros)
+        ros.buses = [simulation.drone.bus]
+        return simulation, ros
+
+    return fly
 
 
-@pytest.fixture(name="served", params=[(LUA, ".lua"), (PYTHON, ".py")], ids=["lua", "python"])
-def _served(request, tmp_path):
-    simulation, ros = flying(tmp_path, *request.param)
-    yield simulation, ros
-    simulation.close()
+@pytest.fixture(name="served", params=[{"lua": LUA}, {"python": PYTHON}], ids=["lua", "python"])
+def _served(request, flying):
+    return flying(**request.param)
 
 
 def answer_of(simulation, asked):
@@ -165,13 +163,13 @@ def test_who_waits_in_vain_is_refused_and_the_script_is_not_asked_later():
         ("'count', 'std_srvs/Trigger'", "wrong number of values"),
     ],
 )
-def test_a_wrong_service_is_one_line(tmp_path, arguments, said):
+def test_a_wrong_service_is_one_line(flying, arguments, said):
     text = f"function sysCall_init() simROS.advertiseService({arguments}) end function counted() end"
     with pytest.raises(ScriptError, match=said):
-        flying(tmp_path, text, ".lua")
+        flying(lua=text)
 
 
-def test_a_handle_of_a_service_is_no_subscription_and_ends_once(tmp_path):
+def test_a_handle_of_a_service_is_no_subscription_and_ends_once(flying):
     text = """function sysCall_init()
       server = simROS.advertiseService('a', 'std_srvs/Empty', 'f')
       assert(not pcall(simROS.shutdownSubscriber, server))
@@ -180,6 +178,5 @@ def test_a_handle_of_a_service_is_no_subscription_and_ends_once(tmp_path):
       simROS.advertiseService('a', 'std_srvs/Empty', 'f')
     end
     function f() end"""
-    simulation, ros = flying(tmp_path, text, ".lua")
+    _, ros = flying(lua=text)
     assert set(ros.asks) == {"/drone/a"}
-    simulation.close()
