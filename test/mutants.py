@@ -62,7 +62,7 @@ def tests_of(path):
     names = {node.name for node in nodes if isinstance(node, ast.ClassDef | ast.FunctionDef)}
     words = {test: set(re.findall(r"\w+", test.read_text())) for test in sorted(ROOT.glob("test/unit/test_*.py"))}
     rarity = {name: 1 / max(1, sum(name in found for found in words.values())) for name in names if len(name) > 3}
-    topics = [word.rstrip("s") for word in module.split("_") if len(word) > 3]
+    topics = {word.rstrip("s") for part in path.with_suffix("").parts[2:] for word in part.split("_") if len(word) > 3}
     score = {
         test: bool(imported.search(test.read_text()))
         + sum(topic in test.stem for topic in topics)
