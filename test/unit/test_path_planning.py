@@ -257,6 +257,7 @@ def sysCall_actuation(): pass
         ("simOMPL.setStateValidityCheckingResolution(task, 0)", "resolution must be from"),
         ("simOMPL.interpolatePath(task, 10**9)", "a path has at most"),
         ("simOMPL.solve(task, float('nan'))", "finite numbers are expected"),
+        ("simOMPL.solve(task, 1e9)", "a search for 1e+09 s: must take more than 0 and at most 600 s"),
         ("simOMPL.solvE(task)", "simOMPL has no 'solvE'; near names are solve"),
         ("simOMPL.setStateValidationCallback(task, 'nothing'); simOMPL.solve(task, 60)", "no function 'nothing'"),
         ("simOMPL.setStateValidationCallback(task, is_free); simOMPL.solve(task, 60)", "division by zero"),

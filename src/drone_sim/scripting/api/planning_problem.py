@@ -31,6 +31,7 @@ SUBSTITUTES = {
 }
 WITH_THREADS = ("PRM", "PRMstar")  # an exception that passes through them would end the process
 _MOST_STATES = 100_000
+_LONGEST = 600.0  # s of a search, during which the simulation stands still
 
 
 class Component(NamedTuple):
@@ -131,6 +132,8 @@ class Problem:
 
     def solve(self, seconds: float) -> bool:
         """Search for a path for at most `seconds`; return whether one was found, possibly an approximate one."""
+        if not 0 < seconds <= _LONGEST:
+            raise ValueError(f"a search for {seconds:g} s: must take more than 0 and at most {_LONGEST:g} s")
         self.is_used = True
         self._condition = self._base.timedPlannerTerminationCondition(seconds)
         return bool(self._planner.solve(self._condition))
