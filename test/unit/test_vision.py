@@ -223,6 +223,17 @@ def test_an_image_of_a_large_sensor_comes_as_numbers(new_simulation):
     assert numbers == [3 * 640 * 560, 640 * 560, 3 * 640 * 560]
 
 
+@pytest.mark.parametrize(("width", "height"), [(80, 40), (40, 80), (80, 80)])
+def test_the_field_of_view_is_that_of_the_larger_side(new_simulation, width, height):
+    down = {"position": [9, 9, 3], "rpy": [np.pi, 0, 0], "fov": np.pi / 2, "width": width, "height": height}
+    eye = {"name": "Eye", "kind": "vision_sensor", **down}
+    box = {"name": "Box", "shape": "box", "size": [0.5, 0.5, 1], "position": [9, 9, 0.5]}  # 2 m below the sensor
+    simulation = new_simulation({"scene": {"objects": [eye, box]}})
+    tree = simulation.context.objects
+    seen = tree[tree.resolve("Eye")].picture("handles") == tree.resolve("Box")
+    assert seen.any(axis=0).sum() == seen.any(axis=1).sum() == 10  # 80 px are 4 m there
+
+
 def test_the_right_camera_of_the_stereo_pair_projects_what_is_in_the_left_one_s_frame(new_simulation):
     simulation = new_simulation({"config": str(package_path() / "config" / "stereo.yaml")})
     left, right = (simulation.drone.cameras[name] for name in ("left", "right"))

@@ -9,9 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from drone_sim.forces.drag import Drag, DragParameters
 from drone_sim.forces.dryden import MOST, Gusts, GustSeries
 from drone_sim.forces.weather import Weather, WeatherParameters
-from drone_sim.mechanics.frames import to_euler
+from drone_sim.mechanics.frames import from_rpy, to_euler
+from drone_sim.mechanics.wrench import Wrench
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
 
@@ -161,6 +163,14 @@ def test_in_a_steady_wind_it_leans_as_far_as_drag_and_weight_say(simulate, wind,
     assert math.tan(lean) == pytest.approx((drag or 0.1) * (wind - drift) / (mass * 9.81), rel=1e-3)
     # The controller's own law: it leans by Kvcorr v against a speed that it is not told to have.
     assert lean == pytest.approx(0.5 * drift, rel=1e-2)
+
+
+def test_drag_is_that_of_the_velocity_relative_to_the_air():
+    turned = from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi / 2))  # body x is world y
+    state = SimpleNamespace(linear_velocity=(1.0, 2.0, 3.0))
+    body, wrench = SimpleNamespace(state=state, matrix=turned, wind=(0.1, 0.2, 0.3)), Wrench()
+    Drag(DragParameters(kind="drag", coefficients=(10.0, 20.0, 40.0), wind=(0.0, 0.5, 0.7))).add_to(wrench, body)
+    assert wrench.force == pytest.approx((-20 * 0.9, -10 * 1.3, -40 * 2.0))
 
 
 def test_drag_of_ones_own_is_the_only_one(simulate):
