@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A node that does something in a flight, once: what its argument names."""
+"""A node that does something in a flight, once: what its argument names. It prepares that before it is seen."""
 
 import json
 import sys
@@ -24,42 +24,59 @@ def client():
 
 def fly():
     """Do what a program that flies may do, and read the scene's text."""
-    edit({"text": True})
-    sim = client()
-    mark, wheel = sim.createDummy(0.1), sim.getObject("/Quadricopter_propeller_respondable1")
-    sim.setObjectPosition(mark, -1, [1, 0, 1])
-    sim.setObjectPosition(sim.getObject("/target"), -1, [0.5, 0, 1])
-    sim.setScriptSimulationParameter(sim.getScriptAssociatedWithObject(wheel), "particleVelocity", 5.3)
-    sim.setFloatSignal("flown", 1.0)
+    sim, read = client(), edit({"text": True})
+
+    def act():
+        read()
+        mark, wheel = sim.createDummy(0.1), sim.getObject("/Quadricopter_propeller_respondable1")
+        sim.setObjectPosition(mark, -1, [1, 0, 1])
+        sim.setObjectPosition(sim.getObject("/target"), -1, [0.5, 0, 1])
+        sim.setScriptSimulationParameter(sim.getScriptAssociatedWithObject(wheel), "particleVelocity", 5.3)
+        sim.setFloatSignal("flown", 1.0)
+
+    return act
 
 
 def push():
     """Push by the remote API, of which one is told."""
     sim = client()
-    drone = sim.getObject("/Drone")
-    for _ in range(50):
-        sim.addForceAndTorque(drone, [0, 0, 0.1], [0, 0, 0])
+
+    def act():
+        drone = sim.getObject("/Drone")
+        for _ in range(50):
+            sim.addForceAndTorque(drone, [0, 0, 0.1], [0, 0, 0])
+
+    return act
 
 
 def edit(request=None):
-    answer = rospy.ServiceProxy("/drone_sim/edit_scene", AddDiagnostics)(json.dumps(request or {"edit": [GATE]}))
-    assert answer.success, answer
+    call = rospy.ServiceProxy("/drone_sim/edit_scene", AddDiagnostics, persistent=True)
+    call.wait_for_service()
+
+    def act():
+        answer = call(json.dumps(request or {"edit": [GATE]}))
+        assert answer.success, answer
+
+    return act
 
 
 def tune():
-    rospy.ServiceProxy("/drone/set_parameters", Reconfigure)(Config(doubles=[DoubleParameter("Kzref", 4.0)]))
+    call = rospy.ServiceProxy("/drone/set_parameters", Reconfigure, persistent=True)
+    call.wait_for_service()
+    return lambda: call(Config(doubles=[DoubleParameter("Kzref", 4.0)]))
 
 
 def main():
-    does = {one.__name__: one for one in (fly, push, edit, tune)}[sys.argv[1]]
-    rospy.init_node(does.__name__, disable_signals=True)
+    prepare = {function.__name__: function for function in (fly, push, edit, tune)}[sys.argv[1]]
+    rospy.init_node(prepare.__name__, disable_signals=True)
     end_on_signals()
+    act = prepare()
     done = []
 
     def hear(odometry):
         if not done and odometry.header.stamp.to_sec() >= SOON:
             done.append(True)
-            does()
+            act()
 
     rospy.Subscriber("/drone/odom", Odometry, hear, queue_size=1)
     rospy.spin()
