@@ -51,8 +51,17 @@ def test_a_script_of_the_package_becomes_a_copy(store, own):
     again, _ = store.save(copy, "changed again", version)
     assert again == copy and store.original(copy) == "shipped"
     assert store.save(pilot, "other", "")[0].name == "mine/pilot_2.py", "nothing is lost"
-    assert store.save(pilot, "changed again", "")[0].name == "mine/pilot.py", "a page was left before it had the answer"
-    assert sorted(file.name for file in own.iterdir()) == ["pilot.py", "pilot_2.py"]
+
+
+def test_a_draft_of_a_page_that_was_left_goes_into_its_copy(store, own):
+    pilot = store.find("built-in/pilot.py")
+    for text in ("# mi", "# mine"):  # the page was left before it had the answer, and comes back with all of it
+        copy, _ = store.save(pilot, text, "", "draft")
+        assert copy.name == "mine/pilot.py" and (own / "pilot.py").read_text() == text
+    (own / "pilot.py").write_text("by another program")
+    assert store.save(pilot, "# mine!", "", "draft")[0].name == "mine/pilot_2.py"
+    assert store.save(pilot, "# mine", "", "another")[0].name == "mine/pilot_3.py"
+    assert (own / "pilot.py").read_text() == "by another program"
 
 
 def test_what_another_has_changed_is_not_overwritten_and_both_texts_can_be_kept(store, own):

@@ -138,12 +138,19 @@ export class Scripts {
 
   change() {
     this.dirty = true;
-    this.drafts.put(this.is.script, { text: this.editor.text, version: this.is.version });
+    this.draft();
     this.store.take("edited");
     if (this.conflict) return;
     this.store.take("saving");
     clearTimeout(this.later);
     this.later = setTimeout(() => this.save().catch(() => {}), QUIET);
+  }
+
+  // Its name lets the cockpit find the copy of a script of the package that it has made of an earlier text.
+  draft() {
+    const { script, version } = this.is;
+    const { name = Math.random().toString(36).slice(2) } = this.drafts.get(script) ?? {};
+    this.drafts.put(script, { text: this.editor.text, version, name });
   }
 
   save() {
@@ -157,7 +164,7 @@ export class Scripts {
     const { script, version } = this.is;
     try {
       if (size(text) > LARGEST) throw new Error(`has more than ${LARGEST} bytes`);
-      const answer = await this.ask("save", { script, text, version });
+      const answer = await this.ask("save", { script, text, version, draft: this.drafts.get(script)?.name });
       if (answer.changed) return await this.compare();
       if (answer.script !== script) keep(COPIES, { ...kept(COPIES, {}), [script]: answer.script });
       this.written(answer, text);
@@ -173,7 +180,7 @@ export class Scripts {
     this.know({ ...answer, text });
     this.drafts.drop(before);
     this.dirty = this.editor.text !== text; // more has been written meanwhile
-    if (this.dirty) this.drafts.put(this.is.script, { text: this.editor.text, version: this.is.version });
+    if (this.dirty) this.draft();
     if (before !== this.is.script) this.editor.rename(this.is.script);
     const { script, file } = this.is;
     this.page.show({ script, of: answer.lesson });

@@ -22,6 +22,7 @@ from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import script_path
 
 _Message = Mapping[str, Any]
+_MAX_DRAFT = 40  # characters of a draft's name
 
 
 class EditorBackend:
@@ -134,7 +135,8 @@ class EditorBackend:
         if not isinstance(version, str):
             raise ScriptStoreError("save: needs script, text and version")
         is_deleted = str(name).startswith(f"{OWN}/") and not self._store.version(name)
-        saved = None if is_deleted else self._store.save(self._store.find(name), text, version)
+        draft = str(message.get("draft", ""))[:_MAX_DRAFT]
+        saved = None if is_deleted else self._store.save(self._store.find(name), text, version, draft)
         return {"changed": True} if saved is None else self._describe(*saved)
 
     def _resolve_conflict(self, message: _Message) -> dict[str, Any]:

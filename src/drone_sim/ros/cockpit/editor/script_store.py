@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-import re
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -63,6 +62,7 @@ class ScriptStore:
         self.folder = folder
         self._shipped = shipped_with_the_package() if shipped is None else shipped
         self._originals: dict[str, str] = {}  # text of the user's scripts before the first change
+        self._copies: dict[tuple[str, str], tuple[ScriptFile, str]] = {}  # with their versions, by script and draft
         self._removed: dict[str, bytes] = {}  # content of the scripts deleted last, by name
         self._writing = threading.Lock()  # two browsers may save at once
 
@@ -126,21 +126,16 @@ class ScriptStore:
             line = content.count(b"\n", 0, error.start) + 1
             raise ScriptStoreError(f"{script.name}: line {line}: is not UTF-8, so it cannot be edited here") from None
 
-    def save(self, script: ScriptFile, text: str, version: str) -> tuple[ScriptFile, str] | None:
-        """Write a script; a script of the package is copied to the user's folder, unless a copy with `text` exists.
+    def save(self, script: ScriptFile, text: str, version: str, draft: str = "") -> tuple[ScriptFile, str] | None:
+        """Write a script; a script of the package is copied to the user's folder.
 
-        Return the written script and its version. Return None, without writing, if the file no longer has `version`.
-        Raises ScriptStoreError.
+        `draft` names the page's draft: a page that was left before it knew of its copy sends the draft again, later,
+        and it belongs into that copy. Return the written script and its version. Return None, without writing, if the
+        file no longer has `version`. Raises ScriptStoreError.
         """
         with self._writing:
             if not script.is_own:
-                saved = self._find_copy(script, text)  # of a page that was left before it had the answer
-                if saved is not None:
-                    return saved, _version_of(saved.path)
-                original, script = self.read(script)[0], self._copy_of(script)
-                written = _write_text(script.name, script.path, text, is_new=True)
-                self._originals[script.name] = original
-                return script, written
+                return self._save_copy(script, text, draft)
             if version != _version_of(script.path):
                 return None
             path = self._resolve(script)
@@ -249,17 +244,18 @@ class ScriptStore:
     def _own(self, file_name: str) -> ScriptFile:
         return ScriptFile(f"{OWN}/{file_name}", self.folder / file_name, True)
 
-    def _find_copy(self, script: ScriptFile, text: str) -> ScriptFile | None:
-        """Return the user's copy of `script` that contains `text`, None if there is none."""
-        stem, ending = Path(script.file_name).stem, script.path.suffix
-        named = re.compile(rf"{re.escape(stem)}(_\d+)?{re.escape(ending)}")
-        for name in filter(named.fullmatch, scripts_in(self.folder)):
-            with contextlib.suppress(ScriptStoreError):
-                copy = self._own(name)
-                self._resolve(copy)
-                if self.read(copy)[0] == text:
-                    return copy
-        return None
+    def _save_copy(self, script: ScriptFile, text: str, draft: str) -> tuple[ScriptFile, str]:
+        """Write a text to the draft's copy of a script of the package, or to a new one."""
+        copy, written = self._copies.get((script.name, draft), (None, ""))
+        if copy is not None and written == _version_of(copy.path):
+            written = _write_text(copy.name, self._resolve(copy), text)
+        else:
+            original, copy = self.read(script)[0], self._copy_of(script)
+            written = _write_text(copy.name, copy.path, text, is_new=True)
+            self._originals[copy.name] = original
+        if draft:
+            self._copies[script.name, draft] = copy, written
+        return copy, written
 
     def _copy_of(self, script: ScriptFile) -> ScriptFile:
         """Return a new script of the user's, with the name of `script` and a number if it is taken."""
