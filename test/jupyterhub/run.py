@@ -300,6 +300,8 @@ def in_a_browser(students, pictures):
         page.select_option("select[name=task]", "hover")
         page.click("text=Show")
         page.get_by_text("Shown now").wait_for()
+        page.evaluate("document.querySelector('main').dataset.old = true")
+        page.locator("main:not([data-old])").wait_for()  # the page renews it
         if pictures:
             pictures.mkdir(parents=True, exist_ok=True)
             page.screenshot(path=pictures / "teachers_page.png")

@@ -109,6 +109,7 @@ class TeacherPage(HubOAuthenticated, web.RequestHandler):  # type: ignore[misc]
                 told=classroom.message_to_all(room) if room else None,
                 names=tasks.names(),
                 form=self.xsrf_form_html(),
+                token=self.xsrf_token.decode(),
                 prefix=_PREFIX,
             )
         )
