@@ -396,13 +396,12 @@ def measure_load(names):
         student.open()
         student.fly(student.name)
         print(f"{student.name} flies after {time.monotonic() - began:.1f} s", flush=True)
-        pages.append(student.connect(student.name))
-    readers = [Page(page) for page in pages]
+        pages.append(Page(student.connect(student.name)))
     time.sleep(WARM_UP)
     busy = used(names)
-    paces = [float(reader.pace or 0) for reader in readers]
+    paces = [float(page.pace or 0) for page in pages]
     for page in pages:
-        page.close()
+        page.socket.close()
     time.sleep(WARM_UP)
     idle = used(names)
     each = 1 / len(names)
