@@ -41,10 +41,10 @@ def test_a_report_of_an_ended_simulator_does_not_count(room, reports):
 
 
 def test_texts_and_pictures_of_strangers_are_limited(room, reports):
-    strange = {"status": ["x"], "script": "s" * 1000, "picture": '" onerror="alert(1)', "more": 1}
+    strange = {"status": ["x"], "script": "s" * 1000, "scene": "\ud800", "picture": '" onerror="alert(1)', "more": 1}
     (reports / "a.json").write_text(json.dumps(strange))
     (found,) = classroom.reports(room).values()
-    assert found == {"status": "['x']", "script": "s" * 200, "scene": "", "grades": "", "picture": ""}
+    assert found == {"status": "['x']", "script": "s" * 200, "scene": "?", "grades": "", "picture": ""}
 
 
 TOO_LARGE = b'{"status": "' + b"x" * (1 << 18) + b'"}'

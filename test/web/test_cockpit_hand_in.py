@@ -57,12 +57,12 @@ def test_a_course_sees_the_drone_and_tells_its_student_a_task(cockpit, browser, 
         page.get_by_text("Well done.").wait_for()
         wait_until(page, lambda: any(one["picture"] for one in classroom.reports(tmp_path).values()))
         (report,) = classroom.reports(tmp_path).values()
-        assert (report["script"], report["scene"]) != ("", "")
+        assert (report["script"], report["status"]) == ("built-in/pilot.py", "flying")
         with context.new_page() as watcher:
             watcher.goto(page.url.split("?")[0] + "?watch", wait_until="commit")
             ready(watcher)
             hidden = "#sim-stop", "#editor", "#rail", "#start-page"
             assert not any(watcher.locator(part).is_visible() for part in hidden)
             watcher.keyboard.press("Enter")  # would end the flight
-            watcher.get_by_text("watching only").wait_for()
-            wait_until(page, lambda: page.locator("#status").get_attribute("data-is") == "flying")
+            watcher.get_by_text("you only watch").wait_for()
+            assert page.locator("#status").get_attribute("data-is") == "flying"

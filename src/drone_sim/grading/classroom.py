@@ -6,9 +6,9 @@ teachers can list. Students can write whatever they like there, so only the owne
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
-import pwd
 import secrets
 import stat
 import time
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from drone_sim.files import writing
+from drone_sim.grading.submissions.handed_in import name_of
 
 VARIABLE = "DRONE_SIM_CLASSROOM"
 TEXTS = ("status", "script", "scene", "grades")  # of a report
@@ -58,16 +59,23 @@ def report(path: Path, texts: dict[str, str], picture: str) -> None:
 
 
 def reports(room: Path) -> dict[str, dict[str, str]]:
-    """Return the latest report of each user whose simulator runs, by the owner of the files."""
-    latest: dict[int, tuple[float, dict[str, Any]]] = {}
+    """Return the latest report of each user whose simulator runs, by the owner of the files.
+
+    Only one file of each user is read, however many there are.
+    """
+    latest: dict[int, tuple[float, Path]] = {}
     for path in (room / _REPORTS).glob("*.json"):
         try:
-            owner, changed, content = _read(path)
-        except (OSError, ValueError, RecursionError):
+            status = path.lstat()
+        except OSError:  # its owner has just removed it
             continue
-        if time.time() - changed < _OUTDATED and latest.get(owner, (0.0,))[0] < changed:
-            latest[owner] = changed, content
-    return {_name_of(owner): _checked(content) for owner, (_, content) in latest.items()}
+        if time.time() - status.st_mtime < _OUTDATED and latest.get(status.st_uid, (0.0,))[0] < status.st_mtime:
+            latest[status.st_uid] = status.st_mtime, path
+    found = {}
+    for owner, (_, path) in latest.items():
+        with contextlib.suppress(OSError, ValueError, RecursionError):
+            found[name_of(owner)] = _checked(_read(path, owner))
+    return found
 
 
 def tell_all(room: Path, text: str, task: str) -> None:
@@ -84,36 +92,35 @@ def tell_all(room: Path, text: str, task: str) -> None:
 def message_to_all(room: Path) -> Message | None:
     """Return what the teachers tell all students; None if that is nothing."""
     try:
-        _, _, content = _read(room / _MESSAGE)
-        return Message(*(str(content[key])[:_MAX_TEXT] for key in Message._fields))
+        content = _read(room / _MESSAGE)
+        return Message(*(_text(content[key]) for key in Message._fields))
     except (OSError, ValueError, LookupError, RecursionError):
         return None
 
 
-def _read(path: Path) -> tuple[int, float, dict[str, Any]]:
-    """Return owner, time of the last change and content of a file. Raises OSError, ValueError and RecursionError."""
+def _read(path: Path, owner: int | None = None) -> dict[str, Any]:
+    """Return the content of a file, of this owner if one is given. Raises OSError, ValueError and RecursionError."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     with open(descriptor, "rb") as file:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode) or status.st_nlink > 1 or status.st_size > _LARGEST:
             raise ValueError("is no file of at most 256 KiB with one name")
+        if owner not in (None, status.st_uid):
+            raise ValueError("was replaced by another user's file")
         content = json.loads(file.read(_LARGEST))
     if not isinstance(content, dict):
         raise ValueError("must be a mapping")
-    return status.st_uid, status.st_mtime, content
+    return content
 
 
 def _checked(content: dict[str, Any]) -> dict[str, str]:
     picture = str(content.get("picture", ""))
-    texts = {key: str(content.get(key, ""))[:_MAX_TEXT] for key in TEXTS}
-    return {**texts, "picture": picture if _is_base64(picture) else ""}
+    return {**{key: _text(content.get(key, "")) for key in TEXTS}, "picture": picture if _is_base64(picture) else ""}
 
 
-def _name_of(uid: int) -> str:
-    try:
-        return pwd.getpwuid(uid).pw_name
-    except KeyError:
-        return f"user {uid}"
+def _text(value: Any) -> str:
+    """Return a value as a short text that can be sent: JSON may contain half of a surrogate pair."""
+    return str(value)[:_MAX_TEXT].encode("utf-8", "replace").decode()
 
 
 def _is_base64(text: str) -> bool:

@@ -184,6 +184,8 @@ class Client:
 class ClientHost:
     """Host of remote clients. Names without a suffix mean the first vehicle's objects, as in its script."""
 
+    script_type = CHILD
+
     def __init__(self, simulation: Simulation):
         """Use the simulation's current context; to be created again with every topology version."""
         self.context = replace(simulation.context, scripts=_ScriptsForClients(simulation.context.scripts))
@@ -197,8 +199,6 @@ class ClientHost:
     @property
     def sensors(self) -> Mapping[str, Readable]:
         return {name: sensor for vehicle in self._vehicles for name, sensor in vehicle.instruments.by_object.items()}
-
-    script_type = CHILD
 
     @property
     def own_script(self) -> str:

@@ -48,7 +48,7 @@ def hand_in(task: str, text: str, suffix: str) -> tuple[str, str]:
         raise ValueError(f"{task}: cannot be handed in now: {VARIABLE} has no folder {task} that you can write to")
     content = text.encode("utf-8")
     now, digest = time.strftime("%Y-%m-%dT%H.%M.%SZ", time.gmtime()), _digest(content)
-    path = folder / f"{_name_of(os.getuid())}+{now}+{digest}{suffix}"
+    path = folder / f"{name_of(os.getuid())}+{now}+{digest}{suffix}"
     if not _NAME.fullmatch(path.name):
         raise ValueError(f"{shown(path.name)}: no such file can be handed in: user or suffix is not allowed")
     writing.write_new(path, content)
@@ -72,7 +72,7 @@ def submissions_in(folder: Path, store: Path) -> list[Submission]:
 
 def times_in(folder: Path) -> dict[str, str]:
     """Return when each user handed in last (UTC), by the name of the files' owner."""
-    return {_name_of(entry.owner): entry.age[0] for entry in _latest_in(folder)}
+    return {name_of(entry.owner): entry.age[0] for entry in _latest_in(folder)}
 
 
 def _latest_in(folder: Path) -> list[_Entry]:
@@ -101,7 +101,7 @@ def _entry_of(path: Path) -> _Entry | None:
 
 
 def _copy(entry: _Entry, store: Path) -> Submission:
-    owner = _name_of(entry.owner)
+    owner = name_of(entry.owner)
     if entry.owner not in (os.getuid(), _uid_of(entry.user)):
         reason = f"belongs to {owner}, not to {entry.user}"
         return Submission(str(entry.path), (Person(owner),), f"{shown(entry.path.name)}: {reason}")
@@ -134,7 +134,8 @@ def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()[:12]
 
 
-def _name_of(uid: int) -> str:
+def name_of(uid: int) -> str:
+    """Return the name of a system user, `user UID` if it has none."""
     try:
         return pwd.getpwuid(uid).pw_name
     except KeyError:
