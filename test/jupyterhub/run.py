@@ -5,8 +5,8 @@ It needs root. The students are system users of namespaces of this script, with 
 it is left on this machine. Each opens the simulator, and hands in a script. Then one of them tries to get at another's:
 through the hub, and as a system user. A teacher uses the course's page in Chromium, and grades what was handed in. Then
 hub, proxy and a simulator are killed. Exit status 1 if anything is let through or lost, or is left after the end of the
-hub. It takes one to three minutes. `./dev.sh jupyterhub --load N` measures N students instead; with `--pictures FOLDER`, the
-teachers' page is saved as a picture.
+hub. It takes one to three minutes. `./dev.sh jupyterhub --load N` measures N students instead; with `--pictures
+FOLDER`, the teachers' page is saved as a picture.
 """
 
 import argparse

@@ -183,3 +183,22 @@ def test_a_double_click_selects_a_whole_number(desk, number):
     found = desk.locator("#text .cm-line", has_text=f" {number}").locator("span", has_text=number.lstrip("-")).last
     found.dblclick()
     wait_until(desk, lambda: desk.evaluate("document.getSelection().toString()") == number)
+
+
+# Chooses a task, and another one while the script of the first is being opened.
+CHOOSE_TWICE = """async () => {
+    const choice = document.querySelector("#lesson");
+    const choose = (name) => {
+        choice.value = name;
+        choice.dispatchEvent(new Event("change"));
+    };
+    choose("tasks/gates");
+    while (!document.querySelector("#lesson-text h1, #lesson-text h2")) await new Promise((done) => setTimeout(done));
+    choose("tasks/hover");
+}"""
+
+
+def test_the_task_that_was_chosen_last_is_shown(opened):
+    opened.evaluate(CHOOSE_TWICE)
+    wait_until(opened, lambda: opened.input_value("#script") == "tasks/hover.py")
+    wait_until(opened, lambda: opened.input_value("#lesson") == "tasks/hover")

@@ -123,6 +123,7 @@ def test_the_tile_starts_the_simulator_and_the_server_ends_it(server, browser):
     page.goto(f"{server.address}{BASE}{tile['path_info']}", wait_until="commit")
     ready(page)
 
+    wait_for(page, "scene.tree.byName.has('base_link')")  # the scene's frames come by themselves
     before = page.evaluate(PLACE)
     page.locator("#command").click()
     page.keyboard.down("w")

@@ -137,7 +137,7 @@ const socket = new PageSocket(store, {
 });
 const windows = new Windows(at("windows"), socket, panels.notice);
 const desk = new Desk(socket, store, show);
-const scripts = new Scripts(at("text"), socket, store, { show }, (name) => lesson.go(name), desk.known, () => desk.look());
+const scripts = new Scripts(at("text"), socket, store, { show }, (name) => lesson.follow(name), desk.known, () => desk.look());
 desk.serve(scripts);
 scripts.onRun = run;
 const teleop = new Teleop(

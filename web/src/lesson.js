@@ -19,6 +19,7 @@ export class Lesson {
     this.edits = 0; // of the store, when the graded script was saved
     this.all = []; // { lesson, title, task, script } in the order of reading
     this.name = "";
+    this.taken = ""; // the text that the user chooses, until it is there
     this.opened = { script: "", lesson: "" };
     parts.choice.onchange = () => this.take(parts.choice.value);
     parts.before.onclick = () => this.turn(-1);
@@ -77,9 +78,16 @@ export class Lesson {
     return hasFunctions(code) ? [put, run] : [put];
   }
 
+  // Shows the text of the script that has been opened, unless the user has chosen another text meanwhile.
+  follow(name) {
+    return this.taken && this.taken !== name ? Promise.resolve() : this.go(name);
+  }
+
   // Goes to a text, and to its script where it has one.
   async take(name) {
+    this.taken = name;
     await this.go(name);
+    if (this.taken === name) this.taken = "";
     if (name === this.name && this.script && this.opened.lesson !== name) this.open(this.script);
   }
 
