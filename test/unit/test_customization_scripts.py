@@ -3,8 +3,6 @@
 import pytest
 
 from drone_sim.config.types import ParameterError
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 PHASES = ("init", "nonSimulation", "beforeSimulation", "actuation", "sensing", "afterSimulation", "cleanup")
 LUA = """
@@ -26,9 +24,8 @@ OBJECTS = [{"name": "Gate", "shape": "box", "size": [0.1, 1, 1], "position": [2,
 
 
 @pytest.fixture(name="fly")
-def _fly(tmp_path):
+def _fly(tmp_path, new_simulation):
     """Return a function that flies a step with texts of scripts on the gate, and returns the simulation."""
-    built = []
 
     def fly(on="Gate", steps=1, **texts):
         entry = {"object": on, "parameters": {"size": 3.0}}
@@ -36,14 +33,12 @@ def _fly(tmp_path):
             path = tmp_path / f"{key}.{'py' if 'def ' in text else 'lua'}"
             path.write_text(text)
             entry[key] = str(path)
-        built.append(Simulation(parameters.load({"scene": {"objects": OBJECTS, "scripts": [entry]}})))
+        simulation = new_simulation({"scene": {"objects": OBJECTS, "scripts": [entry]}})
         for _ in range(steps):
-            built[-1].step()
-        return built[-1]
+            simulation.step()
+        return simulation
 
-    yield fly
-    for one in built:
-        one.close()
+    return fly
 
 
 def lines(caplog):

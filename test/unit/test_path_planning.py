@@ -10,7 +10,6 @@ from remote_client import official_client
 
 from drone_sim.remote.standalone import play
 from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.packing import Packing
 
 WALL = {"name": "Wall", "shape": "box", "size": [0.1, 2.0, 4.0], "position": [0.0, 0.0, 2.0]}
@@ -79,28 +78,20 @@ end
 
 
 @pytest.fixture(name="fly")
-def _fly(tmp_path):
+def _fly(tmp_path, new_simulation):
     """Return a function that flies some steps with a script on the dummy, and returns the simulation."""
-    built = []
 
     def fly(text, steps=3, **overrides):
         path = tmp_path / ("own.py" if "def sysCall" in text else "own.lua")
         path.write_text(text)
         scripts = [{"object": "Way", "script": str(path)}] if text else []
-        built.append(
-            Simulation(
-                parameters.load(
-                    {"drone": {"position": [-1.0, 0.0, 0.5]}, "scene": {**SCENE, "scripts": scripts}, **overrides}
-                )
-            )
-        )
+        flown = {"drone": {"position": [-1.0, 0.0, 0.5]}, "scene": {**SCENE, "scripts": scripts}, **overrides}
+        simulation = new_simulation(flown)
         for _ in range(steps):
-            built[-1].step()
-        return built[-1]
+            simulation.step()
+        return simulation
 
-    yield fly
-    for one in built:
-        one.close()
+    return fly
 
 
 def planned(simulation, size):
