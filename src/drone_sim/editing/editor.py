@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from drone_sim.config.errors import checked
 from drone_sim.config.types import Checked
@@ -22,6 +22,27 @@ from drone_sim.scripting.errors import ScriptError
 
 _LOG = logging.getLogger(__name__)
 _DRAFT_PERIOD = 1.0  # s of real time
+
+
+class OfferedDraft(TypedDict):
+    """A draft as windows show it."""
+
+    file: str  # of its scene; '' if it has none
+    saved: float  # s since 1970
+
+
+class EditorState(TypedDict):
+    """The state of the editor for windows."""
+
+    revision: int
+    file: str  # of the scene; '' if it has none
+    new: bool  # begun here, and without a file yet
+    modified: bool
+    read_only: bool
+    state: str  # of the simulation
+    undo: str  # the name of the step; '' if there is none
+    redo: str
+    draft: OfferedDraft | None
 
 
 class SceneEditor:
@@ -53,8 +74,7 @@ class SceneEditor:
         """The file of the scene, '' if it has none."""
         return str(self.simulation.document.file or "")
 
-    def described(self) -> dict[str, Any]:
-        """Return the state of the editor for windows."""
+    def described(self) -> EditorState:
         offered = self._drafts.offered
         return {
             "revision": self.revision,

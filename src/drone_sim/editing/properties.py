@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, TypedDict
 
 from drone_sim.config.fields import ValueType, field_type, value_type
 from drone_sim.config.types import Checked, Unit, Within, flattened, nested, word_of
@@ -19,20 +19,39 @@ from drone_sim.vehicles.parameters import VehicleParameters
 _EXCLUDED = ("name", "alias", "model", "parent", "position", "rpy", "yaw", "tilt", "shape", "kind")
 _PART_EXCLUDED = ("object", "mount")  # the name, and the pose, which is edited in the text
 _FILES = ("file", "texture", "urdf", "script")
-_KINDS: dict[Any, str] = {bool: "switch", float: "number", int: "number", str: "text"}
+ValueKind = Literal["number", "numbers", "list", "switch", "text", "file", "choice", "color", "other"]
+_KINDS: dict[Any, ValueKind] = {bool: "switch", float: "number", int: "number", str: "text"}
 
 
-def properties() -> dict[str, list[dict[str, Any]]]:
+class Description(TypedDict):
+    """A key and its meaning."""
+
+    key: str  # nested keys have dots
+    kind: ValueKind
+    what: str  # a description
+
+
+class Property(Description, total=False):
+    """A key with the values that it may have; the mount of a camera or sensor has only the description."""
+
+    count: int | None  # of numbers
+    whole: bool  # an integer
+    choices: list[str] | None
+    least: float | None
+    most: float | None
+    unit: str
+    default: bool | float | str | list[float] | None
+
+
+def properties() -> dict[str, list[Property]]:
     """Return the keys of each type of object.
 
-    A type is a value of `shape` or `kind`, floor, vehicle, or the type of a vehicle's camera or sensor. Each key has:
-    `key` (nested keys with dots), `kind`, `count` of numbers, `whole` (an integer), `choices`, `least`, `most`, `unit`,
-    `default`, and `what`, a description.
+    A type is a value of `shape` or `kind`, floor, vehicle, or the type of a vehicle's camera or sensor.
     """
     entries: tuple[Any, ...] = (*SHAPES, *KINDS)
     models: dict[str, type[Checked]] = {word_of(entry, "shape", "kind"): entry for entry in entries}
     models.update(floor=FloorParameters, vehicle=VehicleParameters)
-    mount = {"key": "mount", "kind": "other", "what": "where it sits"}
+    mount: Property = {"key": "mount", "kind": "other", "what": "where it sits"}
     return {
         **{
             word: [_property(key, field) for key, field in model.model_fields.items() if key not in _EXCLUDED]
@@ -62,7 +81,7 @@ def _inner_fields(model: type[Checked], prefix: str = "") -> Iterator[tuple[str,
             yield f"{prefix}{key}", field
 
 
-def _property(key: str, field: Any) -> dict[str, Any]:
+def _property(key: str, field: Any) -> Property:
     value = field_type(field)
     number = value_type(value.elements[0], value.marks) if value.elements else value
     limits, unit = number.mark(Within), number.mark(Unit)
@@ -82,7 +101,7 @@ def _property(key: str, field: Any) -> dict[str, Any]:
     }
 
 
-def _kind(value: ValueType) -> str:
+def _kind(value: ValueType) -> ValueKind:
     if value.words:
         return "choice"
     if ... in value.elements:

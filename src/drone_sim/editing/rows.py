@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal, TypedDict
 
 from drone_sim.config.types import Checked
 from drone_sim.editing.properties import Part, part_named
@@ -17,8 +17,34 @@ from drone_sim.scene.entry import EntryParameters, place_of
 from drone_sim.scene.scene_parameters import AttachedScriptParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
-Row = dict[str, Any]
 _ROW_KEYS = ("name", "alias", "model", "parent", "position", "rpy", "shape", "kind")  # with own fields in a row
+Of = Literal["scene", "vehicle", "floor"]
+
+
+class RowContent(TypedDict):
+    """An object as windows show it."""
+
+    handle: int
+    name: str
+    alias: str
+    kind: str
+    type: str  # the `shape` or `kind` of its entry, floor, vehicle, or the type of a vehicle's camera or sensor
+    parent: int  # -1: the world
+    model: bool
+    script: str  # '' if it has none
+    pose: list[float]  # in the world: x, y, z in m, and a quaternion x, y, z, w
+    position: list[float]  # as in its entry
+    rpy: list[float]  # as in its entry
+    values: Mapping[str, Any]  # the other keys of its entry
+    vehicle: str  # of which it is a part; '' for none
+    of: Of
+
+
+class Row(RowContent, total=False):
+    """A row; only that of a vehicle itself has these keys."""
+
+    root: bool
+    own_script: str  # that the scene names for the vehicle; '' if it names none
 
 
 class SceneRows:
@@ -55,12 +81,11 @@ class SceneRows:
                 self._known[handle] = state
                 if record is not None:
                     content = record.present
-                self.rows[handle] = row = _row(handle, item, parent, content, script)
-                row["vehicle"] = vehicle.name if vehicle else ""
-                row["of"] = "vehicle" if vehicle else "scene" if entry is not None else "floor"
+                of: Of = "vehicle" if vehicle else "scene" if entry is not None else "floor"
+                self.rows[handle] = row = _row(handle, item, parent, content, script, vehicle, of)
                 if vehicle is not None and item is vehicle.object:
                     own = own_script(vehicle.parameters, simulation.parameters)
-                    row.update(root=True, type="vehicle", script=vehicle.parameters.script, own_script=own)
+                    row |= {"root": True, "type": "vehicle", "script": vehicle.parameters.script, "own_script": own}
                 changed.append(row)
         removed = [handle for handle in self._known if tree.get(handle) is None]
         for handle in removed:
@@ -76,7 +101,15 @@ class SceneRows:
         return {**_simple(vehicle.parameters), **vehicle_entries.get(vehicle.name, {})}
 
 
-def _row(handle: int, item: SceneObject, parent: int, content: Any, script: AttachedScriptParameters | None) -> Row:
+def _row(
+    handle: int,
+    item: SceneObject,
+    parent: int,
+    content: Any,
+    script: AttachedScriptParameters | None,
+    vehicle: Vehicle | None,
+    of: Of,
+) -> Row:
     place = place_of(item)
     values: Mapping[str, Any] = content if isinstance(content, Mapping) else {}
     kind = getattr(content, "shape", "") or getattr(content, "kind", "")
@@ -102,6 +135,8 @@ def _row(handle: int, item: SceneObject, parent: int, content: Any, script: Atta
         "position": place["position"],
         "rpy": place["rpy"],
         "values": values,
+        "vehicle": vehicle.name if vehicle else "",
+        "of": of,
     }
 
 

@@ -19,8 +19,8 @@ from diagnostic_msgs.srv import (  # of ROS's own services the one that takes a 
 from std_srvs.srv import Trigger
 
 from drone_sim.config.types import ParameterError
-from drone_sim.editing.editor import SceneEditor
-from drone_sim.editing.rows import SceneRows
+from drone_sim.editing.editor import EditorState, SceneEditor
+from drone_sim.editing.rows import Row, SceneRows
 from drone_sim.files.resources import locate, package_path
 from drone_sim.grading.permissions import CHANGE
 from drone_sim.message_text import encodable
@@ -40,6 +40,15 @@ _READING = {"text", "text_of"}  # requests that change nothing
 _REFUSED = (ParameterError, ScriptError, ValueError, OSError, RuntimeError, RecursionError)
 
 
+class TreeChange(EditorState):
+    """A message of ~scene_objects."""
+
+    version: int
+    since: int | None  # the version that it changes; None: it has the whole tree
+    objects: list[Row]  # that are new or have changed
+    gone: list[int]  # handles of removed objects
+
+
 class SceneEditing:
     """The scene's editor as services and a topic."""
 
@@ -55,7 +64,7 @@ class SceneEditing:
         self._topic = LatchedText("~scene_objects", queue_size=_QUEUE_SIZE)
         self._throttle = Throttle(_PERIOD)
         self._version = 0
-        self._description: dict[str, Any] = {}
+        self._description: EditorState | None = None
         rospy.Service("~edit_scene", AddDiagnostics, self._answer)
         rospy.Service("~save_scene", Trigger, lambda request: self._attempt(self._save, "~save_scene", request))
 
@@ -110,4 +119,7 @@ class SceneEditing:
         since, rows = (None, [*self._rows.rows.values()]) if is_whole else (self._version, changed)
         self._description = description
         self._version += 1
-        self._topic.publish({"version": self._version, "since": since, **description, "objects": rows, "gone": gone})
+        change: TreeChange = {
+            "version": self._version, "since": since, **description, "objects": rows, "gone": gone
+        }  # fmt: skip
+        self._topic.publish(change)

@@ -27,7 +27,7 @@ from drone_sim.mechanics import frames
 from drone_sim.message_text import shown
 from drone_sim.ros.cockpit.scene import scene_state
 from drone_sim.ros.cockpit.scene.markers import entry_of, pose_of
-from drone_sim.ros.cockpit.scene.scene_state import Entry, Key
+from drone_sim.ros.cockpit.scene.scene_state import Entry, Key, Properties
 from drone_sim.ros.core.message_conversion import WORLD_FRAME
 
 _KEEP_ALIVE_PERIOD = 0.25  # s, between messages to the simulation while a handle is held
@@ -131,7 +131,7 @@ class DragControls:
             return changed
 
     def _entries(self, handle: InteractiveMarker, pose: Pose) -> dict[Key, Entry | None]:
-        properties = {"kind": "handle", "layer": self._server, "ns": handle.name, "frame": WORLD_FRAME}
+        properties: Properties = {"kind": "handle", "layer": self._server, "ns": handle.name, "frame": WORLD_FRAME}
         entries: dict[Key, Entry | None] = {(self._server, handle.name, ""): Entry(properties, {}, pose_of(pose))}
         markers = [marker for control in handle.controls if control.always_visible for marker in control.markers]
         visible = (marker for marker in markers if marker.type == Marker.SPHERE and marker.color.a > _MAX_INVISIBLE)

@@ -1,9 +1,4 @@
-"""Conversion of the tf frames and MarkerArrays that the simulation publishes for rviz, for the browsers.
-
-A marker's properties are `kind`; `layer`, the topic's name; `ns`; `color` r g b a (0..1, sRGB); `scale`, m; and, for
-some kinds, `text`, `mesh` (a URL), `own` (use the mesh's own colors) and `lit` (false: the marker is not shaded). Its
-arrays are `points` (x y z each, m) and `colors` (r g b a each).
-"""
+"""Conversion of the tf frames and MarkerArrays that the simulation publishes for rviz, for the browsers."""
 
 from __future__ import annotations
 
@@ -14,7 +9,7 @@ from typing import Any
 import numpy as np
 from visualization_msgs.msg import Marker, MarkerArray
 
-from drone_sim.ros.cockpit.scene.scene_state import AT_REST, Entry, Key, Pose
+from drone_sim.ros.cockpit.scene.scene_state import AT_REST, ArrayName, Entry, Key, Pose, Properties
 from drone_sim.ros.core.message_conversion import WORLD_FRAME, xyz, xyzw
 
 KINDS = {
@@ -131,7 +126,7 @@ def entry_of(
     if not kind or len(points) < _MIN_POINTS.get(kind, 0):
         return None
     color = marker.color
-    properties: dict[str, Any] = {
+    properties: Properties = {
         "kind": kind,
         "layer": layer,
         "ns": marker.ns,
@@ -142,11 +137,11 @@ def entry_of(
     if kind == "text":
         properties["text"] = marker.text
     if kind == "mesh":
-        properties["mesh"] = mesh_url(marker.mesh_resource)
-        properties["own"] = bool(marker.mesh_use_embedded_materials)
-        if properties["mesh"] is None:
+        mesh = mesh_url(marker.mesh_resource)
+        if mesh is None:
             return None
-    arrays = {"points": points.ravel()} if len(points) else {}
+        properties |= {"mesh": mesh, "own": bool(marker.mesh_use_embedded_materials)}
+    arrays: dict[ArrayName, np.ndarray] = {"points": points.ravel()} if len(points) else {}
     if len(points) and len(marker.colors) == len(points) and not is_shaded:
         colors = np.array([(color.r, color.g, color.b, color.a) for color in marker.colors], dtype=np.float32)
         arrays["colors"] = np.round(colors, _COLOR_DECIMALS).ravel()

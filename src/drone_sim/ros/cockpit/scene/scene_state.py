@@ -1,18 +1,8 @@
 """Frames and markers that the browsers show, with versions: a browser gets the changes since its version.
 
-A message is a line of JSON, a line feed, and numbers (float32, little-endian):
-
-| key | value |
-|---|---|
-| `scene` | the version |
-| `whole` | true if the browser must remove everything that it had before |
-| `frames` | [index, name, index of the parent, -1 for the world] of frames that are new or have another parent |
-| `markers` | markers that are new or look different: `id`, and the properties in `markers.py` and `handles.py` |
-| `gone` | ids of removed markers |
-| `moved`, `placed` | indices of frames, and ids of markers, whose poses follow |
-
-The numbers are x y z qx qy qz qw (m) for each frame in `moved`, in its parent, and for each marker in `placed`, in its
-frame; then the arrays of each of `markers`, in the order of its `arrays`, [name, number of values].
+A message is a SceneMessage as a line of JSON, a line feed, and numbers (float32, little-endian). The numbers are
+x y z qx qy qz qw (m) for each frame in `moved`, in its parent, and for each marker in `placed`, in its frame; then the
+arrays of each of `markers`, in the order of its `arrays`.
 """
 
 from __future__ import annotations
@@ -22,7 +12,7 @@ import threading
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -32,11 +22,53 @@ AT_REST: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 _MAX_GONE = 10_000  # removed ids; a browser with an older version than these gets everything again
 
 
+ArrayName = Literal["points", "colors"]  # x y z each, m; r g b a each, 0..1
+
+
+class Handle(TypedDict):
+    """Properties of a handle, and those that every marker has, too."""
+
+    kind: str  # in `markers.py`, or handle
+    layer: str  # the topic's name; of a handle that of its server
+    ns: str
+    frame: str
+
+
+class Properties(Handle, total=False):
+    """Properties of a marker; `text`, `mesh`, `own` and `lit` are only of some kinds."""
+
+    color: list[float]  # r g b a, 0..1, sRGB
+    scale: list[float]  # m
+    text: str
+    mesh: str  # a URL
+    own: bool  # use the mesh's own colors
+    lit: bool  # false: the marker is not shaded
+
+
+class MarkerMessage(Properties, total=False):
+    """A marker for the browsers."""
+
+    id: int
+    arrays: list[tuple[ArrayName, int]]  # with the number of values
+
+
+class SceneMessage(TypedDict):
+    """The changes of the scene since the browser's version."""
+
+    scene: int  # the version
+    whole: bool  # the browser must remove everything that it had before
+    frames: list[tuple[int, str, int]]  # index, name, and index of the parent (-1: world) of new or re-attached frames
+    markers: list[MarkerMessage]  # that are new or look different
+    gone: list[int]  # ids of removed markers
+    moved: list[int]  # indices of frames whose poses follow
+    placed: list[int]  # ids of markers whose poses follow
+
+
 class Entry(NamedTuple):
     """A marker's properties, its arrays, and its pose."""
 
-    properties: Mapping[str, Any]
-    arrays: Mapping[str, np.ndarray]  # float32
+    properties: Properties
+    arrays: Mapping[ArrayName, np.ndarray]  # float32
     pose: Pose
 
     def looks_like(self, other: Entry) -> bool:
@@ -62,9 +94,11 @@ class _Marker:
     changed: int  # version in which it got its properties and arrays
     moved: int = 0  # version in which it got its pose
 
-    def description(self) -> dict[str, Any]:
-        arrays = [[name, int(array.size)] for name, array in self.entry.arrays.items()]
-        return {"id": self.number, **self.entry.properties, **({"arrays": arrays} if arrays else {})}
+    def description(self) -> MarkerMessage:
+        description: MarkerMessage = {"id": self.number, **self.entry.properties}
+        if self.entry.arrays:
+            description["arrays"] = [(name, int(array.size)) for name, array in self.entry.arrays.items()]
+        return description
 
 
 @dataclass
@@ -151,10 +185,10 @@ class SceneState:
         frames = [(name, frame) for name, frame in self._frames.items() if frame.moved > since]
         changed = [marker for marker in self._markers.values() if marker.changed > since]
         placed = [marker for marker in self._markers.values() if marker.moved > since or marker.changed > since]
-        header = {
+        header: SceneMessage = {
             "scene": self.version,
             "whole": is_whole,
-            "frames": [[frame.index, name, frame.parent] for name, frame in frames if frame.attached > since],
+            "frames": [(frame.index, name, frame.parent) for name, frame in frames if frame.attached > since],
             "markers": [marker.description() for marker in changed],
             "gone": [] if is_whole else [number for when, number in self._gone if when > since],
             "moved": [frame.index for _, frame in frames],
