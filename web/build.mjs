@@ -20,6 +20,8 @@ await build({
   bundle: true,
   minify: true,
   target: "es2020",
+  charset: "utf8", // as the server says
+  tsconfigRaw: {}, // esbuild would take `strict` from the settings of the check
   banner: { js: `// built from web/src, sha256 ${digest()}` },
 });
 for (const name of readdirSync("src").filter((one) => /\.(html|css)$/.test(one))) copyFileSync(`src/${name}`, `${PAGE}/${name}`);

@@ -7,6 +7,7 @@ import hashlib
 import http.client
 import json
 import os
+import runpy
 import socket
 import threading
 from pathlib import Path
@@ -197,6 +198,11 @@ def test_the_script_that_is_served_was_built_from_the_source():
         digest.update(f"{file.relative_to(web).as_posix()}\n".encode() + file.read_bytes())
     first_line = page_files()["/cockpit.js"][1].partition(b"\n")[0].decode()
     assert first_line.endswith(digest.hexdigest()), "cd web && npm ci && npm run build"
+
+
+def test_the_types_of_the_page_are_those_of_the_records_and_of_its_elements():
+    generator = runpy.run_path(str(Path(__file__).parents[2] / "web" / "make_types.py"))
+    assert generator["FILE"].read_text() == generator["text"](), "PYTHONPATH=src python web/make_types.py"
 
 
 @pytest.mark.parametrize("path", ["/socket", "/anything"])

@@ -323,6 +323,22 @@ def test_a_new_scene_is_framed_though_the_old_one_is_told_once_more(cockpit, bro
     cockpit.load("")
 
 
+def test_what_was_just_made_can_be_deleted_before_the_tree_has_it(cockpit, browser):
+    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        builder = Builder(page)
+        builder.new_scene()
+        builder.drop("Cuboid", [1, 1, 0])
+        before = page.evaluate("scene.editing.last")
+        page.evaluate("scene.editing.take = () => {}")  # no tree is heard
+        page.keyboard.press("Control+d")
+        wait_until(page, lambda: page.evaluate("scene.editing.last") != before)
+        page.keyboard.press("Delete")
+        page.evaluate("delete scene.editing.take; scene.editing.connected()")
+        wait_until(page, lambda: page.evaluate("scene.editing.is.undo").startswith("Delete"))
+        assert page.get_by_role("treeitem").count() == 2  # the floor, and the first cuboid
+    cockpit.load("")
+
+
 def test_what_is_no_model_cannot_be_saved_as_one_and_the_menu_says_why(cockpit, browser):
     with open_page(cockpit, browser) as page:
         builder = Builder(page)

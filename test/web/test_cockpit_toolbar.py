@@ -236,6 +236,22 @@ def test_a_number_is_taken_as_it_is_written_and_a_wrong_one_is_refused(cockpit, 
     page.locator("#tune-filter").fill("")
 
 
+def test_a_parameter_without_limits_has_a_slider_about_its_value(cockpit, panel):
+    page = panel.page
+    panel.show("Tune")
+    script = cockpit.scripts / "bend.py"
+    cockpit.scripts.mkdir(exist_ok=True)
+    script.write_text("def sysCall_init():\n    sim.setScriptSimulationParameter(sim.handle_self, 'bend', 2.5)\n")
+    rospy.set_param("/drone_sim/script", str(script))
+    cockpit.call("restart")
+    slider = page.get_by_role("slider", name="script_parameters/bend, slider")
+    wait_until(page, lambda: slider.is_visible() and slider.evaluate("one => [one.min, one.max]") == ["0", "5"])
+    slider.evaluate("one => { one.value = 4; one.dispatchEvent(new Event('input')) }")
+    panel.wait_for("script_parameters/bend = 4")
+    cockpit.start_afresh()
+    script.unlink()
+
+
 def test_only_what_the_script_reads_is_tuned_and_who_does_not_listen_says_so(cockpit, panel):
     page = panel.page
     panel.show("Tune")

@@ -21,10 +21,21 @@ export class Board {
     this.versions.clear();
   }
 
+  /**
+   * @template {keyof wire.Panel} Part
+   * @param {Part} part
+   * @param {wire.Panel[Part]} otherwise
+   * @returns {wire.Panel[Part]}
+   */
   get(part, otherwise) {
     return this.parts.get(part) ?? otherwise;
   }
 
+  /**
+   * @template {keyof wire.Panel} Part
+   * @param {Part} part
+   * @param {(content: wire.Panel[Part]) => void} show
+   */
   on(part, show) {
     this.hearing.set(part, [...(this.hearing.get(part) ?? []), show]);
     if (this.parts.has(part)) show(this.parts.get(part));

@@ -5,7 +5,9 @@ import { RangeSet, StateEffect, StateField } from "@codemirror/state";
 // A line at which nothing happens, or nothing but that a function is made.
 const NOTHING = /^\s*(?:(?:#|--|@|(?:async\s+)?def\b|class\b|(?:local\s+)?function\b|"""|''').*|end|else:?|try:|finally:)?\s*$/;
 
+/** @type {import("@codemirror/state").StateEffectType<number>} the beginning of a line */
 const toggled = StateEffect.define({ map: (at, changes) => changes.mapPos(at) });
+/** @type {import("@codemirror/state").StateEffectType<number>} the number of a line, 0 for none */
 const pausedAt = StateEffect.define();
 
 class Marker extends GutterMarker {

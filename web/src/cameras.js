@@ -2,6 +2,7 @@
 import { at, create } from "./dom.js";
 
 export class Cameras {
+  /** @param {import("./board.js").Board} board */
   constructor(board, act) {
     this.act = act;
     this.on = new Set();

@@ -55,6 +55,7 @@ function ask(question) {
 
 const tell = (error) => store.say("trouble", error.message);
 
+/** @param {wire.Told} message */
 function told(message) {
   panels.told(message);
   if (message.windows) windows.show(message.windows);
@@ -65,6 +66,7 @@ function told(message) {
 }
 
 // A message of bytes is a line of JSON, and what belongs to it.
+/** @param {ArrayBuffer} data */
 function took(data) {
   const bytes = new Uint8Array(data);
   const end = bytes.indexOf(LINE_FEED);
@@ -99,7 +101,7 @@ const beginTask = async (name, byKey) => {
   await lesson.take(name);
   if (byKey) at("lesson-body").focus();
 };
-const scene = new Scene(at("scene"), { say: (message) => socket.say(message), ask: (...question) => socket.ask(...question) });
+const scene = new Scene(at("scene"), { say: (message) => socket.say(message) });
 window.scene = scene; // for who looks into it from the browser's console, and for tests
 const replay = new Replay(scene, store);
 const panels = new Panels({
@@ -117,7 +119,7 @@ const lesson = new Lesson(
     grade: at("grade"), handIn: at("hand-in"), graded: at("graded"),
   },
   store,
-  (...question) => socket.ask(...question),
+  (ask, more) => socket.ask(ask, more),
   { open, put, run, save: () => scripts.save(), replay: (...flight) => replay.open(...flight).catch(tell) },
 );
 const socket = new PageSocket(store, {

@@ -41,6 +41,7 @@ export class Known {
     this.modules = new Map(); // of functions, by name
     this.flat = new Map(); // of names in 3.x
     this.constants = new Map();
+    /** @type {wire.Questions["inspect"][1]} */
     this.names = { objects: [], parameters: [] };
   }
 

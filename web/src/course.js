@@ -9,6 +9,7 @@ export const isWatching = new URLSearchParams(location.search).has("watch");
 
 export class ToAll {
   // `take(lesson)` begins a task.
+  /** @param {import("./board.js").Board} board */
   constructor(board, take) {
     const [words, open, close] = at("to-all").children;
     board.on("to_all", (message) => {

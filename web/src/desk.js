@@ -12,6 +12,10 @@ const page = Math.random().toString(36).slice(2); // this page's name
 
 export class Desk {
   // `socket` answers questions; `show` shows questions, as the page's.
+  /**
+   * @param {import("./socket.js").PageSocket} socket
+   * @param {import("./state/store.js").Store} store
+   */
   constructor(socket, store, show) {
     this.socket = socket;
     this.store = store;
@@ -33,7 +37,7 @@ export class Desk {
   // Takes the scripts, which need this one's `known` to be made.
   serve(scripts) {
     this.scripts = scripts;
-    const item = (name) => [name, at(`file-${name}`)];
+    const item = (name) => [name, document.getElementById(`file-${name}`)];
     const items = Object.fromEntries(["new-python", "new-lua", "as", "rename", "duplicate", "download", "upload", "revert", "delete"].map(item));
     const parts = {
       more: at("more"), menu: at("menu"), form: at("as-form"), label: at("as-label"), name: at("name"), said: at("name-said"),
@@ -53,7 +57,7 @@ export class Desk {
     for (const one of this.tabs) {
       one.setAttribute("aria-selected", String(one === tab));
       one.tabIndex = one === tab ? 0 : -1;
-      at(one.getAttribute("aria-controls")).hidden = one !== tab;
+      at(/** @type {"variables"} */ (one.getAttribute("aria-controls"))).hidden = one !== tab;
     }
     at("below").dataset.shows = tab.id;
     this.fold(false);
@@ -64,7 +68,7 @@ export class Desk {
     if (!["ArrowLeft", "ArrowRight"].includes(event.key) || !this.tabs.includes(event.target)) return;
     const other = this.tabs.find((one) => one !== event.target);
     this.choose(other);
-    other.focus();
+    other?.focus();
     event.stopPropagation();
   }
 

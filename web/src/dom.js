@@ -55,8 +55,18 @@ const ICONS = {
 };
 const SVG = "http://www.w3.org/2000/svg";
 
-export const at = (id) => document.getElementById(id);
+/**
+ * @template {keyof PageElements} Id
+ * @param {Id} id
+ */
+export const at = (id) => /** @type {PageElements[Id]} */ (document.getElementById(id));
 
+/**
+ * @template {keyof HTMLElementTagNameMap} Tag
+ * @param {Tag} tag
+ * @param {Record<string, any>} properties of the element, of any type, or attributes
+ * @param {(Node | string)[]} children
+ */
 export function create(tag, properties = {}, ...children) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(properties)) {

@@ -6,7 +6,11 @@ const PREFIX = "draft/";
 
 export class Drafts {
   constructor() {
-    this.drafts = new Map(keysBelow(PREFIX).map((script) => [script, kept(PREFIX + script)]).filter(([, draft]) => draft));
+    this.drafts = new Map();
+    for (const script of keysBelow(PREFIX)) {
+      const draft = kept(PREFIX + script);
+      if (draft) this.drafts.set(script, draft);
+    }
   }
 
   get(script) {

@@ -31,7 +31,12 @@ export const colors = HighlightStyle.define([
 ]);
 
 // Puts another text there, as one change; what is the same stays, and the cursor with it. `annotations` are the change's.
-export function fillWith(view, text, annotations = []) {
+/**
+ * @param {EditorView} view
+ * @param {string} text
+ * @param {import("@codemirror/state").TransactionSpec["annotations"]} [annotations]
+ */
+export function fillWith(view, text, annotations) {
   const before = view.state.doc.toString();
   const most = Math.min(text.length, before.length);
   let from = 0;

@@ -44,6 +44,11 @@ function cardOf(html, page, replay) {
 const seedWords = ({ seed, passed, points, of }) => `${passed ? "✓" : "✗"} seed ${seed}: ${digits(points)}/${digits(of)}`;
 
 // Shows the flights, and the card of the worst. `replay(folder, flight, seed, second)` shows a second in the scene.
+/**
+ * @param {HTMLElement} element
+ * @param {{ script: string, isOld: boolean }} graded
+ * @param {wire.Grade} result
+ */
 export function showGrade(element, { script, isOld }, { problem, points, of, flights = [], cards = [], page = "" }, replay) {
   const old = isOld ? create("p", { className: "progress" }, "The script has been changed since.") : "";
   if (!flights.length) return element.replaceChildren(create("p", { className: "bad" }, problem), old);

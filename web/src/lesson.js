@@ -12,8 +12,19 @@ export class Lesson {
   // `parts` are elements: choice, before, after, fold, body, start, flies, grade, handIn, graded, text. Of `script`, `open` opens one,
   // `save` saves it, `put` puts lines of Python into it, `run` flies it;
   // `replay` shows a second of a graded flight in the scene.
+  /**
+   * @param {import("./state/store.js").Store} store
+   * @param {wire.Ask} ask
+   */
   constructor(parts, store, ask, { open, save, put, run, replay }) {
-    Object.assign(this, { parts, store, ask, open, save, put, run, replay });
+    this.parts = parts;
+    this.store = store;
+    this.ask = ask;
+    this.open = open;
+    this.save = save;
+    this.put = put;
+    this.run = run;
+    this.replay = replay;
     this.graded = kept(GRADE, null);
     this.result = null; // of this.graded, null while it flies
     this.edits = 0; // of the store, when the graded script was saved
@@ -149,11 +160,11 @@ export class Lesson {
     this.store.take("grading", true);
     this.showGraded();
     try {
-      let result = {};
+      let result = await this.ask("graded", { number });
       while (!("problem" in result)) {
+        if (this.graded?.task === this.name) showProgress(this.parts.graded, result);
+        await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN));
         result = await this.ask("graded", { number });
-        if (!("problem" in result) && this.graded?.task === this.name) showProgress(this.parts.graded, result);
-        if (!("problem" in result)) await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN));
       }
       this.result = result;
       keepBest(this.graded.task, result);

@@ -3,6 +3,7 @@ import { Console } from "./console.js";
 import { at, create } from "./dom.js";
 
 export class Log {
+  /** @param {import("./board.js").Board} board */
   constructor(board) {
     this.lines = new Console(at("log-lines"));
     board.on("diagnosis", (all) => this.show(all));

@@ -99,6 +99,7 @@ function withButtons(code, actions) {
 
 // Fills an element with a text whose links and pictures are seen from `folder`; `go` follows a link that is ours.
 // `knows` tells whether there is such a text or script; `actions` returns { label, title, act } for a block of Python.
+/** @param {(code: string) => { label: string, title: string, act: () => any }[]} [actions] */
 export function render(element, text, folder, knows, go, actions = () => []) {
   element.innerHTML = markdown.render(text);
   for (const link of element.querySelectorAll("a")) {

@@ -3,10 +3,10 @@
 import { at } from "./dom.js";
 
 export class Notice {
+  /** @param {import("./state/store.js").Store} store */
   constructor(store) {
     this.store = store;
-    const close = at("notice").querySelector("button");
-    close.onclick = () => this.clear();
+    at("notice").querySelector("button")?.addEventListener("click", () => this.clear());
     at("notice").onkeydown = (event) => {
       if (event.key !== "Escape") return;
       event.stopPropagation();

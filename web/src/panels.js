@@ -18,18 +18,29 @@ const STARTED = /^started(?: in |$)/; // in the log: the simulation has begun an
 const NARROW = matchMedia("(max-width: 1120px)"); // where the scene is not edited beside the script
 const TOUCH = matchMedia("(pointer: coarse), (max-width: 900px)"); // where the script covers the scene
 
+/**
+ * A question whose answer is shown.
+ * @typedef {<Name extends "call" | "request" | "speed" | "scene" | "vehicle" | "camera">(ask: Name, more: wire.Questions[Name][0]) => Promise<void>} Act
+ */
+
 export class Panels {
   // `socket()` and `scene()` are there once the page is; `go` has what the buttons of the start page do, `open(script)`
   // opens one, `goTo(file, line)` a file's line.
+  /**
+   * @param {{ store: import("./state/store.js").Store, socket: () => import("./socket.js").PageSocket,
+   *   scene: () => import("./scene/scene.js").Scene, [part: string]: any }} page
+   */
   constructor({ store, socket, scene, go, open, goTo }) {
     this.store = store;
     for (const element of document.querySelectorAll("[data-icon]")) element.prepend(icon(element.dataset.icon));
     this.board = new Board();
     this.notice = new Notice(store);
+    /** @type {wire.Ask} */
     this.ask = (ask, more) => socket().ask(ask, more);
+    /** @param {wire.Said} message */
     this.say = (message) => socket().say(message);
-    this.toolbar = new Toolbar(store, this.board, (...asked) => this.act(...asked), this.notice, scene);
-    this.cameras = new Cameras(this.board, (...asked) => this.act(...asked));
+    this.toolbar = new Toolbar(store, this.board, (ask, more) => this.act(ask, more), this.notice, scene);
+    this.cameras = new Cameras(this.board, (ask, more) => this.act(ask, more));
     this.plots = new Plots(this.board, this.ask);
     this.tune = new Tune(this.board, this.ask, this.notice);
     this.log = new Log(this.board);
@@ -88,11 +99,12 @@ export class Panels {
   }
 
   // Asks, and shows the answer on the message line.
+  /** @type {Act} */
   async act(ask, more) {
     this.notice.clear();
     try {
       const { said, done = true } = await this.ask(ask, more);
-      if (said) this.notice.say(done ? said : `${more.call ?? ask}: failed: ${said}`, !done);
+      if (said) this.notice.say(done ? said : `${"call" in more ? more.call : ask}: failed: ${said}`, !done);
     } catch (error) {
       this.notice.say(error.message, true);
     }
@@ -106,7 +118,7 @@ export class Panels {
     };
     window.addEventListener("keydown", (event) => {
       if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
-      if (event.target.closest?.("input, textarea, select, [contenteditable], dialog")) return;
+      if (event.target?.closest?.("input, textarea, select, [contenteditable], dialog")) return;
       if (event.key === "?") at("sheet").showModal();
       if (event.key.toLowerCase() === "v") this.view.next();
     });
@@ -131,16 +143,18 @@ export class Panels {
     this.log.begin(whole.lines);
   }
 
+  /** @param {wire.Told} message */
   told(message) {
-    if (message.panel) {
-      if (message.version > this.version + 1) this.connected().catch(() => {}); // it missed something
-      this.version = message.version;
-      this.board.take(message);
+    const { panel, version = 0, log = "" } = message;
+    if (panel) {
+      if (version > this.version + 1) this.connected().catch(() => {}); // it missed something
+      this.version = version;
+      this.board.take({ panel, version });
     }
-    if (message.log) this.log.add(message.log);
-    if (STARTED.test(message.log)) this.store.take("started");
+    if (log) this.log.add(log);
+    if (STARTED.test(log)) this.store.take("started");
     if (message.pulse) this.store.take("pulse", message.pulse);
-    if (NO_EFFECT.test(message.log)) this.notice.warn(message.log);
+    if (NO_EFFECT.test(log)) this.notice.warn(log);
     this.build.told(message);
     if (message.pictures) this.cameras.show(message.pictures);
   }

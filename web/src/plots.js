@@ -35,16 +35,22 @@ export function extent(low, high, least) {
 }
 
 class Chart {
+  /**
+   * @param {wire.Chart} described
+   * @param {() => void} close
+   * @param {() => void} enlarge
+   */
   constructor(described, close, enlarge) {
     this.described = described;
     this.run = 0;
+    /** @type {wire.Rows["rows"]} */
     this.rows = [];
     const { title, unit } = described;
-    const name = unit ? `${title}, ${unit}` : title;
+    this.name = unit ? `${title}, ${unit}` : title;
     this.large = iconButton("large", "Enlarge", enlarge);
     this.element = create(
-      "figure", { className: "chart", role: "group", "aria-label": name },
-      create("figcaption", {}, create("span", { textContent: name }), this.large,
+      "figure", { className: "chart", role: "group", "aria-label": this.name },
+      create("figcaption", {}, create("span", { textContent: this.name }), this.large,
         create("button", { textContent: "PNG", title: "Save the chart as a picture", type: "button", onclick: () => this.savePicture() }),
         create("button", { textContent: "CSV", title: "Save the numbers", type: "button", onclick: () => this.saveNumbers() }),
         iconButton("close", "Close", close)),
@@ -53,7 +59,7 @@ class Chart {
     this.element.append(this.place);
     this.watch = new ResizeObserver(() => this.fit());
     this.watch.observe(this.place);
-    this.paint();
+    this.chart = this.draw();
   }
 
   get size() {
@@ -64,9 +70,14 @@ class Chart {
 
   // Made anew when colours are others.
   paint() {
-    this.chart?.destroy();
+    this.chart.destroy();
+    this.chart = this.draw();
+  }
+
+  draw() {
     const { lines, least } = this.described;
     const axis = { stroke: style("--ink-soft"), grid: { stroke: style("--grid"), width: 1 }, ticks: { show: false }, font: "11px system-ui", values: (_, splits) => ticks(splits) };
+    /** @type {uPlot.Options} */
     const options = {
       ...this.size,
       scales: { x: { time: false, range: [-SECONDS, 0] }, y: { range: (_, low, high) => extent(low, high, least) } },
@@ -82,11 +93,12 @@ class Chart {
       cursor: { y: false, drag: { x: false, y: false } },
       legend: { live: true },
     };
-    this.chart = new uPlot(options, this.columns, this.place);
+    return new uPlot(options, this.columns, this.place);
   }
 
+  /** @returns {uPlot.AlignedData} */
   get columns() {
-    const now = this.rows.at(-1)?.[0];
+    const now = this.rows.at(-1)?.[0] ?? 0;
     const times = this.rows.map(([time]) => time - now);
     return [times, ...this.described.lines.map((_, index) => this.rows.map((row) => row[index + 1]))];
   }
@@ -96,12 +108,13 @@ class Chart {
     if (width !== this.chart.width || height !== this.chart.height) this.chart.setSize({ width, height });
   }
 
+  /** @param {wire.Rows} told */
   take({ run, rows }) {
     if (run !== this.run) this.rows = [];
     this.run = run;
     if (!rows.length) return;
     this.rows.push(...rows);
-    const from = this.rows.at(-1)[0] - SECONDS;
+    const from = rows[rows.length - 1][0] - SECONDS;
     const first = this.rows.findIndex(([time]) => time >= from);
     if (first > 0) this.rows.splice(0, first);
     if (document.hidden) return;
@@ -132,13 +145,13 @@ class Chart {
     const ratio = from.width / this.chart.width;
     const head = 44 * ratio;
     const canvas = create("canvas", { width: from.width, height: from.height + head });
-    const ink = canvas.getContext("2d");
+    const ink = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     ink.fillStyle = style("--surface");
     ink.fillRect(0, 0, canvas.width, canvas.height);
     ink.drawImage(from, 0, head);
     ink.font = `600 ${13 * ratio}px system-ui`;
     ink.fillStyle = style("--ink");
-    ink.fillText(this.element.getAttribute("aria-label"), 8 * ratio, 16 * ratio);
+    ink.fillText(this.name, 8 * ratio, 16 * ratio);
     ink.font = `${11 * ratio}px system-ui`;
     let x = 8 * ratio;
     for (const [index, line] of this.described.lines.entries()) {
@@ -159,6 +172,10 @@ class Chart {
 }
 
 export class Plots {
+  /**
+   * @param {import("./board.js").Board} board
+   * @param {wire.Ask} ask
+   */
   constructor(board, ask) {
     this.ask = ask;
     this.board = board;

@@ -23,10 +23,11 @@ export class Recorder {
   begin() {
     if (!window.MediaRecorder?.isTypeSupported(KIND)) return this.notice.say("this browser cannot record videos", true);
     const parts = [];
-    this.recorder = new MediaRecorder(this.stream(), { mimeType: KIND });
+    const recorder = new MediaRecorder(this.stream(), { mimeType: KIND });
+    this.recorder = recorder;
     this.recorder.ondataavailable = ({ data }) => parts.push(data);
     this.recorder.onstop = () => {
-      for (const track of this.recorder.stream.getTracks()) track.stop();
+      for (const track of recorder.stream.getTracks()) track.stop();
       this.recorder = null;
       this.button.setAttribute("aria-pressed", "false");
       this.ended();

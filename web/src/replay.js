@@ -21,12 +21,24 @@ async function valueOf(address) {
 }
 
 export class Replay {
+  /**
+   * @param {import("./scene/scene.js").Scene} scene
+   * @param {import("./state/store.js").Store} store
+   */
   constructor(scene, store) {
-    Object.assign(this, { scene, store, flight: null, starts: 0 });
+    this.scene = scene;
+    this.store = store;
+    this.flight = null;
+    this.starts = 0;
+    this.second = 0; // which is shown, s
+    this.ghost = this.group = new THREE.Group(); // the drone, and all that is shown of the flight
+    /** @type {{ view: string, focus: HTMLElement | null }} */
+    this.before = { view: FREE, focus: null };
+    this.asked = 0; // the next picture, while it plays
     at("replay-play").onclick = () => this.play(!this.isPlaying);
     at("replay-time").oninput = () => (this.play(false), this.show(at("replay-time").valueAsNumber));
     at("replay-close").onclick = () => this.close();
-    window.addEventListener("keydown", (event) => event.key === "Escape" && !event.defaultPrevented && !event.target.closest?.("dialog") && this.close());
+    window.addEventListener("keydown", (event) => event.key === "Escape" && !event.defaultPrevented && !event.target?.closest?.("dialog") && this.close());
     store.on(({ starts }) => starts !== this.starts && this.close());
   }
 
@@ -66,7 +78,7 @@ export class Replay {
     this.play(false);
     this.flight = this.scene.replay = null;
     this.group.removeFromParent();
-    this.group.traverse((one) => one.userData.isOwn && one.geometry.dispose());
+    this.group.traverse((one) => one instanceof THREE.Mesh && one.userData.isOwn && one.geometry.dispose());
     at("replay").hidden = true;
     document.body.classList.remove("replaying");
     this.scene.turn(this.before.view);

@@ -19,8 +19,14 @@ const size = (text) => new TextEncoder().encode(text).length;
 
 export class Scripts {
   // `page` has show({ lists, script, of, question }); `onOpen` hears of the text that a script has.
+  /**
+   * @param {HTMLElement} parent
+   * @param {import("./socket.js").PageSocket} socket
+   * @param {import("./state/store.js").Store} store
+   */
   constructor(parent, socket, store, page, onOpen, known, onBreakpoints) {
-    this.ask = (...question) => socket.ask(...question);
+    /** @type {wire.Ask} */
+    this.ask = (ask, more) => socket.ask(ask, more);
     this.socket = socket;
     this.store = store;
     this.page = page;
@@ -34,19 +40,26 @@ export class Scripts {
     const moved = (line) => this.store.take("moved", line);
     this.editor = new Editor(parent, { change: () => this.change(), run: () => this.onRun(), check, checked, moved, breakpoints: onBreakpoints }, known);
     this.is = { script: "", file: "", version: "", text: "" }; // what the disk has, as far as we know
+    this.onRun = () => {}; // what Ctrl+Enter does
     this.dirty = false;
     this.conflict = false;
     this.marked = {}; // what `mark` has shown
-    this.turn = Promise.resolve();
+    /** @type {Promise<any>} */
+    this.turn = Promise.resolve(); // of whatever was done last
     setInterval(() => this.watch(), LOOK);
     document.addEventListener("visibilitychange", () => this.watch());
     store.on((now) => this.mark(now));
   }
 
   // One after the other: the second would not know the version that the first has made.
+  /**
+   * @template Result
+   * @param {() => Promise<Result>} action
+   */
   inTurn(action) {
-    this.turn = this.turn.catch(() => {}).then(action);
-    return this.turn;
+    const done = this.turn.catch(() => {}).then(action);
+    this.turn = done;
+    return done;
   }
 
   // ---- what there is
@@ -294,8 +307,8 @@ export class Scripts {
   async compare() {
     const { script } = this.is;
     const theirs = await this.ask("open", { script }).catch((error) => ({ error }));
-    if (theirs.error && !this.socket.open) throw theirs.error;
-    if (theirs.error) return this.disagree(theirs.error);
+    if ("error" in theirs && !this.socket.open) throw theirs.error;
+    if ("error" in theirs) return this.disagree(theirs.error);
     const isTouched = theirs.text === this.is.text || !this.isOwn; // another version of the same
     const isOurs = theirs.text === this.editor.text;
     if (this.dirty && !isTouched && !isOurs) return this.disagree();

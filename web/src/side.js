@@ -39,7 +39,7 @@ export class Side {
     for (const button of this.buttons) {
       const is = button.dataset.panel === this.now;
       button.setAttribute("aria-expanded", String(is));
-      at(`${button.dataset.panel}-panel`).hidden = !is;
+      at(/** @type {"edit-panel"} */ (`${button.dataset.panel}-panel`)).hidden = !is;
       if (is) at("panel-title").textContent = button.title;
     }
     at("panel").hidden = !this.now;

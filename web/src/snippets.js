@@ -82,6 +82,7 @@ export function putInto(view, script, code) {
   view.dispatch({ changes, userEvent: "input.paste" });
   const now = view.state.doc;
   const put = standing(now.toString(), lines) ?? functions(now.toString()).find((one) => functions(text).some(({ name }) => name === one.name));
+  if (!put) return "put into the script";
   view.dispatch({ selection: { anchor: put.from, head: put.to }, effects: EditorView.scrollIntoView(put.from, { y: "center" }) });
   return `put into the script: line ${now.lineAt(put.from).number}`;
 }

@@ -22,6 +22,10 @@ async function sign(key, challenge) {
 
 export class PageSocket {
   // `on` has tell(message), picture(bytes), open() and close(); the store hears of the connection.
+  /**
+   * @param {import("./state/store.js").Store} store
+   * @param {{ tell: (message: wire.Told) => void, picture: (bytes: ArrayBuffer) => void, open: () => void, close: () => void }} on
+   */
   constructor(store, on) {
     this.store = store;
     this.on = on;
@@ -29,19 +33,20 @@ export class PageSocket {
     this.number = 0;
     this.attempts = 0;
     this.key = ""; // by which this page returns to the next cockpit of the port; never stored, and never sent
-    this.connect();
+    this.begun = 0; // ms, when it last began to connect
+    this.socket = this.connect();
     setInterval(() => this.watch(), 500);
   }
 
   connect() {
     clearTimeout(this.later);
-    const socket = new WebSocket(new URL(isWatching ? "socket?watch" : "socket", location).href.replace("http", "ws"), "drone_sim");
-    this.socket = socket;
+    const socket = new WebSocket(new URL(isWatching ? "socket?watch" : "socket", location.href).href.replace("http", "ws"), "drone_sim");
     this.begun = performance.now();
     socket.binaryType = "arraybuffer";
     socket.onopen = () => this.opened();
     socket.onmessage = ({ data }) => this.receive(data);
     socket.onclose = () => this.closed();
+    return socket;
   }
 
   opened() {
@@ -77,7 +82,7 @@ export class PageSocket {
     const answer = mayBeRefused ? await this.askToReturn() : "nobody";
     if (answer === "refused") this.store.take("refused");
     const wait = { refused: REFUSED, allowed: AGAIN[0], nobody: AGAIN[Math.min(attempt, AGAIN.length - 1)] }[answer];
-    this.later = setTimeout(() => this.connect(), wait);
+    this.later = setTimeout(() => (this.socket = this.connect()), wait);
   }
 
   // Returns "nobody" if no cockpit answers (a proxy may answer in its place), "allowed" if it lets this page in, "refused"
@@ -113,6 +118,7 @@ export class PageSocket {
     return this.socket.readyState === WebSocket.OPEN;
   }
 
+  /** @type {wire.Ask} */
   ask(ask, more = {}) {
     if (!this.open) return Promise.reject(new Error("there is no connection"));
     const id = ++this.number;
@@ -120,10 +126,12 @@ export class PageSocket {
     return new Promise((resolve, reject) => this.waiting.set(id, { resolve, reject }));
   }
 
+  /** @param {wire.Said} message */
   say(message) {
     if (this.open) this.socket.send(JSON.stringify(message));
   }
 
+  /** @param {wire.Command} command */
   hold(command) {
     this.say({ hold: command });
   }

@@ -16,7 +16,7 @@ export class Start {
       button.onclick = () => {
         if (button.dataset.start === "tasks") return this.showTasks(true);
         dialog.close();
-        go[button.dataset.start]();
+        go[button.dataset.start ?? ""]();
       };
     }
     at("gallery-back").onclick = () => this.showTasks(false);
@@ -66,6 +66,6 @@ export class Start {
 
   // The page is served before the pictures are.
   load() {
-    for (const picture of at("start-page").querySelectorAll("img[data-src]")) picture.src ||= picture.dataset.src;
+    for (const picture of at("start-page").querySelectorAll("img")) picture.src ||= picture.dataset.src ?? "";
   }
 }

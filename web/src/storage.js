@@ -1,6 +1,6 @@
 // The values that the browser stores for the page. A value that it cannot store is kept until the page is closed.
 // Behind a proxy, several cockpits have the same origin, each with its own folder; without one, this is drone_sim/.
-const PREFIX = `drone_sim${new URL(".", location).pathname}`;
+const PREFIX = `drone_sim${new URL(".", location.href).pathname}`;
 const unstored = new Map(); // values that the browser could not store, by key, as text
 
 function read(key) {

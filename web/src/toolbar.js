@@ -14,6 +14,11 @@ const hasKeys = ({ target, key }) =>
 
 export class Toolbar {
   // `act(ask, more)` asks the node, and shows its answer; `scene()` is the scene, once it is there.
+  /**
+   * @param {import("./state/store.js").Store} store
+   * @param {import("./board.js").Board} board
+   * @param {import("./panels.js").Act} act
+   */
   constructor(store, board, act, notice, scene) {
     this.store = store;
     this.board = board;
@@ -33,12 +38,12 @@ export class Toolbar {
       photo: () => scene().snapshot().then((blob) => save(blob, `drone_sim-${stamp()}.png`)),
       "toolbar-more": () => this.unfold(),
     }))
-      at(id).onclick = press;
+      at(/** @type {"home"} */ (id)).onclick = press;
     new Recorder(at("video"), () => scene().stream(), "scene", notice);
     at("speed").onchange = () => act("speed", { factor: Number(at("speed").value) });
     at("scene-choice").onchange = () => act("scene", { scene: at("scene-choice").value });
     at("vehicle").onchange = () => act("vehicle", { vehicle: at("vehicle").value });
-    for (const part of ["status", "flight", "master", "hears_commands", "pace"]) board.on(part, (content) => store.take(part, content));
+    for (const part of /** @type {const} */ (["status", "flight", "master", "hears_commands", "pace"])) board.on(part, (content) => store.take(part, content));
     board.on("diagnosis", (all) => store.take("warnings", all.filter((one) => one.wrong).map((one) => one.said)));
     board.on("speed", (factor) => this.showSpeed(factor));
     board.on("scenes", ({ all, now }) => this.offer(at("scene-choice"), all, now));
@@ -69,15 +74,15 @@ export class Toolbar {
 
   // A click leaves no focus behind: the next Space would press the same button again.
   listen() {
-    const buttons = [...document.querySelectorAll("button[data-key]")];
+    const buttons = [...document.querySelectorAll("button")].filter(({ dataset }) => dataset.key);
     for (const button of buttons) {
-      button.title += ` (${button.dataset.key.replace(" ", ", ")})`;
+      button.title += ` (${button.dataset.key?.replace(" ", ", ")})`;
       button.addEventListener("click", (event) => event.detail && button.blur());
     }
     window.addEventListener("keydown", (event) => {
       if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || event.repeat || hasKeys(event)) return;
       const key = event.key === " " ? "Space" : event.key.length === 1 ? event.key.toUpperCase() : event.key;
-      const found = buttons.find((one) => one.dataset.key.split(" ").includes(key));
+      const found = buttons.find((one) => one.dataset.key?.split(" ").includes(key));
       const button = key === "Enter" && this.is("stopped") ? at("sim-start") : found;
       if (!button || button.disabled) return;
       event.preventDefault();

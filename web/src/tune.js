@@ -9,6 +9,11 @@ const WIDE = 20; // times the value: a range that is wider than this needs a sli
 const shown = (value) => (typeof value === "number" ? String(Number(value.toPrecision(7))) : value);
 
 export class Tune {
+  /**
+   * @param {import("./board.js").Board} board
+   * @param {wire.Ask} ask
+   * @param {import("./notice.js").Notice} notice
+   */
   constructor(board, ask, notice) {
     this.ask = ask;
     this.notice = notice;
@@ -21,13 +26,13 @@ export class Tune {
   }
 
   build(groups) {
-    const { id, value } = document.activeElement; // who is writing goes on to
+    const { id = "", value } = /** @type {HTMLInputElement} */ (document.activeElement ?? {}); // who is writing goes on to
     this.fields.clear();
     const made = groups.map(({ group, fields }) => this.group(group, fields));
     at("tune-groups").replaceChildren(...made);
     this.fill(this.board.get("values", {}));
     this.filter();
-    const field = id.startsWith("tune ") && at(id);
+    const field = id.startsWith("tune ") && /** @type {HTMLInputElement | null} */ (document.getElementById(id));
     if (!field) return;
     if (field.type === "text") field.value = value;
     field.focus();
@@ -57,6 +62,10 @@ export class Tune {
   }
 
   // A number is taken as it is written; its slider goes as far as a hand can choose from.
+  /**
+   * @param {HTMLElement} row
+   * @param {wire.Field} field
+   */
   number(row, { name, kind, low, high }, id) {
     const range = [low, high].map((end) => (end === null ? "" : shown(end))).join(" to ");
     const text = create("input", { id, type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false });
@@ -71,19 +80,20 @@ export class Tune {
       if (event.key === "Escape") this.refuse(name, "");
     };
     slider.oninput = () => {
-      const fine = (slider.max - slider.min) / STEPS;
+      const fine = (Number(slider.max) - Number(slider.min)) / STEPS;
       const rounded = Number((Math.round(slider.valueAsNumber / fine) * fine).toPrecision(6));
       text.value = shown(kind === "int" ? Math.round(slider.valueAsNumber) : rounded);
       this.set(name, Number(text.value));
     };
     row.append(text, slider);
     this.fields.set(name, (value) => {
-      if (document.activeElement !== text || !this.isWritten(text, value)) text.value = shown(value);
+      if (document.activeElement !== text || !this.isWritten(text)) text.value = shown(value);
       text.dataset.holds = shown(value);
       if (document.activeElement === slider) return;
       const far = Math.max(Math.abs(value) * 2, 1);
-      slider.min = Math.max(low ?? -far, high - low <= WIDE * far ? low : Math.min(0, -far * (value < 0)));
-      slider.max = Math.min(high ?? far, high - low <= WIDE * far ? high : far);
+      const isNarrow = low !== null && high !== null && high - low <= WIDE * far;
+      slider.min = String(isNarrow ? low : Math.max(low ?? -far, value < 0 ? -far : 0));
+      slider.max = String(isNarrow ? high : Math.min(high ?? far, far));
       slider.value = value;
     });
   }
@@ -132,14 +142,15 @@ export class Tune {
 
   filter() {
     const sought = at("tune-filter").value.trim().toLowerCase();
-    for (const group of at("tune-groups").children) {
+    for (const group of at("tune-groups").querySelectorAll("details")) {
       let some = !sought;
       for (const row of group.querySelectorAll(".field")) {
-        row.hidden = sought && !row.dataset.name.includes(sought);
+        row.hidden = !row.dataset.name?.includes(sought);
         some ||= !row.hidden;
       }
       group.hidden = !some;
-      group.open = sought ? some : kept(`tune/${group.dataset.name}`, OPEN.includes(group.dataset.name));
+      const { name = "" } = group.dataset;
+      group.open = sought ? some : kept(`tune/${name}`, OPEN.includes(name));
     }
   }
 }

@@ -21,6 +21,7 @@ const called = (view) => {
 };
 
 export class View {
+  /** @param {import("./scene/scene.js").Scene} scene */
   constructor(scene) {
     this.scene = scene;
     at("shown").replaceChildren(...Object.entries(SHOWN).map(([name, [label, hint]]) => this.box(name, label, hint)));

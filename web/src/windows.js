@@ -4,6 +4,11 @@ import { Overlay } from "./overlay.js";
 import { Recorder } from "./recorder.js";
 
 export class Windows {
+  /**
+   * @param {HTMLElement} parent
+   * @param {import("./socket.js").PageSocket} socket
+   * @param {import("./notice.js").Notice} notice
+   */
   constructor(parent, socket, notice) {
     this.parent = parent;
     this.socket = socket; // { ask, say }
@@ -12,6 +17,7 @@ export class Windows {
     this.labels = new Map(); // of views, by topic
   }
 
+  /** @param {wire.Windows} windows */
   show({ views, dialogs, consoles }) {
     this.labels = new Map(views.map(({ topic, label }) => [topic, label]));
     const blind = views.filter(({ topic }) => !topic);
@@ -58,7 +64,7 @@ export class Windows {
     const element = create("section", { className: `window ${kind}` });
     const header = create("header", {}, create("span", { textContent: title, title }));
     if (onClose) header.append(create("button", { className: "plain", title: "Close", "aria-label": `Close ${title}`, onclick: onClose }, icon("close")));
-    header.onpointerdown = (event) => event.target.closest("button") || drag(element, header, event);
+    header.onpointerdown = (event) => event.target?.closest?.("button") || drag(element, header, event);
     element.append(header);
     return element;
   }
@@ -104,7 +110,7 @@ export class Windows {
     const made = { element, image, note, over, title: element.querySelector("span") };
     const recorder = new Recorder(film, () => this.film(made), name, this.notice, () => (made.canvas = null));
     made.end = () => recorder.stop(); // the film is saved
-    element.querySelector("header button").before(...over.buttons, film);
+    element.querySelector("header button")?.before(...over.buttons, film);
     element.append(create("div", { className: "seen" }, image, over.svg), note, over.legend);
     return made;
   }
@@ -117,6 +123,10 @@ export class Windows {
   }
 
   // A picture is answered for when it is on the screen; only then the node sends another.
+  /**
+   * @param {wire.Picture} said
+   * @param {Uint8Array<ArrayBuffer>} bytes
+   */
   picture(said, bytes) {
     const shown = () => requestAnimationFrame(() => this.socket.say({ shown: said.picture }));
     const there = this.open.get(`picture ${said.picture}`);

@@ -7,6 +7,7 @@ const GAP = 0.2; // m, between what is duplicated
 const shifted = (matrix, by) => new THREE.Matrix4().setPosition(by).multiply(matrix);
 
 export class Arrange {
+  /** @param {import("./edit.js").Edit} edit */
   constructor(edit) {
     this.edit = edit;
   }
@@ -23,6 +24,7 @@ export class Arrange {
   // Along an axis, with the low end (-1), the middle (0) or the high end (1) of the last one.
   align(axis, end) {
     const { last } = this.edit;
+    if (last === undefined || !this.edit.objects.get(last)) return; // it has just been made, and is not told yet
     const ends = (box) => [box.min, box.getCenter(new THREE.Vector3()), box.max][end + 1].getComponent(axis);
     const to = ends(this.edit.seen.boxOf([last]));
     this.shift(`Align ${AXES[axis]}:`, (box) => new THREE.Vector3().setComponent(axis, to - ends(box)), last);
@@ -31,7 +33,7 @@ export class Arrange {
   shift(verb, by, without) {
     const { edit, roots } = this;
     const moved = roots.filter((one) => one !== without);
-    const places = new Map(moved.map((one) => [one, shifted(edit.objects.get(one).matrix, by(edit.seen.boxOf([one])))]));
+    const places = new Map(moved.map((one) => [one, shifted(edit.objects.existing(one).matrix, by(edit.seen.boxOf([one])))]));
     if (places.size) return edit.place(places, edit.named(verb, moved));
   }
 
@@ -41,6 +43,10 @@ export class Arrange {
     return Math.max(0.1, onGrid(size.x + GAP));
   }
 
+  /**
+   * @param {[number, number, number]} counts
+   * @param {[number, number, number]} steps
+   */
   duplicate(counts = [2, 1, 1], steps = [this.aside(), 0, 0]) {
     const objects = this.roots;
     if (objects.length) return this.edit.make([{ do: "copy", objects, counts, steps }], this.edit.named("Duplicate", objects), true);
@@ -48,14 +54,14 @@ export class Arrange {
 
   remove() {
     const { edit } = this;
-    const objects = edit.selected.filter((one) => edit.objects.get(one).of !== "floor");
-    const isModel = objects.some((one) => edit.objects.get(one).model);
+    const objects = edit.selected.filter((one) => edit.objects.get(one)?.of !== "floor");
+    const isModel = objects.some((one) => edit.objects.get(one)?.model);
     if (objects.length) return edit.do([{ do: "remove", objects, ...(isModel ? { below: true } : {}) }], edit.named("Delete", objects));
   }
 
   group(as) {
     const objects = this.roots;
-    if (objects.length) return this.edit.make([{ do: "group", objects, name: as === "model" ? "Model" : this.edit.objects.get(objects[0]).name, as }], this.edit.named("Group", objects));
+    if (objects.length) return this.edit.make([{ do: "group", objects, name: as === "model" ? "Model" : this.edit.objects.existing(objects[0]).name, as }], this.edit.named("Group", objects));
   }
 
   ungroup() {

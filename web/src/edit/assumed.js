@@ -1,26 +1,29 @@
 // What has been asked for, and is not told yet: until then it counts, or a second number that one writes would bring
 // back the first as it was.
 export class Assumed {
+  /** @param {import("./objects.js").Objects} objects */
   constructor(objects) {
     this.objects = objects;
     this.busy = 0; // edits that are not answered
     this.known = 0; // the revision that has been told
     this.told = new Map(); // what has been told of objects that are shown otherwise, by handle
-    this.clear();
+    this.reached = 0; // the revision of the last answer
+    /** @type {Map<number, import("three").Matrix4>} */
+    this.matrices = new Map(); // of the world, by handle
+    /** @type {Map<number, Record<string, any>>} */
+    this.values = new Map(); // by handle
   }
 
   // Lets what has been told be seen.
   clear() {
     for (const { one, ...told } of this.told.values()) Object.assign(one, told);
-    this.reached = 0; // the revision of the last answer
-    this.matrices = new Map(); // of the world, by handle
-    this.values = new Map(); // by handle
-    this.told.clear();
+    this.reached = 0;
+    for (const all of [this.matrices, this.values, this.told]) all.clear();
   }
 
   put(handle, matrix) {
-    const way = matrix.clone().multiply(this.objects.get(handle).matrix.clone().invert());
-    for (const one of this.objects.withBelow(handle)) this.matrices.set(one, way.clone().multiply(this.objects.get(one).matrix));
+    const way = matrix.clone().multiply(this.objects.existing(handle).matrix.clone().invert());
+    for (const one of this.objects.withBelow(handle)) this.matrices.set(one, way.clone().multiply(this.objects.existing(one).matrix));
     this.apply();
   }
 

@@ -20,6 +20,11 @@ const ENDS = [["low", -1, "low ends"], ["middle", 0, "middles"], ["high", 1, "hi
 
 export class Build {
   // `openScript(file)` opens one in the editor, `showScript(is)` shows the place where that is, and the text.
+  /**
+   * @param {import("../scene/scene.js").Scene} scene
+   * @param {wire.Ask} ask
+   * @param {import("../notice.js").Notice} notice
+   */
   constructor(scene, ask, notice, { openScript, showScript }) {
     this.showScript = showScript;
     const edit = new Edit(scene, ask, notice, (file) => (this.showText(false), showScript(true), openScript(file)));
@@ -52,6 +57,7 @@ export class Build {
     this.edit.turn(on);
   }
 
+  /** @param {wire.Told} message */
   told({ tree }) {
     if (tree) this.edit.take(tree);
   }
@@ -87,7 +93,7 @@ export class Build {
         this.acts[button.dataset.edit]();
       };
     }
-    for (const name of ["scene", "edit"]) new Menu(at(`${name}-menu-open`), at(`${name}-menu`));
+    for (const name of /** @type {const} */ (["scene", "edit"])) new Menu(at(`${name}-menu-open`), at(`${name}-menu`));
     at("handles-frame").append(...Object.entries(FRAMES_OF_HANDLES).map(([value, words]) => new Option(words, value)));
     at("handles-frame").onchange = () => this.setFrame(at("handles-frame").value);
     at("scene-text-close").onclick = () => this.showText(false);
@@ -158,24 +164,25 @@ export class Build {
     at("shelf").classList.toggle("folded", !on);
     document.body.classList.toggle("with-shelf", on);
     keep("edit/shelf", on);
-    document.querySelector("button[data-edit=shelf]").setAttribute("aria-pressed", String(on));
+    document.querySelector("button[data-edit=shelf]")?.setAttribute("aria-pressed", String(on));
   }
 
   show() {
     const { edit } = this;
     const { undo, redo, state } = edit.is;
     const one = edit.objects.get(edit.last);
-    const press = (name, on) => document.querySelector(`#build-bar [data-edit=${name}]`).setAttribute("aria-pressed", String(on));
+    const inBar = (name) => /** @type {HTMLButtonElement} */ (document.querySelector(`#build-bar [data-edit=${name}]`));
+    const press = (name, on) => inBar(name).setAttribute("aria-pressed", String(on));
     for (const mode of ["translate", "rotate", "scale"]) press(mode, edit.handles.mode === mode);
     press("grid", edit.handles.isSnapped);
     press("measure", Boolean(edit.hand.measuring));
     for (const [name, what] of [["undo", undo], ["redo", redo]]) {
-      const button = document.querySelector(`#build-bar [data-edit=${name}]`);
+      const button = inBar(name);
       button.disabled = !what;
       button.title = `${name === "undo" ? "Undo" : "Redo"}${what ? `: ${what}` : ""} (Ctrl+${name === "undo" ? "Z" : "Y"})`;
     }
     const whyNoModel = this.files.whyNoModel();
-    const saveModel = document.querySelector("#scene-menu [data-edit=model]");
+    const saveModel = /** @type {HTMLButtonElement} */ (document.querySelector("#scene-menu [data-edit=model]"));
     saveModel.disabled = Boolean(whyNoModel);
     saveModel.title = whyNoModel || "The selected object with all its children becomes a model on the shelf";
     at("until-stop").hidden = !state || state === "stopped";
@@ -189,7 +196,7 @@ export class Build {
     at("attached-none").hidden = Boolean(one?.script);
     at("detach").hidden = Boolean(one?.root); // a vehicle has always one
     at("attached-one").hidden = !one?.script;
-    at("attached-open").onclick = () => edit.openScript(one);
+    at("attached-open").onclick = () => one && edit.openScript(one);
     at("attached-open").textContent = `Open ${one?.script?.split("/").pop() ?? ""}`;
   }
 }

@@ -3,6 +3,7 @@
 const MOST = 4e6; // characters that the node is asked to paste
 
 export class Clipboard {
+  /** @param {import("./edit.js").Edit} edit */
   constructor(edit) {
     this.edit = edit;
   }

@@ -8,13 +8,18 @@ const page = Math.random().toString(36).slice(2); // this page's name
 
 export class Drag {
   // Of the objects `roots`, and of all that hangs on them.
+  /**
+   * @param {import("./edit.js").Edit} edit
+   * @param {number[]} roots
+   */
   constructor(edit, roots) {
-    Object.assign(this, { edit, roots });
+    this.edit = edit;
+    this.roots = roots;
     this.change = { matrix: new THREE.Matrix4(), factors: null };
     this.merge = `${page}-${++drags}`;
-    this.from = new Map(roots.map((one) => [one, edit.objects.get(one).matrix.clone()]));
+    this.from = new Map(roots.map((one) => [one, edit.objects.existing(one).matrix.clone()]));
     const all = roots.flatMap((one) => edit.objects.withBelow(one));
-    const names = new Set(all.map((one) => edit.objects.get(one)).filter(({ of }) => of === "scene").map(({ name }) => name));
+    const names = new Set(all.map((one) => edit.objects.existing(one)).filter(({ of }) => of === "scene").map(({ name }) => name));
     const { scene, glyphs } = edit;
     const shown = [...scene.tree.markers.values()].filter(({ userData: { said } }) => said.layer === "scene" && names.has(said.ns));
     this.shown = [...shown, ...all.map((one) => glyphs.get(one)).filter(Boolean)].map((one) => [one, one.matrixWorld.clone()]);
@@ -35,7 +40,7 @@ export class Drag {
   // Shows it where it will be, before each picture: the node's word comes later.
   show({ matrix, factors } = this.change) {
     const whole = matrix.clone();
-    const own = this.from.get(this.roots.at(-1));
+    const own = this.from.get(this.roots[this.roots.length - 1]);
     if (factors && own) whole.multiply(own.clone().scale(factors).multiply(own.clone().invert()));
     for (const [object, from] of this.shown) {
       const local = from.clone().premultiply(whole).premultiply(object.parent.matrixWorld.clone().invert());
@@ -58,6 +63,7 @@ export class Drag {
     for (const [object] of this.shown) object.scale.setScalar(1);
     const { edit, roots } = this;
     const isMoved = this.isTold || change.matrix.elements.join() !== NOTHING;
+    /** @type {wire.Scale} */
     const resize = { do: "scale", objects: roots, factors: change.factors?.toArray().map((one) => Number(one.toFixed(6))) };
     const done = this.isResize(change) ? await edit.do([resize], edit.named("Resize", roots)) : isMoved && (await this.tell(change));
     this.isOver = true;

@@ -13,15 +13,26 @@ import { poseOf } from "./poses.js";
 import { Seen } from "./seen.js";
 
 const TARGET = "target"; // the alias of the green sphere: what of a vehicle is moved by itself
-const NOTHING = { file: "", modified: false, read_only: false, state: "", undo: "", redo: "", draft: null, revision: 0 };
+/** @type {wire.EditorState} */
+const NOTHING = { file: "", new: false, modified: false, read_only: false, state: "", undo: "", redo: "", draft: null, revision: 0 };
 
 export class Edit {
   // `ask` asks the node, `notice` is the message line, `openScript(file)` opens one in the editor.
+  /**
+   * @param {import("../scene/scene.js").Scene} scene
+   * @param {wire.Ask} ask
+   * @param {import("../notice.js").Notice} notice
+   * @param {(file: string) => any} openScript what it returns is not used
+   */
   constructor(scene, ask, notice, openScript) {
-    Object.assign(this, { scene, ask, notice, openScriptFile: openScript });
+    this.scene = scene;
+    this.ask = ask;
+    this.notice = notice;
+    this.openScriptFile = openScript;
     this.objects = new Objects();
     this.assumed = new Assumed(this.objects);
     this.is = NOTHING; // of the scene as a whole
+    /** @type {number[]} */
     this.selected = []; // handles, the last one last
     this.expected = new Set(); // selected, but not told yet
     this.hearing = new Map();
@@ -70,12 +81,13 @@ export class Edit {
 
   connected() {
     if (!this.isOn || this.asking) return;
-    Object.assign(this, { asking: true, missed: undefined }); // once, however much is missed meanwhile
+    this.asking = true;
+    this.missed = undefined; // once, however much is missed meanwhile
     // What has been told meanwhile may be newer.
     const take = ({ tree }) => tree.version >= (this.objects.version ?? tree.version) && this.take(tree);
     const end = () => {
       this.asking = false;
-      if (this.missed > this.objects.version) this.connected(); // the answer was on its way before
+      if (this.missed !== undefined && this.missed > (this.objects.version ?? -1)) this.connected(); // the answer was on its way before
     };
     return this.ask("tree").then(take, (error) => this.wrong(error.message)).finally(end);
   }
@@ -91,6 +103,7 @@ export class Edit {
 
   // ---- what the node tells
 
+  /** @param {wire.TreeChange} told */
   take(told) {
     if (!this.isOn) return void (this.objects.version = null);
     const changed = this.objects.take(told);
@@ -152,7 +165,7 @@ export class Edit {
 
   // What a click on an object selects: its outermost model first, what it is a part of next, then the part itself.
   shownAs(handle) {
-    const models = this.objects.above(handle).filter((one) => this.objects.get(one).model || this.objects.get(one).root);
+    const models = this.objects.above(handle).filter((one) => this.objects.existing(one).model || this.objects.existing(one).root);
     const way = [...models.reverse(), handle];
     const at = way.findLastIndex((one) => this.has(one));
     return way[Math.min(at + 1, way.length - 1)];
@@ -174,7 +187,7 @@ export class Edit {
   }
 
   frameFloor() {
-    const { size } = this.objects.named("Floor").values;
+    const size = this.objects.named("Floor")?.values.size ?? 0;
     this.scene.view.lookAt(new THREE.Vector3(), size / 2);
     this.scene.view.stepBack();
     this.scene.change();
@@ -184,7 +197,7 @@ export class Edit {
 
   mayMove(handle) {
     const one = this.objects.get(handle);
-    return Boolean(one) && (one.of === "scene" || Boolean(one.root) || (one.of === "vehicle" && one.alias === TARGET));
+    return one !== undefined && (one.of === "scene" || Boolean(one.root) || (one.of === "vehicle" && one.alias === TARGET));
   }
 
   mayRename({ of }) {
@@ -201,6 +214,11 @@ export class Edit {
 
   // Does some operations as one edit; returns the answer, undefined where it was refused. It is asked for at once: the
   // node does in turn what a page asks, so a start, a save or an undo that is asked for later comes after it.
+  /**
+   * @param {wire.Operation[]} operations
+   * @param {string} name
+   * @param {string} [merge]
+   */
   async do(operations, name, merge) {
     try {
       const { is } = this;
@@ -217,6 +235,7 @@ export class Edit {
   }
 
   // Does what makes objects, and selects the first of them, or all.
+  /** @param {wire.Operation[]} operations */
   async make(operations, name, isAll = false) {
     const answer = await this.do(operations, name);
     const made = answer?.handles ?? [];
@@ -246,9 +265,10 @@ export class Edit {
   place(places, name = this.named("Move", [...places.keys()]), merge) {
     for (const [handle, matrix] of places) this.assumed.put(handle, matrix);
     this.glyphs.show(this.seen.bodiless());
+    /** @type {wire.Move[]} */
     const operations = [...places].map(([object, matrix]) => {
-      const pose = poseOf(matrix);
-      return { do: "move", object, position: pose.slice(0, 3), quaternion: pose.slice(3), relative_to: "world" };
+      const [x, y, z, ...quaternion] = poseOf(matrix);
+      return { do: "move", object, position: [x, y, z], quaternion, relative_to: "world" };
     });
     return this.do(operations, name, merge);
   }
@@ -267,7 +287,7 @@ export class Edit {
 
   hang(parent, isRelative) {
     const objects = this.objects.roots(this.selected);
-    const under = parent === WORLD ? "the world" : this.objects.get(parent).name;
+    const under = parent === WORLD ? "the world" : this.objects.existing(parent).name;
     return this.do([{ do: "reparent", objects, parent, keep: isRelative ? "relative" : "pose" }], `${this.named("Hang", objects)} on ${under}`);
   }
 

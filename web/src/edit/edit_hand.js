@@ -8,9 +8,18 @@ export const isFree = (event) => event.ctrlKey || event.metaKey;
 
 // Beside the flight's hand, whose looking about stays.
 export class EditHand {
+  /**
+   * @param {import("../scene/scene.js").Scene} scene
+   * @param {import("./edit.js").Edit} edit
+   * @param {import("./handles.js").Handles} handles
+   */
   constructor(scene, edit, handles) {
-    Object.assign(this, { scene, edit, handles });
+    this.scene = scene;
+    this.edit = edit;
+    this.handles = handles;
     this.caster = new THREE.Raycaster();
+    this.began = this.from = new THREE.Vector3(); // of a slide: what was met, and where the thing was
+    this.level = new THREE.Plane(); // on which it slides
     this.measuring = null; // takes points while one measures
   }
 
@@ -19,7 +28,7 @@ export class EditHand {
     return {
       take: (event) => this.take(event),
       drag: (event) => this.drag(event),
-      drop: (event) => this.drop(event),
+      drop: () => this.drop(),
       click: (event) => this.click(event),
       hover: (event) => this.hover(event),
       look: () => this.edit.last !== undefined && this.scene.frame(),
@@ -28,7 +37,7 @@ export class EditHand {
 
   place(event) {
     const box = this.scene.canvas.dom.getBoundingClientRect();
-    return { x: (2 * (event.clientX - box.left)) / box.width - 1, y: 1 - (2 * (event.clientY - box.top)) / box.height };
+    return new THREE.Vector2((2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height);
   }
 
   ray(event) {
@@ -41,6 +50,7 @@ export class EditHand {
     const ray = this.ray(event);
     const things = [...this.scene.things(), ...this.edit.glyphs.all].filter((one) => one.visible && one.parent);
     for (const met of ray.intersectObjects(things, true)) {
+      /** @type {THREE.Object3D | null} */
       let object = met.object;
       while (object && !object.userData.said) object = object.parent;
       const found = object && this.edit.seen.objectOf(object.userData.said);
@@ -91,10 +101,10 @@ export class EditHand {
     }
     const met = this.meet(event);
     const handle = met?.object && [met.object.handle, ...this.edit.objects.above(met.object.handle)].find((one) => this.edit.has(one));
-    if (handle === undefined || !this.edit.mayMove(handle)) return null;
+    if (!met || handle === undefined || !this.edit.mayMove(handle)) return null;
     this.dragging = "thing";
     this.began = met.point.clone();
-    this.from = new THREE.Vector3().setFromMatrixPosition(this.edit.objects.get(handle).matrix);
+    this.from = new THREE.Vector3().setFromMatrixPosition(this.edit.objects.existing(handle).matrix);
     this.level = new THREE.Plane(up, -met.point.z);
     this.edit.beginDrag();
     return "thing";

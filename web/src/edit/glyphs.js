@@ -55,8 +55,8 @@ export class Glyphs {
 
 function box(size, color, place = [0, 0, 0]) {
   const mesh = new THREE.Mesh(SHAPES.cube, material(color));
-  mesh.scale.set(...size);
-  mesh.position.set(...place);
+  mesh.scale.fromArray(size);
+  mesh.position.fromArray(place);
   return mesh;
 }
 

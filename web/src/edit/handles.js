@@ -22,6 +22,7 @@ export class Handles {
     this.on = on;
     this.controls.addEventListener("objectChange", () => this.on.changed(this.change));
     this.isSnapped = true;
+    this.began = new THREE.Matrix4(); // where the drag has begun
   }
 
   get isDragging() {
@@ -68,14 +69,14 @@ export class Handles {
     if (!this.hover(at)) return false;
     this.began = this.taken.matrixWorld.clone();
     this.snap(isFree);
-    this.controls.pointerDown({ ...at, button: 0 });
+    this.controls.pointerDown(pointer(at, 0));
     return this.isDragging;
   }
 
   // `isFree`: without the grid, while its key is held.
   drag(at, isFree) {
     this.snap(isFree);
-    this.controls.pointerMove({ ...at, button: -1 });
+    this.controls.pointerMove(pointer(at, -1));
   }
 
   snap(isFree) {
@@ -88,14 +89,14 @@ export class Handles {
   // Lets go; returns what the drag has done.
   drop() {
     const { change } = this;
-    this.controls.pointerUp({ button: 0 });
+    this.controls.pointerUp(pointer(null, 0));
     return change;
   }
 
   // Lets go, as if nothing had been done.
   cancel() {
     this.controls.reset();
-    this.controls.pointerUp({ button: 0 });
+    this.controls.pointerUp(pointer(null, 0));
   }
 
   render(renderer, camera) {
@@ -105,6 +106,9 @@ export class Handles {
     renderer.render(this.scene, camera);
   }
 }
+
+/** What the controls read of a pointer; three's types say that it is an event. @returns {any} */
+const pointer = (at, button) => ({ x: at?.x, y: at?.y, button });
 
 // A number on the grid.
 export const onGrid = (value, step = GRID) => Number((Math.round(value / step) * step).toFixed(6));

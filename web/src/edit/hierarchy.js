@@ -8,10 +8,19 @@ const ROW = 32; // px, as high as a finger needs
 const MORE = 8; // rows above and below those that are seen
 const INDENT = 14; // px
 
+/** @typedef {import("./objects.js").SceneObject} SceneObject */
+
 export class Hierarchy {
   // `tree` is the element that scrolls, `find` the search field above it.
+  /**
+   * @param {HTMLElement} tree
+   * @param {HTMLInputElement} find
+   * @param {import("./edit.js").Edit} edit
+   */
   constructor(tree, find, edit) {
-    Object.assign(this, { tree, find, edit });
+    this.tree = tree;
+    this.find = find;
+    this.edit = edit;
     this.folded = new Set(); // handles
     this.known = new Set(); // handles of models that have been folded, or not, by the user
     this.rows = []; // { handle, depth } of what is unfolded, from top to bottom
@@ -67,7 +76,7 @@ export class Hierarchy {
     const shown = new Set();
     for (const one of this.objects.all()) {
       if (!`${one.alias} ${one.name} ${one.type}`.toLowerCase().includes(sought)) continue;
-      for (let above = one; above && !shown.has(above.handle); above = this.objects.get(above.parent)) shown.add(above.handle);
+      for (let above = /** @type {SceneObject | undefined} */ (one); above && !shown.has(above.handle); above = this.objects.get(above.parent)) shown.add(above.handle);
     }
     return shown;
   }
@@ -105,12 +114,12 @@ export class Hierarchy {
   }
 
   row({ handle, depth }, number) {
-    const one = this.objects.get(handle);
+    const one = this.objects.existing(handle);
     const row = create("div", { className: "row", role: "treeitem", id: `object-${handle}`, title: `${one.name}: ${one.type}` });
     row.dataset.handle = handle;
     row.style.cssText = `top:${number * ROW}px;padding-left:${4 + depth * INDENT}px`;
-    row.setAttribute("aria-level", depth + 1);
-    row.setAttribute("aria-selected", this.edit.has(handle));
+    row.setAttribute("aria-level", String(depth + 1));
+    row.setAttribute("aria-selected", String(this.edit.has(handle)));
     row.append(this.folder(row, handle), icon(iconOf(one)), create("span", { className: "name", textContent: one.name }));
     if (one.script) row.append(this.script(one));
     return row;
@@ -153,7 +162,7 @@ export class Hierarchy {
   keyOfFind(event) {
     if (event.key === "ArrowDown" || event.key === "Enter") {
       const sought = this.find.value.trim().toLowerCase();
-      const row = this.rows.find(({ handle }) => this.objects.get(handle).name.toLowerCase().includes(sought));
+      const row = this.rows.find(({ handle }) => this.objects.existing(handle).name.toLowerCase().includes(sought));
       if (row) this.edit.select([row.handle]);
       this.tree.focus();
     } else if (event.key === "Escape" && this.find.value) this.find.value = "";

@@ -16,7 +16,7 @@ export function listen(acts, paste, isOn, isAway) {
   window.addEventListener("paste", (event) => {
     if (!isOn() || event.defaultPrevented || isAway(event.target) || isWriting(event.target)) return;
     event.preventDefault();
-    paste(event.clipboardData.getData("text/plain"));
+    paste(event.clipboardData?.getData("text/plain") ?? "");
   });
   window.addEventListener("keydown", (event) => {
     if (!isOn() || event.defaultPrevented || event.altKey || isAway(event.target)) return;

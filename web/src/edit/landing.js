@@ -22,7 +22,7 @@ export class Landing {
   show(place) {
     if (!place && !this.mark.visible) return;
     this.mark.visible = Boolean(place);
-    if (place) this.mark.position.set(...place);
+    if (place) this.mark.position.fromArray(place);
     this.scene.change();
   }
 }

@@ -17,9 +17,19 @@ const LARGEST = 5 << 20; // bytes of a file: as text it is a third longer, and a
 const FILES = /\.(?:ttm|obj|stl|dae|urdf|ya?ml)$/i;
 
 export class Models {
+  /**
+   * @param {HTMLElement} shelf
+   * @param {HTMLInputElement} find
+   * @param {import("./edit.js").Edit} edit
+   */
   constructor(shelf, find, edit) {
-    Object.assign(this, { shelf, find, edit });
+    this.shelf = shelf;
+    this.find = find;
+    this.edit = edit;
+    /** @type {wire.Questions["models"][1]["groups"]} */
     this.groups = [];
+    /** @type {Map<string | undefined, Pick<wire.Model, "op" | "title">>} */
+    this.ops = new Map(); // by the names of the models that are shown
     this.taken = []; // boxes of what has been added without a drag, and is not told yet
     this.landing = new Landing(edit.scene);
     find.oninput = () => this.show();
@@ -47,7 +57,7 @@ export class Models {
 
   show() {
     const sought = this.find.value.trim().toLowerCase();
-    this.ops = new Map();
+    this.ops.clear();
     const made = this.groups.flatMap(({ name, models }) => {
       const found = models.filter(({ title }) => `${title} ${name}`.toLowerCase().includes(sought));
       return found.length ? [create("h3", { textContent: name }), create("div", { className: "cards", role: "group", "aria-label": name }, ...found.map((one) => this.card(one)))] : [];
@@ -118,8 +128,8 @@ export class Models {
     event.preventDefault();
     event.stopPropagation();
     if (event.repeat) return;
-    const { op, title } = this.ops.get(card.dataset.model);
-    this.putBeside(op, title);
+    const found = this.ops.get(card.dataset.model);
+    if (found) this.putBeside(found.op, found.title);
   }
 
   // Puts a model that was not dragged beside what stands where the camera looks.
@@ -135,7 +145,7 @@ export class Models {
     const { x, y } = view.aim;
     const now = performance.now();
     this.taken = this.taken.filter(({ until }) => until > now);
-    const others = edit.objects.children(WORLD).filter((one) => edit.objects.get(one).of !== "floor");
+    const others = edit.objects.children(WORLD).filter((one) => edit.objects.existing(one).of !== "floor");
     const boxes = [...others.map((one) => edit.seen.boxOf([one])), ...this.taken.map(({ box }) => box)];
     const isFree = (place) => boxes.every(({ min, max }) => ["x", "y"].some((axis) => place[axis] < min[axis] - half || place[axis] > max[axis] + half));
     const isSeen = (place) => [place.clone().project(camera)].every((at) => Math.abs(at.x) < SEEN && Math.abs(at.y) < SEEN && at.z < 1);
@@ -196,7 +206,7 @@ export class Models {
 function base64(file) {
   return new Promise((done, fail) => {
     const reader = new FileReader();
-    reader.onload = () => done(reader.result.split(",")[1] ?? "");
+    reader.onload = () => done(String(reader.result).split(",")[1] ?? "");
     reader.onerror = () => fail(new Error(`${file.name}: cannot be read`));
     reader.readAsDataURL(file);
   });

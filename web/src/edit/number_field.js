@@ -10,12 +10,23 @@ const SAID = 120; // ms between two values of a drag that are taken
 export const shown = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toFixed(digits))) : "");
 const fine = (value, digits) => (value && Math.abs(value) < 0.1 ? String(Number(value.toPrecision(digits))) : shown(value, digits));
 
+/**
+ * @typedef {HTMLInputElement & { fill: (value: any) => void, isDragged: boolean }} NumberField
+ * @typedef {{ take: (value: any, merge?: string) => any, wrong: (line: string) => void, undo: (merge: string) => any,
+ *   digits?: number, step?: number, low?: number | null, high?: number | null,
+ *   isWhole?: boolean, isFine?: boolean, mayBeEmpty?: boolean, title?: string }} NumberOptions
+ */
+
 // `take(value)` gets a new number, `wrong(line)` what is said of a bad one. While it is dragged, `take(value, merge)` gets
 // values with the key of the drag, and `undo(merge)` takes them back if the drag is cancelled. The element's `fill(value)` shows one,
 // unless somebody writes there. `isFine` shows small numbers, too; `mayBeEmpty`: nothing is null.
+/**
+ * @param {string} label
+ * @param {NumberOptions} options
+ */
 export function numberField(label, { take, wrong, undo, digits = 4, step = 0.1, low, high, isWhole = false, isFine = false, mayBeEmpty = false, ...more }) {
   const asText = (value) => (isFine ? fine : shown)(value, digits);
-  const field = create("input", { type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false, "aria-label": label, ...more });
+  const field = /** @type {NumberField} */ (create("input", { type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false, "aria-label": label, ...more }));
   let holds, taken; // the number that is told, and the text that has been taken since
   const written = () => field.value.trim().replace(",", ".");
   const counts = () => taken ?? asText(holds);
@@ -31,7 +42,7 @@ export function numberField(label, { take, wrong, undo, digits = 4, step = 0.1, 
     const text = written();
     const isNothing = text === "" && mayBeEmpty;
     const value = text === "" ? NaN : compute(text);
-    const isIn = Number.isFinite(value) && !(value < low) && !(value > high) && !(isWhole && value % 1);
+    const isIn = Number.isFinite(value) && value >= (low ?? -Infinity) && value <= (high ?? Infinity) && !(isWhole && value % 1);
     if (isNothing || isIn) {
       taken = isNothing ? "" : asText(value);
       field.value = taken;

@@ -5,20 +5,30 @@ import { matrixOf } from "./poses.js";
 export const WORLD = -1;
 const STRUCTURE = ["name", "alias", "type", "parent", "model", "script", "root"]; // what the tree shows
 
+/** @typedef {wire.Row & { matrix: import("three").Matrix4 }} SceneObject */
+
 export class Objects {
   constructor() {
-    this.clear();
+    /** @type {Map<number, SceneObject>} */
+    this.rows = new Map(); // by handle
+    /** @type {Map<number, number[]>} */
+    this.below = new Map(); // handles, by that of their parent
+    /** @type {Map<string, number>} */
+    this.names = new Map(); // handles, by name
+    /** @type {number | null} */
+    this.version = null;
   }
 
   clear() {
-    this.rows = new Map(); // by handle
-    this.below = new Map(); // handles, by that of their parent
-    this.names = new Map(); // handles, by name
+    this.rows.clear();
+    this.below.clear();
+    this.names.clear();
     this.version = null;
   }
 
   // Takes the topic's message; returns "missed" where something was missed before it, "tree" where names, parents or the
   // like have changed, "" where nothing but poses and values have.
+  /** @param {wire.TreeChange} change */
   take({ version, since, objects, gone }) {
     if (since !== null && since !== this.version) return "missed";
     let isNew = gone.length > 0;
@@ -42,8 +52,9 @@ export class Objects {
     this.names.clear();
     for (const { handle, name, parent } of [...this.rows.values()].sort((one, other) => one.handle - other.handle)) {
       const above = this.rows.has(parent) ? parent : WORLD;
-      if (!this.below.has(above)) this.below.set(above, []);
-      this.below.get(above).push(handle);
+      const siblings = this.below.get(above);
+      if (siblings) siblings.push(handle);
+      else this.below.set(above, [handle]);
       this.names.set(name, handle);
     }
   }
@@ -56,8 +67,13 @@ export class Objects {
     return this.rows.get(handle);
   }
 
+  // An object whose handle comes from the tree itself.
+  existing(handle) {
+    return /** @type {SceneObject} */ (this.rows.get(handle));
+  }
+
   named(name) {
-    return this.rows.get(this.names.get(name));
+    return this.get(this.names.get(name));
   }
 
   children(handle) {

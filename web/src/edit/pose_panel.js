@@ -9,8 +9,14 @@ const AXES = [["X", "x"], ["Y", "y"], ["Z", "z"]];
 const ANGLES = [["Alpha", "α"], ["Beta", "β"], ["Gamma", "γ"]];
 
 export class PosePanel {
+  /**
+   * @param {HTMLElement} element
+   * @param {import("./edit.js").Edit} edit
+   */
   constructor(element, edit) {
     this.edit = edit;
+    /** @type {number[]} */
+    this.numbers = []; // at the beginning of a drag, and what it has changed of them
     this.relative = create("select", { "aria-label": "Relative to", title: "The axes and origin of the numbers" });
     this.relative.append(...Object.entries(FRAMES_OF_NUMBERS).map(([value, words]) => new Option(words, value)));
     this.relative.value = kept("edit/relative", "world");
@@ -59,9 +65,11 @@ export class PosePanel {
 
   // What is not written anew stays as it is, to the last digit; in a drag, as it was at its beginning.
   take(number, value, merge) {
-    if (!merge || merge !== this.merge) this.numbers = numbersOf(seenFrom(this.frame, this.one.matrix));
+    const { one } = this;
+    if (!one) return; // it was removed while its number is dragged
+    if (!merge || merge !== this.merge) this.numbers = numbersOf(seenFrom(this.frame, one.matrix));
     this.merge = merge;
     this.numbers[number] = value;
-    return this.edit.place(new Map([[this.one.handle, this.frame.clone().multiply(matrixOfNumbers(this.numbers))]]), undefined, merge);
+    return this.edit.place(new Map([[one.handle, this.frame.clone().multiply(matrixOfNumbers(this.numbers))]]), undefined, merge);
   }
 }

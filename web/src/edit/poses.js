@@ -5,10 +5,15 @@ const DEGREE = Math.PI / 180;
 const ORDER = "XYZ"; // V-REP's alpha, beta, gamma: about its own x, then y, then z
 const ONE = new THREE.Vector3(1, 1, 1);
 
+/** @param {number[]} pose */
 export function matrixOf([x, y, z, qx, qy, qz, qw]) {
   return new THREE.Matrix4().compose(new THREE.Vector3(x, y, z), new THREE.Quaternion(qx, qy, qz, qw).normalize(), ONE);
 }
 
+/**
+ * @param {THREE.Matrix4} matrix
+ * @returns {[...position: [number, number, number], ...quaternion: [number, number, number, number]]}
+ */
 export function poseOf(matrix) {
   const [position, turn] = [new THREE.Vector3(), new THREE.Quaternion()];
   matrix.decompose(position, turn, new THREE.Vector3());
@@ -22,8 +27,10 @@ export function numbersOf(matrix) {
   return [x, y, z, ...[angles.x, angles.y, angles.z].map((one) => one / DEGREE)];
 }
 
+/** @param {number[]} numbers */
 export function matrixOfNumbers([x, y, z, ...angles]) {
-  const turn = new THREE.Quaternion().setFromEuler(new THREE.Euler(...angles.map((one) => one * DEGREE), ORDER));
+  const [alpha, beta, gamma] = angles.map((one) => one * DEGREE);
+  const turn = new THREE.Quaternion().setFromEuler(new THREE.Euler(alpha, beta, gamma, ORDER));
   return new THREE.Matrix4().compose(new THREE.Vector3(x, y, z), turn, ONE);
 }
 

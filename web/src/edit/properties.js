@@ -45,10 +45,19 @@ const same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
 
 export class Properties {
   // `openText()` shows the scene as text, where what has no field can be written.
+  /**
+   * @param {HTMLElement} element
+   * @param {import("./edit.js").Edit} edit
+   * @param {() => void} openText
+   */
   constructor(element, edit, openText) {
-    Object.assign(this, { element, edit, openText });
+    this.element = element;
+    this.edit = edit;
+    this.openText = openText;
+    /** @type {Record<string, wire.Property[]> | null} */
     this.types = null; // the keys of each type, once they have been asked for
     this.built = ""; // for what there are fields
+    /** @type {((one: import("./objects.js").SceneObject) => void)[]} */
     this.fills = []; // show the values of now
     edit.on("mode", () => this.ask());
     edit.on("selection", () => this.show());
@@ -64,7 +73,7 @@ export class Properties {
   }
 
   get ones() {
-    return this.edit.selected.map((one) => this.edit.objects.get(one)).filter(Boolean);
+    return this.edit.selected.flatMap((one) => this.edit.objects.get(one) ?? []);
   }
 
   // The keys that all of what is selected have.
@@ -95,10 +104,14 @@ export class Properties {
     if (one?.script && this.ones.length === 1) rows.push(this.parameters(one));
     if (isPlain) rows.push(create("p", { textContent: "A part of a vehicle: it has no properties of its own." }));
     this.element.replaceChildren(...rows.filter(Boolean));
-    this.element.parentElement.scrollTop = 0;
+    this.element.parentElement?.scrollTo(0, 0);
   }
 
   // Look, physics and camera are open; others stand folded, unless one of their keys says something.
+  /**
+   * @param {wire.Property[]} keys
+   * @param {Partial<import("./objects.js").SceneObject>} [one]
+   */
   grouped(keys, { values = {}, type } = {}) {
     const rows = [];
     const groups = new Map();
@@ -149,21 +162,24 @@ export class Properties {
     return [name, field("alias", ({ alias }) => alias, (wanted) => this.set("alias", wanted), "Its name in 4.x paths, which siblings may share; alias: in the scene's file")];
   }
 
+  /** @param {wire.Property} told */
   row(told) {
     const said = { ...told, unit: this.unitOf(told) };
     const { key, kind, unit } = said;
     const made = (KINDS[kind] ?? other)(this, said);
     const row = this.line(key, hintOf(said), ...[made].flat());
-    const parts = key === "size" ? PARTS[this.ones.at(-1).type] : undefined;
-    if (parts ?? NAMES[key]) row.firstChild.textContent = parts?.join(", ") ?? NAMES[key];
-    if (unit) row.firstChild.append(create("small", { textContent: ` ${unit === "rad" ? "°" : unit}` }));
+    const parts = key === "size" ? PARTS[this.ones.at(-1)?.type ?? ""] : undefined;
+    const [label] = row.children;
+    if (parts ?? NAMES[key]) label.textContent = parts?.join(", ") ?? NAMES[key];
+    if (unit) label.append(create("small", { textContent: ` ${unit === "rad" ? "°" : unit}` }));
     row.classList.add(kind);
     return row;
   }
 
   // Those of a joint depend on its type, and on what its motor does.
+  /** @param {wire.Property} property */
   unitOf({ key, unit }) {
-    const { type, values } = this.ones.at(-1);
+    const [{ type, values }] = this.ones.slice(-1);
     if (type !== "joint" || !JOINTS[values.type]) return unit ?? "";
     const { place, speed, force } = JOINTS[values.type];
     const target = { position: place, velocity: speed, force }[values.mode] ?? "";
@@ -174,18 +190,19 @@ export class Properties {
   density() {
     if (!this.ones.every((each) => volumeOf(this.whole(each)))) return null;
     const take = (value, merge) => {
+      /** @type {wire.Set[]} */
       const operations = this.ones.map((each) => ({ do: "set", object: each.handle, values: { mass: value * volumeOf(this.whole(each)) } }));
       return this.edit.do(operations, this.edit.named("Change"), merge);
     };
     const field = numberField("density", { take, ...this.answers, low: 0, step: 100, digits: 2 });
     this.fills.push((each) => field.fill((each.values.mass ?? 0) / volumeOf(this.whole(each))));
     const row = this.line("density", "Another density sets the mass", field);
-    row.firstChild.append(create("small", { textContent: " kg/m³" }));
+    row.firstElementChild?.append(create("small", { textContent: " kg/m³" }));
     return row;
   }
 
   whole(one) {
-    const size = (this.types[one.type] ?? []).find(({ key }) => key === "size")?.default;
+    const size = (this.types?.[one.type] ?? []).find(({ key }) => key === "size")?.default;
     return { type: one.type, size: one.values.size ?? size };
   }
 
@@ -220,8 +237,9 @@ export class Properties {
 }
 
 // What a value is, what is allowed, and its key in the scene's file.
+/** @param {wire.Property} property */
 function hintOf({ key, what, unit, least, most }) {
-  const isLimited = typeof least === "number" && most < MOST_SHOWN;
+  const isLimited = typeof least === "number" && typeof most === "number" && most < MOST_SHOWN;
   const isAngle = unit === "rad";
   const [low, high] = [least, most].map((one) => (isAngle && isLimited ? degrees(one) : one));
   const limits = isLimited && [low, "to", high, isAngle ? "°" : unit].filter((one) => one !== "").join(" ");

@@ -10,8 +10,17 @@ const PACE = 8; // px
 
 export class RowDrag {
   // `range(handle)` selects all rows up to that one; `twice()` hears of a double click.
+  /**
+   * @param {HTMLElement} tree
+   * @param {import("./edit.js").Edit} edit
+   * @param {(handle: number) => void} range
+   * @param {() => void} twice
+   */
   constructor(tree, edit, range, twice) {
-    Object.assign(this, { tree, edit, range, twice });
+    this.tree = tree;
+    this.edit = edit;
+    this.range = range;
+    this.twice = twice;
     tree.addEventListener("pointerdown", (event) => this.down(event));
     window.addEventListener("keydown", (event) => event.key === "Escape" && this.end(), true);
   }
@@ -28,8 +37,8 @@ export class RowDrag {
     const before = this.pressed;
     this.pressed = { handle, time: event.timeStamp };
     const isSecond = before?.handle === handle && event.timeStamp - before.time < DOUBLE;
-    this.began = { handle, x: event.clientX, y: event.clientY, isSecond };
-    follow(event, (moved) => this.began && this.move(moved), (ended, isCancelled) => (isCancelled ? this.end() : this.began && this.up(ended)));
+    this.began = { handle, x: event.clientX, y: event.clientY, isSecond, isDone: false };
+    follow(event, (moved) => this.began && this.move(moved, this.began), (ended, isCancelled) => (isCancelled ? this.end() : this.began && this.up(ended, this.began)));
     if (event.shiftKey) this.range(handle);
     else if (event.ctrlKey || event.metaKey) this.edit.toggle(handle);
     else if (!this.edit.has(handle)) this.edit.select([handle]);
@@ -37,11 +46,10 @@ export class RowDrag {
     this.began.isDone = true; // there is nothing left to do when it is let go
   }
 
-  move(event) {
-    const { x, y } = this.began;
+  move(event, { x, y }) {
     if (!this.label) {
       if (Math.hypot(event.clientX - x, event.clientY - y) < FAR || !this.edit.selected.every((one) => this.edit.mayMove(one))) return;
-      const names = this.edit.selected.map((one) => this.edit.objects.get(one).name);
+      const names = this.edit.selected.map((one) => this.edit.objects.existing(one).name);
       this.label = create("div", { className: "drag-label", textContent: names.length > 1 ? `${names.length} objects` : names[0] });
       document.body.append(this.label);
     }
@@ -59,13 +67,12 @@ export class RowDrag {
     const isFine = handle !== undefined && this.edit.selected.every((one) => this.edit.objects.mayHangOn(one, handle));
     this.to = isFine ? handle : undefined;
     for (const row of this.tree.querySelectorAll(".aimed")) row.classList.remove("aimed");
-    if (isFine && handle !== WORLD) over.closest("[data-handle]").classList.add("aimed");
+    if (isFine && handle !== WORLD) over?.closest("[data-handle]")?.classList.add("aimed");
     this.tree.classList.toggle("aimed", isFine && handle === WORLD);
-    this.label.classList.toggle("wrong", !isFine);
+    this.label?.classList.toggle("wrong", !isFine);
   }
 
-  up(event) {
-    const { handle, isDone, isSecond } = this.began;
+  up(event, { handle, isDone, isSecond }) {
     const { label, to } = this;
     this.end();
     if (label && to !== undefined) this.edit.hang(to, event.shiftKey);

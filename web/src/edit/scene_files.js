@@ -7,6 +7,7 @@ const stem = (path) => nameOf(path).replace(/\.\w+$/, "");
 const KINDS = { own: "Yours", recent: "Opened last", package: "Of the package" };
 
 export class SceneFiles {
+  /** @param {import("./edit.js").Edit} edit */
   constructor(edit) {
     this.edit = edit;
     edit.on("objects", () => {
@@ -25,7 +26,7 @@ export class SceneFiles {
     const question = at("draft");
     question.hidden = !draft;
     if (!draft || question.dataset.of === String(draft.saved)) return;
-    question.dataset.of = draft.saved;
+    question.dataset.of = String(draft.saved);
     const when = new Date(1000 * draft.saved).toLocaleString();
     const choice = (which, textContent) => create("button", { type: "button", textContent, onclick: () => this.act("draft", { draft: which }) });
     question.replaceChildren(`${draft.file ? nameOf(draft.file) : "A new scene"} was not saved (${when}). `, choice("take", "Go on with it"), choice("drop", "Forget it"));
@@ -85,7 +86,7 @@ export class SceneFiles {
   }
 
   saveModel() {
-    const one = this.edit.objects.get(this.edit.last);
+    const one = this.edit.objects.existing(this.edit.last);
     if (this.whyNoModel()) return this.edit.wrong(this.whyNoModel());
     this.askForFile(`Save ${one.name} as a model`, { label: "Name", value: `${one.name}.yaml` }, "save_model", { object: one.handle });
   }

@@ -13,8 +13,13 @@ const QUIET = 700; // ms without a key before it is taken; at once where one lea
 
 export class SceneText {
   // `parts`: part (the whole), text, said, title, question.
+  /** @param {import("./edit.js").Edit} edit */
   constructor(parts, edit) {
-    Object.assign(this, { parts, edit });
+    this.parts = parts;
+    this.edit = edit;
+    /** @type {EditorView | undefined} */
+    this.made = undefined;
+    /** @type {number | undefined} */
     this.revision = undefined;
     this.dirty = false;
     edit.on("objects", () => this.follow());
@@ -26,8 +31,12 @@ export class SceneText {
 
   show(on) {
     this.parts.part.hidden = !on;
-    if (on) this.view ??= this.begin();
     if (on) this.read();
+  }
+
+  // The editor, which is made when the text is shown first.
+  get view() {
+    return (this.made ??= this.begin());
   }
 
   begin() {
@@ -49,16 +58,17 @@ export class SceneText {
   }
 
   async read() {
+    const { view } = this;
     if (this.reading) return;
     this.reading = true;
     try {
       const { text, file, revision } = await this.edit.ask("scene_text");
       if (this.dirty) return;
       this.revision = revision;
-      this.parts.title.textContent = file.split("/").pop() || "not saved yet";
+      this.parts.title.textContent = file?.split("/").pop() || "not saved yet";
       this.parts.title.title = file;
       this.filling = true;
-      fillWith(this.view, text, Transaction.addToHistory.of(false)); // which the scene's own undo has
+      fillWith(view, text ?? "", Transaction.addToHistory.of(false)); // which the scene's own undo has
       this.filling = false;
       this.say("");
     } catch (error) {
@@ -129,6 +139,7 @@ export class SceneText {
 
   mark(error) {
     const { doc } = this.view.state;
+    /** @type {import("@codemirror/lint").Diagnostic[]} */
     const found = [];
     if (error?.line) {
       const { from, to } = doc.line(Math.min(Math.max(1, error.line), doc.lines));

@@ -1,12 +1,13 @@
 // What is seen in the scene of the objects: which one is under the mouse, which have an outline, how large they are.
 import * as THREE from "three";
-import { ACCENT } from "../scene/looks.js";
+import { ACCENT, isSingleMesh } from "../scene/looks.js";
 
 const HOVERED = 0xffffff;
 const ALSO = 0xf4a261; // what was selected before the last one
 const MOST_LIT = 150; // meshes with an outline
 
 export class Seen {
+  /** @param {import("./edit.js").Edit} edit */
   constructor(edit) {
     this.edit = edit;
   }
@@ -29,24 +30,30 @@ export class Seen {
     return [...this.objects.all()].filter(({ of, vehicle }) => of === "scene" || (vehicle && vehicles.has(vehicle)));
   }
 
-  // What has an outline, as Outline takes it.
+  /**
+   * What has an outline, as Outline takes it.
+   * @returns {[meshes: THREE.Mesh[], color: number, pixels: number][]}
+   */
   lit() {
     const { hovered, last, selected } = this.edit;
+    /** @type {ReturnType<Seen["lit"]>} */
     const lit = [[this.meshesOf(selected.slice(0, -1)), ALSO, 2.5], [this.meshesOf([last]), ACCENT, 2.5]];
     if (hovered !== undefined && !this.edit.has(hovered)) lit.push([this.meshesOf([hovered]), HOVERED, 1.5]);
-    return lit.filter(([meshes]) => meshes.length).map(([meshes, ...how]) => [meshes.slice(0, MOST_LIT), ...how]);
+    return lit.filter(([meshes]) => meshes.length).map(([meshes, color, pixels]) => [meshes.slice(0, MOST_LIT), color, pixels]);
   }
 
   // Of objects, and of all that hangs on them.
   meshesOf(handles) {
     const all = new Set(handles.filter((one) => this.objects.get(one)).flatMap((one) => this.objects.withBelow(one)));
-    const names = new Set([...all].flatMap((one) => this.namesOf(this.objects.get(one))));
+    const names = new Set([...all].flatMap((one) => this.namesOf(this.objects.existing(one))));
     const shown = all.size ? this.edit.scene.things().filter((one) => names.has(one.userData.said.ns)) : [];
+    /** @type {THREE.Mesh[]} */
     const meshes = [];
-    for (const one of [...shown, ...[...all].map((each) => this.edit.glyphs.get(each)).filter(Boolean)]) one.traverse((part) => part.isMesh && !part.isInstancedMesh && meshes.push(part));
+    for (const one of [...shown, ...[...all].map((each) => this.edit.glyphs.get(each)).filter(Boolean)]) one.traverse((part) => isSingleMesh(part) && meshes.push(part));
     return meshes;
   }
 
+  /** @param {import("./objects.js").SceneObject} object */
   namesOf({ name, root, vehicle }) {
     return root ? [name, vehicle] : [name];
   }
@@ -57,7 +64,7 @@ export class Seen {
     const box = new THREE.Box3();
     for (const mesh of this.meshesOf(handles)) box.expandByObject(mesh, true);
     if (!box.isEmpty()) return box;
-    for (const one of handles) box.expandByPoint(new THREE.Vector3().setFromMatrixPosition(this.objects.get(one).matrix));
+    for (const one of handles) box.expandByPoint(new THREE.Vector3().setFromMatrixPosition(this.objects.existing(one).matrix));
     return box;
   }
 }

@@ -10,6 +10,7 @@ export class Batch {
   constructor(world) {
     this.group = new THREE.Group();
     world.add(this.group);
+    /** @type {[THREE.InstancedMesh, THREE.Object3D[]][]} */
     this.painted = []; // [painted at once, the objects]
   }
 
@@ -38,7 +39,7 @@ export class Batch {
     const color = new THREE.Color();
     objects.forEach((object, number) => {
       object.children[0].visible = false;
-      together.setColorAt(number, color.setRGB(...object.userData.said.color.slice(0, 3)));
+      together.setColorAt(number, color.fromArray(object.userData.said.color));
     });
     together.castShadow = together.receiveShadow = true;
     together.frustumCulled = false;

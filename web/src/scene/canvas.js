@@ -7,7 +7,7 @@ const SLOW = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 function paintsInSoftware() {
   const gl = document.createElement("canvas").getContext("webgl2");
   const names = gl?.getExtension("WEBGL_debug_renderer_info");
-  const slow = Boolean(gl) && SLOW.test(names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : gl.getParameter(gl.RENDERER));
+  const slow = gl !== null && SLOW.test(names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : gl.getParameter(gl.RENDERER));
   gl?.getExtension("WEBGL_lose_context")?.loseContext();
   return slow;
 }
@@ -22,6 +22,7 @@ export class Canvas {
     this.dom = this.renderer?.domElement ?? document.createElement("canvas");
     this.dom.style.cssText = "display:block;width:100%;height:100%;touch-action:none;outline-offset:-3px";
     element.append(this.dom);
+    this.onFit = (_width, _height) => {};
     this.after = []; // what is done once the next picture is there
     this.frames = 0;
     new ResizeObserver(() => this.fit()).observe(element);
@@ -50,7 +51,7 @@ export class Canvas {
     const { clientWidth: width, clientHeight: height } = this.element;
     if (!width || !height) return;
     this.renderer?.setSize(width, height, false);
-    this.onFit?.(width, height);
+    this.onFit(width, height);
     this.draw(); // at once, or it would be empty for a moment
   }
 

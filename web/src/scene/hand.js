@@ -7,10 +7,17 @@ const STAYS = 500; // ms, that handles stay after the mouse has gone
 const SAID = 30; // ms between two words on where something is dragged
 const DOUBLE = 400; // ms between two clicks that are one double click
 
+/**
+ * @typedef {{ place: THREE.Vector3, heading: number }} Place
+ * @typedef {{ name: string, handle: wire.Marker, drag: Drag, isNew: boolean, now?: Place, saying?: ReturnType<typeof setTimeout> }} Dragged
+ */
+
 export class Hand {
+  /** @param {import("./scene.js").Scene} scene */
   constructor(scene) {
     this.scene = scene;
     this.hovered = null; // the name of what is under the mouse, or was a moment ago
+    /** @type {Dragged | null} */
     this.dragged = null;
     this.clicked = -DOUBLE;
     this.caster = new THREE.Raycaster();
@@ -29,7 +36,8 @@ export class Hand {
   pick(event) {
     const here = this.scene.things().filter((one) => one.visible && one.parent);
     const [met] = this.ray(event).intersectObjects(here, true);
-    let object = met?.object;
+    /** @type {THREE.Object3D | null} */
+    let object = met?.object ?? null;
     while (object && !object.userData.said) object = object.parent;
     return object ? { name: object.userData.said.ns, point: met.point } : null;
   }
@@ -123,7 +131,7 @@ export class Hand {
     if (!dragged) return;
     const now = dragged.drag.to(this.ray(event).ray);
     if (!now) return;
-    if (dragged.isNew) this.sayDrag("start", { place: dragged.drag.place, heading: dragged.drag.heading });
+    if (dragged.isNew) this.sayDrag(dragged, "start", { place: dragged.drag.place, heading: dragged.drag.heading });
     if (dragged.isNew) this.scene.view.hold();
     dragged.isNew = false;
     dragged.now = now;
@@ -134,14 +142,14 @@ export class Hand {
   sayMove(dragged) {
     clearTimeout(dragged.saying);
     dragged.saying = undefined;
-    if (this.dragged === dragged) this.sayDrag("move", dragged.now);
+    if (this.dragged === dragged && dragged.now) this.sayDrag(dragged, "move", dragged.now);
   }
 
   drop() {
     const { dragged } = this;
-    if (dragged && !dragged.isNew) {
+    if (dragged?.now) {
       if (dragged.saying !== undefined) this.sayMove(dragged);
-      this.sayDrag("end", dragged.now);
+      this.sayDrag(dragged, "end", dragged.now);
       this.scene.view.letGo();
     }
     this.dragged = null;
@@ -149,8 +157,7 @@ export class Hand {
     this.scene.change();
   }
 
-  sayDrag(phase, { place, heading }) {
-    const { layer, ns } = this.dragged.handle;
+  sayDrag({ handle: { layer, ns } }, phase, { place, heading }) {
     const turn = [0, 0, Math.sin(heading / 2), Math.cos(heading / 2)];
     this.scene.say({ drag: phase, server: layer, name: ns, pose: [...place.toArray(), ...turn] });
   }

@@ -34,7 +34,10 @@ export const isFloor = ({ layer, ns }) => layer === "view/surroundings" && ns ==
 
 const known = new Map();
 
-// A material for a colour r g b a, 0..1, which all that has this colour shares.
+/**
+ * A material for a colour r g b a, 0..1, which all that has this colour shares.
+ * @param {number[]} color
+ */
 export function material([r, g, b, a], lit = true) {
   const key = `${r} ${g} ${b} ${a} ${lit}`;
   let found = known.get(key);
@@ -46,6 +49,9 @@ export function material([r, g, b, a], lit = true) {
   }
   return found;
 }
+
+/** @type {(one: THREE.Object3D) => one is THREE.Mesh} */
+export const isSingleMesh = (one) => one instanceof THREE.Mesh && !(one instanceof THREE.InstancedMesh);
 
 // Frees what a part of the scene alone has used.
 export function dispose(object) {

@@ -40,7 +40,7 @@ function solid(shape) {
   return ({ color, scale, lit }) => {
     const group = new THREE.Group(); // the pose is the group's, the size is the mesh's
     const mesh = new THREE.Mesh(SHAPES[shape], material(color, lit));
-    mesh.scale.set(...scale.map((one) => one || 1e-6));
+    mesh.scale.fromArray(scale.map((one) => one || 1e-6));
     return group.add(shade(mesh, color[3]));
   };
 }
@@ -77,9 +77,8 @@ function lines({ kind, color, scale, points, colors, layer }) {
   const geometry = new LineSegmentsGeometry().setPositions(ends);
   if (shades) geometry.setColors(shades.filter((_, number) => number % 4 !== 3));
   const width = layer.startsWith("view/") ? { linewidth: ABOUT } : { worldUnits: true, linewidth: Math.max(scale[0], THINNEST) };
-  const look = { ...width, vertexColors: Boolean(shades) };
-  if (!shades) look.color = new THREE.Color(...color.slice(0, 3));
-  const made = new LineSegments2(geometry, new LineMaterial({ ...look, opacity: color[3], transparent: color[3] < 1 }));
+  const look = shades ? { vertexColors: true } : { color: new THREE.Color(...color.slice(0, 3)) };
+  const made = new LineSegments2(geometry, new LineMaterial({ ...width, ...look, opacity: color[3], transparent: color[3] < 1 }));
   made.raycast = () => {};
   return made;
 }
@@ -96,7 +95,8 @@ function many(shape) {
   return ({ color, scale, points, colors }) => {
     const count = points.length / 3;
     const mesh = new THREE.InstancedMesh(SHAPES[shape], material(colors ? [1, 1, 1, color[3]] : color), count);
-    const matrix = new THREE.Matrix4().makeScale(...scale.map((one) => one || 1e-6));
+    const [x, y, z] = scale.map((one) => one || 1e-6);
+    const matrix = new THREE.Matrix4().makeScale(x, y, z);
     const shadeOf = new THREE.Color();
     for (let one = 0; one < count; one++) {
       mesh.setMatrixAt(one, matrix.setPosition(points[3 * one], points[3 * one + 1], points[3 * one + 2]));
@@ -119,13 +119,13 @@ function dots({ color, scale, points, colors }) {
 function words({ text, color, scale, layer }) {
   const ink = `rgb(${color.slice(0, 3).map((one) => Math.round(255 * one)).join(" ")})`;
   const isLabel = layer.startsWith("view/"); // of the simulation's own: always as large as what else is to be read
-  const made = new Words(text, { color: ink, size: isLabel ? LABEL : scale[2], fixed: isLabel, plate: isLabel ? undefined : null });
+  const made = new Words(text, { color: ink, size: isLabel ? LABEL : scale[2], fixed: isLabel, plate: isLabel ? undefined : "" });
   return made;
 }
 
 function triangles({ color, scale, points, colors, lit }) {
   const mesh = colors ? painted(points, colors) : shade(new THREE.Mesh(facets(points), material(color, lit)), color[3]);
-  mesh.scale.set(...scale.map((one) => one || 1));
+  mesh.scale.fromArray(scale.map((one) => one || 1));
   return new THREE.Group().add(mesh);
 }
 
@@ -155,7 +155,7 @@ function corners(points) {
 function mesh(said, changed) {
   const { mesh: address, own, color, scale } = said;
   const group = new THREE.Group();
-  group.scale.set(...scale.map((one) => one || 1));
+  group.scale.fromArray(scale.map((one) => one || 1));
   const outer = new THREE.Group().add(group);
   load(address).then(
     (loaded) => {

@@ -12,6 +12,7 @@ export class Outline {
   }
 
   // `lit`: [[meshes, color, pixels], ...]
+  /** @param {[meshes: THREE.Mesh[], color: number, pixels: number][]} lit */
   show(lit) {
     this.scene.clear();
     lit.forEach(([meshes, color, pixels], number) => this.add(meshes, color, pixels, number + 1));
@@ -24,11 +25,11 @@ export class Outline {
       return this.paint(reference, color, [pixels * Math.cos(angle), pixels * Math.sin(angle)], false);
     });
     for (const mesh of meshes) {
-      for (const [order, material] of [[2 * reference, mask], ...rims.map((rim) => [2 * reference + 1, rim])]) {
+      for (const material of [mask, ...rims]) {
         const copy = new THREE.Mesh(mesh.geometry, material);
         copy.matrixAutoUpdate = copy.matrixWorldAutoUpdate = false;
         copy.matrixWorld = mesh.matrixWorld; // the same, which moves
-        copy.renderOrder = order;
+        copy.renderOrder = material === mask ? 2 * reference : 2 * reference + 1;
         copy.frustumCulled = false;
         this.scene.add(copy);
       }

@@ -11,6 +11,7 @@ export class Pointer {
     this.element = element;
     this.acts = acts;
     this.fingers = new Map();
+    /** @type {"orbit" | "pan" | "pinch" | "drag" | null} */
     this.does = null;
     const on = (name, act, options) => element.addEventListener(name, act, options);
     on("pointerdown", (event) => this.down(event));
@@ -49,7 +50,7 @@ export class Pointer {
     if (Math.hypot(event.clientX - this.began.clientX, event.clientY - this.began.clientY) > STILL) this.isClick = false;
     if (this.isClick) return;
     if (this.does === "drag") this.acts.drag(event);
-    else if (this.does in this.acts) this.acts[this.does](right, down);
+    else if (this.does && this.does in this.acts) this.acts[this.does](right, down);
   }
 
   pinch(event, right, down) {

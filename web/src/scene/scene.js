@@ -1,6 +1,6 @@
 // The scene: what the node tells is shown, and what the mouse does to it is told to the node.
 import * as THREE from "three";
-import { ACCENT, isFloor, quality } from "./looks.js";
+import { ACCENT, isFloor, isSingleMesh, quality } from "./looks.js";
 import { Batch } from "./batch.js";
 import { Canvas } from "./canvas.js";
 import { Gizmo } from "./gizmo.js";
@@ -23,13 +23,24 @@ const LAYERS = { path: "view/path", command: "view/command", forces: "view/force
 const SHOWN = { frames: false, path: true, command: true, forces: false, handles: true, labels: true, marks: true };
 
 export class Scene {
+  /**
+   * @param {HTMLElement} element
+   * @param {{ say: (message: wire.Said) => void }} node
+   */
   constructor(element, { say }) {
     this.say = say;
     this.followedVehicle = "";
     this.pushes = 0.5; // N
     this.views = [BEHIND, FREE];
     this.selected = "";
+    /** @type {Map<string, string>} */
+    this.bodies = new Map(); // name of a vehicle -> what its frames begin with
+    /** @type {Map<string, THREE.Object3D>} */
+    this.handles = new Map(); // [server, name] -> the place of a handle
+    this.onViews = this.onLook = this.onSelect = () => {}; // what the page shows of them follows
+    /** @type {import("../replay.js").Replay | null} */
     this.replay = null; // the Replay, while it shows a flight
+    /** @type {import("../edit/edit.js").Edit | null} */
     this.editing = null; // who edits the scene: Edit, while its panel is open
     this.world = new THREE.Scene();
     this.world.matrixWorldAutoUpdate = false;
@@ -86,14 +97,15 @@ export class Scene {
   // Looks what there is, after frames or markers have come or gone.
   sort() {
     this.tree.isNew = false;
-    this.bodies = new Map(); // name of a vehicle -> what its frames begin with
-    this.handles = new Map(); // [server, name] -> the place of a handle
+    this.bodies.clear();
+    this.handles.clear();
     for (const object of this.tree.markers.values()) {
       const { layer, ns, kind, frame } = object.userData.said;
       if (layer === BODIES && frame.endsWith(BASE)) this.bodies.set(ns, frame.slice(0, -BASE.length));
       if (kind === "handle") this.handles.set(key(layer, ns), object);
     }
-    if (!this.bodies.has(this.vehicle) && this.bodies.size) this.followedVehicle = this.bodies.keys().next().value;
+    const [first] = this.bodies.keys();
+    if (!this.bodies.has(this.vehicle) && first !== undefined) this.followedVehicle = first;
     if (this.selected && !this.meshesOf(this.selected).length && !this.handleOf(this.selected)) this.select("");
     this.offerViews();
     this.batch.build(this.tree.markers.values());
@@ -130,7 +142,7 @@ export class Scene {
     if (String(views) === String(this.views)) return;
     this.views = views;
     this.turn(views.includes(this.wanted) ? this.wanted : views.includes(this.view.name) ? this.view.name : BEHIND);
-    this.onViews?.();
+    this.onViews();
   }
 
   // ---- what one sees
@@ -147,12 +159,12 @@ export class Scene {
     this.change();
     if (view === this.told) return;
     this.told = view;
-    this.onLook?.(view);
+    this.onLook();
   }
 
   // Looks at something by its name, or at the vehicle, from near; at all there is if there is no vehicle.
   frame(name = this.selected || this.vehicle) {
-    const isThere = this.bodies?.has(this.vehicle);
+    const isThere = this.bodies.has(this.vehicle);
     if (this.editing?.last !== undefined) this.lookAt(this.editing.seen.meshesOf(this.editing.selected));
     else if (name === this.vehicle && isThere && this.view.name === BEHIND) this.view.reset();
     else this.lookAt(isThere || this.selected ? this.meshesOf(name) : this.meshes());
@@ -187,7 +199,7 @@ export class Scene {
   select(name) {
     if (name === this.selected) return;
     this.selected = name;
-    this.onSelect?.(name);
+    this.onSelect();
     this.rearrange();
   }
 
@@ -214,7 +226,7 @@ export class Scene {
     this.camera.updateProjectionMatrix();
     this.unit = (2 * Math.tan(THREE.MathUtils.degToRad(FOV / 2))) / height; // m of a pixel, at 1 m
     Words.unit = this.unit;
-    this.world.traverse((one) => one.fixed && one.fit());
+    this.world.traverse((one) => one instanceof Words && one.fixed && one.fit());
   }
 
   paint(renderer, seconds) {
@@ -245,7 +257,7 @@ export class Scene {
 
   get followed() {
     if (this.view.name !== BEHIND) return this.tree.byName.get(this.view.name);
-    return this.tree.byName.get(`${this.bodies?.get(this.vehicle) ?? ""}${TRACK}`);
+    return this.tree.byName.get(`${this.bodies.get(this.vehicle) ?? ""}${TRACK}`);
   }
 
   // Where a vehicle is in the world, undefined where that is not known.
@@ -255,7 +267,7 @@ export class Scene {
   }
 
   baseOf(vehicle) {
-    return this.bodies?.has(vehicle) ? this.tree.byName.get(this.bodies.get(vehicle) + BASE) : undefined;
+    return this.bodies.has(vehicle) ? this.tree.byName.get(this.bodies.get(vehicle) + BASE) : undefined;
   }
 
   // ---- what has handles
@@ -269,8 +281,8 @@ export class Scene {
 
   // The handle of a vehicle, a sphere or an object. That of a vehicle alone has another name than this.
   handleOf(name) {
-    const own = this.handles?.get(key(TARGETS, name)) ?? this.handles?.get(key(OBJECTS, name));
-    if (own || !this.bodies?.has(name)) return own;
+    const own = this.handles.get(key(TARGETS, name)) ?? this.handles.get(key(OBJECTS, name));
+    if (own || !this.bodies.has(name)) return own;
     return [...this.handles.values()].find((one) => one.userData.said.layer === TARGETS && !this.looks(TARGETS, one.userData.said.ns));
   }
 
@@ -284,16 +296,18 @@ export class Scene {
   }
 
   meshesOf(name) {
+    /** @type {THREE.Mesh[]} */
     const meshes = [];
     for (const object of this.things()) {
       if (object.userData.said.ns !== name) continue;
-      object.traverse((one) => one.isMesh && !one.isInstancedMesh && meshes.push(one));
+      object.traverse((one) => isSingleMesh(one) && meshes.push(one));
     }
     return meshes;
   }
 
   mark() {
     if (this.editing) return this.outline.show(this.editing.seen.lit());
+    /** @type {[THREE.Mesh[], number, number][]} */
     const lit = [];
     if (this.hand.hovered && this.hand.hovered !== this.selected) lit.push([this.meshesOf(this.hand.hovered), HOVERED, 1.5]);
     if (this.selected) lit.push([this.meshesOf(this.selected), ACCENT, 2.5]);

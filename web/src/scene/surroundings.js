@@ -5,6 +5,7 @@ import { quality } from "./looks.js";
 const TO_SUN = new THREE.Vector3(-0.34, 0.3, 0.89).normalize();
 const BELOW = 0x6b6966, ABOVE = 0x858a91, SUN = 0x8a857a; // what a surface gets of each, as in scene_markers.py
 // Elevation in degrees, and the colour there.
+/** @type {[elevation: number, color: number[]][]} */
 const BANDS = [
   [-90, [0.72, 0.78, 0.68]], [-4, [0.8, 0.86, 0.82]], [-0.5, [0.9, 0.94, 0.95]], [1.5, [0.89, 0.945, 0.985]], [6, [0.7, 0.845, 0.975]],
   [20, [0.52, 0.73, 0.95]], [45, [0.42, 0.65, 0.92]], [90, [0.3, 0.54, 0.86]],
@@ -132,10 +133,11 @@ function marks() {
 function strip(width, height, color, line, write) {
   const canvas = document.createElement("canvas");
   Object.assign(canvas, { width: width * DENSE, height: height * DENSE });
-  const pen = canvas.getContext("2d");
+  const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   Object.assign(pen, { font: `500 ${0.13 * DENSE}px system-ui, "DejaVu Sans", sans-serif`, textAlign: "center", textBaseline: "middle" });
   pen.fillStyle = color;
-  pen.fillRect(...line.map((metres) => metres * DENSE));
+  const [left, top, wide, high] = line.map((metres) => metres * DENSE);
+  pen.fillRect(left, top, wide, high);
   pen.fillStyle = "#1a1f29";
   write((words, right, down) => pen.fillText(words, right * DENSE, down * DENSE));
   const map = new THREE.CanvasTexture(canvas);

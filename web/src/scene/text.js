@@ -11,7 +11,11 @@ export class Words extends THREE.Sprite {
   // `size`: m of a line, or with `fixed` CSS pixels, near and far.
   constructor(text, { color = "#1a1f29", plate = "rgba(255,255,255,0.78)", size = 0.05, fixed = false } = {}) {
     super(new THREE.SpriteMaterial({ sizeAttenuation: !fixed, transparent: true, depthWrite: false, depthTest: !fixed }));
-    Object.assign(this, { color, plate, size, fixed });
+    this.color = color;
+    this.plate = plate;
+    this.size = size;
+    this.fixed = fixed;
+    this.pixels = [0, 0]; // width and height of what is painted
     this.center.set(0.5, 0);
     this.renderOrder = 5;
     this.raycast = () => {};
@@ -31,7 +35,7 @@ export class Words extends THREE.Sprite {
     this.text = text;
     const lines = text.split("\n");
     const canvas = document.createElement("canvas");
-    const pen = canvas.getContext("2d");
+    const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     const font = `500 ${FONT}px system-ui, "DejaVu Sans", sans-serif`;
     pen.font = font;
     // Numbers that change do not let the plate jump: its width grows in steps.

@@ -11,27 +11,46 @@ const LABELS = "view/state"; // which stand high above the drone for rviz, from 
 const LOW = 0.5;
 const JUMP = 0.5; // m: who moves so far at once was put there
 
+/** @typedef {{ position: THREE.Vector3, quaternion: THREE.Quaternion }} Place */
+
 export class Tree {
+  /**
+   * @param {THREE.Scene} scene
+   * @param {() => void} changed
+   */
   constructor(scene, changed) {
     this.root = new THREE.Group();
     scene.add(this.root);
     this.changed = changed;
     this.smooth = 0; // s, in which a frame goes to where it is told to be
+    this.isMoved = false; // whether objects have moved since somebody looked
+    /** @type {THREE.Object3D[]} */
+    this.frames = []; // by index
+    /** @type {Map<string, THREE.Object3D>} */
+    this.byName = new Map();
+    /** @type {Map<number, THREE.Object3D>} */
+    this.markers = new Map(); // by id
+    /** @type {Map<THREE.Object3D, { from: Place, to: Place, began: number }>} */
+    this.moving = new Map(); // frames on their way: where from, where to, since when
+    /** @type {Set<THREE.Object3D>} */
+    this.waiting = new Set(); // markers whose frame is not known
     this.clear();
   }
 
   clear() {
-    for (const object of this.markers?.values() ?? []) remove(object);
+    for (const object of this.markers.values()) remove(object);
     this.root.clear();
-    this.frames = []; // by index
+    this.frames = [];
     this.byName = new Map([[WORLD, this.root]]);
-    this.markers = new Map(); // by id
-    this.moving = new Map(); // frames on their way: where from, where to, since when
-    this.waiting = new Set(); // markers whose frame is not known
+    for (const known of [this.markers, this.moving, this.waiting]) known.clear();
     this.isNew = true; // whether frames or markers have come or gone since somebody looked
   }
 
   // Takes what scene_state.py tells: `said`, and the numbers (float32) that belong to it.
+  /**
+   * @param {wire.SceneMessage} said
+   * @param {Float32Array} numbers
+   */
   take(said, numbers) {
     if (said.whole) this.clear();
     for (const id of said.gone) this.drop(id);
@@ -39,7 +58,7 @@ export class Tree {
     let at = 0;
     for (const index of said.moved) this.move(this.frames[index], numbers, 7 * at++);
     let after = 7 * (said.moved.length + said.placed.length);
-    for (const one of said.markers) {
+    for (const one of /** @type {wire.Marker[]} */ (said.markers)) {
       for (const [name, count] of one.arrays ?? []) {
         one[name] = numbers.slice(after, after + count);
         after += count;
@@ -49,7 +68,7 @@ export class Tree {
     for (const id of said.placed) {
       const object = this.markers.get(id);
       if (object) place(object, numbers, 7 * at);
-      this.isMoved ||= object?.userData.said.layer === OBJECTS; // whether objects have moved since somebody looked
+      this.isMoved ||= object?.userData.said.layer === OBJECTS;
       if (object?.userData.said.layer === LABELS) object.position.multiplyScalar(LOW);
       at++;
     }

@@ -18,12 +18,16 @@ const up = new THREE.Vector3(0, 0, 1);
 const CAMERA = new THREE.Quaternion().setFromAxisAngle(new THREE.Vector3(1, 0, 0), Math.PI); // optical frames look along z
 
 export class View {
+  /** @param {THREE.PerspectiveCamera} camera */
   constructor(camera) {
     this.camera = camera;
     this.name = BEHIND;
     this.center = new THREE.Vector3(); // of the orbit, seen from `base` and its heading
     this.base = new THREE.Vector3();
     this.heading = 0;
+    this.yaw = this.pitch = 0; // of the orbit, rad
+    this.zoom = 1; // of the view behind; of others, m
+    this.onFree = () => {}; // the scene hears that the view has become free
     this.isHeld = false; // while a drone is dragged, the eyes do not run after it
     this.reset();
   }
@@ -139,7 +143,7 @@ export class View {
   ofHand() {
     if (this.name === BEHIND || this.name === FREE) return;
     this.free();
-    this.onFree?.();
+    this.onFree();
   }
 
   // Looks at a ball of the world, from where one is, near enough to see it well.
@@ -147,7 +151,7 @@ export class View {
     this.ofHand();
     if (this.name === BEHIND) {
       this.free();
-      this.onFree?.();
+      this.onFree();
     }
     this.center.copy(place);
     this.zoom = THREE.MathUtils.clamp(4 * radius, 0.5, 60);

@@ -6,7 +6,7 @@ import {
 } from "./words.js";
 
 // Parts of the page, other than single buttons, that are disabled while no simulator answers.
-const PARTS_OF_SIMULATOR = ["build-bar", "shelf", "tune-groups", "left", "right"];
+const PARTS_OF_SIMULATOR = /** @type {const} */ (["build-bar", "shelf", "tune-groups", "left", "right"]);
 
 function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
@@ -52,7 +52,7 @@ const withoutNumbers = (text) => text.replace(/\d+/g, "");
 
 function showFlight(now) {
   const deaf = deafWords(now);
-  for (const id of ["deaf", "sheet-deaf"]) {
+  for (const id of /** @type {const} */ (["deaf", "sheet-deaf"])) {
     at(id).hidden = !deaf;
     write(at(id), deaf);
     at(id).title = deaf;
@@ -79,7 +79,10 @@ function showNotice({ notice }) {
 }
 
 function showButtons(now) {
-  for (const [id, can] of Object.entries(abilities(now))) if (at(id).disabled === can) at(id).disabled = !can;
+  for (const [id, can] of Object.entries(abilities(now))) {
+    const button = at(/** @type {"run"} */ (id)); // or a list
+    if (button.disabled === can) button.disabled = !can;
+  }
   for (const id of PARTS_OF_SIMULATOR) at(id).inert = !answers(now);
 }
 

@@ -10,6 +10,12 @@ const SETTLED = 3000; // ms of flight after which an older failure is over, thou
 const BLOCKED = 2000; // ms between two ticks; if there are more, the page or its computer was suspended
 const READ = 6000; // ms after which a notice disappears; an error stays
 
+/**
+ * @typedef {{ file: string, line: number, time: number, told: number }} Reached
+ * @typedef {wire.ScriptFailure & { told: number }} Failure
+ * @typedef {{ kind: keyof typeof MESSAGES, text: string, bad: boolean }} Message
+ * @typedef {{ text: string, bad: boolean, told: number }} Notice
+ */
 const BEGINNING = {
   at: 0, // ms, when the last event came
   connection: "connecting", // or connected, lost, refused (the cockpit does not know this tab)
@@ -26,15 +32,15 @@ const BEGINNING = {
   hadSimulation: false, // whether there was a simulator since this page was opened
   hearsCommands: true, // whether the drone's script does
   pace: "", // the actual speed, compared with real time
-  warnings: [], // the texts of what is wrong in /diagnostics
-  reached: null, // the breakpoint that paused the flight: { file, line, time (s), told (ms) }
+  warnings: /** @type {string[]} */ ([]), // the texts of what is wrong in /diagnostics
+  reached: /** @type {Reached | null} */ (null), // the breakpoint that paused the flight: { file, line, time (s), told (ms) }
   flown: "", // the simulator's script
   open: { script: "", file: "" }, // the file in the editor
-  failure: null, // the last error of a script: { file, line, said, phase, told (ms) }
-  mended: null, // the failure that the user has mended, so that a late repetition does not bring it back
-  message: null, // below the script: { kind, text, bad }
+  failure: /** @type {Failure | null} */ (null), // the last error of a script: { file, line, said, phase, told (ms) }
+  mended: /** @type {{ key: string, at: number } | null} */ (null), // the failure that the user has mended, so that a late repetition does not bring it back
+  message: /** @type {Message | null} */ (null), // below the script: { kind, text, bad }
   saved: { text: "", bad: false }, // whether the file is on the disk
-  notice: null, // over the scene: { text, bad, told (ms) }
+  notice: /** @type {Notice | null} */ (null), // over the scene: { text, bad, told (ms) }
   starts: 0, // of flights, since the page was opened
   edits: 0, // of the user, since the page was opened
   isGrading: false,
@@ -135,6 +141,7 @@ export class Store {
   // `clock` returns ms.
   constructor(clock = () => performance.now()) {
     this.clock = clock;
+    /** @type {typeof BEGINNING} */
     this.now = { ...BEGINNING, at: clock() };
     this.listeners = [];
   }

@@ -95,7 +95,10 @@ const OF_SIMULATOR = [
   "speed", "scene-choice", "vehicle", "run",
 ];
 
-// Whether each button is enabled, by its id.
+/**
+ * Whether each button is enabled, by its id.
+ * @returns {Record<string, boolean>}
+ */
 export function abilities(now) {
   const can = answers(now);
   return {
