@@ -18,6 +18,8 @@ from drone_sim.grading import flight, tasks
 from drone_sim.grading import plan as plans
 from drone_sim.grading.flight import Flight, script_seed
 from drone_sim.mechanics.state import Pose, Twist
+from drone_sim.scripting.api import listing
+from drone_sim.scripting.api.calls import contents
 from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.rpc import api_stubs, connection, effects, script_process, script_proxy, values
 from drone_sim.scripting.rpc.connection import ScriptConnection
@@ -41,7 +43,7 @@ SCRIPTS = sorted(
     [
         *(ROOT / "docs" / "tutorial").glob("[1-7]_*.py"),
         *(ROOT / "docs" / "tutorial" / "solutions").glob("*.py"),
-        *(ROOT / "test" / "unit" / "scripts").glob("tutorial_v?.lua"),
+        ROOT / "src" / "drone_sim" / "child_scripts" / "tutorial_v4.lua",
     ]
 )
 TASKS = [one.name for one in sorted(tasks.folder().iterdir()) if (one / "solution.py").exists()]
@@ -87,6 +89,17 @@ DOES = {
     "names its arguments": "say(sim.getObjectPosition(self.d, relativeTo=self.mark))",
     "reads more poses than it may announce": "sim.getSimulationTime() < 0.2 and say(sum("
     "tried(lambda: sim.getObjectPosition(1000 + number, -1)) != [] for number in range(300)))",
+    "turns a joint": "j = sim.getObjectHandle('Quadricopter_propeller_joint1');"
+    " sim.setJointPosition(j, sim.getSimulationTime()); self.tip = getattr(self, 'tip', None) or sim.createDummy(0.1);"
+    " sim.setObjectParent(self.tip, j, False); say([sim.getObjectPose(j, -1), sim.getObjectPose(self.tip, -1),"
+    " sim.getObjectPosition(self.d, j), sim.getJointPosition(j)])",
+    "moves what is on a mark": "m = sim.getObjectChild(self.mark, 0); v = sim.getObjectVelocity(m);"
+    " sim.setObjectPosition(self.mark, self.d, [sim.getSimulationTime(), 0, 0]);"
+    " say([v, sim.getObjectVelocity(m), sim.getObjectPosition(m, -1), sim.getObjectPosition(m, self.mark)])",
+    "moves one mark by another": "self.other = getattr(self, 'other', None) or sim.createDummy(0.1);"
+    " sim.setObjectPose(self.other, self.mark, [1, 2, 3, 0, 0, 0, 1]); sim.setObjectPosition(self.mark, self.other,"
+    " [0.5, 0, 0]); say([sim.getObjectPose(self.mark, -1), sim.getObjectPose(self.other, -1)]);"
+    " sim.setObjectParent(self.other, self.mark, True)",
     "reads sensors": "say(sim.readSensor(sim.getObjectHandle('imu')))",
     "packs": "say(sim.unpackTable(sim.packTable({'a': [1, 2.5, 'c', True]})))",
 }
@@ -241,6 +254,19 @@ def sysCall_thread():
     assert same(plan, path).error is None
 
 
+def test_a_thread_and_the_phases_take_turns_behind_a_door(plan, tmp_path):
+    path = tmp_path / "turns.py"
+    act = "self.order = getattr(self, 'order', '') + 'a'; say(self.order)"
+    thread = """
+def sysCall_thread():
+    while True:
+        self.order = getattr(self, "order", "") + "t"
+        sim.switchThread()
+"""
+    path.write_text(PYTHON.replace("BEGIN", "pass").replace("ACT", act).replace("SENSE", "pass") + HELPERS + thread)
+    assert "tatata" in same(plan, path).outcomes[0].said
+
+
 def test_lua_flies_the_same_behind_a_door(plan, tmp_path):
     path = tmp_path / "flies.lua"
     path.write_text(LUA)
@@ -270,7 +296,7 @@ def test_a_controller_asks_nothing_that_can_be_told_before(plan, monkeypatch):
     monkeypatch.setattr(connection.Channel, "receive", lambda self: came.append(receive(self)) or came[-1])
     longer = plan.model_copy(update={"timeline": [], "duration": 10.0})
     flown_elsewhere(longer, "pilot")
-    assert len([one for one in came if one]) < 1.5 * 200 + 100  # messages of 200 steps, and the beginning
+    assert len([one for one in came if one]) < 2.1 * 200 + 100  # two messages in each of 200 steps, and the beginning
 
 
 # ---- values
@@ -306,11 +332,13 @@ def test_values_come_through_as_they_are(value):
 
 
 def test_all_that_is_said_of_functions_is_of_functions_that_there_are():
-    known = {f"{name}.{key}" for name, functions, _ in api_stubs.declared() for key in functions}
-    named = {*effects.READS, *effects.CHANGES, *(f"sim.{one}" for one in (*effects.PLACED, *effects.PUT))}
-    assert named <= known and set(effects.OWN_THREADS) <= {one.partition(".")[2] for one in known}
+    apis = listing.apis()
+    known = {f"{name}.{key}" for name, api in apis.items() for key in contents(api)[1]}
+    named = {*effects.READS, *effects.POSE_READS, *effects.CHANGES}
+    own = {f"sim.{one}" for names in effects.OWN.values() for one in names.split()}
+    assert named | own <= known
     modules = api_stubs.ApiStubs(None, None, Turns()).modules
-    assert modules.keys() == {name for name, _, _ in api_stubs.declared()}
+    assert modules.keys() == apis.keys()
     assert modules["sim"].packInt32Table([1]) == b"\x01\0\0\0"  # in this process: there is no link to call through
 
 
@@ -323,16 +351,18 @@ SAID = {
     "no end of it": (b"[" * 100_000, "invalid message: not JSON"),
     "numbers without end": (b"[" + b"9" * 100_000 + b"]", "invalid message: not JSON"),
     "a function that is none": (
-        json.dumps([["call", "os.system", -1, [], "id"]]).encode(),
+        json.dumps([["call", "os.system", [], "id"]]).encode(),
         "unknown function of the API",
     ),
-    "a function by a list": (json.dumps([["call", ["x"], -1, []]]).encode(), "unknown function of the API"),
-    "an attribute": (json.dumps([["call", "sim.__class__", -1, []]]).encode(), "unknown function of the API"),
+    "a function by a list": (json.dumps([["call", ["x"], []]]).encode(), "unknown function of the API"),
+    "an attribute": (json.dumps([["call", "sim.__class__", []]]).encode(), "unknown function of the API"),
     "an order": (json.dumps([["quit"]]).encode(), "unknown reply 'quit'"),
     "a call without all": (json.dumps([["call"]]).encode(), "malformed call"),
     "a question not waited for": (json.dumps([["set", "sim.stopSimulation"]]).encode(), "needs a reply"),
-    "reads that are calls": (json.dumps([["reads", "x", 0, [["sim.stopSimulation"]], []]]).encode(), "a read"),
-    "too many reads": (json.dumps([["reads", "x", 0, [["sim.getSimulationTime"]] * 201, []]]).encode(), "too many"),
+    "reads that are calls": (json.dumps([["reads", [["sim.stopSimulation"]]]]).encode(), "a read"),
+    "too many reads": (json.dumps([["reads", [["sim.getSimulationTime"]] * 201]]).encode(), "too many"),
+    "no list of reads": (json.dumps([["reads", 1]]).encode(), "malformed list of reads"),
+    "a pose of a text": (json.dumps([["reads", [["pose", "x"]]]]).encode(), "not a read"),
     "a result of load that is none": (json.dumps([["end", False, [1, 2]]]).encode(), "malformed result of load"),
     "no result of load": (json.dumps([["end", False, None]]).encode(), "malformed result of load"),
     "an end with more": (json.dumps([["end", 1, 2, 3, 4]]).encode(), "malformed end of a call"),

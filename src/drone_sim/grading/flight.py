@@ -131,7 +131,7 @@ class Flight:
             self._permissions = Permissions(plan, self._simulation, self._script, self._recorder.goals)
             self._rules = Rules(plan, self._simulation, self._watch)
             if connection is not None:
-                connection.begin(self._simulation.context.objects, self._is_quiet, self._permissions)
+                connection.begin(self._simulation.context.objects, self._permissions)
         except BaseException:
             self._simulation.close()
             raise
@@ -173,12 +173,6 @@ class Flight:
             self._recorder.record_step()
             if self._recorder.is_over:
                 return
-
-    def _is_quiet(self) -> bool:
-        """Return whether no message or other script can reach the flying script before its next actuation."""
-        simulation = self._simulation
-        scripts = len(simulation.child_scripts) + len(simulation.scene.scripts)
-        return scripts == 1 and simulation.drone.commands.is_quiet and not self._timeline.is_due(simulation.steps)
 
 
 def table_digest(rows: np.ndarray) -> str:

@@ -166,9 +166,6 @@ class Timeline:
         """Return the entries of a vehicle, including those without a vehicle's name."""
         return Timeline([entry for entry in self.entries if entry.vehicle in ("", vehicle)], self._time_step)
 
-    def is_due(self, step: int) -> bool:
-        return step in self._due
-
     def apply(self, step: int, vehicles: Mapping[str, Vehicle]) -> None:
         """Apply the entries of a step (counted from 0), just before it runs. Raises TimelineError."""
         for entry in self._due.get(step, ()):

@@ -50,19 +50,10 @@ class Commands:
 
     def advance(self) -> None:
         """Age the command by one step; replace it by a zero command after the timeout."""
-        if self._is_timed_out:
+        too_old = self.timeout and self.age > self.timeout - self._clock.time_step / 2
+        if too_old and self.now != Twist():
             self._post(Twist())
         self.age += self._clock.time_step
-
-    @property
-    def _is_timed_out(self) -> bool:
-        too_old = self.timeout and self.age > self.timeout - self._clock.time_step / 2
-        return bool(too_old and self.now != Twist())
-
-    @property
-    def is_quiet(self) -> bool:
-        """Whether no command will be posted in the next step unless a new one is received."""
-        return self.link is None and not self._is_timed_out
 
     def _post(self, twist: Twist) -> None:
         self.now, self.age = twist, 0.0

@@ -29,11 +29,14 @@ _PAGES = {
 }  # of the manual, one for each plugin
 
 
-def apis() -> dict[str, Api]:
-    """Return the modules of the script API, without a simulation; only functions that need none may be called."""
+def apis(objects: ObjectTree | None = None, services: SceneServices | None = None) -> dict[str, Api]:
+    """Return the modules of the script API, without a simulation; only functions that need none may be called.
+
+    Functions that read and move objects use `objects`, by default none.
+    """
     scripts = Scripts()
     scripts.add("Drone", {})
-    clock, objects = Clock(0.05), ObjectTree()
+    clock, objects, services = Clock(0.05), objects or ObjectTree(), services or SceneServices()
     host: Any = SimpleNamespace(
         context=ScriptContext(
             clock=clock,
@@ -49,12 +52,12 @@ def apis() -> dict[str, Api]:
         script_type=CHILD,
     )
     ros = make_sim_ros(MessageBus("drone"), host.context.clock)
-    vision = make_sim_vision(host, SceneServices())
+    vision = make_sim_vision(host, services)
     return {
-        "sim": make_sim(host, SceneServices()),
+        "sim": make_sim(host, services),
         "simROS": ros,
         "simVision": vision,
-        **make_plugins(host, SceneServices()),
+        **make_plugins(host, services),
     }
 
 

@@ -94,24 +94,20 @@ class ScriptConnection:
         """
         self._channel = Channel(end, _CHECK_INTERVAL)
         self.processor = processor
+        self.objects = ObjectTree()
         self.permit: Permit = _all_permitted
         self.items: deque[list[Any]] = deque()  # received and not yet handled
         self.numbers = itertools.count(1)  # of the scripts in the script's process
         self.why_closed = ""  # a line of text; '' while open
         self.is_gone = False  # whether the script's process has ended or does not receive
-        self.objects: ObjectTree | None = None
-        self.is_quiet: Callable[[], bool] = lambda: False
 
-    def begin(self, objects: ObjectTree, is_quiet: Callable[[], bool], permit: Permit | None = None) -> None:
+    def begin(self, objects: ObjectTree, permit: Permit) -> None:
         """Set the objects of a flight, before its scripts are loaded.
 
         `permit` is called with a function's name and arguments before each call. It raises ValueError if the script may
         not make the call; it may return a function that is called with the result.
-        `is_quiet` returns whether a script receives nothing between the coming sensing and the next actuation: then it
-        may run that actuation right after the sensing.
         """
-        self.objects, self.is_quiet = objects, is_quiet
-        self.permit = permit or _all_permitted
+        self.objects, self.permit = objects, permit
 
     def close(self, why: str) -> None:
         """Close the channel; later calls fail with `why`."""

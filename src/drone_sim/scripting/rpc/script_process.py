@@ -15,7 +15,7 @@ from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.api.scripts import FunctionsOfScript
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.rpc import effects, values
-from drone_sim.scripting.rpc.api_stubs import NO_ANSWERS, Answers, ApiStubs
+from drone_sim.scripting.rpc.api_stubs import ApiStubs
 from drone_sim.scripting.rpc.connection import Channel, Disconnected
 from drone_sim.scripting.time_limit import TimeLimit
 
@@ -47,7 +47,6 @@ class ScriptWorker:
         self._functions: list[Any] = []
         self._numbers: dict[int, int] = {}  # numbers of functions, by id()
         self._caller: _LoadedScript | None = None  # the running script
-        self._requests = 0  # in the current call
 
     def open(self, channel: Channel, path: str) -> None:
         self._channel, self.path = channel, path
@@ -71,23 +70,22 @@ class ScriptWorker:
         items, self._queued = self._queued, []
         self._channel.send(values.written(items))
 
-    def request(self, item: list[Any]) -> tuple[Any, Answers]:
-        """Send an item; return its result, and the results of the expected reads. Raises the error received."""
+    def request(self, item: list[Any]) -> tuple[Any, Exception | None, list[Any]]:
+        """Send a call; return its result, or the error that it raised, and the snapshot that came with it."""
         self._queued.append(item)
         self._send()
-        self._requests += 1
         while True:
             message = self.receive()
             if message[0] == "go":
                 self.execute(message)
             elif message[0] == "is":
-                _, value, (answers, places) = message
-                return self._decoded(value), (self._decoded(answers), places)
+                _, value, snapshot = message
+                return self._decoded(value), None, self._decoded(snapshot)
             else:
-                _, kind, text, explanation = message
+                _, kind, text, explanation, snapshot = message
                 error = values.ERRORS.get(kind, RuntimeError)(text)
                 error.explained = explanation
-                raise error
+                return None, error, self._decoded(snapshot)
 
     def _decoded(self, value: Any) -> Any:
         return values.incoming(value, self._functions.__getitem__, self._functions_of)
@@ -110,36 +108,21 @@ class ScriptWorker:
     # ---- commands for the scripts
 
     def execute(self, message: tuple[Any, ...]) -> None:
-        """Execute a command, and send how it ended."""
-        _, number, command, arguments, (answers, places), may_run_ahead = message
+        """Execute a command, and send its result or error."""
+        _, number, command, arguments, snapshot = message
         script = self._scripts.get(number)
         if script is None:
             script = self._scripts[number] = self._next if not self._scripts else _LoadedScript(self)
         outer, self._caller = self._caller, script
         try:
-            self._requests = 0
-            decoded = [self._decoded(argument) for argument in arguments]
-            has_succeeded = self._do(script, command, decoded, (self._decoded(answers), places))
-            if command == "call" and arguments == ["actuation"]:
-                script.is_silent = not self._requests
-            if may_run_ahead and has_succeeded and script.is_silent and not self._requests:
-                self._queued[-1].append("goes on")
-                self._do(script, "call", ["actuation"], NO_ANSWERS)
-                script.is_silent = not self._requests
-        finally:
-            self._caller = outer
-        self._send()
-
-    def _do(self, script: _LoadedScript, command: str, arguments: list[Any], answers: Answers) -> bool:
-        """Execute one command, and queue how it ended; return whether it succeeded."""
-        try:
-            result = script.do(command, arguments, answers)
+            result = script.do(command, [self._decoded(argument) for argument in arguments], self._decoded(snapshot))
+            self._queued.append(["end", script.is_threaded, self.marked(result)])
         except ScriptError as error:
             place = str(error.phase), str(error.path), int(error.line), str(error.reason)
             self._queued.append(["failed", script.is_threaded, *place])
-            return False
-        self._queued.append(["end", script.is_threaded, self.marked(result)])
-        return True
+        finally:
+            self._caller = outer
+        self._send()
 
 
 class _LoadedScript:
@@ -148,18 +131,16 @@ class _LoadedScript:
         self._limit, self._turns = TimeLimit(0.0), Turns()
         self._stubs = ApiStubs(worker, self._limit.outside, self._turns)
         self._script: load.Script = load.no_script()
-        self._snapshots: list[Callable[[], None]] = []
-        self.is_silent = False  # whether its last actuation made no request
+        self._saved_states: list[Callable[[], None]] = []  # functions that restore them
         self.call_script_function = vars(self._stubs.modules["sim"])["callScriptFunction"]
 
     @property
     def is_threaded(self) -> bool:
         return self._script.threaded
 
-    def do(self, command: str, arguments: list[Any], answers: Any) -> Any:
+    def do(self, command: str, arguments: list[Any], snapshot: list[Any]) -> Any:
         """Execute a command of the simulation. Raises ScriptError."""
-        name = arguments[0] if arguments and isinstance(arguments[0], str) else ""
-        self._stubs.begin(f"{command} {name}", answers)
+        self._stubs.begin(effects.phase_of(command, arguments), snapshot)
         try:
             if command in ("load", "save", "restore"):
                 return getattr(self, f"_{command}")(*arguments)
@@ -176,11 +157,11 @@ class _LoadedScript:
         return [self._script.idle, self._script.is_empty]
 
     def _save(self) -> int:
-        self._snapshots.append(self._script.save_state())
-        return len(self._snapshots) - 1
+        self._saved_states.append(self._script.save_state())
+        return len(self._saved_states) - 1
 
     def _restore(self, number: int) -> None:
-        self._snapshots[number]()
+        self._saved_states[number]()
 
 
 def prepared() -> ScriptWorker:
@@ -191,5 +172,5 @@ def prepared() -> ScriptWorker:
     with simulation_socket, script_socket:  # warm up: forks share what the first script has read and compiled
         first = ScriptWorker()
         first.open(Channel(script_socket), _WARM_UP_SCRIPT)
-        first.execute(("go", 1, "load", [0.0, None], NO_ANSWERS, False))
+        first.execute(("go", 1, "load", [0.0, None], []))
     return ScriptWorker()

@@ -6,7 +6,7 @@ arguments are numbers, strings, bytes, lists and mappings of these, and size and
 
 from __future__ import annotations
 
-import contextlib
+import functools
 import inspect
 import itertools
 import logging
@@ -22,7 +22,7 @@ from drone_sim.scripting.breakpoints import Scope
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.rpc import effects, values
 from drone_sim.scripting.rpc.connection import Disconnected, ScriptConnection
-from drone_sim.scripting.rpc.places import Place, place_of
+from drone_sim.scripting.rpc.mirror import POSE, pose_of
 from drone_sim.scripting.rpc.values import ALL_PLAIN, PLAIN, InvalidMessage, ScriptFunction, kind_of
 from drone_sim.scripting.time_limit import TimeLimit
 
@@ -30,8 +30,6 @@ _LOG = logging.getLogger(__name__)
 GRACE = 5.0  # s beyond the time limit, which the script's process should enforce itself
 _MAX_WAITS = 1000
 _MAX_TEXT = 1000  # characters of an error text, and of the name of a phase
-_POSE_FUNCTION = f"sim.{effects.PLACED[-1]}"  # reads the complete pose of an object
-_NO_READS: tuple[list[Any], list[int]] = ([], [])
 
 
 class ConnectionClosed(ScriptError):
@@ -49,12 +47,11 @@ class ScriptProxy(Script):
         }
         self._changes = {name: function for name, function in self._functions.items() if name in effects.CHANGES}
         self._handed: dict[int, ScriptFunction] = {}
-        self._expected = ExpectedReads(connection, self._functions, self._value)
+        self._watched = WatchedReads(connection, self._functions, self._value)
         self._waits = PendingWaits()
         self._failure: tuple[str, Exception] | None = None  # of a call whose reply the script did not wait for
         self._deadline = 0.0
         self._phase = ""  # the current one
-        self._is_ahead = False  # whether it ran the next actuation right after a sensing
         self.language = "python" if path.endswith(".py") else "lua"
         self._thread_is_alive = False
         result = self._do("load", [self._limit.seconds, self._connection.processor])
@@ -65,10 +62,8 @@ class ScriptProxy(Script):
     # ---- interface of a script
 
     def _run_phase(self, phase: str) -> None:
-        if self._is_ahead and phase == "actuation":
-            self._finish()
-        elif not self._connection.why_closed or phase != "cleanup":
-            self._do("call", [phase], phase == "sensing" and self._connection.is_quiet())
+        if not self._connection.why_closed or phase != "cleanup":
+            self._do("call", [phase])
 
     def _has_thread(self) -> bool:
         return self._thread_is_alive
@@ -119,85 +114,65 @@ class ScriptProxy(Script):
 
     # ---- messages
 
-    def _finish(self) -> None:
-        """Execute the API calls of an actuation that the script has run ahead of the simulation."""
-        self._is_ahead = False
-        self._phase = "call actuation"
-        self._exchange("actuation")
+    def _do(self, command: str, arguments: list[Any]) -> Any:
+        """Send a command to the script, execute the calls that it requests, and return its result. Raises ScriptError.
 
-    def _do(self, command: str, arguments: list[Any], may_run_ahead: bool = False) -> Any:
-        """Send a command to the script, execute the calls that it requests, and return its result.
-
-        `may_run_ahead`: whether the script may run the next step's actuation right after this sensing.
+        Commands are nested: a call may lead to a command to the same script.
         """
-        if self._is_ahead:  # the flight ends before that step
-            with contextlib.suppress(ScriptError):
-                self._finish()
-        is_text = command.startswith("execute")
-        name = arguments[0] if arguments and isinstance(arguments[0], str) and not is_text else ""
-        phase = f"{command} {name}"
-        shown = str(arguments[0]) if command not in ("load", "take_turn") and arguments and not is_text else command
+        is_named = arguments and command not in ("load", "take_turn", "execute", "execute_own")
+        shown = str(arguments[0]) if is_named else command  # in error texts
         if self._connection.why_closed:
             raise ConnectionClosed(shown, self._path, 0, self._connection.why_closed)
-        encoded = [values.outgoing(argument) for argument in arguments]
-        message = "go", self._number, command, encoded, self._reads(phase, 0), may_run_ahead
-        return self._exchange(shown, message)
-
-    def _exchange(self, phase: str, message: tuple[Any, ...] | None = None) -> Any:
-        """Send a message, and handle the script's items until it returns; `phase` is for error texts."""
-        limit = self._limit.seconds
-        outer, self._deadline = self._deadline, monotonic() + (limit + GRACE if limit else 1e9)
+        outer, limit = (self._phase, self._deadline, self._failure), self._limit.seconds
+        self._phase, self._failure = effects.phase_of(command, arguments), None
+        self._deadline = monotonic() + (limit + GRACE if limit else 1e9)
         try:
-            if message is not None:
-                self._connection.send(message)
-            return self._until_end(phase)
+            encoded = [values.outgoing(argument) for argument in arguments]
+            self._connection.send(("go", self._number, command, encoded, self._watched.snapshot(self._phase)))
+            return self._until_end(shown)
         except TimeoutError:
-            self._end(phase, f"did not return after {self._limit.seconds:g} s (script_time_limit)")
+            self._end(shown, f"did not return after {limit:g} s (script_time_limit)")
         except Disconnected:
             self._connection.is_gone = True
-            self._end(phase, "its process has ended")
+            self._end(shown, "its process has ended")
         except InvalidMessage as error:
-            self._end(phase, f"its process sent an invalid message: {error}")
+            self._end(shown, f"its process sent an invalid message: {error}")
         finally:
-            self._deadline = outer
+            self._phase, self._deadline, self._failure = outer
 
-    def _end(self, phase: str, why: str) -> NoReturn:
+    def _end(self, shown: str, why: str) -> NoReturn:
         self._connection.close(why)
-        raise ConnectionClosed(phase, self._path, 0, why) from None
+        raise ConnectionClosed(shown, self._path, 0, why) from None
 
-    def _until_end(self, phase: str) -> Any:
-        self._failure, outer = None, self._failure
+    def _until_end(self, shown: str) -> Any:
+        """Handle the script's items until its result or error."""
         connection, items = self._connection, self._connection.items
-        try:
-            while True:
-                item = items.popleft() if items else connection.next_item(self._deadline)
-                kind = item[0]
-                if kind == "set" and len(item) > 1:
-                    self._set(item)
-                elif kind == "call":
-                    self._serve_call(item)
-                elif kind == "reads":
-                    self._expected.note(item)
-                elif kind == "end":
-                    return self._returned(phase, item)
-                elif kind == "failed":
-                    if len(item) != 6 or [type(field) for field in item[2:]] != [str, str, int, str]:
-                        raise InvalidMessage("malformed failure")
-                    _, threaded, name, path, line, reason = item
-                    self._thread_is_alive = threaded is True
-                    raise ScriptError(name[:_MAX_TEXT], path[:_MAX_TEXT], line, reason)
-                else:
-                    raise InvalidMessage(f"unknown reply '{kind:.20}'")
-        finally:
-            self._failure = outer
+        while True:
+            item = items.popleft() if items else connection.next_item(self._deadline)
+            kind = item[0]
+            if kind == "set" and len(item) > 1:
+                self._set(item)
+            elif kind == "call":
+                self._serve_call(item)
+            elif kind == "reads":
+                self._watched.watch(self._phase, item)
+            elif kind == "end":
+                return self._returned(shown, item)
+            elif kind == "failed":
+                if len(item) != 6 or [type(field) for field in item[2:]] != [str, str, int, str]:
+                    raise InvalidMessage("malformed failure")
+                _, threaded, name, path, line, reason = item
+                self._thread_is_alive = threaded is True
+                raise ScriptError(name[:_MAX_TEXT], path[:_MAX_TEXT], line, reason)
+            else:
+                raise InvalidMessage(f"unknown reply '{kind:.20}'")
 
-    def _returned(self, phase: str, item: list[Any]) -> Any:
-        if not 3 <= len(item) <= 4:
+    def _returned(self, shown: str, item: list[Any]) -> Any:
+        if len(item) != 3:
             raise InvalidMessage("malformed end of a call")
-        self._is_ahead = len(item) == 4
         self._thread_is_alive = item[1] is True
         if self._failure is not None:
-            raise ScriptError(phase, self._path, 0, self._explained(*self._failure))
+            raise ScriptError(shown, self._path, 0, self._explained(*self._failure))
         return None if item[2] is None else self._value(item[2])
 
     # ---- requests of the script
@@ -221,24 +196,23 @@ class ScriptProxy(Script):
             self._failure = name, error
 
     def _serve_call(self, item: list[Any]) -> None:
-        """Execute a call, and send its result with the results of the reads that are expected next."""
-        if len(item) < 4 or type(item[2]) is not int or type(item[3]) is not list:
+        """Execute a call, and send its result or error with a new snapshot."""
+        if len(item) < 3 or type(item[2]) is not list:
             raise InvalidMessage("malformed call")
         began = monotonic()
-        phase = self._phase
         try:
             if self._failure is not None:
                 (item[1], failure), self._failure = self._failure, None
                 raise failure
-            result = self._called(item[1], item[4:], item[3])
-            answer: tuple[Any, ...] = "is", values.outgoing(self._waits.kept(result)), self._reads(phase, item[2])
+            result = self._called(item[1], item[3:], item[2])
+            answer: tuple[Any, ...] = "is", values.outgoing(self._waits.kept(result))
         except (InvalidMessage, ConnectionClosed):
             raise
         except Exception as error:
             answer = "no", kind_of(error), _text(error), self._explained(item[1], error)
-        self._phase = phase
+        snapshot = self._watched.snapshot(self._phase)
         self._deadline += monotonic() - began
-        self._connection.send(answer)
+        self._connection.send((*answer, snapshot))
 
     def _called(self, name: Any, arguments: list[Any], named: list[Any]) -> Any:
         """Return the result of a call; `named` are pairs of names and arguments."""
@@ -277,67 +251,53 @@ class ScriptProxy(Script):
             text = f"{name if isinstance(error, ValueError) else type(error).__name__}: {_text(error)}"
         return text[: 2 * _MAX_TEXT]
 
-    def _reads(self, phase: str, segment: int) -> tuple[list[Any], list[Place]]:
-        """Start a segment of a phase; return the results of its expected reads."""
-        self._phase = phase
-        return self._expected.results_of(phase, segment)
-
 
 def _text(error: Exception) -> str:
     text = error.args[0] if isinstance(error, KeyError) and error.args else error
     return str(text)[:_MAX_TEXT]
 
 
-class ExpectedReads:
-    """The expected reads of a script, by phase and segment."""
+class WatchedReads:
+    """The reads that a script's phases made in their last run; snapshots contain their results."""
 
     def __init__(self, connection: ScriptConnection, functions: Mapping[str, Function], value: Callable[[Any], Any]):
-        """Create empty lists; `functions` are the script's API, `value` decodes an argument."""
+        """Begin without reads; `functions` are the script's API, `value` decodes an argument."""
         self._connection, self._functions, self._value = connection, functions, value
-        self._expected: dict[tuple[str, int], tuple[list[tuple[Function, list[Any]]], list[int]]] = {}
+        self._reads: dict[str, list[tuple[Function, list[Any]]]] = {}  # by phase
 
-    def note(self, item: list[Any]) -> None:
-        """Store the reads that the script announces for a segment of a phase. Raises InvalidMessage."""
-        if [type(field) for field in item[1:]] != [str, int, list, list]:
+    def watch(self, phase: str, item: list[Any]) -> None:
+        """Store the reads that the script announces for a phase. Raises InvalidMessage."""
+        if len(item) != 2 or type(item[1]) is not list:
             raise InvalidMessage("malformed list of reads")
-        if max(len(item[3]), len(item[4]), len(self._expected)) > effects.MAX_READS:
+        if len(item[1]) > effects.MAX_READS:
             raise InvalidMessage("too many reads")
-        if not all(type(handle) is int for handle in item[4]):
-            raise InvalidMessage("handles must be integers")
-        reads = [self._read(read) for read in item[3]]
-        handles = [handle for handle in item[4] if self._is_permitted(_POSE_FUNCTION, [handle])]
-        self._expected[item[1][:_MAX_TEXT], item[2]] = reads, handles
+        self._reads[phase] = [self._read(read) for read in item[1]]
 
     def _read(self, read: Any) -> tuple[Function, list[Any]]:
         if type(read) is not list or not read or type(read[0]) is not str:
             raise InvalidMessage("not a read")
-        name = read[0]
-        if name not in effects.READS or name not in self._functions:
+        name, arguments = read[0], [self._value(value) for value in read[1:]]
+        function = self._functions.get(name) if name in effects.READS else None
+        if name == POSE and len(arguments) == 1 and type(arguments[0]) is int:
+            name, function = effects.POSE_READS[-1], functools.partial(pose_of, self._connection.objects)
+        if function is None:
             raise InvalidMessage("not a read")
-        arguments = [self._value(value) for value in read[1:]]
-        return (self._functions[name] if self._is_permitted(name, arguments) else _refused), arguments
-
-    def _is_permitted(self, name: str, arguments: list[Any]) -> bool:
         try:
             self._connection.permit(name, arguments)
         except ValueError:
-            return False
-        return True
+            return _refused, arguments
+        return function, arguments
 
-    def results_of(self, phase: str, segment: int) -> tuple[list[Any], list[Place]]:
-        """Return the results of the expected reads (Ellipsis if a read fails), and poses of objects."""
-        reads, handles = self._expected.get((phase, segment), _NO_READS)
+    def snapshot(self, phase: str) -> list[Any]:
+        """Return the present results of a phase's reads; Ellipsis for those that fail or are not permitted."""
         results = []
-        for function, arguments in reads:
+        for function, arguments in self._reads.get(phase, ()):
             try:
                 results.append(values.outgoing(function(*arguments)))
             except Exception:  # raised again if the script makes the call
-                _LOG.debug("an expected read failed:", exc_info=True)
+                _LOG.debug("a watched read failed:", exc_info=True)
                 results.append(...)
-        objects = self._connection.objects
-        if objects is None:
-            return results, []
-        return results, [place for handle in handles if (place := place_of(objects, handle)) is not None]
+        return results
 
 
 def _refused(*_: Any) -> NoReturn:
