@@ -35,6 +35,7 @@ HOST = "127.0.0.1:8000"
 PATIENCE = 240  # s
 WARM_UP, MEASURED = 10, 20  # s, of the measurement of the load
 STUDENTS, TEACHER = ("ann", "ben", "cas"), "tea"
+SCENE = "wide.yaml"
 CLASSROOM = "/srv/drone_sim/classroom"
 HANDED_IN = "/srv/drone_sim/handed_in/hover"
 SOLUTION = ROOT / "tasks/hover/solution.py"
@@ -65,6 +66,7 @@ for name in sys.argv[3].split():
     tries("read-handed-in", lambda: pathlib.Path(HANDED_IN, name).read_bytes())
     tries("remove-handed-in", lambda: os.rename(f"{HANDED_IN}/{name}", f"{HANDED_IN}/gone") is None)
 tries("tell-all", lambda: pathlib.Path(CLASSROOM, "to_all.json").write_text("{}"))
+tries("send-scene", lambda: pathlib.Path(CLASSROOM, "scenes", "wide.yaml").write_text("{}"))
 tries("replace-room", lambda: os.rename(f"{CLASSROOM}/reports", f"{CLASSROOM}/gone") is None)
 tries("list-reports", lambda: os.listdir(f"{CLASSROOM}/reports"))
 for name in sys.argv[4].split():
@@ -222,11 +224,16 @@ class Student:
             return False
         return panel.get("status") == "flying"
 
-    def is_told(self, text):
-        """Return whether the cockpit shows a text of the teacher."""
+    def is_told(self, *texts):
+        """Return whether the cockpit shows texts of the teacher."""
         with self.connect(self.name) as socket:
-            until(lambda: text in str(ask(socket, "panel")["panel"].get("to_all")))
+            until(lambda: all(text in str(ask(socket, "panel")["panel"].get("to_all")) for text in texts))
         return True
+
+    def opens(self, scene):
+        """Return whether the simulation starts in a scene of the list."""
+        with self.connect(self.name) as socket:
+            return ask(socket, "scene", scene=scene)["done"]
 
     def saved_text(self):
         """Save a script once, and return its text as the cockpit has it."""
@@ -298,6 +305,7 @@ def in_a_browser(students, pictures):
         page.get_by_alt_text(f"Camera of {students[0].name}").wait_for(timeout=PATIENCE * 1000)
         page.fill("input[name=text]", "Now everybody hovers.")
         page.select_option("select[name=task]", "hover")
+        page.set_input_files("input[name=scene]", {"name": SCENE, "mimeType": "", "buffer": b"floor: {size: 31}"})
         page.click("text=Show")
         page.get_by_text("Shown now").wait_for()
         page.evaluate("document.querySelector('main').dataset.old = true")
@@ -313,8 +321,9 @@ def in_a_browser(students, pictures):
         if pictures:
             opened.value.screenshot(path=pictures / "watching.png")
         browser.close()
-    told = [student.is_told("Now everybody hovers.") for student in students]
-    return [] if all(told) else ["not all students are told what the teacher tells all"]
+    told = [student.is_told("Now everybody hovers.", SCENE) for student in students]
+    failures = [] if all(told) else ["not all students are told what the teacher tells all"]
+    return failures + [f"no scene: {one.name}" for one in students[1:] if not one.opens(f"course/{SCENE}")]
 
 
 def kill(hub, folder, student, teacher):

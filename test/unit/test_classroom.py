@@ -3,6 +3,7 @@
 import json
 import os
 import pwd
+from itertools import pairwise
 
 import pytest
 
@@ -72,6 +73,49 @@ def test_a_message_reaches_all_and_ends(room):
     assert classroom.reports(room) == {}
     classroom.tell_all(room, "", "")
     assert classroom.message_to_all(room) is None
+
+
+SCENE = b"floor: {size: 7}\nobjects:\n- {shape: box, size: [1, 1, 1], position: [2, 0, 0.5]}\n"
+
+
+def test_a_scene_reaches_all(room):
+    classroom.keep_scene(room, "my gates.yaml", SCENE)
+    classroom.tell_all(room, "", "", "my gates.yaml")
+    message = classroom.message_to_all(room)
+    assert (message.text, message.task, message.scene) == ("", "", "my gates.yaml")
+    file = classroom.scenes_folder(room) / message.scene
+    assert (file.read_bytes(), file.stat().st_mode & 0o777) == (SCENE, 0o644)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "a", "a.ttt", "../a.yaml", "/etc/a.yaml", ".a.yaml", "a\n.yaml", "x" * 99 + ".yaml", "a\0.yaml"]
+)
+def test_a_scene_with_another_name_is_refused(room, name):
+    with pytest.raises(ValueError, match="ends in"):
+        classroom.keep_scene(room, name, SCENE)
+    assert not classroom.scenes_folder(room).exists()
+
+
+BOMB = "a: &a [1, 1]\n" + "".join(f"{new}: &{new} [*{old}, *{old}]\n" for old, new in pairwise("abcdefghijklmnopqrst"))
+HOSTILE = {
+    "larger than 1 MiB": b"#" * (1 << 20) + b"\n",
+    "values": BOMB.encode(),
+    "deep": b"[" * 5000,
+    "UTF-8": b"\xff",
+    "tag": b"!!python/object/apply:os.system [id]",
+    "no such file": b"objects: [{shape: mesh, file: ../../../nowhere.obj, position: [0, 0, 0]}]",
+    "regular file": b"objects: [{shape: mesh, file: /dev/zero, position: [0, 0, 0]}]",
+    "unknown key": b"sript: x.py",
+}
+
+
+@pytest.mark.parametrize("words", HOSTILE)
+def test_a_scene_that_the_simulator_refuses_is_not_sent(room, words):
+    classroom.keep_scene(room, "gates.yaml", SCENE)
+    with pytest.raises(ValueError, match=words):
+        classroom.keep_scene(room, "gates.yaml", HOSTILE[words])
+    (kept,) = classroom.scenes_folder(room).iterdir()
+    assert kept.read_bytes() == SCENE
 
 
 @pytest.mark.parametrize("content", ["", "[1]", '{"text": "x"}'])

@@ -40,7 +40,7 @@ def test_a_changed_script_is_handed_in_and_again(cockpit, browser, tmp_path, mon
             wait_until(page, lambda words=words: said.count() and all(word in said.inner_text() for word in words))
 
 
-def test_a_course_sees_the_drone_and_tells_its_student_a_task(cockpit, browser, tmp_path, monkeypatch):
+def test_a_course_sees_the_drone_and_sends_its_student_a_task_and_a_scene(cockpit, browser, tmp_path, monkeypatch):
     monkeypatch.setenv("ROS_MASTER_URI", os.environ["ROS_MASTER_URI"])  # that of this process, afterwards
     monkeypatch.setenv(classroom.VARIABLE, str(tmp_path))
     (tmp_path / "reports").mkdir()
@@ -53,8 +53,15 @@ def test_a_course_sees_the_drone_and_tells_its_student_a_task(cockpit, browser, 
         page.click("text=Open hover")
         wait_until(page, lambda: page.input_value("#script") == "tasks/hover.py")
         assert not page.get_by_text("Let us hover.").is_visible()
-        classroom.tell_all(tmp_path, "Well done.", "")
+        classroom.keep_scene(tmp_path, "wide.yaml", b"floor: {size: 31}\n")
+        classroom.tell_all(tmp_path, "Fly here.", "", "wide.yaml")
+        page.click("text=Open the scene wide")
+        wait_until(page, lambda: page.input_value("#scene-choice") == "course/wide.yaml")
+        assert not page.get_by_text("Fly here.").is_visible()
+        (tmp_path / "scenes/bad.yaml").write_text("flor: {size: 31}\n")
+        classroom.tell_all(tmp_path, "Well done.", "", "bad.yaml")
         page.get_by_text("Well done.").wait_for()
+        assert not page.get_by_text("Open the scene").is_visible(), "the simulator would refuse it"
         wait_until(page, lambda: any(one["picture"] for one in classroom.reports(tmp_path).values()))
         (report,) = classroom.reports(tmp_path).values()
         assert (report["script"], report["status"]) == ("built-in/pilot.py", "flying")

@@ -8,25 +8,29 @@ const PUT_AWAY = "to-all"; // the time of the last message that was put away
 export const isWatching = new URLSearchParams(location.search).has("watch");
 
 export class ToAll {
-  // `take(lesson)` begins a task.
+  // `take(lesson)` begins a task, `load(scene)` flies in a scene of the list.
   /** @param {import("./board.js").Board} board */
-  constructor(board, take) {
-    const [words, open, close] = at("to-all").children;
+  constructor(board, take, load) {
+    const [words, task, scene, close] = at("to-all").children;
     board.on("to_all", (message) => {
       at("to-all").hidden = !message || message.time === kept(PUT_AWAY, "");
       if (!message) return;
       words.textContent = message.text;
-      open.hidden = !message.task;
-      open.textContent = `Open ${message.task}`;
       const putAway = () => {
         keep(PUT_AWAY, message.time);
         at("to-all").hidden = true;
       };
-      close.onclick = putAway;
-      open.onclick = () => {
-        putAway();
-        take(`tasks/${message.task}`);
+      const offer = (button, what, open) => {
+        button.hidden = !what;
+        button.textContent = `Open ${what}`;
+        button.onclick = () => {
+          putAway();
+          open();
+        };
       };
+      close.onclick = putAway;
+      offer(task, message.task, () => take(`tasks/${message.task}`));
+      offer(scene, message.scene && `the scene ${message.scene.replace(/\.ya?ml$/, "")}`, () => load(`course/${message.scene}`));
     });
   }
 }

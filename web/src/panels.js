@@ -63,10 +63,15 @@ export class Panels {
     const choices = { tutorial: () => this.enter(go.tutorial), fly: () => this.showScript(false), build: () => this.showPlace("edit") };
     const gallery = { list: go.tasks, take: (...task) => this.enter(() => go.take(...task)) };
     this.start = new Start(choices, gallery, (script) => this.enter(() => open(script)));
-    new ToAll(this.board, (lesson) => {
+    const take = (lesson) => {
       at("start-page").close();
       this.enter(() => go.take(lesson));
-    });
+    };
+    const load = (file) => {
+      at("start-page").close();
+      this.act("scene", { scene: file });
+    };
+    new ToAll(this.board, take, load);
     this.keys();
   }
 

@@ -272,11 +272,12 @@ declare namespace wire {
     said: string;
     severity: string;
   }
-  /** Words of a teacher to all students, about a task or none (''). */
+  /** Words of a teacher to all students, about a task or none (''), and about a scene file or none. */
   interface Message {
     time: string;
     text: string;
     task: string;
+    scene: string;
   }
 }
 
@@ -314,7 +315,6 @@ interface PageElements {
   "scene": HTMLElementTagNameMap["div"];
   "banner": HTMLElementTagNameMap["div"];
   "to-all": HTMLElementTagNameMap["div"];
-  "to-all-open": HTMLElementTagNameMap["button"];
   "windows": HTMLElementTagNameMap["div"];
   "enlarged": HTMLElementTagNameMap["div"];
   "build-bar": HTMLElementTagNameMap["div"];

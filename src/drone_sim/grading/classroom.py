@@ -1,7 +1,8 @@
 """What the simulators of a course tell its teachers, and what the teachers tell all students: files in one folder.
 
-Only teachers can write to the folder $DRONE_SIM_CLASSROOM. Everybody can write to its folder `reports`, which only
-teachers can list. Students can write whatever they like there, so only the owner of a file counts.
+Only teachers can write to the folder $DRONE_SIM_CLASSROOM and to its folder `scenes`. Everybody can write to its folder
+`reports`, which only teachers can list. Students can write whatever they like there, so only the owner of a file
+counts.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import secrets
 import stat
 import time
@@ -17,10 +19,13 @@ from typing import Any, NamedTuple
 
 from drone_sim.files import writing
 from drone_sim.grading.submissions.handed_in import name_of
+from drone_sim.message_text import shown
+from drone_sim.run import parameters
 
 VARIABLE = "DRONE_SIM_CLASSROOM"
 TEXTS = ("status", "script", "scene", "grades")  # of a report
-_MESSAGE, _REPORTS = "to_all.json", "reports"
+_MESSAGE, _REPORTS, _SCENES = "to_all.json", "reports", "scenes"
+_SCENE_NAME = re.compile(r"\w[\w -]{0,60}\.ya?ml")
 _OUTDATED = 30.0  # s after which a simulator that reports nothing has ended
 _MAX_TEXT = 200  # characters
 _LARGEST = 1 << 18  # bytes
@@ -29,11 +34,12 @@ _MESSAGE_MODE = 0o644
 
 
 class Message(NamedTuple):
-    """Words of a teacher to all students, about a task or none ('')."""
+    """Words of a teacher to all students, about a task or none (''), and about a scene file or none."""
 
     time: str
     text: str
     task: str
+    scene: str = ""
 
 
 def folder() -> Path | None:
@@ -78,13 +84,13 @@ def reports(room: Path) -> dict[str, dict[str, str]]:
     return found
 
 
-def tell_all(room: Path, text: str, task: str) -> None:
-    """Show all students a text and the button of a task; nothing if both are ''. Raises OSError."""
+def tell_all(room: Path, text: str, task: str, scene: str = "") -> None:
+    """Show all students a text and the buttons of a task and of a scene; nothing if all are ''. Raises OSError."""
     path = room / _MESSAGE
-    if not text and not task:
+    if not text and not task and not scene:
         path.unlink(missing_ok=True)
         return
-    message = Message(time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), text[:_MAX_TEXT], task)
+    message = Message(time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), text[:_MAX_TEXT], task, scene)
     writing.write(path, json.dumps(message._asdict()))
     path.chmod(_MESSAGE_MODE)
 
@@ -92,10 +98,36 @@ def tell_all(room: Path, text: str, task: str) -> None:
 def message_to_all(room: Path) -> Message | None:
     """Return what the teachers tell all students; None if that is nothing."""
     try:
-        content = _read(room / _MESSAGE)
+        content = {"scene": "", **_read(room / _MESSAGE)}
         return Message(*(_text(content[key]) for key in Message._fields))
     except (OSError, ValueError, LookupError, RecursionError):
         return None
+
+
+def scenes_folder(room: Path) -> Path:
+    """Return the folder of the scene files that the teachers have sent; it need not exist."""
+    return room / _SCENES
+
+
+def keep_scene(room: Path, name: str, content: bytes) -> None:
+    """Write a scene file for all students. Raises OSError, and ValueError if the simulator would refuse the file."""
+    if not _SCENE_NAME.fullmatch(name):
+        raise ValueError(f"{shown(name)}: a scene's name has letters, digits, spaces, _ and -, and ends in .yaml")
+    folder = scenes_folder(room)
+    folder.mkdir(exist_ok=True)
+    file = folder / f"{name}.new"  # beside the files that it may name
+    try:
+        file.write_bytes(content)
+        check_scene(file)
+        file.chmod(_MESSAGE_MODE)
+        file.replace(folder / name)
+    finally:
+        file.unlink(missing_ok=True)
+
+
+def check_scene(file: Path) -> None:
+    """Read a scene file as the simulator does. Raises ParameterError, a ValueError."""
+    parameters.load({"scene_file": str(file)})
 
 
 def _read(path: Path, owner: int | None = None) -> dict[str, Any]:

@@ -87,7 +87,7 @@ class Course:
 
 
 class TeacherPage(HubOAuthenticated, web.RequestHandler):  # type: ignore[misc]
-    """The page. A POST with `grade` grades that task; one with `text` and `task` shows both to all students."""
+    """The page. A POST with `grade` grades that task, one with `text`, `task` and `scene` shows these to all."""
 
     @web.authenticated
     async def get(self) -> None:
@@ -128,15 +128,17 @@ class TeacherPage(HubOAuthenticated, web.RequestHandler):  # type: ignore[misc]
         else:
             self.redirect(_PREFIX)
 
-    @staticmethod
-    def _tell(text: str, task: str) -> None:
-        """Raises OSError, and ValueError for a task that does not exist."""
+    def _tell(self, text: str, task: str) -> None:
+        """Raises OSError, and ValueError for a task that does not exist, or a scene that cannot be opened."""
         if task and task not in tasks.names():
             raise ValueError(f"{task[:80]!r}: there is no such task")
         room = classroom.folder()
         if room is None:
             raise ValueError(f"{classroom.VARIABLE} has no folder that the teachers' page can write to")
-        classroom.tell_all(room, text, task)
+        scene = self.request.files.get("scene")
+        if scene:
+            classroom.keep_scene(room, scene[0].filename, scene[0].body)
+        classroom.tell_all(room, text, task, scene[0].filename if scene else "")
 
 
 class Reports(HubOAuthenticated, web.StaticFileHandler):  # type: ignore[misc]

@@ -38,9 +38,11 @@ class Classroom:
         if room is None:
             return
         path = classroom.report_path(room)
+        message: classroom.Message | None = None
         while not rospy.is_shutdown():
-            message = classroom.message_to_all(room)
-            self._board.show("to_all", message._asdict() if message else None)
+            before, message = message, classroom.message_to_all(room)
+            if message != before:
+                self._board.show("to_all", _offered(room, message))
             if self._is_open() and self._board.get("status", NO_SIMULATION) != NO_SIMULATION:
                 self._report(path)
             time.sleep(_PERIOD)
@@ -66,3 +68,15 @@ class Classroom:
         except rospy.ROSException:  # none came in time, or the node ends
             return ""
         return base64.b64encode(picture).decode() if len(picture) <= _MAX_PICTURE else ""
+
+
+def _offered(room: Path, message: classroom.Message | None) -> dict[str, str] | None:
+    """Return a message for the page, without a scene that the simulator would refuse."""
+    if message is None or not message.scene:
+        return message and message._asdict()
+    try:
+        classroom.check_scene(classroom.scenes_folder(room) / message.scene)
+    except ValueError as error:
+        rospy.logwarn(f"the course's scene cannot be opened: {error}")
+        message = message._replace(scene="")
+    return message._asdict()

@@ -11,13 +11,14 @@ from typing import Any
 from drone_sim.editing.library import KINDS
 from drone_sim.files import writing
 from drone_sim.files.resources import package_path, resolve
+from drone_sim.grading import classroom
 from drone_sim.ros.cockpit.server.access_control import Content
 from drone_sim.vehicles.types import TYPES
 from drone_sim.vrep_files.model import SUFFIXES
 
 NO_SCENE = "none"  # as in the launch file
 NEW_SCENE = "new scene"  # the name of a scene without a file
-_MINE = "mine/"
+_MINE, _COURSE = "mine/", "course/"
 _SHIPPED = "config/scenes"
 _RECENT = ".recent_scenes.json"  # in the user's folder
 _MAX_RECENT = 10
@@ -45,8 +46,10 @@ class SceneList:
     """Names of scenes for the page, each with its value of the parameter `scene_file`."""
 
     def __init__(self, folder: Path):
-        """`folder` is that of the user's scenes, listed after those of the package; it need not exist."""
+        """`folder` is that of the user's scenes, listed after those of package and course; it need not exist."""
         self._folder = folder
+        room = classroom.folder()
+        self._course = classroom.scenes_folder(room) if room else None
         shipped = sorted((package_path() / _SHIPPED).glob("*.yaml"))
         # As package:// so that a simulator on another machine finds its own copy.
         self._shipped = {file.stem: f"package://drone_sim/{_SHIPPED}/{file.name}" for file in shipped}
@@ -64,7 +67,9 @@ class SceneList:
 
     def _files(self) -> dict[str, str]:
         own = {f"{_MINE}{file.name}": str(file) for file in own_files(self._folder, _SUFFIXES)}
-        return {NO_SCENE: NO_SCENE, **self._shipped, **own}
+        sent = own_files(self._course, _SUFFIXES) if self._course else []
+        of_course = {f"{_COURSE}{file.name}": str(file) for file in sent}
+        return {NO_SCENE: NO_SCENE, **self._shipped, **of_course, **own}
 
 
 class RecentScenes:

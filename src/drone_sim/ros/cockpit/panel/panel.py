@@ -72,7 +72,8 @@ class Panel:
 
     def _load(self, message: Mapping[str, Any]) -> dict[str, Any]:
         """Load another scene, which restarts the simulation. Raises ValueError."""
-        name = one_of(message, "scene", self.board.get("scenes", {}).get("all", []))
+        now = self.board.get("scenes", {}).get("now", "")
+        name = one_of(message, "scene", self._scenes.names(now)[0])
         try:
             self._simulator.set_parameter("scene_file", self._scenes.file(name))
         except FAILURES as error:
