@@ -107,6 +107,17 @@ def network(folder):
     return os.readlink(folder / "ns/net")
 
 
+def test_a_container_for_one_user_needs_no_namespaces(monkeypatch):
+    monkeypatch.setenv("DRONE_SIM_SINGLE_USER_CONTAINER", "yes")
+    assert jupyter.server()["command"][0] == "sh"
+    monkeypatch.setenv("DRONE_SIM_SINGLE_USER_CONTAINER", "")
+    try:
+        command = jupyter.server()["command"]
+    except OSError:
+        return  # there is no tile
+    assert command[0] == "bwrap"
+
+
 def test_the_tile_starts_the_simulator_and_the_server_ends_it(server, browser):
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     context.add_init_script(STARTED)

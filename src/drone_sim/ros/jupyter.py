@@ -2,10 +2,14 @@
 
 They run in network and process namespaces of their own: no other user of the machine reaches a port of theirs, and all
 of them end with the server, even if it is killed. The only way in is the UNIX socket of the proxy.
+
+A container for one user is such namespaces already, and forbids others inside. Its image says so by a variable. There
+ROS listens only at the container's own loopback, which no other container reaches.
 """
 
 from __future__ import annotations
 
+import os
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -16,6 +20,7 @@ _ISOLATED = (
 )
 # After an exit status of 0 the proxy would not start it again.
 _LAUNCH = 'roslaunch drone_sim drone.launch rviz:=false web:=true web_socket:="$0"; exit 1'
+_SINGLE_USER = "DRONE_SIM_SINGLE_USER_CONTAINER"  # set in the image of packaging/jupyterhub
 _TIMEOUT = 120  # s, for the page to answer, on a machine that starts many at once
 
 
@@ -24,12 +29,13 @@ def server() -> dict[str, Any]:
 
     Raises OSError if the simulator cannot be started here: then there is no tile, and the server logs the reason.
     """
-    find = [*_ISOLATED, "sh", "-c", "command -v roslaunch || echo no roslaunch on the PATH >&2"]
+    isolated = () if os.environ.get(_SINGLE_USER) else _ISOLATED
+    find = [*isolated, "sh", "-c", "command -v roslaunch || echo no roslaunch on the PATH >&2"]
     trial = subprocess.run(find, capture_output=True, text=True, check=False)
     if trial.stderr:
         raise OSError(" ".join(trial.stderr.split())[:300])
     return {
-        "command": [*_ISOLATED, "sh", "-c", _LAUNCH, "{unix_socket}"],
+        "command": [*isolated, "sh", "-c", _LAUNCH, "{unix_socket}"],
         "environment": {"ROS_MASTER_URI": "http://localhost:11311", "ROS_HOSTNAME": "localhost"},
         "unix_socket": True,
         "timeout": _TIMEOUT,
