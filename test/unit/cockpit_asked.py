@@ -44,7 +44,7 @@ class TimelinePlayer:
 class Scene:
     """A scene that may name a script for its drone."""
 
-    own_script, has_no_vehicle, is_modified = "", False, False
+    own_script, has_no_vehicle, is_modified, is_own = "", False, False, False
 
     opened, on_reopened = None, None
 

@@ -112,6 +112,20 @@ def test_run_goes_back_to_changes_that_are_not_saved_and_to_a_scene_that_names_a
     assert node.asked == ["stop", "stop", "restart"]
 
 
+def test_a_page_that_can_ask_is_told_when_run_would_leave_the_users_scene(ask):
+    assert ask("run", script="tutorial/4_pitch.py", lesson="stage-4-pitch", may_ask=True)["done"]
+    ask.node.parameters["scene_file"], ask.scene.is_own = "mine.yaml", True
+    assert ask("run", script="tutorial/1_thrust.py", lesson="stage-1-constant-thrust", may_ask=True)["done"]
+    ask.node.asked.clear()
+    asked = ask("run", script="tutorial/4_pitch.py", lesson="stage-4-pitch", may_ask=True)
+    assert asked == {"leaves": "empty.yaml"} and ask.node.asked == []
+    assert ask("run", script="tasks/hover.py", lesson="tasks/hover", may_ask=True) == {
+        "leaves": "the scene of the task hover"
+    }
+    assert ask("run", script="tasks/hover.py", lesson="tasks/hover", may_ask=False)["done"]
+    assert ask("run", script="tasks/hover.py", lesson="tasks/hover", may_ask=True)["done"], "it is there already"
+
+
 def test_a_scene_that_the_user_has_chosen_meanwhile_stays(ask):
     ask("run", script="tasks/gates.py", lesson="tasks/gates")
     ask.node.parameters["scene_file"] = "other.yaml"

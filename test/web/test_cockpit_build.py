@@ -432,7 +432,13 @@ def test_properties_are_computed_dragged_and_in_degrees(cockpit, browser):
     cockpit.load("")
 
 
-def test_run_without_a_lesson_goes_back_to_a_new_scene_that_was_not_saved(cockpit, browser):
+def label_and_drone(page):
+    """Return the frames in which the drone's label stands, and in which its body is."""
+    return page.evaluate("""['view/state', 'view/bodies'].map((layer) =>
+        [...scene.tree.markers.values()].find((one) => one.userData.said.layer === layer)?.parent?.name)""")
+
+
+def test_run_asks_before_it_leaves_a_new_scene_and_goes_back_to_it_without_a_text(cockpit, browser):
     with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
         builder = Builder(page)
         builder.new_scene()
@@ -441,8 +447,20 @@ def test_run_without_a_lesson_goes_back_to_a_new_scene_that_was_not_saved(cockpi
         page.select_option("#script", "tasks/hover.py")
         page.locator("#grade").wait_for()
         page.click("#run")
+        page.get_by_role("button", name="Fly in my scene, close the text").click()
+        wait_until(page, lambda: page.inner_text("#flown") == "tasks/hover.py")
+        wait_until(page, lambda: page.inner_text("#said") == "started")
+        assert page.input_value("#lesson") == "" and builder.object("Cuboid")
+        wait_until(page, lambda: label_and_drone(page) == ["quadricopter/base_link"] * 2)
+        page.select_option("#lesson", "tasks/hover")
+        page.locator("#grade").wait_for()
+        page.click("#run")
+        page.get_by_role("button", name="Leave my scene").click()
         wait_until(page, lambda: page.inner_text("#said") == "started in the scene of the task hover")
         builder.row("Cuboid").wait_for(state="detached")
+        wait_until(page, lambda: label_and_drone(page) == ["base_link"] * 2)
+        page.select_option("#lesson", "")
+        wait_until(page, lambda: not page.locator("#grade").is_visible())
         page.select_option("#script", "tutorial/2_elevation.py")
         wait_until(page, lambda: page.input_value("#lesson") == "stage-2-elevation")
         page.select_option("#lesson", "")

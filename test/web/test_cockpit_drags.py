@@ -18,6 +18,15 @@ objects:
   - {name: Shelf, shape: box, size: [0.4, 0.4, 0.1], position: [1.5, -0.5, 0.59]}
 """
 ARROW, RING = (0.0, 0.0, 0.95), (0.0, 0.72, 0.0)  # in parts; the ring's is to the left
+# How far the lower edge of the drone's label is above the tip of the handles, in half pictures.
+LABEL_OVER_HANDLES = """() => {
+    const label = [...scene.tree.markers.values()].find((one) => one.userData.said.layer === "view/state");
+    const heightOf = (point) => point.project(scene.camera).y;
+    const tip = scene.gizmo.parts[2].localToWorld(scene.camera.position.clone().set(0, 0, 1.05));
+    const place = scene.camera.position.clone().setFromMatrixPosition(label.matrixWorld);
+    const plate = label.scale.y * scene.camera.projectionMatrix.elements[5];
+    return heightOf(place) - label.center.y * plate - heightOf(tip);
+}"""
 
 
 class Mouse:
@@ -93,8 +102,13 @@ def test_a_drone_has_handles_and_thrust_arrows_while_the_mouse_is_on_it(cockpit,
     wait_until(opened, lambda: opened.evaluate(seen) == [False, False, False])
     mouse.over(cockpit.drone.place)
     mouse.wait(seen, [True, True, True])
+    wait_until(opened, lambda: opened.evaluate(LABEL_OVER_HANDLES) > 0)
     mouse.over(np.add(cockpit.drone.place, (0.5, 0.6, -0.6)))
     mouse.wait(seen, [False, False, False])
+    opened.evaluate("scene.select('drone')")
+    mouse.wait("scene.gizmo.isShown", True)
+    cockpit.call("restart")
+    mouse.wait("[scene.gizmo.isShown, scene.selected]", [False, ""])
 
 
 def test_the_drone_goes_where_its_arrow_is_dragged(cockpit, opened, mouse):

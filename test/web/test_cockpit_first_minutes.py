@@ -120,6 +120,7 @@ def test_keys_alone_lead_from_the_start_page_to_a_graded_task_and_its_replay(stu
     wait_until(student, lambda: has_focus(student, "#lesson-body"))
     wait_until(student, lambda: student.input_value("#script") == "tasks/hover.py")
     student.locator("#start").wait_for(state="hidden")
+    assert "solution" not in student.inner_text("#lesson-text").lower(), "there is none to be opened here"
     student.keyboard.press("Tab")
     assert has_focus(student, "#grade")
     student.keyboard.press("Enter")

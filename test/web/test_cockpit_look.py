@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-from cockpit_page import Panel, open_page, wait_until
+from cockpit_page import Panel, open_page, ready, wait_until
 
 CONTRAST = 4.5  # to 1, of text on its ground: WCAG 2.2, level AA
 TARGET = 32  # px, height of what is pressed
@@ -146,6 +146,15 @@ def test_on_touch_screens_thumbs_reach_both_sticks_and_nothing_lies_above_the_dr
         show_script(page)
         assert page.locator("#editor").bounding_box()["width"] == width
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+        page.select_option("#script", "tutorial/1_thrust.py")
+        wait_until(page, lambda: page.inner_text("#flying") == "built-in/pilot.py flies")
+        assert page.locator("#script").bounding_box()["width"] > 200, "its name can be read beside what flies"
+        page.click("#run")
+        wait_until(page, lambda: page.inner_text("#flying") == "flies")
+        page.locator("#toggle, [data-place=scene]").locator("visible=true").click()
+        page.locator("#deaf").wait_for()
+        assert "does not listen to commands" in page.inner_text("#deaf") and page.locator("#left").is_visible()
+    cockpit.start_afresh()
 
 
 def test_on_a_tablet_that_is_held_upright_scene_script_and_edit_are_tabs(cockpit, browser):
@@ -179,5 +188,8 @@ def test_in_a_narrow_window_the_scene_is_edited_without_the_script(cockpit, brow
             box, last = bar.bounding_box(), page.locator("#edit-menu-open").bounding_box()
             for side, size in (("x", "width"), ("y", "height")):
                 assert last[side] + last[size] <= box[side] + box[size], "all of the bar is in it"
+            page.reload()
+            ready(page)
+            assert bar.is_visible() and not script.is_visible(), "Edit was open"
             page.click("#toggle")
             assert script.is_visible() and not bar.is_visible()

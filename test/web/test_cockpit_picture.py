@@ -284,6 +284,14 @@ def test_a_cameras_view_is_the_cameras_and_a_drag_makes_it_free(cockpit, opened)
     assert np.linalg.norm(np.subtract(opened.evaluate(PLACES)["eye"], places["eye"])) > 0.05
 
 
+# Whether a point is in the picture, and large enough to be seen.
+IN_SIGHT = """point => {
+    const at = scene.camera.position.clone().set(...point), far = at.distanceTo(scene.camera.position);
+    const { x, y, z } = at.project(scene.camera);
+    return Math.max(Math.abs(x), Math.abs(y)) < 0.9 && z < 1 && far < 10;
+}"""
+
+
 def test_one_browsers_view_is_its_own_and_is_kept(cockpit, browser, opened):
     hover(cockpit, opened)
     with open_page(cockpit, browser) as other:
@@ -294,6 +302,7 @@ def test_one_browsers_view_is_its_own_and_is_kept(cockpit, browser, opened):
     opened.reload()
     wait_until(opened, lambda: opened.evaluate("window.scene?.bodies?.has('drone')"))
     assert opened.evaluate("[scene.view.name, scene.shown.frames]") == ["free", True]
+    wait_until(opened, lambda: opened.evaluate(IN_SIGHT, cockpit.drone.place))
 
 
 def stand_still(cockpit, page):

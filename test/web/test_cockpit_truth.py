@@ -85,6 +85,7 @@ def test_a_script_that_has_failed_does_not_fly(cockpit, desk):
     wait_until(desk, lambda: "actuation, line 2: ValueError: of the script" in said(desk))
     wait_until(desk, lambda: desk.inner_text("#flying") == "has failed")
     assert desk.inner_text("#status") == "Script failed" and desk.get_attribute("#flown", "data-is") == "failed"
+    wait_until(desk, lambda: desk.inner_text("#why") == "1 warning")  # though the node and its vehicle say it
     open_file(cockpit, desk, "steps.py", STEPS)
     wait_until(desk, lambda: desk.inner_text("#flying") == "mine/bad.py has failed")
     assert said(desk).startswith("actuation, bad.py, line 2"), "the error is of another file now"

@@ -76,11 +76,23 @@ function took(data) {
   else windows.picture(said, rest);
 }
 
-const run = () => {
-  if (!abilities(store.now).run) return Promise.resolve();
+const run = () => fly(true);
+async function fly(mayAsk) {
+  if (!abilities(store.now).run) return;
   desk.console.begin();
-  return scripts.run(lesson.name).catch(tell);
-};
+  try {
+    const leaves = await scripts.run(lesson.name, mayAsk);
+    if (leaves) askWhere(leaves);
+    else ask(null);
+  } catch (error) {
+    tell(error);
+  }
+}
+function askWhere(scene) {
+  const go = ["Leave my scene", () => fly(false)];
+  const stay = ["Fly in my scene, close the text", () => lesson.take("").then(run)];
+  ask({ said: `This text flies in ${scene}, not in your scene.`, choices: [go, stay] });
+}
 const open = (script) => scripts.open(script).catch(tell);
 const put = (code) => {
   try {

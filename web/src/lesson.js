@@ -99,7 +99,7 @@ export class Lesson {
     this.taken = name;
     await this.go(name);
     if (this.taken === name) this.taken = "";
-    if (name === this.name && this.script && this.opened.lesson !== name) this.open(this.script);
+    if (name && name === this.name && this.script && this.opened.lesson !== name) this.open(this.script);
   }
 
   async turn(way) {

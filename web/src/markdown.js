@@ -97,6 +97,13 @@ function withButtons(code, actions) {
   code.parentElement.after(row);
 }
 
+// A paragraph that is nothing but the link goes with it.
+function withoutLink(link) {
+  const paragraph = link.closest("p");
+  if (paragraph?.textContent === link.textContent && !link.firstElementChild) paragraph.remove();
+  else link.replaceWith(...link.childNodes);
+}
+
 // Fills an element with a text whose links and pictures are seen from `folder`; `go` follows a link that is ours.
 // `knows` tells whether there is such a text or script; `actions` returns { label, title, act } for a block of Python.
 /** @param {(code: string) => { label: string, title: string, act: () => any }[]} [actions] */
@@ -108,7 +115,7 @@ export function render(element, text, folder, knows, go, actions = () => []) {
     else if ((to.lesson || to.script) && knows(to)) {
       link.href = "#";
       link.onclick = (event) => (event.preventDefault(), go(to));
-    } else link.replaceWith(...link.childNodes); // it leads to what is only in the repository
+    } else withoutLink(link); // it leads to what is only in the repository
   }
   for (const picture of element.querySelectorAll("img")) {
     const path = within(picture.getAttribute("src"), folder)?.pathname;

@@ -32,6 +32,7 @@ export class Panels {
    */
   constructor({ store, socket, scene, go, open, goTo }) {
     this.store = store;
+    this.scene = scene;
     for (const element of document.querySelectorAll("[data-icon]")) element.prepend(icon(element.dataset.icon));
     this.board = new Board();
     this.notice = new Notice(store);
@@ -59,7 +60,7 @@ export class Panels {
     this.board.on("vehicles", ({ now }) => (scene().vehicle = now));
     for (const button of this.places) button.onclick = () => this.showPlace(button.dataset.place);
     at("toggle").onclick = () => this.showScript(document.body.classList.contains("wide"));
-    this.showScript(!TOUCH.matches && !isWatching);
+    this.showScript(!TOUCH.matches && !isWatching && !(this.edits && NARROW.matches));
     const choices = { tutorial: () => this.enter(go.tutorial), fly: () => this.showScript(false), build: () => this.showPlace("edit") };
     const gallery = { list: go.tasks, take: (...task) => this.enter(() => go.take(...task)) };
     this.start = new Start(choices, gallery, (script) => this.enter(() => open(script)));
@@ -157,7 +158,10 @@ export class Panels {
       this.board.take({ panel, version });
     }
     if (log) this.log.add(log);
-    if (STARTED.test(log)) this.store.take("started");
+    if (STARTED.test(log)) {
+      this.store.take("started");
+      this.scene().select(""); // its handles would be in the picture of the flight
+    }
     if (message.pulse) this.store.take("pulse", message.pulse);
     if (NO_EFFECT.test(log)) this.notice.warn(log);
     this.build.told(message);

@@ -363,8 +363,9 @@ export class Scripts {
 
   // ---- flown
 
-  // Saves what is shown, and flies that, unless it cannot even be read.
-  async run(lesson) {
+  // Saves what is shown, and flies that, unless it cannot even be read. With `mayAsk`, nothing happens if that would leave
+  // a scene of the user's; the name of the text's scene is returned then.
+  async run(lesson, mayAsk) {
     await this.save();
     const wrong = (await this.editor.check()).find(isSyntaxError);
     if (wrong) {
@@ -374,8 +375,9 @@ export class Scripts {
     const { script } = this.is;
     this.store.take("run");
     this.store.say("starting", `starting ${script} ...`);
-    const { done, said, failure } = await this.ask("run", { script, lesson });
+    const { done, said, failure, leaves } = await this.ask("run", { script, lesson, may_ask: mayAsk });
     this.store.take("answered");
+    if (leaves) return leaves;
     if (done) this.hear(script);
     if (failure) this.store.take("failure", failure);
     else this.store.say(done ? "started" : "refused", said);

@@ -7,6 +7,9 @@ const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 0];
 
 const speedText = (factor) => (factor === 0 ? "fastest" : `${factor} ×`);
 
+// The texts without those that another one repeats and continues: a script's error is that of its vehicle, too.
+const distinct = (texts) => [...new Set(texts)].filter((one, _, all) => !all.some((other) => other !== one && other.startsWith(one)));
+
 // Whoever writes, reads or moves a bar presses no keys of ours; on a focused button Space is that button's own.
 const hasKeys = ({ target, key }) =>
   target.closest?.("input, textarea, select, article, summary, [contenteditable], [role=separator], dialog") ||
@@ -44,7 +47,7 @@ export class Toolbar {
     at("scene-choice").onchange = () => act("scene", { scene: at("scene-choice").value });
     at("vehicle").onchange = () => act("vehicle", { vehicle: at("vehicle").value });
     for (const part of /** @type {const} */ (["status", "flight", "master", "hears_commands", "pace"])) board.on(part, (content) => store.take(part, content));
-    board.on("diagnosis", (all) => store.take("warnings", all.filter((one) => one.wrong).map((one) => one.said)));
+    board.on("diagnosis", (all) => store.take("warnings", distinct(all.filter((one) => one.wrong).map((one) => one.said))));
     board.on("speed", (factor) => this.showSpeed(factor));
     board.on("scenes", ({ all, now }) => this.offer(at("scene-choice"), all, now));
     board.on("vehicles", ({ all, now }) => {

@@ -58,7 +58,7 @@ declare namespace wire {
     locate: [{ file: string }, { script: string }];
     revert: [{ script: string }, { text: string }];
     lesson: [{ lesson: string }, { lesson: string; text: string; folder: string; script: string; flies: string }];
-    run: [{ script: string; lesson: string }, { done: boolean; said: string; failure: ScriptFailure | null }];
+    run: [{ script: string; lesson: string; may_ask: boolean }, { done: boolean; said: string; failure: ScriptFailure | null; leaves?: string }];
     grade: [{ script: string; lesson: string }, { number: number }];
     "hand in": [{ script: string; lesson: string }, { time: string; digest: string }];
     graded: [{ number: number }, Grade | { flights: number; seeds: number }];

@@ -4,6 +4,7 @@ import * as THREE from "three";
 import { SHAPES } from "./looks.js";
 
 const PIXELS = 140; // of an arrow
+const TIP = 1.1; // arrows, to the end of its head
 const COLORS = [0xd62828, 0x2b9a3e, 0x2f6fde];
 const RING = 0xf08c00;
 const LIT = 0xffd43b;
@@ -72,6 +73,11 @@ export class Gizmo {
     if (!place) return;
     this.root.position.copy(place);
     this.root.quaternion.setFromAxisAngle(up, heading);
+  }
+
+  // Where its upper end is in the world, null while it is hidden.
+  get tip() {
+    return this.isShown ? this.root.position.clone().addScaledVector(up, TIP * this.root.scale.z) : null;
   }
 
   // Returns the part that a ray meets, null for none.

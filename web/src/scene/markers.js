@@ -28,7 +28,8 @@ export function make(said, changed) {
 
 // Gives an object another look of the same kind; tells whether that was possible.
 export function change(object, said) {
-  if (said.kind !== "text" || object.userData.said.kind !== "text" || !object.isSprite) return false;
+  const before = object.userData.said;
+  if (said.kind !== "text" || before.kind !== "text" || said.frame !== before.frame || !object.isSprite) return false;
   object.say(said.text);
   object.userData.said = said;
   return true;
@@ -119,7 +120,7 @@ function dots({ color, scale, points, colors }) {
 function words({ text, color, scale, layer }) {
   const ink = `rgb(${color.slice(0, 3).map((one) => Math.round(255 * one)).join(" ")})`;
   const isLabel = layer.startsWith("view/"); // of the simulation's own: always as large as what else is to be read
-  const made = new Words(text, { color: ink, size: isLabel ? LABEL : scale[2], fixed: isLabel, plate: isLabel ? undefined : "" });
+  const made = new Words(text, { color: ink, size: isLabel ? LABEL : scale[2], fixed: isLabel, isLabel, plate: isLabel ? undefined : "" });
   return made;
 }
 

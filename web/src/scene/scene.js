@@ -64,7 +64,7 @@ export class Scene {
     const { view, shown } = kept(STORE, {});
     this.wanted = view ?? BEHIND; // a camera may come later
     this.show(shown ?? {});
-    if (view === FREE) this.look(FREE);
+    this.isUnframed = true; // until it is known where the vehicle is
     this.canvas.fit();
   }
 
@@ -162,6 +162,17 @@ export class Scene {
     this.onLook();
   }
 
+  // A page that begins with the free view looks at the vehicle or, without one, at the middle of the floor.
+  beginFree() {
+    if (!this.tree.markers.size) return;
+    this.isUnframed = false;
+    if (![this.wanted, this.view.name].includes(FREE)) return;
+    this.turn(BEHIND);
+    this.view.update(this.followed);
+    this.view.lookAt(this.place(this.vehicle) ?? new THREE.Vector3(), 0);
+    this.view.stepBack();
+  }
+
   // Looks at something by its name, or at the vehicle, from near; at all there is if there is no vehicle.
   frame(name = this.selected || this.vehicle) {
     const isThere = this.bodies.has(this.vehicle);
@@ -240,6 +251,7 @@ export class Scene {
     const isMoving = this.tree.advance(performance.now());
     this.editing?.dragged?.show();
     this.world.updateMatrixWorld();
+    if (this.isUnframed) this.beginFree();
     const isLate = this.view.update(this.followed, seconds);
     this.camera.updateMatrixWorld();
     this.surroundings.follow(this.camera, this.place(this.vehicle) ?? this.view.aim);
@@ -247,6 +259,7 @@ export class Scene {
     this.surroundings.ground.updateMatrixWorld();
     this.surroundings.sun.updateMatrixWorld();
     this.putGizmo();
+    Words.above = this.gizmo.tip;
     renderer.clear();
     renderer.render(this.world, this.camera);
     this.outline.render(renderer, this.camera);

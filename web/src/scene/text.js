@@ -8,13 +8,16 @@ const at = new THREE.Vector3();
 
 export class Words extends THREE.Sprite {
   static unit = 0.001; // m, how large a CSS pixel is at 1 m
+  /** @type {THREE.Vector3 | null} */
+  static above = null; // the tip of the handles, in the world: the labels of vehicles stand above it
   // `size`: m of a line, or with `fixed` CSS pixels, near and far.
-  constructor(text, { color = "#1a1f29", plate = "rgba(255,255,255,0.78)", size = 0.05, fixed = false } = {}) {
+  constructor(text, { color = "#1a1f29", plate = "rgba(255,255,255,0.78)", size = 0.05, fixed = false, isLabel = false } = {}) {
     super(new THREE.SpriteMaterial({ sizeAttenuation: !fixed, transparent: true, depthWrite: false, depthTest: !fixed }));
     this.color = color;
     this.plate = plate;
     this.size = size;
     this.fixed = fixed;
+    this.isLabel = isLabel;
     this.pixels = [0, 0]; // width and height of what is painted
     this.center.set(0.5, 0);
     this.renderOrder = 5;
@@ -22,12 +25,13 @@ export class Words extends THREE.Sprite {
     this.say(text);
   }
 
-  // A plate that would reach over the picture's upper edge is lowered.
+  // A plate that would cover handles is raised; one that would reach over the picture's upper edge is lowered.
   onBeforeRender(_renderer, _scene, camera) {
     if (!this.fixed) return;
     const { y } = at.setFromMatrixPosition(this.matrixWorld).project(camera);
     const height = this.scale.y * camera.projectionMatrix.elements[5]; // half pictures
-    this.center.y = Math.min(1, Math.max(0, 1 - (1 - y) / height));
+    const raised = this.isLabel && Words.above ? (y - at.copy(Words.above).project(camera).y) / height : 0;
+    this.center.y = Math.min(1, Math.max(Math.min(0, raised), 1 - (1 - y) / height));
   }
 
   say(text) {

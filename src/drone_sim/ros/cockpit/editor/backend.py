@@ -198,7 +198,11 @@ class EditorBackend:
         }
 
     def _run(self, message: _Message) -> dict[str, Any]:
-        """Start a script from the beginning, in its lesson's scene; return the simulator's answer."""
+        """Start a script from the beginning, in its lesson's scene; return the simulator's answer.
+
+        If that would leave a scene of the user's and the page `may_ask`, nothing happens, and `leaves` names the
+        lesson's scene.
+        """
         script = self._script(message)
         path = str(script.path)
         if not path.isprintable():
@@ -206,6 +210,9 @@ class EditorBackend:
                 f"{script.name!r}: a ROS parameter cannot hold this name; save the script under another name"
             )
         lesson = self._find_lesson(message)
+        leaves = self._switcher.leaves_own_scene(lesson) if message.get("may_ask") is True else ""
+        if leaves:
+            return {"leaves": leaves}
         plan = plan_of(lesson) if lesson and lesson.task else None
         self._player.prepare(plan, self._store.read(script)[0])
         self._switcher.go_back(lesson)

@@ -122,6 +122,15 @@ class SceneSwitcher:
         has_scene = lesson is not None and bool(lesson.task or lesson.scene)
         return not has_scene and not self._is_of_lesson(self._scene_file())
 
+    def leaves_own_scene(self, lesson: Lesson | None) -> str:
+        """Return the name of the lesson's scene if flying it leaves a scene of the user's, else ''.
+
+        Raises ValueError and OSError, in one line.
+        """
+        now, wanted = self._scene_file(), _scene(lesson)
+        is_left = wanted not in ("", now) and not self._is_of_lesson(now) and self._scene.is_own
+        return _scene_name(lesson, wanted) if is_left else ""
+
     def fly(self, lesson: Lesson | None) -> tuple[bool, str]:
         """Restart the simulation in the lesson's scene; return whether it started, and one line.
 
@@ -133,9 +142,7 @@ class SceneSwitcher:
             if not self._is_of_lesson(now):
                 self._user_scene, self._was_modified = now, self._scene.is_modified
                 self._named_script = bool(self._scene.own_script)
-            task = lesson.task if lesson else ""
-            name = f"the scene of the task {task}" if task else wanted.rpartition("/")[2]
-            return self._load(wanted, now, f"started in {name}")
+            return self._load(wanted, now, f"started in {_scene_name(lesson, wanted)}")
         if self._is_of_lesson(now):
             return self._load(self._user_scene, now, f"started {self._back()}")
         return self._simulator.call("restart")
@@ -187,3 +194,7 @@ def _scene(lesson: Lesson | None) -> str:
     if lesson is None:
         return ""
     return scene_of(plan_of(lesson)) if lesson.task else lesson.scene
+
+
+def _scene_name(lesson: Lesson | None, file: str) -> str:
+    return f"the scene of the task {lesson.task}" if lesson and lesson.task else file.rpartition("/")[2]

@@ -91,6 +91,11 @@ class SceneBackend:
         """Whether the scene has changes that are not saved."""
         return bool(self._state("modified")["modified"])
 
+    @property
+    def is_own(self) -> bool:
+        """Whether the scene has changes that are not saved, or is a file in the user's folder."""
+        return self.is_modified or self._folder in Path(self._state("file")["file"] or "").parents
+
     def reopen(self, file: str, was_modified: bool) -> None:
         """Open a scene file, or the draft of a scene that another one replaced before it was saved; nothing flies then.
 
