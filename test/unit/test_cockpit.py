@@ -635,3 +635,13 @@ def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
         assert shown._panel.board.get("master") is (master is answer)
     assert shown._panel.board.get("status") == "no simulation"
     shown._server.stop()
+
+
+def test_other_vehicles_in_the_scene_are_looked_for_at_once(tmp_path, monkeypatch):
+    shown, asked = Cockpit(PageServer("127.0.0.1", 0), "drone_sim", tmp_path), []
+    monkeypatch.setattr(shown, "_ask_master", lambda: asked.append(vehicles))
+    monkeypatch.setattr(type(shown._editing), "vehicles", property(lambda _: vehicles))
+    for vehicles in (frozenset(), frozenset(), frozenset({"drone"}), frozenset({"drone"}), frozenset()):  # noqa: B007
+        shown._update(10.0)
+    assert asked == [frozenset(), frozenset({"drone"}), frozenset()]
+    shown._server.stop()

@@ -312,8 +312,16 @@ def test_a_new_scene_flies_the_pilot_and_a_saved_one_the_script_that_was_run(coc
     cockpit.load("")
 
 
-def test_a_new_scene_is_framed_though_the_old_one_is_told_once_more(cockpit, browser):
+def test_a_scene_is_framed_after_a_drone_that_flew_away_and_a_new_one_though_the_old_one_is_told_again(
+    cockpit, browser
+):
     with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        page.evaluate("scene.look('free')")
+        for show_floor in (lambda: Builder(page), lambda: Panel(page).press("Stop", "stopped")):
+            page.evaluate("scene.view.center.z = 900; scene.change()")
+            wait_for(page, "scene.camera.position.z > 800")
+            show_floor()
+            wait_for(page, "scene.camera.position.length() < 60")
         builder = Builder(page)
         page.evaluate("scene.view.approachBy(0.1)")
         page.evaluate(TOLD_AGAIN)

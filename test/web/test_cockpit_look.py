@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-from cockpit_page import Panel, open_page, ready, wait_until
+from cockpit_page import Panel, open_page, ready, switch_camera, wait_until
 
 CONTRAST = 4.5  # to 1, of text on its ground: WCAG 2.2, level AA
 TARGET = 32  # px, height of what is pressed
@@ -176,6 +176,15 @@ def test_on_a_tablet_that_is_held_upright_scene_script_and_edit_are_tabs(cockpit
         page.locator("#rail").get_by_role("button", name="Plots").tap()
         assert tabs.locator("[aria-pressed=true]").all_inner_texts() == ["Scene"]
         assert not page.locator("#toggle").is_visible()
+        switch_camera(page)
+        tabs.get_by_role("button", name="Edit").tap()
+        title, warning = page.locator(".picture header"), page.locator("#until-stop")
+        title.wait_for()
+        warning.wait_for()
+        box = warning.bounding_box()
+        assert title.bounding_box()["y"] >= box["y"] + box["height"], "the buttons of the picture are not covered"
+        title.get_by_role("button").last.tap()
+        title.wait_for(state="detached")
 
 
 def test_in_a_narrow_window_the_scene_is_edited_without_the_script(cockpit, browser):

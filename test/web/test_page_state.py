@@ -164,6 +164,7 @@ def test_an_error_belongs_to_its_file_and_goes_with_the_copy(feed):
 def test_beside_run_stands_what_the_script_does(feed):
     assert last(feed, status("flying"))["flying"] == "flies"
     assert last(feed, status("flying"), ["flown", "mine/bad.py"])["flying"] == "mine/bad.py flies"
+    assert last(feed, status("flying"), ["flown", ""])["status"] == "Running", "without a vehicle"
     failed = last(feed, ["flown", "mine/bad.py"], status("stopped"), flight("script failed"))
     assert (failed["flying"], failed["is"], failed["status"]) == ("mine/bad.py has failed", "failed", "Script failed")
     assert last(feed, status("paused"))["flying"] == "is paused"

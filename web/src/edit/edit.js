@@ -13,6 +13,7 @@ import { poseOf } from "./poses.js";
 import { Seen } from "./seen.js";
 
 const TARGET = "target"; // the alias of the green sphere: what of a vehicle is moved by itself
+const AWAY = 60; // m from the middle of the floor, of an eye that sees nothing of the scene
 /** @type {wire.EditorState} */
 const NOTHING = { file: "", new: false, modified: false, read_only: false, state: "", undo: "", redo: "", draft: null, revision: 0 };
 
@@ -70,7 +71,7 @@ export class Edit {
         scene.look(FREE);
         scene.view.stepBack();
       }
-      this.connected();
+      this.connected()?.then(() => this.comeBack());
     } else {
       this.endMeasure();
       if (this.viewBefore !== FREE && scene.view.name === FREE) scene.look(this.viewBefore);
@@ -113,6 +114,7 @@ export class Edit {
     }
     const { objects, gone, version, since, ...is } = told;
     const isFlying = is.state !== "stopped";
+    const hasEnded = !isFlying && this.is.state !== is.state;
     this.isAway = isFlying && (this.isAway || this.is.state === "stopped");
     this.is = is;
     this.assumed.tell(is.revision);
@@ -122,6 +124,7 @@ export class Edit {
     this.emit("objects");
     if (still.length !== this.selected.length || changed === "tree") this.choose(still);
     this.show();
+    if (hasEnded) this.comeBack();
   }
 
   // Paints anew what is seen of the objects, and of what is selected.
@@ -184,6 +187,12 @@ export class Edit {
     const { held } = this;
     const frame = this.handles.mode === "scale" ? "own" : this.frame;
     this.handles.put(held ? this.frameOf(held.handle, frame) : null, held && new THREE.Vector3().setFromMatrixPosition(held.matrix));
+  }
+
+  // A drone that flew away has taken the view with it, so that nothing of the scene could be seen.
+  comeBack() {
+    const size = this.objects.named("Floor")?.values.size;
+    if (size && this.scene.camera.position.length() > Math.max(AWAY, 2 * size)) this.frameFloor();
   }
 
   frameFloor() {

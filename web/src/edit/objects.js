@@ -11,6 +11,8 @@ export class Objects {
   constructor() {
     /** @type {Map<number, SceneObject>} */
     this.rows = new Map(); // by handle
+    /** @type {Map<number, wire.Row>} */
+    this.told = new Map(); // the rows as the node has told them, by handle
     /** @type {Map<number, number[]>} */
     this.below = new Map(); // handles, by that of their parent
     /** @type {Map<string, number>} */
@@ -21,13 +23,14 @@ export class Objects {
 
   clear() {
     this.rows.clear();
+    this.told.clear();
     this.below.clear();
     this.names.clear();
     this.version = null;
   }
 
-  // Takes the topic's message; returns "missed" where something was missed before it, "tree" where names, parents or the
-  // like have changed, "" where nothing but poses and values have.
+  // Takes a change of the tree, whose rows have only the keys that have changed. Returns "missed" where something was
+  // missed before it, "tree" where names, parents or the like have changed, "" where nothing but poses and values have.
   /** @param {wire.TreeChange} change */
   take({ version, since, objects, gone }) {
     if (since !== null && since !== this.version) return "missed";
@@ -35,12 +38,15 @@ export class Objects {
     if (since === null) {
       isNew = true;
       this.rows.clear();
+      this.told.clear();
     }
     this.version = version;
-    for (const handle of gone) this.rows.delete(handle);
-    for (const row of objects) {
-      const before = this.rows.get(row.handle);
+    for (const handle of gone) for (const all of [this.rows, this.told]) all.delete(handle);
+    for (const changed of objects) {
+      const before = this.told.get(changed.handle);
+      const row = { ...before, ...changed };
       isNew ||= !before || STRUCTURE.some((key) => before[key] !== row[key]);
+      this.told.set(row.handle, row);
       this.rows.set(row.handle, { ...row, matrix: matrixOf(row.pose) });
     }
     if (isNew) this.sort();

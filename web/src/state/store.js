@@ -34,7 +34,7 @@ const BEGINNING = {
   pace: "", // the actual speed, compared with real time
   warnings: /** @type {string[]} */ ([]), // the texts of what is wrong in /diagnostics
   reached: /** @type {Reached | null} */ (null), // the breakpoint that paused the flight: { file, line, time (s), told (ms) }
-  flown: "", // the simulator's script
+  flown: /** @type {string | null} */ (null), // the simulator's script, "" if there is no vehicle
   open: { script: "", file: "" }, // the file in the editor
   failure: /** @type {Failure | null} */ (null), // the last error of a script: { file, line, said, phase, told (ms) }
   mended: /** @type {{ key: string, at: number } | null} */ (null), // the failure that the user has mended, so that a late repetition does not bring it back

@@ -31,6 +31,7 @@ const isFailed = (now) => now.flight === "script failed";
 export function statusWords(now) {
   if (now.connection === "lost" || now.connection === "refused") return "No connection";
   if (hasSimulator(now) && !answers(now)) return "No answer";
+  if (answers(now) && now.status === "flying" && now.flown === "") return "Running"; // there is no vehicle that could fly
   const says = now.status === "flying" && now.flight && !now.flight.startsWith("unknown") ? now.flight : now.status;
   return capital(now.status === "stopped" && isFailed(now) ? now.flight : says);
 }

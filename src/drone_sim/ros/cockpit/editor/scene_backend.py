@@ -77,9 +77,14 @@ class SceneBackend:
                 return
             for handle in change["gone"]:
                 self._rows.pop(handle, None)
+            changed = [
+                {"handle": row["handle"], **difference}
+                for row in change["objects"]
+                if (difference := _difference(self._rows.get(row["handle"], {}), row))
+            ]
             self._rows.update((row["handle"], row) for row in change["objects"])
             self._header = {key: value for key, value in change.items() if key not in ("objects", "gone")}
-        self._broadcast({"tree": change})
+        self._broadcast({"tree": {**change, "objects": changed}})
 
     @property
     def is_new(self) -> bool:
@@ -107,6 +112,12 @@ class SceneBackend:
             time.sleep(_TREE_POLL)
 
     # ---- the script of the vehicle that the page flies
+
+    @property
+    def vehicles(self) -> frozenset[str]:
+        """The names of the scene's vehicles, as far as they are known."""
+        with self._lock:
+            return frozenset(str(row["vehicle"]) for row in self._rows.values() if row.get("root"))
 
     @property
     def has_no_vehicle(self) -> bool:
@@ -238,6 +249,12 @@ class SceneBackend:
         except OSError as error:
             raise ValueError(str(error)) from None
         return {"model": self.models.operation(self.models.folder / name)}
+
+
+def _difference(before: _Message, row: _Message) -> dict[str, Any]:
+    """Return the changed keys of a row, None for those that are gone. In flight, these are the poses of what moves."""
+    changed = {key: value for key, value in row.items() if key not in before or before[key] != value}
+    return dict.fromkeys(before.keys() - row.keys()) | changed
 
 
 def _name_in_scene(script: str) -> str:
