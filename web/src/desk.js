@@ -37,7 +37,7 @@ export class Desk {
   // Takes the scripts, which need this one's `known` to be made.
   serve(scripts) {
     this.scripts = scripts;
-    const item = (name) => [name, document.getElementById(`file-${name}`)];
+    const item = (name) => [name, at(/** @type {"file-as"} */ (`file-${name}`))];
     const items = Object.fromEntries(["new-python", "new-lua", "as", "rename", "duplicate", "download", "upload", "revert", "delete"].map(item));
     const parts = {
       more: at("more"), menu: at("menu"), form: at("as-form"), label: at("as-label"), name: at("name"), said: at("name-said"),

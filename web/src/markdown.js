@@ -106,7 +106,7 @@ function withoutLink(link) {
 
 // Fills an element with a text whose links and pictures are seen from `folder`; `go` follows a link that is ours.
 // `knows` tells whether there is such a text or script; `actions` returns { label, title, act } for a block of Python.
-/** @param {(code: string) => { label: string, title: string, act: () => any }[]} [actions] */
+/** @param {(code: string) => { label: string, title: string, act: () => void }[]} [actions] */
 export function render(element, text, folder, knows, go, actions = () => []) {
   element.innerHTML = markdown.render(text);
   for (const link of element.querySelectorAll("a")) {

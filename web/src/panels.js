@@ -28,7 +28,9 @@ export class Panels {
   // opens one, `goTo(file, line)` a file's line.
   /**
    * @param {{ store: import("./state/store.js").Store, socket: () => import("./socket.js").PageSocket,
-   *   scene: () => import("./scene/scene.js").Scene, [part: string]: any }} page
+   *   scene: () => import("./scene/scene.js").Scene,
+   *   go: { tutorial: () => void, tasks: () => wire.Lesson[], take: (name: string, byKey?: boolean) => void },
+   *   open: (script: string) => void, goTo: (file: string, line: number) => void }} page
    */
   constructor({ store, socket, scene, go, open, goTo }) {
     this.store = store;
@@ -62,7 +64,7 @@ export class Panels {
     at("toggle").onclick = () => this.showScript(document.body.classList.contains("wide"));
     this.showScript(!TOUCH.matches && !isWatching && !(this.edits && NARROW.matches));
     const choices = { tutorial: () => this.enter(go.tutorial), fly: () => this.showScript(false), build: () => this.showPlace("edit") };
-    const gallery = { list: go.tasks, take: (...task) => this.enter(() => go.take(...task)) };
+    const gallery = { list: go.tasks, take: (name, byKey) => this.enter(() => go.take(name, byKey)) };
     this.start = new Start(choices, gallery, (script) => this.enter(() => open(script)));
     const take = (lesson) => {
       at("start-page").close();

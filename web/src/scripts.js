@@ -44,7 +44,7 @@ export class Scripts {
     this.dirty = false;
     this.conflict = false;
     this.marked = {}; // what `mark` has shown
-    /** @type {Promise<any>} */
+    /** @type {Promise<unknown>} */
     this.turn = Promise.resolve(); // of whatever was done last
     setInterval(() => this.watch(), LOOK);
     document.addEventListener("visibilitychange", () => this.watch());

@@ -32,7 +32,7 @@ export class Tune {
     at("tune-groups").replaceChildren(...made);
     this.fill(this.board.get("values", {}));
     this.filter();
-    const field = id.startsWith("tune ") && /** @type {HTMLInputElement | null} */ (document.getElementById(id));
+    const field = id.startsWith("tune ") && at(/** @type {`tune ${string}`} */ (id));
     if (!field) return;
     if (field.type === "text") field.value = value;
     field.focus();

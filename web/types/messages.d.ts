@@ -43,7 +43,7 @@ declare namespace wire {
     write_scene_text: [{ text: string; revision?: number }, EditAnswer];
     draft: [Draft, EditAnswer];
     // editor/backend.py
-    api: [Nothing, { functions: ApiFunction[]; constants: Record<string, any> }];
+    api: [Nothing, { functions: ApiFunction[]; constants: Record<string, unknown> }];
     check: [{ text: string; lua: boolean }, { found: Finding[]; unchecked?: string }];
     scripts: [Nothing, Scripts];
     open: [{ script: string }, OpenedScript];
@@ -131,7 +131,7 @@ declare namespace wire {
   interface Variables {
     time: number;
     state: string;
-    reached: { file?: string; line?: number; time?: number; scopes?: Scopes };
+    reached: { file: string; line: number; time: number; scopes: Scopes } | { file?: undefined };
     scripts: { name: string; file: string; scopes: Scopes }[];
   }
 

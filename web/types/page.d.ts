@@ -22,6 +22,11 @@ interface EventTarget {
   closest?(selectors: string): Element | null;
 }
 
+// The fields of *Tune*, which the page makes, by their ids.
+interface PageElements {
+  [field: `tune ${string}`]: HTMLInputElement | null;
+}
+
 // Only Chromium's; without it there is none.
 interface Navigator {
   keyboard?: { getLayoutMap?: () => Promise<Map<string, string>> };

@@ -23,7 +23,7 @@ export class Edit {
    * @param {import("../scene/scene.js").Scene} scene
    * @param {wire.Ask} ask
    * @param {import("../notice.js").Notice} notice
-   * @param {(file: string) => any} openScript what it returns is not used
+   * @param {(file: string) => void} openScript
    */
   constructor(scene, ask, notice, openScript) {
     this.scene = scene;

@@ -11,8 +11,8 @@ export const shown = (value, digits = 4) => (Number.isFinite(value) ? String(Num
 const fine = (value, digits) => (value && Math.abs(value) < 0.1 ? String(Number(value.toPrecision(digits))) : shown(value, digits));
 
 /**
- * @typedef {HTMLInputElement & { fill: (value: any) => void, isDragged: boolean }} NumberField
- * @typedef {{ take: (value: any, merge?: string) => any, wrong: (line: string) => void, undo: (merge: string) => any,
+ * @typedef {HTMLInputElement & { fill: (value: unknown) => void, isDragged: boolean }} NumberField
+ * @typedef {{ take: (value: number | null, merge?: string) => unknown, wrong: (line: string) => void, undo: (merge: string) => unknown,
  *   digits?: number, step?: number, low?: number | null, high?: number | null,
  *   isWhole?: boolean, isFine?: boolean, mayBeEmpty?: boolean, title?: string }} NumberOptions
  */

@@ -5,6 +5,8 @@ import {
   abilities, bannerWords, deafWords, diagnosisWords, flyingWords, paceWords, pauseOf, saidWords, statusWords,
 } from "./words.js";
 
+/** @typedef {import("./store.js").Facts} Facts */
+
 // Parts of the page, other than single buttons, that are disabled while no simulator answers.
 const PARTS_OF_SIMULATOR = /** @type {const} */ (["build-bar", "shelf", "tune-groups", "left", "right"]);
 
@@ -24,6 +26,7 @@ function showLine(element, { text, bad }) {
   makeScrollable(element);
 }
 
+/** @param {Facts} now */
 function showFlying(now) {
   const { text, is } = flyingWords(now);
   write(at("flying"), text);
@@ -34,6 +37,7 @@ function showFlying(now) {
   at("flown").title = text && `The script of the drone: ${is}`;
 }
 
+/** @param {Facts} now */
 function showStatus(now) {
   const pause = pauseOf(now);
   write(at("status"), statusWords(now));
@@ -50,6 +54,7 @@ function showStatus(now) {
 
 const withoutNumbers = (text) => text.replace(/\d+/g, "");
 
+/** @param {Facts} now */
 function showFlight(now) {
   const deaf = deafWords(now);
   for (const id of /** @type {const} */ (["deaf", "sheet-deaf"])) {
@@ -62,6 +67,7 @@ function showFlight(now) {
   write(at("diagnosis-says"), diagnosisWords(now));
 }
 
+/** @param {Facts} now */
 function showBanner(now) {
   const words = bannerWords(now);
   // A screen reader reads the banner once, not each time its count of seconds changes.
@@ -72,12 +78,14 @@ function showBanner(now) {
   document.body.classList.toggle("outdated", Boolean(words)); // the scene may differ from the simulation
 }
 
+/** @param {Facts} now */
 function showNotice({ notice }) {
   showLine(at("notice-text"), notice ?? { text: "", bad: false });
   at("notice").classList.toggle("bad", Boolean(notice?.bad));
   at("notice").classList.toggle("empty", !notice);
 }
 
+/** @param {Facts} now */
 function showButtons(now) {
   for (const [id, can] of Object.entries(abilities(now))) {
     const button = at(/** @type {"run"} */ (id)); // or a list
@@ -86,6 +94,7 @@ function showButtons(now) {
   for (const id of PARTS_OF_SIMULATOR) at(id).inert = !answers(now);
 }
 
+/** @param {Facts} now */
 export function show(now) {
   showBanner(now);
   showStatus(now);

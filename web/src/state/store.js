@@ -46,12 +46,17 @@ const BEGINNING = {
   isGrading: false,
 };
 
+/** @typedef {typeof BEGINNING} Facts */
+
 export const isSyntaxError = ({ said }) => /^syntax ?error/i.test(said);
 const keyOf = (failure) => failure && `${failure.file}:${failure.said}`;
 const isDoubled = (now, failure) => keyOf(now.failure) === keyOf(failure) && now.at - now.failure.told < DOUBLED;
 const isMended = ({ mended, at }, failure) => mended && mended.key === keyOf(failure) && at - mended.at < DOUBLED;
 
-// What each event changes. `now` has the time of the event.
+/**
+ * What each event changes. `now` has the time of the event.
+ * @satisfies {Record<string, (now: Facts, content: any) => Partial<Facts>>}
+ */
 const EVENTS = {
   // ---- the connection to the cockpit
   connected: (now) => ({ connection: "connected", since: now.at, heard: now.at, silent: 0, isFrozen: false, hasEnded: false, hasMaster: true }),
@@ -61,6 +66,7 @@ const EVENTS = {
   tick: (now) => ({ ticked: now.at, ...awoken(now), ...settled(now), ...(isRead(now) ? { notice: null } : {}) }),
 
   // ---- the simulator
+  /** @type {(now: Facts, pulse: NonNullable<wire.Told["pulse"]>) => Partial<Facts>} */
   pulse: (now, { silent, frozen, ended }) => ({ silent, isFrozen: frozen, hasEnded: ended }),
   master: (now, hasMaster) => ({ hasMaster }),
   flight: (now, flight) => ({ flight }),
@@ -73,10 +79,12 @@ const EVENTS = {
     return { status, statusSince: now.at, reached, hadSimulation: now.hadSimulation || ![NO_SIMULATION, UNKNOWN].includes(status) };
   },
   // The variables of scripts; null after nobody has watched them for some time, which does not change the flight.
+  /** @type {(now: Facts, variables: wire.Variables | null) => Partial<Facts>} */
   variables(now, variables) {
     if (variables === null) return {};
-    const { file, line, time } = variables.reached ?? {};
-    return { reached: file && variables.state === "paused" ? { file, line, time, told: now.at } : null };
+    const { reached, state } = variables;
+    if (!reached?.file || state !== "paused") return { reached: null };
+    return { reached: { file: reached.file, line: reached.line, time: reached.time, told: now.at } };
   },
 
   // ---- flights of scripts
@@ -85,6 +93,7 @@ const EVENTS = {
   answered: () => ({}), // the simulator has replied to Run
   // From the simulator's log, so in the right order with its failures.
   started: (now) => ({ starts: now.starts + 1, failure: null, mended: null, notice: now.notice?.bad ? null : now.notice }),
+  /** @type {(now: Facts, failure: wire.ScriptFailure) => Partial<Facts>} */
   failure: (now, failure) => (isMended(now, failure) || isDoubled(now, failure) ? {} : { failure: { ...failure, told: now.at } }),
 
   // ---- the file in the editor
@@ -141,17 +150,25 @@ export class Store {
   // `clock` returns ms.
   constructor(clock = () => performance.now()) {
     this.clock = clock;
-    /** @type {typeof BEGINNING} */
+    /** @type {Facts} */
     this.now = { ...BEGINNING, at: clock() };
+    /** @type {((now: Facts) => void)[]} */
     this.listeners = [];
   }
 
-  // Calls `show` with the facts, now and after every event.
+  /**
+   * Calls `show` with the facts, now and after every event.
+   * @param {(now: Facts) => void} show
+   */
   on(show) {
     this.listeners.push(show);
     show(this.now);
   }
 
+  /**
+   * @param {keyof typeof EVENTS} event
+   * @param {any} [content] as the event needs it
+   */
   take(event, content) {
     const before = this.now;
     const now = { ...before, at: this.clock() };
@@ -163,6 +180,10 @@ export class Store {
     for (const show of this.listeners) show(this.now);
   }
 
+  /**
+   * @param {keyof typeof MESSAGES} kind
+   * @param {string} text
+   */
   say(kind, text) {
     this.take("say", { kind, text });
   }

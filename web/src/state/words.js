@@ -2,12 +2,15 @@
 import { NO_SIMULATION, SILENCE, answers, hasSimulator, isReachable, secondsOfSilence } from "./facts.js";
 import { NOT_STARTED } from "./store.js";
 
+/** @typedef {import("./store.js").Facts} Facts */
+
 const nameOf = (file) => file.split("/").pop();
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 // ---- the connection
 
 // The text of the banner over the scene; "" while the scene is up to date.
+/** @param {Facts} now */
 export function bannerWords(now) {
   const { connection, since, at } = now;
   if (connection === "connecting") return at - since > SILENCE * 1000 ? "Connecting to the cockpit ..." : "";
@@ -24,10 +27,13 @@ export function bannerWords(now) {
 // ---- the flight
 
 // The breakpoint at which the flight is paused, null if it is not.
+/** @param {Facts} now */
 export const pauseOf = (now) => (now.connection === "connected" && now.status === "paused" ? now.reached : null);
 
+/** @param {Facts} now */
 const isFailed = (now) => now.flight === "script failed";
 
+/** @param {Facts} now */
 export function statusWords(now) {
   if (now.connection === "lost" || now.connection === "refused") return "No connection";
   if (hasSimulator(now) && !answers(now)) return "No answer";
@@ -39,16 +45,20 @@ export function statusWords(now) {
 const DEAF = "This script does not listen to commands: its flight is in the script. Stage 6 of the tutorial does, and pilot.py.";
 
 // Nothing is said of a stopped script, because none listens to commands while it is stopped.
+/** @param {Facts} now */
 export const deafWords = (now) => (answers(now) && !now.hearsCommands && now.status !== "stopped" ? DEAF : "");
 
+/** @param {Facts} now */
 export const paceWords = (now) => (answers(now) && Number(now.pace) ? `${Number(now.pace).toFixed(2)} ×` : "");
 
+/** @param {Facts} now */
 export function diagnosisWords(now) {
   if (!answers(now)) return "The simulator does not answer; this is what it said last.";
   return now.warnings.length ? "" : "Nothing is wrong.";
 }
 
 // The text beside Run: what the simulator's script does, which may be another one than the open script.
+/** @param {Facts} now */
 export function flyingWords(now) {
   if (!now.flown || !answers(now)) return { text: "", is: "" };
   const is = isFailed(now) ? "failed" : now.status;
@@ -56,12 +66,14 @@ export function flyingWords(now) {
   return { text: now.flown === now.open.script ? does : `${now.flown} ${does}`, is };
 }
 
-function failureWords({ failure, open }) {
+/** @param {NonNullable<Facts["failure"]>} failure */
+function failureWords(failure, open) {
   const place = failure.file === open.file ? `line ${failure.line}` : `${nameOf(failure.file)}, line ${failure.line}`;
   return `${failure.phase}, ${place}: ${failure.said}`;
 }
 
 // The console's line about the error that kept the script from starting; its place is a link. Other errors are in the log.
+/** @param {Facts} now */
 export const consoleWords = ({ failure }) =>
   failure?.phase === NOT_STARTED ? `error: [load] ${failure.file}:${failure.line}: ${failure.said}` : "";
 
@@ -70,16 +82,18 @@ function pauseWords({ file, line, time }, open) {
 }
 
 // The line below the script: { text, bad }. The message of a failed action comes first, then the script's error.
+/** @param {Facts} now */
 export function saidWords(now) {
   const { message, failure } = now;
   const pause = pauseOf(now);
   if (message?.bad) return message;
-  if (failure) return { text: failureWords(now), bad: true };
+  if (failure) return { text: failureWords(failure, now.open), bad: true };
   if (pause) return { text: pauseWords(pause, now.open), bad: false };
   return message ?? { text: "", bad: false };
 }
 
 // The marked lines of the open file: the line that failed, and the line of the pause; 0 if there is none.
+/** @param {Facts} now */
 export function markedLines(now) {
   const pause = pauseOf(now);
   const { failure, open } = now;
@@ -99,6 +113,7 @@ const OF_SIMULATOR = [
 /**
  * Whether each button is enabled, by its id.
  * @returns {Record<string, boolean>}
+ * @param {Facts} now
  */
 export function abilities(now) {
   const can = answers(now);
