@@ -637,11 +637,11 @@ def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
     shown._server.stop()
 
 
-def test_other_vehicles_in_the_scene_are_looked_for_at_once(tmp_path, monkeypatch):
+def test_another_scene_is_looked_for_at_once(tmp_path, monkeypatch):
     shown, asked = Cockpit(PageServer("127.0.0.1", 0), "drone_sim", tmp_path), []
-    monkeypatch.setattr(shown, "_ask_master", lambda: asked.append(vehicles))
-    monkeypatch.setattr(type(shown._editing), "vehicles", property(lambda _: vehicles))
-    for vehicles in (frozenset(), frozenset(), frozenset({"drone"}), frozenset({"drone"}), frozenset()):  # noqa: B007
+    monkeypatch.setattr(shown, "_ask_master", lambda: asked.append(scene))
+    monkeypatch.setattr(type(shown._editing), "scene", property(lambda _: scene))
+    for scene in (("", "drone"), ("", "drone"), ("a.yaml", "drone"), ("a.yaml", "drone"), ("a.yaml", "")):
         shown._update(10.0)
-    assert asked == [frozenset(), frozenset({"drone"}), frozenset()]
+    assert asked == [("", "drone"), ("a.yaml", "drone"), ("a.yaml", "")]
     shown._server.stop()

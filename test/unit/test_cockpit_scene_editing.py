@@ -72,14 +72,14 @@ def test_a_browser_that_comes_late_gets_the_whole_tree(editing, told):
 
 def test_browsers_get_only_what_has_changed_of_a_row(editing, told):
     say(1, None, [{**ROW, "pose": [0], "root": True, "vehicle": "drone"}])
-    assert editing.vehicles == {"drone"}
+    assert editing.scene[-1] == {"drone"}
     say(2, 1, [{**ROW, "pose": [1], "root": True, "vehicle": "drone"}])
     say(3, 2, [{**ROW, "pose": [1], "vehicle": ""}, {"handle": 4, "name": "Post"}])
     assert [one["tree"]["objects"] for one in told[1:]] == [
         [{"handle": 3, "pose": [1]}],
         [{"handle": 3, "root": None, "vehicle": ""}, {"handle": 4, "name": "Post"}],
     ]
-    assert tree(editing)["objects"][0] == {**ROW, "pose": [1], "vehicle": ""} and editing.vehicles == set()
+    assert tree(editing)["objects"][0] == {**ROW, "pose": [1], "vehicle": ""} and editing.scene[-1] == set()
 
 
 def test_after_a_lost_message_the_whole_is_heard_anew(editing, told):

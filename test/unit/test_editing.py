@@ -582,6 +582,16 @@ def test_a_draft_that_cannot_be_written_is_said_once(tmp_path, monkeypatch, capl
     assert drafts.Drafts(tmp_path).offered.text == "third" and len(caplog.records) == 1
 
 
+def test_undo_and_redo_back_to_what_was_saved_leave_nothing_to_save(editor, tmp_path):
+    edit(editor, {"do": "add", "objects": [GATE], "position": [5, 0, 0]})
+    editor.answer({"save": str(tmp_path / "gate.yaml")})
+    edit(editor, {"do": "move", "object": "Gate", "position": [6, 0, 1]})
+    undo_or_redo = [({"undo": True}, False), ({"undo": True}, True), ({"redo": True}, False), ({"redo": True}, True)]
+    for request, is_modified in undo_or_redo:
+        editor.answer(request)
+        assert editor.is_modified == is_modified, request
+
+
 def test_a_scene_that_is_loaded_in_flight_is_not_modified(editor):
     edit(editor, {"do": "add", "objects": [GATE], "position": [5, 0, 0]})
     editor.simulation.start()

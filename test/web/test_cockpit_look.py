@@ -183,6 +183,9 @@ def test_on_a_tablet_that_is_held_upright_scene_script_and_edit_are_tabs(cockpit
         warning.wait_for()
         box = warning.bounding_box()
         assert title.bounding_box()["y"] >= box["y"] + box["height"], "the buttons of the picture are not covered"
+        tabs.get_by_role("button", name="Script").tap()
+        scene = page.locator("#scene").bounding_box()
+        assert title.bounding_box()["y"] <= scene["y"] + 12, "beside a script, pictures begin at the scene's edge"
         title.get_by_role("button").last.tap()
         title.wait_for(state="detached")
 

@@ -58,6 +58,7 @@ class SceneEditor:
         self._draft_throttle = Throttle(_DRAFT_PERIOD)
         self.revision = 0  # changes with every edit
         self._saved = 0  # the revision in the file
+        self._saved_content = self.simulation.content()
         self._started = 0, False  # revision at the start of the run, and whether it was modified
         self._run = -1  # number of the run, -1 while stopped
         self._operations = EditOperations(self.simulation)
@@ -120,6 +121,7 @@ class SceneEditor:
         self.history.clear()
         self.revision += 1
         self._saved, self._run = self.revision, -1  # stop does not revert edits of another scene
+        self._saved_content = self.simulation.content()
 
     def answer(self, message: Any) -> dict[str, Any]:
         """Execute a request and return the answer. Raises ValueError and OSError; then nothing has changed."""
@@ -191,6 +193,9 @@ class SceneEditor:
             back()
             raise ValueError(f"'{entry.name}' cannot be {word}: {error}") from None
         self.revision += 1
+        is_saved = change_between(self._saved_content, self.simulation.content()).is_empty
+        if is_saved and not self.simulation.running:
+            self._saved = self.revision
         handles = [handle for handle in change.entries if self.simulation.tree.get(handle) is not None]
         return self._answer(f"{word}: {entry.name}", handles=handles)
 
@@ -240,7 +245,7 @@ class SceneEditor:
             is_copy = path != self.simulation.document.file
             note = ". This is a copy: to save the scene itself, stop the simulation first" if is_copy else ""
             return self._answer(f"saved the scene as it is in flight to {path}{note}", file=str(path))
-        self._saved = self.revision
+        self._saved, self._saved_content = self.revision, self.simulation.content()
         return self._answer(f"saved {path}", file=str(path))
 
     def _save_model(self, request: records.SaveModel) -> dict[str, Any]:

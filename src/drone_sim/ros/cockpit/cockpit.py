@@ -49,7 +49,7 @@ class Cockpit:
         self._topics = FoundTopics()
         self._view: SceneView | None = None
         self._asked_master_at = 0.0
-        self._vehicles = frozenset[str]()  # of the scene, when the master was last asked
+        self._scene: tuple[object, ...] = ()  # when the master was last asked
         self._state, self._meshes, self._lessons = SceneState(), MeshStore(), Lessons()
         self._commands = CommandPublisher()
         held = HeldCommands(self._commands.send)
@@ -94,9 +94,9 @@ class Cockpit:
 
     def _update(self, now: float) -> None:
         browsers = self._socket.browsers
-        vehicles = self._editing.vehicles
-        if vehicles != self._vehicles or now - self._asked_master_at > _MASTER_PERIOD:
-            self._vehicles, self._asked_master_at = vehicles, now  # at once, so that no picture of the old scene stays
+        scene = self._editing.scene
+        if scene != self._scene or now - self._asked_master_at > _MASTER_PERIOD:
+            self._scene, self._asked_master_at = scene, now  # at once, so that no picture of the old scene stays
             self._ask_master()
         self._inspector.update(bool(self._topics.namespace))
         wanted = self._topics.namespace if browsers else ""

@@ -114,10 +114,11 @@ class SceneBackend:
     # ---- the script of the vehicle that the page flies
 
     @property
-    def vehicles(self) -> frozenset[str]:
-        """The names of the scene's vehicles, as far as they are known."""
+    def scene(self) -> tuple[object, ...]:
+        """What tells the scene from another one: its file, and the names of its vehicles."""
         with self._lock:
-            return frozenset(str(row["vehicle"]) for row in self._rows.values() if row.get("root"))
+            vehicles = frozenset(str(row["vehicle"]) for row in self._rows.values() if row.get("root"))
+            return self._header.get("file"), self._header.get("new"), vehicles
 
     @property
     def has_no_vehicle(self) -> bool:
