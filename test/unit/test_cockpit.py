@@ -641,7 +641,8 @@ def test_another_scene_is_looked_for_at_once(tmp_path, monkeypatch):
     shown, asked = Cockpit(PageServer("127.0.0.1", 0), "drone_sim", tmp_path), []
     monkeypatch.setattr(shown, "_ask_master", lambda: asked.append(scene))
     monkeypatch.setattr(type(shown._editing), "scene", property(lambda _: scene))
-    for scene in (("", "drone"), ("", "drone"), ("a.yaml", "drone"), ("a.yaml", "drone"), ("a.yaml", "")):
+    for one in (("", "drone"), ("", "drone"), ("a.yaml", "drone"), ("a.yaml", "drone"), ("a.yaml", "")):
+        scene = one
         shown._update(10.0)
     assert asked == [("", "drone"), ("a.yaml", "drone"), ("a.yaml", "")]
     shown._server.stop()
