@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 from drone_sim.files.resources import package_path
-from drone_sim.ros.core.launch_parameters import from_shell
+from drone_sim.ros.core.shell_files import from_shell
 from drone_sim.ros.node.start_checks import check
 from drone_sim.run.parameters import ParameterError
 

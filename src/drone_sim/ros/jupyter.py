@@ -19,7 +19,7 @@ _ISOLATED = (
     "--",
 )
 # After an exit status of 0 the proxy would not start it again.
-_LAUNCH = 'roslaunch drone_sim drone.launch rviz:=false web:=true web_socket:="$0"; exit 1'
+_LAUNCH = 'roslaunch --skip-log-check drone_sim drone.launch rviz:=false web:=true web_socket:="$0"; exit 1'
 _SINGLE_USER = "DRONE_SIM_SINGLE_USER_CONTAINER"  # set in the image of packaging/jupyterhub
 _TIMEOUT = 120  # s, for the page to answer, on a machine that starts many at once
 

@@ -15,7 +15,7 @@ from drone_sim.files.resources import locate
 from drone_sim.message_text import near_names, shown
 from drone_sim.ros.cockpit.server.address import address_file, print_to_terminal
 from drone_sim.ros.cockpit.server.page_server import PageServer
-from drone_sim.ros.core.launch_parameters import from_shell
+from drone_sim.ros.core.shell_files import from_shell
 from drone_sim.ros.core.shutdown import end_on_signals
 from drone_sim.ros.core.startup import init_node, status_of_node
 

@@ -1,18 +1,16 @@
-"""Parameters that a launch file sets: the simulator's, and file names that are relative to the user's shell."""
+"""Parameters of the simulator that a launch file sets."""
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
 from typing import Any
 
 import rospy
 
 from drone_sim.config.types import ParameterError
+from drone_sim.ros.core.shell_files import NOT_GIVEN, from_shell, script_from_shell
 from drone_sim.run import parameters as parameters_module
 from drone_sim.run.parameters import Parameters
 
-NOT_GIVEN = "default"  # the default of launch arguments whose parameters a scene or config may set, too
 # Values of parameters whose launch arguments the user did not give.
 _DEFAULTS = {**dict.fromkeys(("script", "start", "gui", "real_time_factor"), NOT_GIVEN), "scene_file": "none"}
 
@@ -50,21 +48,3 @@ def use_sim_time() -> bool:
     if not isinstance(value, bool):
         raise ParameterError("must be true or false", ("/use_sim_time",), str(value)[:80])
     return value
-
-
-def from_shell(name: str) -> str:
-    """Return a file name that is valid in any folder: a relative path becomes absolute.
-
-    It is relative to the folder of the shell that ran roslaunch: roslaunch runs nodes in ~/.ros, with the shell's PWD.
-    The name of a built-in script, such as "target", stays unchanged; "none" becomes "".
-    """
-    if name == "none":  # roslaunch shows arguments with an empty default as required
-        return ""
-    if not name or name.startswith(("package://", "~", "/")) or ("/" not in name and not Path(name).suffix):
-        return name
-    return str(Path(os.environ.get("PWD") or os.getcwd()) / name)
-
-
-def script_from_shell(name: str) -> str:
-    """Return a script's name or file as `from_shell` does, but "none" unchanged, and "" for a launch file's default."""
-    return {NOT_GIVEN: "", "none": "none"}.get(name, from_shell(name))

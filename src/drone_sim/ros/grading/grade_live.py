@@ -31,7 +31,7 @@ from drone_sim.grading.outputs.html import report
 from drone_sim.grading.permissions import CHANGE, MOVE
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
-from drone_sim.ros.core.launch_parameters import from_shell
+from drone_sim.ros.core.shell_files import from_shell
 from drone_sim.ros.core.shutdown import end_on_signals
 from drone_sim.ros.core.startup import init_node, status_of_node
 from drone_sim.ros.grading.flight_listener import FlightListener, LiveRules

@@ -12,8 +12,8 @@ from drone_sim.mechanics.frames import to_rpy
 from drone_sim.offline import timeline as timelines
 from drone_sim.offline.timeline import ObjectMove, Timeline, TimelineError
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.core.launch_parameters import from_shell
 from drone_sim.ros.core.message_conversion import xyz, xyzw
+from drone_sim.ros.core.shell_files import from_shell
 from drone_sim.ros.core.startup import MASTER_FAILURES
 from drone_sim.ros.core.validation import check_frame, intervention
 from drone_sim.run.parameters import Parameters

@@ -15,7 +15,7 @@ from drone_sim.grading.permissions import CHANGE
 from drone_sim.message_text import shown
 from drone_sim.ros.core.connections import wait_until_taken
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.core.launch_parameters import from_shell, script_from_shell
+from drone_sim.ros.core.shell_files import from_shell, script_from_shell
 from drone_sim.ros.core.startup import MASTER_FAILURES
 from drone_sim.ros.core.validation import intervention
 from drone_sim.ros.node.run_timeline import RunTimeline

@@ -18,7 +18,7 @@ from typing import Any
 import rospy
 from sensor_msgs.msg import Joy
 
-from drone_sim.ros.core.launch_parameters import from_shell
+from drone_sim.ros.core.shell_files import from_shell
 from drone_sim.ros.core.shutdown import run_tool
 from drone_sim.ros.tools import gamepad
 from drone_sim.ros.tools.commands import Command

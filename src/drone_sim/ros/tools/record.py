@@ -22,7 +22,7 @@ import roslib.packages
 import rospkg
 
 from drone_sim.command_line import Parser, status_of
-from drone_sim.ros.core.launch_parameters import from_shell
+from drone_sim.ros.core.shell_files import from_shell
 from drone_sim.ros.core.startup import poll_master
 
 _NAME = "record"

@@ -26,8 +26,8 @@ from tf2_msgs.msg import TFMessage
 from drone_sim.command_line import FAILED, SIGNALLED, Parser, status_of
 from drone_sim.files import writing
 from drone_sim.files.resources import cache_path, package_path
-from drone_sim.ros.core.launch_parameters import from_shell
 from drone_sim.ros.core.message_conversion import first_frame
+from drone_sim.ros.core.shell_files import from_shell
 from drone_sim.ros.core.startup import poll_master
 
 _NAME = "show"

@@ -15,7 +15,7 @@ from drone_sim.ros.cockpit.editor.scene_backend import SceneBackend
 from drone_sim.ros.cockpit.editor.script_store import OWN, ScriptFile, ScriptStore, ScriptStoreError
 from drone_sim.ros.cockpit.editor.task_flights import Grader, TimelinePlayer
 from drone_sim.ros.cockpit.server.page_socket import Answer
-from drone_sim.ros.core.launch_parameters import script_from_shell
+from drone_sim.ros.core.shell_files import script_from_shell
 from drone_sim.ros.core.simulator import FAILURES, Simulator, script_failure
 from drone_sim.scripting.api.listing import for_editors
 from drone_sim.scripting.errors import ScriptError

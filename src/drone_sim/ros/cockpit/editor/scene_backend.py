@@ -21,7 +21,7 @@ from drone_sim.files import writing
 from drone_sim.files.resources import package_path
 from drone_sim.ros.cockpit.editor.lists import ModelList, RecentScenes
 from drone_sim.ros.cockpit.server.page_socket import Answer
-from drone_sim.ros.core.launch_parameters import script_from_shell
+from drone_sim.ros.core.shell_files import script_from_shell
 from drone_sim.ros.core.simulator import FAILURES
 from drone_sim.scripting.load import DEFAULT
 from drone_sim.scripting.python.helpers import BUILT_IN
