@@ -32,7 +32,10 @@ export class Assumed {
     this.apply();
   }
 
-  // Hears of an edit; returns its answer.
+  /**
+   * Hears of an edit; returns its answer.
+   * @param {Promise<wire.EditAnswer>} asked
+   */
   async during(asked) {
     this.busy++;
     try {

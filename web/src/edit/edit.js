@@ -258,7 +258,10 @@ export class Edit {
     this.notice.say(line, true);
   }
 
-  // `merge`: of one drag, whatever others have done since.
+  /**
+   * @param {"undo" | "redo"} which
+   * @param {string} [merge] of one drag, whatever others have done since
+   */
   async undo(which, merge) {
     try {
       const { said, handles = [] } = await this.ask(which, merge ? { merge } : {});
