@@ -143,12 +143,12 @@ ENDS = {  # what ends the flight, and what is said of it
         "before the flight was over",
     ),
     "a function that is none": (
-        'say = b\'[["call","os.system",-1,[],"id"]]\'\n    os.write(3, struct.pack(\'<I\', len(say)) + say)\n'
+        'say = b\'[["call","os.system",[],"id"]]\'\n    os.write(3, struct.pack(\'<I\', len(say)) + say)\n'
         "    time.sleep(9)",
         "unknown function of the API",
     ),
     "an order for the judge": (
-        'say = b\'[["call","sim.addForce",-1,[["handle"]]]]\'\n    os.write(3, struct.pack(\'<I\', len(say)) + say)\n'
+        'say = b\'[["call","sim.addForce",[["handle"]]]]\'\n    os.write(3, struct.pack(\'<I\', len(say)) + say)\n'
         "    time.sleep(9)",
         "malformed named arguments",
     ),

@@ -1,10 +1,10 @@
 """RPC between a simulation and a child script in a separate process; only calls of the script API are transferred.
 
-The simulation's process sends a command, such as a phase, and waits for its end; meanwhile it executes the calls that the
-script makes. `script_proxy` does that, and validates everything that it receives from `connection`. In the script's
+The simulation's process sends a command, such as a phase, and waits for its end; meanwhile it executes the calls that
+the script makes. `script_proxy` does that, and validates everything that it receives from `connection`. In the script's
 process, `script_process` executes the commands, and the script calls `api_stubs`. The `mirror` saves messages there: it
-answers reads, from the snapshot that each message to the script contains. `effects` says how long they are valid.
-`values` encodes arguments and results.
+answers reads from the snapshot in each message to the script. `effects` says how long they are valid. `values` encodes
+arguments and results.
 
 Messages to the script, written by marshal:
 
