@@ -43,7 +43,7 @@ class Mirror:
 
     def __init__(self) -> None:
         self.results: dict[Read, Any] = {}
-        self.objects = ObjectTree()  # those in `_poses`, and others, whose poses are not valid
+        self.objects = ObjectTree()  # those in `_poses`, and earlier ones, whose poses are no longer valid
         self._poses: dict[int, list[Any]] = {}  # by handle
 
     def take(self, reads: Iterable[Read], results: Iterable[Any]) -> None:
