@@ -157,6 +157,16 @@ def test_on_touch_screens_thumbs_reach_both_sticks_and_nothing_lies_above_the_dr
     cockpit.start_afresh()
 
 
+# Whether the tabs stand in the toolbar's first row, also beside the longest words of a state.
+TABS_STAY = """() => {
+    const at = (id) => document.getElementById(id);
+    at("why").hidden = false;
+    Object.entries({ why: "2 warnings", status: "Script failed", flown: "mine/a_long_name.py" })
+        .forEach(([id, words]) => (at(id).textContent = words));
+    return at("places").getBoundingClientRect().top < at("home").getBoundingClientRect().bottom;
+}"""
+
+
 def test_on_a_tablet_that_is_held_upright_scene_script_and_edit_are_tabs(cockpit, browser):
     size = {"width": 768, "height": 1024}
     with open_page(cockpit, browser, viewport=size, has_touch=True, is_mobile=True) as page:
@@ -176,6 +186,7 @@ def test_on_a_tablet_that_is_held_upright_scene_script_and_edit_are_tabs(cockpit
         page.locator("#rail").get_by_role("button", name="Plots").tap()
         assert tabs.locator("[aria-pressed=true]").all_inner_texts() == ["Scene"]
         assert not page.locator("#toggle").is_visible()
+        assert page.evaluate(TABS_STAY), "a failure is told without another row of the toolbar"
         switch_camera(page)
         tabs.get_by_role("button", name="Edit").tap()
         title, warning = page.locator(".picture header"), page.locator("#until-stop")
