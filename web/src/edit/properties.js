@@ -292,7 +292,8 @@ function onOff(panel, { key, default: otherwise }) {
 }
 
 function text(panel, { key, default: otherwise }) {
-  const field = create("input", { type: "text", "aria-label": words(key), spellcheck: false });
+  const placeholder = key === "script" ? "the one that you run" : "";
+  const field = create("input", { type: "text", "aria-label": words(key), placeholder, spellcheck: false });
   field.onchange = () => panel.set(key, field.value.trim() || null);
   panel.follow(key, otherwise, (value) => document.activeElement === field || (field.value = value ?? ""));
   return field;
