@@ -234,7 +234,7 @@ export class Edit {
       const answer = await this.assumed.during(this.ask("edit", { edit: operations, name, ...(merge ? { merge } : {}) }));
       this.emit("objects"); // what was told meanwhile counts now
       const first = answer.until_stop && !this.hasTold;
-      if (first) this.notice.say("The simulation runs: stop will undo your edits. To keep them, stop first, then edit.");
+      if (first) this.notice.say("The simulation runs: stop will undo your edits. To keep them, stop first.");
       this.hasTold = Boolean(answer.until_stop) && is.state !== "stopped";
       return answer;
     } catch (error) {
