@@ -72,6 +72,9 @@ class Picture:
 
     def __init__(self, page):
         self.page = page
+        wait_until(
+            page, lambda: not page.evaluate("scene.isUnframed")
+        )  # the page frames the drone once, if its view is free
         page.click("#toggle")  # without the editor, the scene is wide
         ahead = AIM - EYE
         far = np.linalg.norm(ahead)
