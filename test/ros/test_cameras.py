@@ -70,14 +70,17 @@ class Cameras(unittest.TestCase):
             rospy.rostime.wallsleep(0.01)  # the connections are made in other threads
         self.fail("nothing such in 400 steps")
 
-    def step_to_the_next_picture(self, every, image, odometry):
-        """Take so many steps, each when the one before has been heard: ROS drops what comes faster than it is sent."""
-        pictures = len(image.messages)
+    def step_to_the_next_picture(self, every, odometry, *listeners):
+        """Take so many steps, each when the one before has been heard: ROS drops what comes faster than it is sent.
+
+        `listeners` hear one message in these steps.
+        """
+        before = [len(one.messages) for one in listeners]
         for _ in range(every):
             heard = len(odometry.messages)
             self.node.step()
             wait_until(lambda heard=heard: len(odometry.messages) > heard)
-        wait_until(lambda: len(image.messages) > pictures)
+        wait_until(lambda: all(len(one.messages) > count for one, count in zip(listeners, before)))
 
     def rendered_in_a_step(self):
         self.pictures.clear()
@@ -103,7 +106,7 @@ class Cameras(unittest.TestCase):
                 self.step_until(lambda several=(image, info, odometry): all(one.messages for one in several))
                 before = len(image.messages) + 1  # what is heard of the one is heard of the others, too, from here on
                 for _ in range(5):
-                    self.step_to_the_next_picture(self.parameters.cameras[name].every, image, odometry)
+                    self.step_to_the_next_picture(self.parameters.cameras[name].every, odometry, image, info)
                 expected = self.parameters.cameras[name]
                 picture, model = image.messages[-1], info.messages[-1]
                 self.assertEqual((picture.encoding, picture.header.frame_id), (encoding, frame))
