@@ -4,6 +4,7 @@ import asyncio
 import json
 import re
 from typing import ClassVar
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -315,6 +316,20 @@ def test_what_is_no_state_of_windows_changes_nothing(cameras, sent, wrong):
     }
     with pytest.raises(ValueError, match="no simulation"):
         windows.answers["answer"]({"handle": 1, "button": "ok"})
+
+
+def test_an_answer_that_nobody_would_receive_is_refused_and_not_lost(cameras, sent, monkeypatch):
+    windows = ScriptWindows("/drone_sim", cameras, sent)
+    publisher = windows._publisher = mock.Mock()
+    publisher.get_num_connections.return_value = 0
+    monkeypatch.setattr(cameras_module, "_CONNECT_TIMEOUT", 0.0)
+    with pytest.raises(ValueError, match="press the button again"):
+        windows.answers["answer"]({"handle": 1, "button": "ok"})
+    publisher.publish.assert_not_called()
+    publisher.get_num_connections.side_effect = [0, 1]
+    monkeypatch.setattr(cameras_module, "_CONNECT_TIMEOUT", 60.0)
+    windows.answers["answer"]({"handle": 1, "button": "ok", "typed": "2"})
+    assert json.loads(publisher.publish.call_args.args[0]) == {"handle": 1, "button": "ok", "typed": "2"}
 
 
 @pytest.mark.parametrize(

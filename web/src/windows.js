@@ -78,7 +78,7 @@ export class Windows {
   dialog({ handle, title, text, buttons, typed }) {
     const element = this.frame("dialog", title);
     const field = typed === null ? null : create("input", { value: typed, "aria-label": title });
-    const press = (button) => this.socket.ask("answer", { handle, button, typed: field?.value ?? "" }).catch(() => {});
+    const press = (button) => this.socket.ask("answer", { handle, button, typed: field?.value ?? "" }).catch((error) => this.notice.say(error.message, true));
     if (field) field.onkeydown = (event) => event.key === "Enter" && press(buttons[0]);
     element.append(create("p", { textContent: text }));
     if (field) element.append(field);

@@ -33,7 +33,7 @@ _MILLIMETRES = "16UC1"  # REP-118
 _WINDOWS = ("views", "dialogs", "consoles")
 BOXES, MASK = OVERLAYS = ("boxes", "mask")
 _MAX_LENGTH = 1 << 21  # characters of a message; the simulation's are shorter
-_CONNECT_TIMEOUT = 3.0  # s, for the simulation to subscribe to answers
+_CONNECT_TIMEOUT = 10.0  # s, for the simulation to subscribe to answers; rospy connects again after 0.5, 1, 2 and 4 s
 _NAMES = {"track": "tracking"}  # names for people, by topic
 
 
@@ -279,13 +279,16 @@ class ScriptWindows:
         self._socket.tell({"windows": state})
 
     def _answer_dialog(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Forward the pressed button to the simulation, which checks it."""
-        if self._publisher is None:
+        """Forward the pressed button to the simulation, which checks it. Raises ValueError if nobody can receive it."""
+        publisher = self._publisher
+        if publisher is None:
             raise ValueError("no simulation is there to receive the answer")
         deadline = time.monotonic() + _CONNECT_TIMEOUT
-        while not self._publisher.get_num_connections() and time.monotonic() < deadline:
-            time.sleep(0.05)  # without a subscriber the message would be lost
-        self._publisher.publish(json.dumps({key: message.get(key) for key in ("handle", "button", "typed")}))
+        while not publisher.get_num_connections():
+            if time.monotonic() > deadline:
+                raise ValueError("the simulation does not receive answers now: press the button again")
+            time.sleep(0.05)
+        publisher.publish(json.dumps({key: message.get(key) for key in ("handle", "button", "typed")}))
         return {}
 
 
