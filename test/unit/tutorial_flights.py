@@ -22,7 +22,8 @@ CONTROLLERS = [name for name in STAGES if name[0] < "8"]  # which hold all of th
 
 @contextlib.contextmanager
 def flying(stage, *assignments, backend=None):
-    values = parameters.load(settings(assignments))
+    # A script that imports OpenCV may take longer than the default limit on a busy machine.
+    values = parameters.load(settings(("script_time_limit=60", *assignments)))
     simulation = Simulation(values, script=str(STAGES[stage]) if stage in STAGES else stage, backend=backend)
     try:
         yield simulation

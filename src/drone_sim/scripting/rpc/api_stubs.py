@@ -188,7 +188,7 @@ def _form(name: str, arguments: tuple[Any, ...]) -> Any:
 
     It is why an error is raised in the line that causes it, although writes are not waited for: a wrong handle, name or
     count of values has another form. If all writes were waited for, a step of the built-in script would take eight
-    messages to the script instead of two, and graded flights 60 % longer (./dev.sh bench grade).
+    messages to the script instead of two.
     """
     others = arguments[:-1]
     if not arguments or not ALL_PLAIN(map(type, others)):
