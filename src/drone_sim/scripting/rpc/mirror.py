@@ -2,8 +2,8 @@
 
 Poses, so that a mark can be moved without a message. A mark is a dummy without a parent, such as V-REP's track frame: a
 controller moves it in every step, and reads its vehicle's pose relative to it. Without this, a step of the built-in
-script would take three messages to the script instead of two. The API's own functions compute with the poses, so results
-are equal to the last bit.
+script would take three messages to the script instead of two. The API's own functions compute with the poses, so
+results are equal to the last bit.
 """
 
 from __future__ import annotations
