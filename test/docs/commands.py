@@ -72,8 +72,7 @@ NOT_RUN = {  # with the reason
     "docker exec -it drone_sim bash": CONTAINER,
     "docker build -f packaging/jupyterhub/Dockerfile -t drone_sim_jupyter .": CONTAINER,
     "docker compose -f packaging/jupyterhub/compose.yaml up -d --build": CONTAINER,
-    "helm upgrade --install drone-sim jupyterhub/jupyterhub"
-    " --values packaging/jupyterhub/values.yaml": CONTAINER,
+    "helm upgrade --install drone-sim jupyterhub/jupyterhub --values packaging/jupyterhub/values.yaml": CONTAINER,
     "mkdir -p handed_in": CONTAINER,
     "for home in $(docker volume ls -q --filter name=drone_sim_home_); do docker run --rm --network none"
     " --entrypoint timeout -v $home:/home/pilot:ro drone_sim 10 head -c 1000000 drone_scripts/hover.py"
