@@ -9,9 +9,11 @@ import pytest
 import trimesh
 from drawing import AHEAD, BLUE, CAMERA, FLOOR, GREY, RED, at, box, draw, looking, pixel, reddish, seen
 
-from drone_sim.render import context
+from drone_sim.render import batches, context, culling
+from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics, Orthographic
-from drone_sim.render.renderer import Renderer
+from drone_sim.render.programs import TO_SUN
+from drone_sim.render.renderer import FrameState, Renderer
 from drone_sim.shapes.box import Box
 from drone_sim.shapes.capsule import Capsule
 from drone_sim.shapes.cylinder import Cylinder
@@ -47,6 +49,48 @@ def test_up_is_up_and_left_is_left(renderer):
     assert np.nonzero(reddish(picture))[0].mean() < 60
     assert np.nonzero((picture[:, :, 2] > 100) & (picture[:, :, 0] < 40))[1].mean() < 100
     assert picture[0].mean() < picture[100].mean()  # the sky is deeper above than at the horizon
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [CAMERA, Orthographic(160, 120, 4.0, 0.1, 20.0), Distorted(160, 120, 2.6, 0.02, 50.0, "equidistant")],
+    ids=["pinhole", "orthographic", "fisheye"],
+)
+def test_what_is_outside_the_view_is_not_drawn_and_the_picture_is_the_same(renderer, monkeypatch, camera):
+    """Every picture, with its outputs, equals that for which everything is drawn, to the last bit."""
+    random, drawn = np.random.default_rng(7), []
+
+    def recorded(*arguments):
+        drawn.append(culling.in_view(*arguments))
+        return drawn[-1]
+
+    names = ["color", "depth", "instance", "before"]
+    for _ in range(20):
+        shapes = [Box((0.4, 0.2, 0.3)), Sphere((0.2,)), Cylinder((0.2, 0.6)), Box((0.2, 0.4, 0.3))]
+        colors = [RED, BLUE, (0.0, 1.0, 0.0, 0.5), GREY]
+        visuals = [FLOOR, *(Visual(number, shapes[number % 4], colors[number % 4]) for number in range(40))]
+        poses = np.array([np.eye(4), *(at(*point) for point in random.uniform((-6, -6, -0.5), (8, 6, 4), (40, 3)))])
+        renderer.set_visuals(visuals)
+        before = FrameState(AHEAD, poses + random.normal(0.0, 0.05))
+        view = looking(random.uniform((-3, -3, 0.5), (3, 3, 3)), random.uniform(-3, 3, 3))
+        images = []
+        for in_view in (recorded, lambda centres, *_: np.ones(len(centres), dtype=bool)):
+            monkeypatch.setattr(batches, "in_view", in_view)
+            images.append(
+                renderer.render_outputs(names, camera, view, poses, instances=np.arange(1, 42), before=before)
+            )
+        for name in names:
+            np.testing.assert_array_equal(images[0][name], images[1][name])
+    assert 0.1 < np.mean(drawn) < 0.9
+
+
+def test_a_shadow_is_seen_without_the_thing_that_casts_it(renderer):
+    """The ball is 3 m above the picture's upper edge; its shadow is in the middle."""
+    view = looking((0.0, 0.0, 2.0), (0.0, 0.1, 0.0))
+    x, y, z = np.array(TO_SUN) / TO_SUN[2] * 5.0
+    with_shadow = draw(renderer, [FLOOR, Visual("ball", Sphere((0.2,)), RED)], [np.eye(4), at(x, y + 0.1, z)], view)
+    without = draw(renderer, [FLOOR], [np.eye(4)], view)
+    assert not reddish(with_shadow).any() and with_shadow[120, 160].mean() < 0.6 * without[120, 160].mean()
 
 
 def test_visuals_come_change_and_go(renderer):

@@ -11,6 +11,7 @@ import numpy as np
 
 from drone_sim.files.mesh_files import WHITE
 from drone_sim.render import surfaces
+from drone_sim.render.culling import in_view
 from drone_sim.render.programs import Role
 from drone_sim.render.surfaces import Surface
 from drone_sim.shapes.visual import Visual
@@ -18,9 +19,10 @@ from drone_sim.shapes.visual import Visual
 SHADE = 0.55  # brightness of the floor in a shadow, relative to its brightness in the light
 VERTEX_LAYOUT = (("position", "3f", 12), ("normal", "3f", 12), ("uv", "2f", 8))
 MOVING_LAYOUT = (("row0", "4f", 16), ("row1", "4f", 16), ("row2", "4f", 16))
-FIXED_LAYOUT = (("paint", "4f", 16),)
+PAINT_LAYOUT = (("paint", "4f", 16),)
 IDENTITY_LAYOUT = (("identity", "1f", 4),)
 BEFORE_LAYOUT = (("before0", "4f", 16), ("before1", "4f", 16), ("before2", "4f", 16))
+INSTANCE_LAYOUTS = (MOVING_LAYOUT, PAINT_LAYOUT, IDENTITY_LAYOUT, BEFORE_LAYOUT)
 ANISOTROPY = 8.0
 
 
@@ -35,7 +37,8 @@ class CardSurface:
     transparent: bool
     closed: bool
     top: float
-    centre: np.ndarray
+    centre: np.ndarray  # of its bounding box
+    half_size: np.ndarray
 
     def release(self) -> None:
         """Free the GPU memory of the surface."""
@@ -54,6 +57,7 @@ class Batch:
     transparent: bool = False
     ground: bool = False
     first: int = 0  # index of its first record in the instance buffers
+    visible: int = 0  # how many of its instances, from the first on, are drawn
     arrays: dict[Role, moderngl.VertexArray] = field(default_factory=dict)
 
     @property
@@ -65,7 +69,8 @@ class Batch:
         """Render the batch in a role that `DrawBatches.link` prepared."""
         if role.kind == "surface" and self.surface.texture is not None:
             self.surface.texture.use(0)
-        self.arrays[role].render(instances=len(self.members) * role.tiles)
+        if self.visible:
+            self.arrays[role].render(instances=self.visible * role.tiles)
 
 
 class DrawBatches:
@@ -78,8 +83,13 @@ class DrawBatches:
         self._linked: set[Role] = set()
         self._surfaces: dict[Visual, tuple[CardSurface, ...]] = {}
         self._buffers: list[moderngl.Buffer] = []
+        # For each record of the instance buffers: its visual, batch, scale, and bounding sphere in the mesh's frame.
         self._members: np.ndarray = np.zeros(0, dtype=np.intp)
+        self._batch_of = self._members
         self._scales = np.zeros((0, 1, 3))
+        self._centres, self._radii = np.zeros((0, 3, 1)), np.zeros(0)
+        self._order: np.ndarray = np.zeros(0, dtype=np.intp)  # of the records; those that are not drawn last
+        self._paints = np.zeros((0, 4), dtype=np.float32)
         self.visuals: tuple[Visual, ...] = ()
         self.all: list[Batch] = []
         self.solids: list[Batch] = []
@@ -107,24 +117,45 @@ class DrawBatches:
         self.ground = [batch for batch in self.all if batch.ground]
         self.glass = [batch for batch in self.all if batch.transparent]
         self._members = np.array([i for batch in self.all for i in batch.members], dtype=np.intp)
+        self._batch_of = np.repeat(np.arange(len(self.all)), [len(batch.members) for batch in self.all])
         self._scales = np.array([shared[i][1] for i in self._members]).reshape(-1, 1, 3)
+        self._centres = np.array([batch.surface.centre for batch in self.all for _ in batch.members]).reshape(-1, 3, 1)
+        half_sizes = np.array([batch.surface.half_size for batch in self.all for _ in batch.members]).reshape(-1, 1, 3)
+        self._radii = np.linalg.norm(half_sizes * self._scales, axis=2)[:, 0]
         self._reserve()
 
-    def move(self, origin: np.ndarray, poses: np.ndarray) -> None:
+    def move(
+        self, origin: np.ndarray, poses: np.ndarray, clip_from_world: np.ndarray, floor_height: float | None
+    ) -> None:
         """Upload the poses, world-from-visual (N, 4, 4), relative to `origin` (3,), metres.
 
-        The subtraction is in double precision, so that objects far from the world's origin do not jitter.
+        The subtraction is in double precision, so that objects far from the world's origin do not jitter. Solid
+        instances outside the view, (4, 4) or (tiles, 4, 4) with `origin` as the world's origin, are not drawn; with a
+        `floor_height`, relative to `origin`, only if their shadows on it are outside, too.
         """
         if poses.shape != (len(self.visuals), 4, 4):
             raise ValueError(f"poses of shape {poses.shape} for {len(self.visuals)} visuals")
         if self._buffers:
-            self._buffers[0].write(self._rows(origin, poses))
+            rows = self._rows(np.arange(len(self._members)), origin, poses)
+            self._hide(rows, clip_from_world, floor_height)
+            self._buffers[0].write(rows[self._order].astype(np.float32))
 
-    def _rows(self, origin: np.ndarray, poses: np.ndarray) -> np.ndarray:
-        rows = poses[self._members, :3, :]
+    def _rows(self, records: np.ndarray, origin: np.ndarray, poses: np.ndarray) -> np.ndarray:
+        rows: np.ndarray = poses[self._members[records], :3, :]
         rows[:, :, 3] -= origin
-        rows[:, :, :3] *= self._scales
-        return np.asarray(rows, dtype=np.float32)
+        rows[:, :, :3] *= self._scales[records]
+        return rows
+
+    def _hide(self, rows: np.ndarray, clip_from_world: np.ndarray, floor_height: float | None) -> None:
+        """Sort the records of each batch so that those outside the view come last, and count the others."""
+        centres = (rows[:, :, :3] @ self._centres)[:, :, 0] + rows[:, :, 3]
+        visible = in_view(centres, self._radii, clip_from_world, floor_height)
+        order = np.argsort(2 * self._batch_of - visible, kind="stable")
+        for batch, count in zip(self.all, np.bincount(self._batch_of, visible, len(self.all))):
+            batch.visible = int(count)
+        if not np.array_equal(order, self._order):
+            self._order = order
+            self._buffers[1].write(self._paints[order])
 
     def link(self, role: Role, programs: Mapping[str, Any]) -> None:
         """Prepare the batches for a role, once. `programs` maps each `Batch.look` to the role's shader program."""
@@ -136,19 +167,19 @@ class DrawBatches:
     def identify(self, instances: np.ndarray) -> None:
         """Upload the instance number of each visual, (N,), for the output "instance"."""
         if self._buffers:
-            self._buffers[2].write(np.asarray(instances)[self._members].astype(np.float32))
+            self._buffers[2].write(np.asarray(instances)[self._members[self._order]].astype(np.float32))
 
     def move_before(self, origin: np.ndarray, poses: np.ndarray) -> None:
         """Upload the poses of the previous image, for the output "before"; arguments as for `move`."""
         if self._buffers:
-            self._buffers[3].write(self._rows(origin, poses))
+            self._buffers[3].write(self._rows(self._order, origin, poses).astype(np.float32))
 
-    def floor_height(self, poses: np.ndarray) -> float | None:
-        """Return the world z of the top of the first floor, metres; None without a floor."""
+    def floor_height(self, origin: np.ndarray, poses: np.ndarray) -> float | None:
+        """Return the z of the top of the first floor relative to `origin` (3,), metres; None without a floor."""
         if not self.floors:
             return None
         floor = self.floors[0]
-        return float(poses[floor.members[0], 2, 3] + floor.surface.top * self._scales[floor.first, 0, 2])
+        return float(poses[floor.members[0], 2, 3] - origin[2] + floor.surface.top * self._scales[floor.first, 0, 2])
 
     def glass_from_far(self, distance: Callable[[np.ndarray], float], poses: np.ndarray) -> list[Batch]:
         """Return the transparent batches, farthest first; `distance` is that of a point (3,) in the world."""
@@ -189,6 +220,7 @@ class DrawBatches:
             closed=surface.closed,
             top=float(high[2]),
             centre=(low + high) / 2.0,
+            half_size=(high - low) / 2.0,
         )
 
     def _upload_texture(self, image: np.ndarray) -> moderngl.Texture:
@@ -229,12 +261,10 @@ class DrawBatches:
     def _reserve(self) -> None:
         if not self.all:
             return
-        records = [self._paint(batch, index) for batch in self.all for index in batch.members]
-        moving = self._context.buffer(reserve=48 * len(records), dynamic=True)
-        fixed = self._context.buffer(np.array(records, dtype=np.float32))
-        identity = self._context.buffer(reserve=4 * len(records), dynamic=True)
-        before = self._context.buffer(reserve=48 * len(records), dynamic=True)
-        self._buffers = [moving, fixed, identity, before]
+        paints = [self._paint(batch, index) for batch in self.all for index in batch.members]
+        self._paints, self._order = np.array(paints, dtype=np.float32), np.zeros(0, dtype=np.intp)
+        sizes = (row_size for layout in INSTANCE_LAYOUTS for row_size in [sum(size for _, _, size in layout)])
+        self._buffers = [self._context.buffer(reserve=size * len(paints), dynamic=True) for size in sizes]
 
     def _paint(self, batch: Batch, index: int) -> tuple[float, ...]:
         red, green, blue, alpha = np.multiply(self.visuals[index].rgba, batch.surface.rgba)
@@ -243,10 +273,9 @@ class DrawBatches:
     def _array(self, batch: Batch, program: Any, times: int) -> moderngl.VertexArray:
         """Return the vertex array with which `program` draws every instance of a batch `times` times."""
         array = self._context.vertex_array(program, [], index_buffer=batch.surface.indices, index_element_size=4)
-        layouts = (MOVING_LAYOUT, FIXED_LAYOUT, IDENTITY_LAYOUT, BEFORE_LAYOUT)
         for layout, buffer, first, divisor in (
             (VERTEX_LAYOUT, batch.surface.vertices, 0, 0),
-            *((layout, buffer, batch.first, times) for layout, buffer in zip(layouts, self._buffers)),
+            *((layout, buffer, batch.first, times) for layout, buffer in zip(INSTANCE_LAYOUTS, self._buffers)),
         ):
             stride = sum(size for _, _, size in layout)
             offset = first * stride

@@ -229,7 +229,8 @@ class Renderer:
         """Draw solid objects, floor, sky, shadows, transparent objects; of the ground, only its outputs."""
         batches, role, shadow = self._batches, view.role("surface", outputs), view.role("shadow")
         with self._context() as gl:
-            self._upload(outputs, view)
+            floor_height = batches.floor_height(view.camera_pose[:3, 3], view.poses)
+            self._upload(outputs, view, floor_height)
             self._prepare(role, view)
             self._prepare(shadow, view)
             target = self._clear_target((COLOR, *outputs), view, SHADE if batches.ground else 1.0)
@@ -241,9 +242,8 @@ class Renderer:
             gl.disable(gl.CULL_FACE)
             if not isinstance(view.intrinsics, Orthographic):
                 self._draw_sky(gl, view)
-            height = batches.floor_height(view.poses)
-            if height is not None:
-                self._programs.one(shadow)["floor_height"] = height - view.camera_pose[2, 3]
+            if floor_height is not None:
+                self._programs.one(shadow)["floor_height"] = floor_height
                 gl.enable_only(gl.BLEND)
                 gl.blend_func = gl.ZERO, gl.DST_ALPHA, gl.ONE, gl.ZERO
                 self._draw_batches(gl, batches.solids, shadow)
@@ -274,10 +274,10 @@ class Renderer:
                 gl.disable(gl.CULL_FACE)
             batch.draw(role)
 
-    def _upload(self, names: Sequence[str], view: _View) -> None:
-        """Upload the poses of the visuals and the attributes for the outputs `names`."""
-        batches = self._batches
-        batches.move(view.camera_pose[:3, 3], view.poses)
+    def _upload(self, names: Sequence[str], view: _View, floor_height: float | None = None) -> None:
+        """Upload the poses of the visuals and the attributes for the outputs `names`; `floor_height` as for `move`."""
+        batches, origin = self._batches, view.camera_pose[:3, 3]
+        batches.move(origin, view.poses, _clip_from_world(view), floor_height)
         if "instance" in names:
             batches.identify(np.zeros(len(batches.visuals)) if view.instances is None else view.instances)
         if "before" in names:
@@ -302,7 +302,7 @@ class Renderer:
                 program["parallel"] = lens.near, lens.far - lens.near
 
     def _set_projection(self, program: Any, view: _View) -> None:
-        program["clip_from_world"].write(_bytes(view.intrinsics.projection() @ _optical_from_world(view.camera_pose)))
+        program["clip_from_world"].write(_bytes(_clip_from_world(view)))
         if isinstance(view.intrinsics, Tiles) and "bounds" in program:
             program["bounds"].write(view.intrinsics.bounds.astype(np.float32).tobytes())
 
@@ -335,6 +335,11 @@ def _optical_from_world(camera_pose: np.ndarray) -> np.ndarray:
     rotation = np.eye(4)
     rotation[:3, :3] = camera_pose[:3, :3].T
     return rotation
+
+
+def _clip_from_world(view: _View) -> np.ndarray:
+    """Return the view's projection, (4, 4) or (tiles, 4, 4), with the camera as the world's origin."""
+    return view.intrinsics.projection() @ _optical_from_world(view.camera_pose)
 
 
 def _bytes(matrix: np.ndarray) -> bytes:
