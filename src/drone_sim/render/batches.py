@@ -129,8 +129,8 @@ class DrawBatches:
     ) -> None:
         """Upload the poses, world-from-visual (N, 4, 4), relative to `origin` (3,), metres.
 
-        The subtraction is in double precision, so that objects far from the world's origin do not jitter. Solid
-        instances outside the view, (4, 4) or (tiles, 4, 4) with `origin` as the world's origin, are not drawn; with a
+        The subtraction is in double precision, so that objects far from the world's origin do not jitter. Visuals
+        outside the view, (4, 4) or (tiles, 4, 4) with `origin` as the world's origin, are not drawn; with a
         `floor_height`, relative to `origin`, only if their shadows on it are outside, too.
         """
         if poses.shape != (len(self.visuals), 4, 4):

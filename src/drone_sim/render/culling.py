@@ -17,10 +17,10 @@ def in_view(
 ) -> np.ndarray:
     """Return whether a part of each sphere, (N, 3) and (N,), m, may be in a view, or of its shadow on a floor; (N,).
 
-    clip_from_world: (4, 4), or (tiles, 4, 4) for any of several views. floor_height: z, m; None if shadows do not count.
+    clip_from_world: (4, 4), or (tiles, 4, 4) for any of several views. floor_height: z, m; None: no shadows.
     """
     rows = clip_from_world.reshape(-1, 4, 4)
-    planes = np.concatenate([rows[:, 3:] + rows[:, :3], rows[:, 3:] - rows[:, :3]], axis=1)  # (tiles, 6, 4), inside >= 0
+    planes = np.concatenate([rows[:, 3:] + rows[:, :3], rows[:, 3:] - rows[:, :3]], axis=1)  # >= 0 inside
     planes /= np.linalg.norm(planes[:, :, :3], axis=2, keepdims=True)
     visible = _reach(planes, centres, radii)
     if floor_height is not None and not visible.all():
