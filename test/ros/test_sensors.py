@@ -63,8 +63,9 @@ class Sensors(unittest.TestCase):
         cls.node.close()
 
     def setUp(self):
+        heard = len(self.odometry.messages)
         self.assertTrue(rospy.ServiceProxy("~restart", Trigger)().success)
-        self.odometry.wait_for(lambda o: 0 < o.header.stamp.to_sec() < 1)
+        self.odometry.wait_for(lambda o: 0 < o.header.stamp.to_sec() < 1, after=heard)
 
     def pause(self, on):
         self.assertTrue(rospy.ServiceProxy("~pause", SetBool)(on).success)

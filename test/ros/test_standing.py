@@ -65,8 +65,9 @@ class Standing(unittest.TestCase):
             cls.node.close()
 
     def setUp(self):
+        heard = len(self.odometry.messages)
         self.call("start")
-        self.odometry.wait_for(lambda o: 0 < o.header.stamp.to_sec() < 1)
+        self.odometry.wait_for(lambda o: 0 < o.header.stamp.to_sec() < 1, after=heard)
         self.scripts.wait_for()  # the script has advertised its topic anew
         self.assertTrue(rospy.ServiceProxy("~pause", SetBool)(True).success)
 

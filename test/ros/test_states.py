@@ -183,8 +183,9 @@ class States(unittest.TestCase):
         (bag,) = Path(self.folder.name).iterdir()
         heard = (self.odometry[RECORDED], self.commands)
         flown, changes = path([one.messages[:] for one in heard])
+        count = len(self.odometry[RECORDED].messages)
         self.assertTrue(rospy.ServiceProxy(f"/sim_{RECORDED}/restart", Trigger)().success)
-        self.odometry[RECORDED].wait_for(lambda m: m.header.stamp.to_sec() < 1)
+        self.odometry[RECORDED].wait_for(lambda m: m.header.stamp.to_sec() < 1, after=count)
         before = [len(one.messages) for one in heard]
         topics = (f"/{RECORDED}/{topic}" for topic in ("takeoff", "cmd_vel", "land"))
         pace = str(FLIGHTS[RECORDED].factor)
