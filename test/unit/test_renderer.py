@@ -59,6 +59,7 @@ def test_up_is_up_and_left_is_left(renderer):
 def test_what_is_outside_the_view_is_not_drawn_and_the_picture_is_the_same(renderer, monkeypatch, camera):
     """Every picture, with its outputs, equals that for which everything is drawn, to the last bit."""
     random, drawn = np.random.default_rng(7), []
+    monkeypatch.setattr(batches, "MANY_VERTICES", 0)
 
     def recorded(*arguments):
         drawn.append(culling.in_view(*arguments))
@@ -84,8 +85,9 @@ def test_what_is_outside_the_view_is_not_drawn_and_the_picture_is_the_same(rende
     assert 0.1 < np.mean(drawn) < 0.9
 
 
-def test_a_shadow_is_seen_without_the_thing_that_casts_it(renderer):
+def test_a_shadow_is_seen_without_the_thing_that_casts_it(renderer, monkeypatch):
     """The ball is 3 m above the picture's upper edge; its shadow is in the middle."""
+    monkeypatch.setattr(batches, "MANY_VERTICES", 0)
     view = looking((0.0, 0.0, 2.0), (0.0, 0.1, 0.0))
     x, y, z = np.array(TO_SUN) / TO_SUN[2] * 5.0
     with_shadow = draw(renderer, [FLOOR, Visual("ball", Sphere((0.2,)), RED)], [np.eye(4), at(x, y + 0.1, z)], view)

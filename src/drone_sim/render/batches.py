@@ -22,8 +22,10 @@ MOVING_LAYOUT = (("row0", "4f", 16), ("row1", "4f", 16), ("row2", "4f", 16))
 PAINT_LAYOUT = (("paint", "4f", 16),)
 IDENTITY_LAYOUT = (("identity", "1f", 4),)
 BEFORE_LAYOUT = (("before0", "4f", 16), ("before1", "4f", 16), ("before2", "4f", 16))
+VERTEX_SIZE = 32  # bytes
 INSTANCE_LAYOUTS = (MOVING_LAYOUT, PAINT_LAYOUT, IDENTITY_LAYOUT, BEFORE_LAYOUT)
 ANISOTROPY = 8.0
+MANY_VERTICES = 10_000  # of all visuals; fewer are drawn faster than it takes to find out which are in the view
 
 
 @dataclass
@@ -88,7 +90,8 @@ class DrawBatches:
         self._batch_of = self._members
         self._scales = np.zeros((0, 1, 3))
         self._centres, self._radii = np.zeros((0, 3, 1)), np.zeros(0)
-        self._order: np.ndarray = np.zeros(0, dtype=np.intp)  # of the records; those that are not drawn last
+        self._has_many_vertices = False
+        self._order = self._members  # of the records; those that are not drawn last
         self._paints = np.zeros((0, 4), dtype=np.float32)
         self.visuals: tuple[Visual, ...] = ()
         self.all: list[Batch] = []
@@ -122,6 +125,8 @@ class DrawBatches:
         self._centres = np.array([batch.surface.centre for batch in self.all for _ in batch.members]).reshape(-1, 3, 1)
         half_sizes = np.array([batch.surface.half_size for batch in self.all for _ in batch.members]).reshape(-1, 1, 3)
         self._radii = np.linalg.norm(half_sizes * self._scales, axis=2)[:, 0]
+        vertices = sum(len(batch.members) * batch.surface.vertices.size for batch in self.all) // VERTEX_SIZE
+        self._has_many_vertices = vertices > MANY_VERTICES
         self._reserve()
 
     def move(
@@ -136,9 +141,9 @@ class DrawBatches:
         if poses.shape != (len(self.visuals), 4, 4):
             raise ValueError(f"poses of shape {poses.shape} for {len(self.visuals)} visuals")
         if self._buffers:
-            rows = self._rows(np.arange(len(self._members)), origin, poses)
-            self._hide(rows, clip_from_world, floor_height)
-            self._buffers[0].write(rows[self._order].astype(np.float32))
+            if self._has_many_vertices:
+                self._hide(self._rows(np.arange(len(self._members)), origin, poses), clip_from_world, floor_height)
+            self._buffers[0].write(self._rows(self._order, origin, poses).astype(np.float32))
 
     def _rows(self, records: np.ndarray, origin: np.ndarray, poses: np.ndarray) -> np.ndarray:
         rows: np.ndarray = poses[self._members[records], :3, :]
@@ -254,7 +259,7 @@ class DrawBatches:
         batches = shared + singles
         first = 0
         for batch in batches:
-            batch.first = first
+            batch.first, batch.visible = first, len(batch.members)
             first += len(batch.members)
         return batches
 
@@ -262,9 +267,12 @@ class DrawBatches:
         if not self.all:
             return
         paints = [self._paint(batch, index) for batch in self.all for index in batch.members]
-        self._paints, self._order = np.array(paints, dtype=np.float32), np.zeros(0, dtype=np.intp)
-        sizes = (row_size for layout in INSTANCE_LAYOUTS for row_size in [sum(size for _, _, size in layout)])
-        self._buffers = [self._context.buffer(reserve=size * len(paints), dynamic=True) for size in sizes]
+        self._paints, self._order = np.array(paints, dtype=np.float32), np.arange(len(paints))
+        moving = self._context.buffer(reserve=48 * len(paints), dynamic=True)
+        paint = self._context.buffer(self._paints, dynamic=True)
+        identity = self._context.buffer(reserve=4 * len(paints), dynamic=True)
+        before = self._context.buffer(reserve=48 * len(paints), dynamic=True)
+        self._buffers = [moving, paint, identity, before]
 
     def _paint(self, batch: Batch, index: int) -> tuple[float, ...]:
         red, green, blue, alpha = np.multiply(self.visuals[index].rgba, batch.surface.rgba)
