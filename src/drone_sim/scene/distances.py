@@ -74,7 +74,7 @@ class Distances:
     def _to_solids(
         self, points: Sequence[SceneObject], solids: Mapping[_Solid, str], reach: float
     ) -> Iterator[Nearest]:
-        """Yield the nearest point of each solid in reach of each point."""
+        """Yield, for each point, the nearest point on every solid that is at most `reach` (m) away."""
         for item in points if solids else ():
             start = frames.position(item.matrix())
             queries = self._context.world.queries

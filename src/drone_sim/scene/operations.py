@@ -302,7 +302,7 @@ class SceneOperations:
                 record.entry = entry.model_copy(update={"linked": ""})
 
     def _check_links(self, changed_entries: Iterable[EntryParameters]) -> None:
-        """Raise ParameterError if one of these entries has a link that cannot be; they are records already."""
+        """Raise ParameterError if the link of one of these dummies is impossible in the scene, which has them already."""
         if any(isinstance(entry, DummyParameters) and entry.linked for entry in changed_entries):
             check_links(self._scene.entries.values())
 
