@@ -87,12 +87,12 @@ class DrawBatches:
         self._buffers: list[moderngl.Buffer] = []
         # For each record of the instance buffers: its visual, batch, scale, and bounding sphere in the mesh's frame.
         self._members: np.ndarray = np.zeros(0, dtype=np.intp)
-        self._batch_of = self._members
+        self._batch_of: np.ndarray = self._members
         self._scales = np.zeros((0, 1, 3))
         self._centres, self._radii = np.zeros((0, 3, 1)), np.zeros(0)
         self._has_many_vertices = False
-        self._order = self._members  # of the records; those that are not drawn last
-        self._paints = np.zeros((0, 4), dtype=np.float32)
+        self._order: np.ndarray = self._members  # of the records; those that are not drawn last
+        self._paints: np.ndarray = np.zeros((0, 4), dtype=np.float32)
         self.visuals: tuple[Visual, ...] = ()
         self.all: list[Batch] = []
         self.solids: list[Batch] = []
