@@ -302,7 +302,7 @@ class SceneOperations:
                 record.entry = entry.model_copy(update={"linked": ""})
 
     def _check_links(self, changed_entries: Iterable[EntryParameters]) -> None:
-        """Raise ParameterError if the link of one of these dummies is impossible in the scene, which has them already."""
+        """Raise ParameterError for an impossible link of one of these dummies, which are in the scene already."""
         if any(isinstance(entry, DummyParameters) and entry.linked for entry in changed_entries):
             check_links(self._scene.entries.values())
 
