@@ -174,7 +174,7 @@ class Actions:
 
     def _first_object(self, arguments: list[Any]) -> SceneObject | None:
         """Return the object whose handle is the first argument."""
-        return self._objects.get(bare(arguments[0])) if arguments and _is_handle(arguments[0]) else None
+        return self._objects.by_handle.get(bare(arguments[0])) if arguments and _is_handle(arguments[0]) else None
 
     # ---- actions that depend on the arguments
 
@@ -325,7 +325,7 @@ class Permissions(Actions):
         A goal on a vehicle of the submission may move with the vehicle.
         """
         for handle in _handles(arguments[:1]):
-            scene_object = self._objects.get(bare(handle))
+            scene_object = self._objects.by_handle.get(bare(handle))
             if scene_object is not None:
                 is_carrier = any(scene_object.is_part_of(vehicle.object) for vehicle in self._flown)
                 yield from (goal for goal in self._goals_on(scene_object) if goal is scene_object or not is_carrier)

@@ -67,7 +67,7 @@ class _OnScripts(Functions):
         if not isinstance(handle, (int, float)):
             raise WrongValue("expected the handle of a script")
         number = int(handle)
-        item = self._objects.get(number)
+        item = self._objects.by_handle.get(number)
         return self._script_of(number) if item is not None and item.kind == "script" else self._scripts[number]
 
     def _script_of(self, handle: int) -> Attachment:
