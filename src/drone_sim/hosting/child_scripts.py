@@ -120,16 +120,10 @@ class HostedScript(ABC):
     def _call_init(self) -> None:
         """Call init. Raises ScriptError, also if a subscribed callback does not exist."""
         self.script.call("init")
-        self._check_callbacks()
-
-    def _check_callbacks(self) -> None:
-        """Raise ScriptError if the script has subscribed with the name of a function that does not exist."""
-        for callback in self.bus.new_callbacks():
-            self.script.check(callback)
+        self.bus.check_callbacks(self.script)
 
     def actuation(self) -> None:
         """Deliver waiting messages to the script, then call its actuation."""
-        self._check_callbacks()
         self.bus.deliver(self.script)
         self.script.call("actuation")
 
@@ -210,7 +204,8 @@ class ChildScript(HostedScript):
 
     def actuation(self) -> None:
         """Apply the vehicle's commands, deliver waiting messages to the script, and call its actuation."""
-        self.vehicle.begin_step()
+        for call in self.vehicle.step_calls:
+            call()
         super().actuation()
 
     def close(self) -> None:

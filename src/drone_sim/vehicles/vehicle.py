@@ -122,11 +122,12 @@ class Vehicle:
         self._update_step_calls()
 
     def _update_step_calls(self) -> None:
-        """Update the calls that precede the scripts in every step; none without sensors and command link."""
-        self._step_calls = [self.instruments.clear] if self.instruments else []
+        """Update the calls before its script in every step: clear the last readings, post and age the command."""
+        self.step_calls = [self.instruments.clear] if self.instruments else []
         self.commands.link = self.faults.commands
         if self.commands.link is not None:
-            self._step_calls.append(self.commands.take)
+            self.step_calls.append(self.commands.take)
+        self.step_calls.append(self.commands.advance)
 
     def _leave_tree(self) -> None:
         """Remove its objects from the tree, unless the tree was already cleared."""
@@ -179,12 +180,6 @@ class Vehicle:
         self.context.tunings += 1
 
     # ---- phases
-
-    def begin_step(self) -> None:
-        """Clear the readings of the last step, and post the command to the scripts."""
-        for call in self._step_calls:
-            call()
-        self.commands.advance()
 
     def wrench(self) -> Wrench:
         """Return the wrench for this step without the sub-step forces; zero while the body is held."""

@@ -37,7 +37,6 @@ _TYPE = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
 _NAME = re.compile(r"(/[A-Za-z0-9_]+)+")  # like rosgraph.names.is_legal_name for complete names, but ASCII only
 # Called with a message handler; returns a function that ends the subscription.
 Begin = Callable[[Callable[[Any], None]], Callable[[], None]]
-_NO_CALLBACKS: list[Callback] = []
 _SERVICE = "service {}"  # stored in place of a topic, whose name begins with a slash
 
 
@@ -61,8 +60,8 @@ class MessageBus:
         self._own_topics = {self.resolve(topic): kind for topic, kind in own.items()}
         self._subscriptions = Subscriptions()
         # Called in every step, so without another function call.
-        self.new_callbacks, self.deliver = self._subscriptions.new_callbacks, self._subscriptions.deliver
-        self.take = self._subscriptions.take
+        self.deliver, self.take = self._subscriptions.deliver, self._subscriptions.take
+        self.check_callbacks, self.new_callbacks = self._subscriptions.check_callbacks, self._subscriptions.new_callbacks
         self._publishers: dict[int, _Publisher] = {}
         self.own_messages: dict[str, Any] = {}  # the last message on each of the drone's own topics, by complete name
         self._last_handle = 0
@@ -334,13 +333,21 @@ class Subscriptions:
 
     def new_callbacks(self) -> list[Callback]:
         """Return the callbacks of the subscriptions that were added since the last call."""
-        if not self._new_callbacks:
-            return _NO_CALLBACKS
         new, self._new_callbacks = self._new_callbacks, []
         return new
 
+    def check_callbacks(self, script: Script) -> None:
+        """Raise ScriptError if the script has subscribed with the name of a function that does not exist."""
+        for callback in self.new_callbacks():
+            script.check(callback)
+
     def deliver(self, script: Script) -> None:
-        """Pass every waiting message and request to the script, for each subscription the oldest first."""
+        """Check new callbacks, then pass every waiting message and request to the script.
+
+        For each subscription the oldest message is first. Raises ScriptError.
+        """
+        if self._new_callbacks:
+            self.check_callbacks(script)
         for callback, message in self.take():
             if type(message) is ServiceRequest:
                 execute(message, functools.partial(script.answer, callback))
