@@ -183,8 +183,9 @@ class Vehicle:
 
     def wrench(self) -> Wrench:
         """Return the wrench for this step without the sub-step forces; zero while the body is held."""
-        body = self.body
-        wrench = body.take_pushes()
+        wrench, body = Wrench(), self.body
+        if body.pending:
+            body.take_pushes(wrench)
         for force in self._forces:
             force.add_to(wrench, body)
         if self.pushes.lasting:
@@ -197,9 +198,9 @@ class Vehicle:
         Cameras with automatic exposure measure the light whenever they are due.
         """
         for name, camera in self.cameras.items():
-            if not now:
-                camera.meter(steps)
-            is_watched = camera.watched()
+            if camera.photography.is_metering and not now and camera.is_due(steps):
+                camera.meter()
+            is_watched = camera.viewers and camera.watched()
             if is_watched or camera.image is not None:
                 is_rendered = is_watched and (now or camera.is_due(steps)) and camera.failure != "silent"
                 camera.show(steps, *self.faults.transmit(name, camera.look() if is_rendered else None))

@@ -124,7 +124,7 @@ class Dynamics:
         """See World.advance."""
         moments = self._gyroscopic_term.moments_to_cancel
         self._term_acts = self._gyroscopic_term.begin_step(wrenches)
-        loads = [[body, wrench.force, *wrench.terms, moments.get(body), None] for body, wrench in wrenches.items()]
+        loads = [[body, it.force, it.torque, it.levers, moments.get(body), None] for body, it in wrenches.items()]
         any_fast = self._impacts.begin_step(sub_steps, self._cached)
         if not any_fast:
             self._queries.begin_sub_step()
