@@ -5,7 +5,7 @@ One thread owns it. Every call names its client, so several worlds can live in o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pybullet
@@ -14,7 +14,6 @@ from drone_sim.mechanics.frames import Matrix, Vector, cross, multiply_quaternio
 from drone_sim.mechanics.inertia import Inertia
 from drone_sim.mechanics.state import Motion, Pose, State, compose, inverse
 from drone_sim.mechanics.urdf import RigidBody
-from drone_sim.mechanics.wrench import Wrench
 from drone_sim.shapes.compound import parts_of
 from drone_sim.shapes.mass import inertia_of
 from drone_sim.shapes.shape import WHITE, DrawnShape, Rgba, SceneShape
@@ -87,8 +86,9 @@ class World:
         self.collision_filter = CollisionFilter(client, self._forget_motion_of)
         self.queries = Queries(client, self.collision_filter)
         self.rigid_links = RigidLinks(client)
-        self._dynamics = Dynamics(client, self._sub_step, self.queries, gyroscopic=self._gyroscopic)
-        self.shape_forces, self.apply = self._dynamics.shape_forces, self._dynamics.apply
+        dynamics = Dynamics(client, self._sub_step, self.queries, self.pictures, gyroscopic=self._gyroscopic)
+        self._dynamics, self.shape_forces = dynamics, dynamics.shape_forces
+        self.apply, self.advance = dynamics.apply, dynamics.advance
         self.saved_states = SavedStates(client, self._forget_all_motion)
 
     def _forget_motion_of(self, body: int) -> None:
@@ -268,16 +268,6 @@ class World:
         """End all contacts of a body by moving it far up: Bullet would keep them wherever else it is placed."""
         self.set_pose(body, Pose((0.0, 0.0, _FAR_UP)))
         pybullet.performCollisionDetection(self._client)
-
-    def advance(
-        self, wrenches: Mapping[int, Wrench], sub_steps: int, between: Callable[[int], None] | None = None
-    ) -> None:
-        """Take `sub_steps` sub-steps and re-apply each body's wrench in every one, since PyBullet clears it.
-
-        `between` is called with 0 before the first sub-step, and after each with the number of sub-steps so far.
-        """
-        self._dynamics.advance(wrenches, sub_steps, between)
-        self.pictures.look_anew()
 
     def keep_initial_poses(self) -> None:
         """Save the poses of all bodies, at rest, and restore them, so that all runs begin equal to the last bit."""
