@@ -249,7 +249,7 @@ class AttachedScript(HostedScript):
         self._is_removed = False
         self._first_bus = bus
         if self.vehicle:
-            self.vehicle.commands.listening.append(bus)
+            self.vehicle.commands.buses.append(bus)
             self.vehicle.flight_state.script_errors.append(self.error)
         # Parameters of V-REP's script there; a propeller's built-in thrust model is replaced by the script.
         is_child = kind == CHILD
@@ -305,8 +305,8 @@ class AttachedScript(HostedScript):
     def leave(self) -> None:
         super().leave()
         self._is_removed = True
-        if self.vehicle and self._first_bus in self.vehicle.commands.listening:
-            self.vehicle.commands.listening.remove(self._first_bus)
+        if self.vehicle and self._first_bus in self.vehicle.commands.buses:
+            self.vehicle.commands.buses.remove(self._first_bus)
             self.vehicle.flight_state.script_errors.remove(self.error)
 
     def split_off(self) -> AttachedScript:

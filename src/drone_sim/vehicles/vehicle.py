@@ -88,7 +88,7 @@ class Vehicle:
             if tree[handle].body is not None:
                 self.context.velocities.follow(handle)
         self.propulsion.attach(parameters.propellers)
-        self.commands.listening = []
+        self.commands.buses = [self.bus]
         for camera in self.cameras.values():
             camera.reset()
         self.instruments.reset()
