@@ -51,6 +51,7 @@ class HostedScript(ABC):
         self.script: load.Script = load.no_script()
         self.path = ""  # of the loaded script
         self.flat_names: Collection[str] = ()  # functions that it calls by their V-REP 3.x names
+        self.step_calls: Sequence[Callable[[], None]] = ()  # before each actuation
         self._filters_pictures = False  # whether the script filters each picture of its vision sensor
 
     @abstractmethod
@@ -123,7 +124,9 @@ class HostedScript(ABC):
         self.bus.check_callbacks(self.script)
 
     def actuation(self) -> None:
-        """Deliver waiting messages to the script, then call its actuation."""
+        """Clear readings and apply commands, if it flies a vehicle; deliver messages, then call its actuation."""
+        for call in self.step_calls:
+            call()
         self.bus.deliver(self.script)
         self.script.call("actuation")
 
@@ -169,6 +172,7 @@ class ChildScript(HostedScript):
         """Create it for a vehicle; `begin` must be called before anything else."""
         super().__init__(vehicle.object_name, vehicle.bus, vehicle.context)
         self.vehicle = vehicle
+        self.step_calls = vehicle.step_calls
         self.parameters: dict[str, Any] = {}
         self.tuning = Tuning(vehicle, self.parameters)
 
@@ -201,12 +205,6 @@ class ChildScript(HostedScript):
         before = dict(self.parameters)
         self._call_init()
         self.tuning.begin(before)
-
-    def actuation(self) -> None:
-        """Apply the vehicle's commands, deliver waiting messages to the script, and call its actuation."""
-        for call in self.vehicle.step_calls:
-            call()
-        super().actuation()
 
     def close(self) -> None:
         if self.vehicle.flight_state.is_flown:

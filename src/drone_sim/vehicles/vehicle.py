@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -57,6 +57,7 @@ class Vehicle:
             self.body.begin_on_floor()
         self.propulsion = Propulsion(rotors, self.body, suffix)
         self.handles: list[int] = []  # of its objects
+        self.step_calls: list[Callable[[], None]] = []  # always this list; see _update_step_calls
         self._cleared = -1  # the tree's count of clearings when the objects were added
         self.cameras: dict[str, Camera] = {}
         for name, item in parameters.cameras.items():
@@ -123,8 +124,8 @@ class Vehicle:
 
     def _update_step_calls(self) -> None:
         """Update the calls before its script in every step: clear the last readings, post and age the command."""
-        self.step_calls = [self.instruments.clear] if self.instruments else []
         self.commands.link = self.faults.commands
+        self.step_calls[:] = [self.instruments.clear] if self.instruments else []
         if self.commands.link is not None:
             self.step_calls.append(self.commands.take)
         self.step_calls.append(self.commands.advance)

@@ -9,11 +9,11 @@ from typing import Any
 
 import pybullet
 
-from drone_sim.mechanics.frames import Vector
-from drone_sim.mechanics.state import Motion
+from drone_sim.mechanics.frames import Vector, multiply_quaternions, turned
+from drone_sim.mechanics.state import UNTURNED, Pose, State
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.world.gyroscopic_term import SLOW, GyroscopicTerm, NoGyroscopicTerm, torque_of_turn
-from drone_sim.world.impacts import Impacts
+from drone_sim.world.impacts import Impacts, Motion
 from drone_sim.world.pictures import Pictures
 from drone_sim.world.queries import Queries
 
@@ -69,12 +69,23 @@ class Dynamics:
     Code that sets the pose or velocity of a body must call `moved` or `all_moved` after it.
     """
 
-    def __init__(self, client: int, sub_step: float, queries: Queries, pictures: Pictures, *, gyroscopic: bool):
+    def __init__(
+        self,
+        client: int,
+        sub_step: float,
+        queries: Queries,
+        pictures: Pictures,
+        inertial_frames: Mapping[int, tuple[Pose, Pose]],
+        *,
+        gyroscopic: bool,
+    ):
         """Step the bodies of PyBullet's `client` by `sub_step` (s).
 
+        `inertial_frames` has, by body, the pose of the inertial frame in the root link's frame, and the inverse.
         `gyroscopic`: bodies rotate by Euler's equations; otherwise as in V-REP, without the term ω × Iω.
         """
         self._client, self._sub_step, self._queries, self._pictures = client, sub_step, queries, pictures
+        self._inertial_frames = inertial_frames
         self.shape_forces = ShapeForces(client)
         self._gyroscopic_term = GyroscopicTerm(client) if gyroscopic else NoGyroscopicTerm(client)
         self._impacts = Impacts(client, sub_step)
@@ -103,12 +114,20 @@ class Dynamics:
         self._cached.clear()
         self.shape_forces.sums.clear()
 
-    def motion(self, body: int) -> Motion:
-        """Return the pose of a root's inertial frame (m, unit quaternion) and its velocities (m/s, rad/s)."""
-        motion = self._cached.get(body)
-        if motion is None:
-            motion = self._cached[body] = *_pose_of(body, self._client), *_velocity_of(body, self._client)
-        return motion
+    def state(self, body: int) -> State:
+        """Return pose and velocity of a body's root link; the same object as long as it does not move."""
+        if body in self._cached:
+            return self._cached[body][-1]
+        centre, axes = _pose_of(body, self._client)
+        linear, angular = _velocity_of(body, self._client)
+        inertial, from_root = self._inertial_frames[body]
+        orientation = axes if from_root.orientation is UNTURNED else multiply_quaternions(axes, from_root.orientation)
+        ax, ay, az = turned(orientation, inertial.position)  # from the root link to the centre of mass
+        (x, y, z), (vx, vy, vz), (wx, wy, wz) = centre, linear, angular
+        velocity = vx - (wy * az - wz * ay), vy - (wz * ax - wx * az), vz - (wx * ay - wy * ax)
+        state = State((x - ax, y - ay, z - az), orientation, velocity, angular)
+        self._cached[body] = centre, axes, linear, angular, state
+        return state
 
     # ---- steps
 
