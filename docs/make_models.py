@@ -88,7 +88,7 @@ def write_mesh(name, corners, faces):
 def picture(operation):
     """Return the picture (HEIGHT, WIDTH, 3) uint8 of what an operation adds; what no camera sees, as a symbol."""
     simulation = Simulation(load({"samples": 4}), started=False)
-    editor = SceneEditor(Player(simulation, simulation.step, lambda state: None, False))
+    editor = SceneEditor(Player(simulation, lambda state: None, False))
     editor.answer({"new": True})
     (first, *_) = editor.answer({"edit": [{**operation, "position": [0, 0, 0]}]})["handles"]
     symbol = [{"name": "Part", **one} for one in SYMBOLS.get(simulation.context.objects[first].name, [])]

@@ -328,7 +328,7 @@ def _messages(case: Case, folder: Path) -> str:
 def _requests(case: Case, folder: Path) -> str:
     """Let a client send its messages, one after the other, while the simulation steps; each must be answered."""
     simulation = Simulation(parameters.load(_with_small_pictures({"script_time_limit": _SCRIPT_LIMIT})), started=False)
-    player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
+    player = Player(simulation, lambda _state: None, simulated_time=False)
     server = RemoteApiServer(player, "127.0.0.1", 0)
     with zmq.Context() as context, context.socket(zmq.DEALER) as client:
         client.setsockopt(zmq.LINGER, 0)
@@ -359,7 +359,7 @@ def _asked(client: zmq.Socket[bytes], message: bytes, player: Player, server: Re
 def _connections(case: Case, folder: Path) -> str:
     """Let peers send what they like; each must be let go, none may start the simulation, and a client is answered."""
     simulation = Simulation(parameters.load(_with_small_pictures({})), started=False)
-    player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
+    player = Player(simulation, lambda _state: None, simulated_time=False)
     server = RemoteApiServer(player, "127.0.0.1", 0)
     with zmq.Context() as context, context.socket(zmq.DEALER) as client:
         client.setsockopt(zmq.LINGER, 0)
@@ -406,7 +406,7 @@ def _send_all(server: RemoteApiServer, pieces: list[bytes]) -> None:
 def _legacy_commands(case: Case, folder: Path) -> str:
     """Let clients send what they like while the simulation steps; when they have gone it does, and one is heard."""
     simulation = Simulation(parameters.load(_with_small_pictures({"script_time_limit": _SCRIPT_LIMIT})), started=False)
-    player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
+    player = Player(simulation, lambda _state: None, simulated_time=False)
     server, log = LegacyServer(player, "127.0.0.1", 0), _Log()
     logging.getLogger("drone_sim.remote").addHandler(log)
     try:

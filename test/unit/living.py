@@ -12,7 +12,7 @@ from drone_sim.run.simulation import Simulation
 def editor_of(given=None, drafts=None):
     """Return the editor of a scene that is stopped."""
     simulation = Simulation(parameters.load(given), started=False)
-    return SceneEditor(Player(simulation, simulation.step, lambda state: None, False), drafts)
+    return SceneEditor(Player(simulation, lambda state: None, False), drafts)
 
 
 def edit(editor, *operations, **more):

@@ -31,7 +31,7 @@ class Looked:
         settings = {"script": str(script), "scene": {"objects": [WALL]}}
         self.simulation = Simulation(parameters.load(settings))
         self.now = 0.0
-        self.player = Player(self.simulation, self.simulation.step, lambda _: None, False)
+        self.player = Player(self.simulation, lambda _: None, False)
         self.pacer = Pacer(0.05, self.clock, lambda _: None)
         self.renew()
 
@@ -319,7 +319,7 @@ def test_a_script_on_an_object_that_has_failed_is_an_error_with_its_line(tmp_pat
     script.write_text("def sysCall_actuation():\n    if sim.getSimulationTime() > 0.08: lost()\n")
     scene = {"objects": [WALL], "scripts": [{"object": on, "script": str(script)}]}
     simulation = new_simulation({"scene": scene})
-    player = Player(simulation, simulation.step, lambda _: None, False)
+    player = Player(simulation, lambda _: None, False)
     diagnosis = Diagnosis(player, Pacer(0.05, lambda: 0.0, lambda _: None), dict, False, lambda: 0.0)
     before, levels = simulation.snapshot(), []
     for _ in range(2):
@@ -396,7 +396,7 @@ def test_a_script_that_hears_commands_and_never_uses_them_is_told(tmp_path, zero
     seed.write_text(lua.replace(elevation, zeros + elevation))
     small = {"front": {"width": 16, "height": 12}}
     simulation = new_simulation({"script": str(seed), "cameras": small})
-    player, log, now = Player(simulation, simulation.step, lambda _: None, False), CommandLog(lambda: now), 0.0
+    player, log, now = Player(simulation, lambda _: None, False), CommandLog(lambda: now), 0.0
     diagnosis = Diagnosis(player, Pacer(0.05, lambda: now, lambda _: None), lambda: {"drone": log}, False, lambda: now)
     simulation.drone.commands.receive(twist)
     log.take("cmd_vel", "/pilot")

@@ -50,7 +50,7 @@ class Stage:
             monkeypatch.setattr(rospy, name, lambda *_: None)
         given = {"vehicles": {"drone": {}, "other": {"position": [1, 1, 0.8]}}, "scene": {"objects": [CRATE]}}
         self.simulation = Simulation(parameters.load(given))
-        self.player = Player(self.simulation, self.simulation.step, lambda _: None, simulated_time=False)
+        self.player = Player(self.simulation, lambda _: None, simulated_time=False)
         self.interventions = interventions.Interventions(self.simulation)
         self.inbox = Inbox(on_intervention=self.interventions.publish)
         self.simulation.step()

@@ -73,7 +73,7 @@ class Stage:
             "remote_api": {"serve": True, "address": "127.0.0.1", "legacy_port": 0},
         }
         self.simulation = Simulation(parameters.load(values), started=False)
-        self.player = Player(self.simulation, self.simulation.step, lambda _state: None, simulated_time=False)
+        self.player = Player(self.simulation, lambda _state: None, simulated_time=False)
         self.now = 0.0  # s
         self.server = LegacyServer(self.player, "127.0.0.1", 0, clock=lambda: self.now)
         self.clients = []

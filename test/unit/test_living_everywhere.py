@@ -154,7 +154,7 @@ class Served:
     """The official client in a thread of its own, while the simulation is served, and stepped, in this one."""
 
     def __init__(self, simulation):
-        self.player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
+        self.player = Player(simulation, lambda _state: None, simulated_time=False)
         self.server = RemoteApiServer(self.player, "127.0.0.1", 0)
         self.thread = concurrent.futures.ThreadPoolExecutor(1)
         self.sim = self._wait_for(lambda: official_client(self.server.port).require("sim"))

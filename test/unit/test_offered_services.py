@@ -67,7 +67,7 @@ class Ros:
 
         thread = threading.Thread(target=run)
         thread.start()
-        while not any(one.messages for bus in self.buses for one in bus._subscriptions._by_handle.values()):
+        while not any(one.messages for bus in self.buses for one in bus._subscriptions.values()):
             thread.join(0.001)
         return thread, answers
 

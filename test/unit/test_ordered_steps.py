@@ -22,7 +22,8 @@ def _begin(tmp_path, new_simulation):
         path = tmp_path / "script.py"
         path.write_text(text or SCRIPT, encoding="utf-8")
         simulation = new_simulation(script=str(path), started=False)
-        player = Player(simulation, step or simulation.step, lambda _state: None, simulated_time=False)
+        simulation.step = step or simulation.step
+        player = Player(simulation, lambda _state: None, simulated_time=False)
         player.start()
         player.pause(True)
         return player, str(path)

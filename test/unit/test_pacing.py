@@ -167,7 +167,7 @@ def test_a_wrong_factor_changes_nothing(pace, changes, said):
 
 
 def test_a_pace_is_not_blamed_for_the_one_before(pace, pacer, simulation):
-    player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
+    player = Player(simulation, lambda _state: None, simulated_time=False)
     pace.change({"real_time_factor": 1.0})
     before = count(player, pacer, 0.0)
     assert between(before, count(player, pacer, 1.0)) is not None

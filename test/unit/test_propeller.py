@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drone_sim.forces.propellers import ParticleLaw, Propellers
+from drone_sim.forces.propellers import PARTICLE_VELOCITY, ParticleLaw, Propellers
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose
 from drone_sim.mechanics.wrench import Wrench
@@ -51,8 +51,8 @@ def test_propellers_push_along_their_axes_and_turn_against_their_rotation(veloci
     points = [(0.1, 0.1, 0.0), (-0.1, 0.1, 0.01), (-0.1, -0.1, 0.0), (0.1, -0.1, 0.02)]
     rotations = [-1, 1, -1, 1]
     body = frames.from_euler((0, 0, 0), angles)
-    wrench = Wrench()
-    propellers = Propellers(parameters.load().propellers, axes, points, rotations, 0.05, lambda: velocities)
+    wrench, commands = Wrench(), [{PARTICLE_VELOCITY: velocity} for velocity in velocities]
+    propellers = Propellers(parameters.load().propellers, axes, points, rotations, 0.05, commands)
     propellers.add_to(wrench, SimpleNamespace(matrix=body))
     force, torque = np.zeros(3), np.zeros(3)
     for velocity, axis, point, rotation in zip(velocities, axes, points, rotations):

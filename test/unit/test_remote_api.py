@@ -57,7 +57,7 @@ class Stage:
         self.drawings = Drawings()
         values = {"script": str(script), "vehicles": {"drone": {}, "other": {"position": [1, 1, 0.8]}}}
         self.simulation = Simulation(parameters.load(values), drawings=self.drawings, backend=self.radio, started=False)
-        self.player = Player(self.simulation, self.simulation.step, lambda _state: None, simulated_time=False)
+        self.player = Player(self.simulation, lambda _state: None, simulated_time=False)
         self.now = 0.0  # s
         self.server = RemoteApiServer(self.player, "127.0.0.1", 0, self.radio, lambda: self.now)
         self.clients = []
@@ -650,7 +650,7 @@ def test_a_scene_of_coppeliasim_is_loaded_from_the_folder_of_scenes(tmp_path):
     (tmp_path / "messaging" / "arm.ttt").write_bytes(scene)
     loaded = parameters.load({"remote_api": {"scenes": str(tmp_path)}})
     simulation = Simulation(loaded, started=False)
-    player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
+    player = Player(simulation, lambda _state: None, simulated_time=False)
     server = RemoteApiServer(player, "127.0.0.1", 0)
     client = Client(server)
     try:

@@ -31,11 +31,13 @@ class Stage:
         values = parameters.load(given)
         self.simulation = Simulation(values, script=str(script), started=False)
         self.timeline = RunTimeline(values)
-        self.player = Player(self.simulation, self.step, lambda _: None, True, self.timeline.read)
+        self.player = Player(self.simulation, lambda _: None, True, self.timeline.read)
 
     def step(self):
-        self.timeline.apply(self.simulation)
-        self.simulation.step()
+        with self.player.stepping():
+            self.timeline.apply(self.simulation)
+            self.simulation.step()
+        return self.player.end_step()
 
 
 @pytest.fixture(name="stage")
@@ -64,7 +66,7 @@ def test_the_file_of_a_config_is_read_relative_to_it_unless_the_parameter_is_set
         one.player.restart()
         summaries.append(one.timeline.summary)
     assert summaries[0] == summaries[3] and summaries[2] == "" and len(set(summaries)) == 3
-    assert one.player.step() and one.simulation.drone.commands.now.linear.x == 1
+    assert one.step() and one.simulation.drone.commands.now.linear.x == 1
 
 
 def test_every_start_reads_the_file(stage, tmp_path):
@@ -113,12 +115,12 @@ def test_an_entry_that_cannot_be_executed_stops_the_run_with_one_line(stage, tmp
     one = stage()
     one.given["~timeline_file"] = str(file)
     one.player.start()
-    assert one.player.step()
-    assert not one.player.step()
+    assert one.step()
+    assert not one.step()
     assert one.player.state == "stopped"
     line = f"script error: [timeline] {file}: entry at 0.05 s: no object named 'Nothing'"
     assert one.player.why_stopped.startswith(line)
     assert sum(message.startswith(line) for message in caplog.messages) == 1
     one.given["~timeline_file"] = ""
     one.player.start()
-    assert one.player.step()
+    assert one.step()

@@ -111,7 +111,7 @@ def flown(simulation, steps, each=lambda: None):
 def test_the_simulation_pauses_after_the_step_in_which_a_line_is_reached(begin, text, name, line):
     simulation, path = begin(text, name)
     told = []
-    player = Player(simulation, simulation.step, told.append, simulated_time=False)
+    player = Player(simulation, told.append, simulated_time=False)
     simulation.set_breakpoints({path: frozenset((line,))})
     player.start()
     while player.playing:
@@ -133,7 +133,7 @@ def test_lines_of_init_of_the_top_level_of_helpers_and_of_another_file(begin, tm
     (tmp_path / "helper.py").write_text("def doubled(x):\n    y = 2 * x\n    return y\n", encoding="utf-8")
     text = "import helper\nx = 1\ndef sysCall_init():\n    self.y = x\ndef sysCall_sensing():\n    helper.doubled(4)\n"
     simulation, path = begin(text)
-    player = Player(simulation, simulation.step, lambda _: None, simulated_time=False)
+    player = Player(simulation, lambda _: None, simulated_time=False)
     for line in (2, 4):
         simulation.set_breakpoints({path: frozenset((line,)), "/no/such/file.py": frozenset((1,))})
         player.start()

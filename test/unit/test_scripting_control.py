@@ -29,7 +29,7 @@ end
 def played(new_simulation):
     def play(text):
         simulation, told = new_simulation(lua=text), []
-        player = Player(simulation, simulation.step, told.append, simulated_time=False)
+        player = Player(simulation, told.append, simulated_time=False)
         while player.playing and simulation.steps < 10:
             player.step()
         return simulation, told

@@ -354,7 +354,7 @@ def test_a_timeline_with_more_than_it_takes(tmp_path: Path):
 
 def test_the_diagnosis_says_the_state(landed):
     again(landed)
-    player = Player(landed, landed.step, lambda _: None, False)
+    player = Player(landed, lambda _: None, False)
     log = CommandLog()
     log.take("cmd_vel", "/pilot")
     landed.drone.commands.receive(FORWARD)

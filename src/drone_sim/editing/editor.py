@@ -161,7 +161,7 @@ class SceneEditor:
         if not done.is_empty:
             self.history.add(Step(name, merge, done))
             self.revision += 1
-        return self._answer(name, handles=[key for key in handles if self.simulation.tree.get(key) is not None])
+        return self._answer(name, handles=[key for key in handles if key in self.simulation.tree.by_handle])
 
     def _apply(self, change: SceneChange) -> list[int]:
         """Apply a change; return the handles of its objects."""
@@ -196,7 +196,7 @@ class SceneEditor:
         is_saved = change_between(self._saved_content, self.simulation.content()).is_empty
         if is_saved and not self.simulation.running:
             self._saved = self.revision
-        handles = [handle for handle in change.entries if self.simulation.tree.get(handle) is not None]
+        handles = [handle for handle in change.entries if handle in self.simulation.tree.by_handle]
         return self._answer(f"{word}: {entry.name}", handles=handles)
 
     # ---- texts and files

@@ -87,7 +87,7 @@ class SceneRows:
                     own = own_script(vehicle.parameters, simulation.parameters)
                     row |= {"root": True, "type": "vehicle", "script": vehicle.parameters.script, "own_script": own}
                 changed.append(row)
-        removed = [handle for handle in self._known if tree.get(handle) is None]
+        removed = [handle for handle in self._known if handle not in tree.by_handle]
         for handle in removed:
             del self._known[handle], self.rows[handle]
         return changed, removed

@@ -13,8 +13,9 @@ V-REP 3.x keeps the carry (21, 22, 21, ... particles at dt = 0.05 s), CoppeliaSi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
+from operator import itemgetter
 from typing import Annotated, Literal
 
 from drone_sim.config.types import Checked, Finite, Limits, Within
@@ -22,6 +23,9 @@ from drone_sim.forces.force import Force, PushedBody
 from drone_sim.mechanics.frames import Vector, rotate
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.wrench import Wrench
+
+PARTICLE_VELOCITY = "particleVelocity"  # the commanded one (m/s), among the parameters of a propeller's script
+_velocity_in = itemgetter(PARTICLE_VELOCITY)
 
 
 class PropellerParameters(Checked):
@@ -64,13 +68,14 @@ class Propellers(Force):
         points: Sequence[Vector],
         rotations: Sequence[int],
         time_step: float,
-        commanded: Callable[[], Sequence[float]],
+        commands: Sequence[Mapping[str, float]],
     ):
         """Create the propellers: axis (unit, root link's frame), point (m, inertial frame) and sense (+-1) of each.
 
-        `commanded` returns the commanded particle velocities (m/s).
+        `commands` has PARTICLE_VELOCITY of each, and is read in every step.
         """
-        self._commanded = self._intact_commands = commanded
+        self._commands = commands
+        self._is_weak = False
         self.effectiveness: tuple[float, ...] = (1.0,) * len(axes)
         self.air = [0.0] * len(axes)  # m of air that has gone through each
         self.clipped = 0  # steps in which a limit was applied
@@ -78,7 +83,7 @@ class Propellers(Force):
         self._emitted: Sequence[float] = [0.0] * len(axes)  # m/s, in the last step
         self._law = ParticleLaw(parameters, time_step)
         self._time_step = time_step
-        self._limits = self._slowest, self._fastest = parameters.velocity_limits or (-math.inf, math.inf)
+        self._slowest, self._fastest = parameters.velocity_limits or (-math.inf, math.inf)
         by_axis: dict[Vector, list[tuple[int, float, float, float, float]]] = {}
         for number, (axis, point, rotation) in enumerate(zip(axes, points, rotations)):
             by_axis.setdefault(axis, []).append((number, *point, rotation * parameters.torque_per_velocity))
@@ -86,10 +91,13 @@ class Propellers(Force):
 
     def add_to(self, wrench: Wrench, body: PushedBody) -> None:
         """Emit a step's particles at the commanded velocities, within limits."""
-        velocities, matrix = self._commanded(), body.matrix
+        velocities, matrix = list(map(_velocity_in, self._commands)), body.matrix
         if min(velocities) < self._slowest or max(velocities) > self._fastest:
-            self.clipped += 1
+            if not self._is_weak:
+                self.clipped += 1
             velocities = [min(max(velocity, self._slowest), self._fastest) for velocity in velocities]
+        if self._is_weak:
+            velocities = [share * velocity for share, velocity in zip(self.effectiveness, velocities)]
         self._emitted = velocities
         newtons = self._newtons = self._law.emit()
         air, time_step = self.air, self._time_step
@@ -119,14 +127,7 @@ class Propellers(Force):
         """
         count = len(self.air)
         self.effectiveness = (*effectiveness, *[1.0] * count)[:count]
-        if all(share == 1 for share in effectiveness):
-            self._commanded, (self._slowest, self._fastest) = self._intact_commands, self._limits
-        else:
-            self._commanded, self._slowest, self._fastest = self._weakened_velocities, -math.inf, math.inf
-
-    def _weakened_velocities(self) -> list[float]:
-        slowest, fastest = self._limits
-        return [share * min(max(v, slowest), fastest) for share, v in zip(self.effectiveness, self._intact_commands())]
+        self._is_weak = any(share != 1 for share in effectiveness)
 
     @property
     def velocities(self) -> Sequence[float]:

@@ -148,7 +148,7 @@ class FlightRecorder:
         vehicle = self._simulation.vehicles.get(vehicle_name)
         if vehicle is not None:
             return (*vehicle.body.state.position, *vehicle.body.state.orientation)
-        scene_object = self._simulation.context.objects.get(handle)
+        scene_object = self._simulation.context.objects.by_handle.get(handle)
         if scene_object is None or vehicle_name:
             return _NO_POSE
         matrix = scene_object.matrix()

@@ -65,7 +65,7 @@ class OwnObjects:
         if handle in self._collections:
             members = self._collections.objects(handle, self._objects)
             return next(filter(None, map(self._foreign_name, members)), None)
-        scene_object = self._objects.get(handle)
+        scene_object = self._objects.by_handle.get(handle)
         if scene_object is None or handle in self.handles:
             return None
         is_created = handle not in self._initial_handles and scene_object.kind in _CREATED_KINDS
@@ -135,7 +135,7 @@ class SceneValues:
         if len(arguments) < 2 or not _is_number(arguments[0]):
             return "", None  # the function itself raises an error
         key = int(arguments[0]), arguments[1]
-        scene_object = self._objects.get(key[0])
+        scene_object = self._objects.by_handle.get(key[0])
         label = f"{key[1]} of {scene_object.name if scene_object is not None else 'the scene'}"
         if key[1] in _PATH_PROPERTIES and scene_object is not None and key[0] not in self._own_objects:
             return label, None  # scripts would use it as the path's points

@@ -169,12 +169,12 @@ class Actions:
         scene_object = self._first_object(arguments)
         if scene_object is not None:
             return scene_object.name
-        script = self._scripts.get(arguments[0]) if arguments and _is_handle(arguments[0]) else None
+        script = self._scripts.by_handle.get(arguments[0]) if arguments and _is_handle(arguments[0]) else None
         return f"the script of {script.name}" if script is not None else "the scene"
 
     def _first_object(self, arguments: list[Any]) -> SceneObject | None:
         """Return the object whose handle is the first argument."""
-        return self._objects.get(bare(arguments[0])) if arguments and _is_handle(arguments[0]) else None
+        return self._objects.by_handle.get(bare(arguments[0])) if arguments and _is_handle(arguments[0]) else None
 
     # ---- actions that depend on the arguments
 
@@ -195,7 +195,7 @@ class Actions:
         """
         if scene_object.kind not in ("dummy", "path") or scene_object.body is not None:
             return False
-        others = (other for other in map(self._objects.get, self._objects) if other is not None)
+        others = self._objects.by_handle.values()
         return all(other.kind in _FRAME_CHILDREN for other in others if other.is_descendant_of(scene_object))
 
     def _joint_action(self, arguments: list[Any]) -> str | None:
@@ -231,7 +231,7 @@ class Actions:
 
     def _script_owner(self, handle: int, arguments: list[Any]) -> str:
         """Return the name of the object whose script a handle (of the script or of the object) means, '' for none."""
-        script = self._scripts.get(handle)
+        script = self._scripts.by_handle.get(handle)
         if script is not None:
             return script.name if script.kind == CHILD else ""
         scene_object = self._first_object(arguments)
@@ -325,14 +325,14 @@ class Permissions(Actions):
         A goal on a vehicle of the submission may move with the vehicle.
         """
         for handle in _handles(arguments[:1]):
-            scene_object = self._objects.get(bare(handle))
+            scene_object = self._objects.by_handle.get(bare(handle))
             if scene_object is not None:
                 is_carrier = any(scene_object.is_part_of(vehicle.object) for vehicle in self._flown)
                 yield from (goal for goal in self._goals_on(scene_object) if goal is scene_object or not is_carrier)
 
     def _goals_on(self, scene_object: SceneObject) -> Iterator[SceneObject]:
         """Yield the goals that are an object, or a descendant of it."""
-        goals = filter(None, map(self._objects.get, self._goals))
+        goals = filter(None, map(self._objects.by_handle.get, self._goals))
         return (goal for goal in goals if goal is scene_object or goal.is_descendant_of(scene_object))
 
 

@@ -51,6 +51,7 @@ class HostedScript(ABC):
         self.script: load.Script = load.no_script()
         self.path = ""  # of the loaded script
         self.flat_names: Collection[str] = ()  # functions that it calls by their V-REP 3.x names
+        self.step_calls: Sequence[Callable[[], None]] = ()  # before each actuation
         self._filters_pictures = False  # whether the script filters each picture of its vision sensor
 
     @abstractmethod
@@ -120,16 +121,12 @@ class HostedScript(ABC):
     def _call_init(self) -> None:
         """Call init. Raises ScriptError, also if a subscribed callback does not exist."""
         self.script.call("init")
-        self._check_callbacks()
-
-    def _check_callbacks(self) -> None:
-        """Raise ScriptError if the script has subscribed with the name of a function that does not exist."""
-        for callback in self.bus.new_callbacks():
-            self.script.check(callback)
+        self.bus.check_callbacks(self.script)
 
     def actuation(self) -> None:
-        """Deliver waiting messages to the script, then call its actuation."""
-        self._check_callbacks()
+        """Clear readings and apply commands, if it flies a vehicle; deliver messages, then call its actuation."""
+        for call in self.step_calls:
+            call()
         self.bus.deliver(self.script)
         self.script.call("actuation")
 
@@ -175,6 +172,7 @@ class ChildScript(HostedScript):
         """Create it for a vehicle; `begin` must be called before anything else."""
         super().__init__(vehicle.object_name, vehicle.bus, vehicle.context)
         self.vehicle = vehicle
+        self.step_calls = vehicle.step_calls
         self.parameters: dict[str, Any] = {}
         self.tuning = Tuning(vehicle, self.parameters)
 
@@ -207,11 +205,6 @@ class ChildScript(HostedScript):
         before = dict(self.parameters)
         self._call_init()
         self.tuning.begin(before)
-
-    def actuation(self) -> None:
-        """Apply the vehicle's commands, deliver waiting messages to the script, and call its actuation."""
-        self.vehicle.begin_step()
-        super().actuation()
 
     def close(self) -> None:
         if self.vehicle.flight_state.is_flown:
@@ -254,7 +247,7 @@ class AttachedScript(HostedScript):
         self._is_removed = False
         self._first_bus = bus
         if self.vehicle:
-            self.vehicle.commands.listening.append(bus)
+            self.vehicle.commands.buses.append(bus)
             self.vehicle.flight_state.script_errors.append(self.error)
         # Parameters of V-REP's script there; a propeller's built-in thrust model is replaced by the script.
         is_child = kind == CHILD
@@ -310,8 +303,8 @@ class AttachedScript(HostedScript):
     def leave(self) -> None:
         super().leave()
         self._is_removed = True
-        if self.vehicle and self._first_bus in self.vehicle.commands.listening:
-            self.vehicle.commands.listening.remove(self._first_bus)
+        if self.vehicle and self._first_bus in self.vehicle.commands.buses:
+            self.vehicle.commands.buses.remove(self._first_bus)
             self.vehicle.flight_state.script_errors.remove(self.error)
 
     def split_off(self) -> AttachedScript:

@@ -46,6 +46,15 @@ class Handles(NamedTuple):
 NO_HANDLES = Handles()
 
 
+class _ByHandle(dict[int, SceneObject]):
+    """Objects by handle."""
+
+    def __missing__(self, handle: object) -> SceneObject:
+        if isinstance(handle, (int, float)):
+            raise ValueError(f"there is no object with the handle {handle}")
+        raise TypeError("a handle must be a whole number")
+
+
 class ObjectTree:
     """All objects, by name and by handle (a small integer that no other object of the run has had)."""
 
@@ -58,7 +67,7 @@ class ObjectTree:
     def clear(self) -> None:
         """Remove all objects; handles start again as in __init__."""
         self.cleared += 1
-        self._objects: dict[int, SceneObject] = {}
+        self.by_handle = _ByHandle()
         self._handles: dict[str, int] = {}
         self._reserved, self._next = self._initial_handles  # no handle is given twice
         self._suffixed_names: set[str] = set()  # that some object has, or had, with a suffix
@@ -80,7 +89,7 @@ class ObjectTree:
         `alias` is its name in 4.x paths (by default `name`), `also` are further names, `kind` is one of
         scene_object.KINDS. Raises ValueError for a name that is taken.
         """
-        parent_object = self._objects[self._handles[parent]] if parent else None
+        parent_object = self.by_handle[self._handles[parent]] if parent else None
         return self.insert(SceneObject((name, *also), alias or name, parent_object, local, body, kind=kind))
 
     def insert(self, added: SceneObject) -> int:
@@ -89,12 +98,12 @@ class ObjectTree:
             if name in self._handles:
                 raise ValueError(f"an object named '{name}' already exists")
         handle = self._reserved.get(added.name, self._next)
-        if handle == self._next or handle in self._objects:
+        if handle == self._next or handle in self.by_handle:
             handle, self._next = self._next, self._next + 1
-        is_out_of_order = handle < next(reversed(self._objects), handle)
-        self._objects[handle] = added
+        is_out_of_order = handle < next(reversed(self.by_handle), handle)
+        self.by_handle[handle] = added
         if is_out_of_order:  # it was removed and comes back: restore its position among its siblings
-            self._objects = dict(sorted(self._objects.items()))
+            self.by_handle = _ByHandle(sorted(self.by_handle.items()))
         self._handles.update((name, handle) for name in added.names)
         self._suffixed_names.update(plain(name) for name in added.names if plain(name) != name)
         if added.is_free_child:
@@ -107,12 +116,12 @@ class ObjectTree:
 
     def remove(self, handles: Collection[int]) -> None:
         """Remove objects. Children that remain lose their parent and keep their pose in the world."""
-        removed = {id(self._objects[handle]) for handle in handles}
-        for handle, child in self._objects.items():
+        removed = {id(self.by_handle[handle]) for handle in handles}
+        for handle, child in self.by_handle.items():
             if handle not in handles and id(child.parent) in removed:
                 child.local, child.parent = child.matrix(), None
         for handle in handles:
-            for name in self._objects.pop(handle).names:
+            for name in self.by_handle.pop(handle).names:
                 del self._handles[name]
         self.refresh_free_children()
 
@@ -130,8 +139,8 @@ class ObjectTree:
 
     def replace(self, handle: int, other: SceneObject) -> None:
         """Replace an object by `other`, which has its names and parent; its children get `other` as parent."""
-        before, self._objects[handle] = self._objects[handle], other
-        for child in self._objects.values():
+        before, self.by_handle[handle] = self.by_handle[handle], other
+        for child in self.by_handle.values():
             if child.parent is before:
                 child.parent = other
         self.refresh_free_children()
@@ -142,7 +151,7 @@ class ObjectTree:
 
     def refresh_free_children(self) -> None:
         """Update the list of bodies that follow their parent only when a script moves that."""
-        self._free_children = [body for body in self._objects.values() if body.is_free_child]
+        self._free_children = [body for body in self.by_handle.values() if body.is_free_child]
 
     def is_copied(self, name: str) -> bool:
         """Return whether any object has, or had, that name with a suffix."""
@@ -157,7 +166,7 @@ class ObjectTree:
     def named(self, name: str) -> SceneObject:
         """Return the object `name`. Raises ValueError, which lists similar names."""
         try:
-            return self._objects[self._handles[name]]
+            return self.by_handle[self._handles[name]]
         except KeyError:
             return self[self.handle(name)]
 
@@ -178,7 +187,7 @@ class ObjectTree:
 
     def children(self, parent: SceneObject | None) -> Iterator[tuple[int, SceneObject]]:
         """Return handle and object of each child of `parent` (None: objects without a parent), by handle."""
-        return ((handle, child) for handle, child in self._objects.items() if child.parent is parent)
+        return ((handle, child) for handle, child in self.by_handle.items() if child.parent is parent)
 
     def path(self, handle: int) -> str:
         """Return the object's 4.x path from the root, such as /Quadcopter/propeller[0]/respondable."""
@@ -192,13 +201,10 @@ class ObjectTree:
 
     def __iter__(self) -> Iterator[int]:
         """Iterate over the handles."""
-        return iter(self._objects)
+        return iter(self.by_handle)
 
     def __contains__(self, name: object) -> bool:
         return name in self._handles
-
-    def get(self, handle: int) -> SceneObject | None:
-        return self._objects.get(handle)
 
     def handle_of(self, item: SceneObject | None) -> int:
         """Return the handle of an object, WORLD for None."""
@@ -206,22 +212,17 @@ class ObjectTree:
 
     def __getitem__(self, handle: int) -> SceneObject:
         """Return the object with a handle. Raises ValueError, or TypeError if it is not a number."""
-        try:
-            return self._objects[handle]
-        except (KeyError, TypeError):
-            if isinstance(handle, (int, float)):
-                raise ValueError(f"there is no object with the handle {handle}") from None
-            raise TypeError("a handle must be a whole number") from None
+        return self.by_handle[handle]
 
     def save_state(self) -> Restore:
         """Return a function that puts every object back where it is now, below its present parent.
 
         An object that was removed since, or whose parent was, is left unchanged.
         """
-        states = [(item, item.parent, item.save_state()) for item in self._objects.values()]
+        states = [(item, item.parent, item.save_state()) for item in self.by_handle.values()]
 
         def restore() -> None:
-            existing = {None, *self._objects.values()}
+            existing = {None, *self.by_handle.values()}
             for item, parent, restore_item in states:
                 if item in existing and parent in existing:
                     restore_item()
@@ -234,38 +235,30 @@ class ObjectTree:
 
         Relative to a joint means to its moving side, the frame of its children; with `base` to its fixed side.
         """
-        try:
-            moved = self._objects[handle]
-        except (KeyError, TypeError):
-            moved = self[handle]  # raises the error; only then, since this runs a dozen times a step
-        if relative_to == WORLD:
-            return moved.matrix()
-        frame = self._frame(moved, relative_to, base)
+        moved = self.by_handle[handle]
+        frame = None if relative_to == WORLD else self._frame(moved, relative_to, base)
         return moved.matrix() if frame is None else frames.relative(frame, moved.matrix())
 
     def _frame(self, moved: SceneObject, relative_to: int, base: bool) -> Matrix | None:
-        """Return the transform world from the frame of reference, None for the world's."""
-        if relative_to == WORLD:
-            return None
-        reference = moved.parent if relative_to == PARENT else self[relative_to]
+        """Return the transform world from the frame of reference, None for a parent that is the world."""
+        reference = moved.parent if relative_to == PARENT else self.by_handle[relative_to]
         if reference is None:
             return None
         return reference.matrix() if base else reference.below()
 
     def turn(self, handle: int, relative_to: int = WORLD, base: bool = False) -> Matrix:
         """Return `matrix` with a correct rotation only; the translation may be 0, which saves time."""
-        if relative_to in (WORLD, PARENT):
-            return self.matrix(handle, relative_to, base)
-        reference = self[relative_to]
-        return frames.relative_turn(reference.matrix() if base else reference.below(), self[handle].matrix())
+        moved = self.by_handle[handle]
+        frame = None if relative_to == WORLD else self._frame(moved, relative_to, base)
+        return moved.matrix() if frame is None else frames.relative_turn(frame, moved.matrix())
 
     def set_matrix(self, handle: int, relative_to: int, matrix: Matrix, base: bool = False) -> None:
         """Place an object, with its descendants, relative to another, to its PARENT, or to the WORLD.
 
         `base` is as for `matrix`. Raises ValueError for an object that cannot be placed.
         """
-        moved = self[handle]
-        frame = self._frame(moved, relative_to, base)
+        moved = self.by_handle[handle]
+        frame = None if relative_to == WORLD else self._frame(moved, relative_to, base)
         self._place(moved, matrix if frame is None else frames.multiply(frame, matrix))
 
     def _place(self, moved: SceneObject, matrix: Matrix) -> None:
@@ -289,8 +282,8 @@ class ObjectTree:
         Its rotation is not converted to that frame and back: each time that an object is moved relative to itself, its
         rounding errors would grow threefold.
         """
-        moved = self[handle]
-        frame = self._frame(moved, relative_to, base)
+        moved = self.by_handle[handle]
+        frame = None if relative_to == WORLD else self._frame(moved, relative_to, base)
         x, y, z = position if frame is None else frames.transform(frame, position)
         m0, m1, m2, _, m4, m5, m6, _, m8, m9, m10, _ = moved.matrix()
         self._place(moved, (m0, m1, m2, x, m4, m5, m6, y, m8, m9, m10, z))
@@ -317,7 +310,7 @@ class ObjectTree:
         if new is moved or (new is not None and new.is_descendant_of(moved)):
             raise ValueError(f"'{moved.name}' cannot be its own ancestor")
         depth = max(
-            levels(item, moved) for item in self._objects.values() if item is moved or item.is_descendant_of(moved)
+            levels(item, moved) for item in self.by_handle.values() if item is moved or item.is_descendant_of(moved)
         )
         if new is not None and levels(new) + 1 + depth > DEEPEST:
             raise ValueError(f"'{moved.name}' cannot be attached there: more than {DEEPEST} ancestors of an object")

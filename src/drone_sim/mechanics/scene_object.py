@@ -100,7 +100,8 @@ class SceneObject:
         if self.parent is None:
             return self.local
         # Scripts read the same few frames several times a step: the product of the same two tuples is cached.
-        parent, local = self.parent.below(), self.local
+        above, local = self.parent, self.local
+        parent = above.below() if above.body is None else above.body.matrix
         if parent is not self._cached_parent or local is not self._cached_local:
             self._cached_parent, self._cached_local = parent, local
             self._cached_matrix = parent if local == IDENTITY else frames.multiply(parent, local)

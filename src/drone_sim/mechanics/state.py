@@ -16,15 +16,14 @@ from drone_sim.mechanics.frames import (
     transform,
 )
 
-# Of a body: position of the centre of mass (m), orientation of the principal axes, velocities (m/s, rad/s).
-Motion = tuple[Vector, Quaternion, Vector, Vector]
+UNTURNED: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
 class Pose(NamedTuple):
     """A body's position (m) and orientation (unit quaternion x, y, z, w) in the world."""
 
     position: Vector
-    orientation: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    orientation: Quaternion = UNTURNED
 
     @classmethod
     def of(cls, matrix: Matrix) -> Pose:

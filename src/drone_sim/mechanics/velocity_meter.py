@@ -32,8 +32,9 @@ class VelocityMeter:
 
     def begin_step(self) -> None:
         """Record the poses of the objects that the dynamics is about to move."""
+        objects = self._objects.by_handle
         for handle, last in list(self._now.items()):
-            item = self._objects.get(handle)
+            item = objects.get(handle)
             if item is None:
                 del self._now[handle]
             elif (matrix := item.matrix()) is not last and item.carrier is not None:
@@ -42,8 +43,8 @@ class VelocityMeter:
     def end_step(self) -> None:
         """Record the poses after the step."""
         if self._now:
-            self._before = self._now
-            self._now = {handle: self._objects[handle].matrix() for handle in self._now}
+            objects, self._before = self._objects.by_handle, self._now
+            self._now = {handle: objects[handle].matrix() for handle in self._now}
 
     def velocity(self, handle: int) -> tuple[Vector, Vector]:
         """Return linear (m/s, world) and angular velocity (rad/s): Euler angles of the step's rotation, per second.
@@ -71,7 +72,7 @@ class VelocityMeter:
 
     def _rotation_over_step(self, handle: int) -> Matrix | None:
         """Return how an object rotated over the step, None if that is unknown."""
-        matrix = self._objects[handle].matrix()
+        matrix = self._objects.by_handle[handle].matrix()
         if handle not in self._now:
             self._begin_to_measure(handle, matrix)
         before = self._before.get(handle)

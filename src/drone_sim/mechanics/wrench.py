@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from drone_sim.mechanics.frames import Quaternion, Vector
 
 
@@ -20,8 +18,8 @@ class Wrench:
     def __init__(self) -> None:
         """Start with zero force and torque."""
         self.force: Vector = (0.0, 0.0, 0.0)
-        self._torque: Vector = (0.0, 0.0, 0.0)  # the part that does not depend on R: the torques, and every l x a
-        self._levers: list[tuple[float, ...]] = []  # 2 l and a of each axis, in one tuple
+        self.torque: Vector = (0.0, 0.0, 0.0)  # the part that does not depend on R: the torques, and every l x a
+        self.levers: list[tuple[float, ...]] = []  # 2 l and a of each axis, in one tuple
 
     def push(self, force: Vector) -> None:
         """Add a force (N, world) at the centre of mass."""
@@ -37,28 +35,23 @@ class Wrench:
 
         `lever` is sum p_i f_i (inertial frame of the body) over the points p_i where forces f_i times the axis act.
         """
-        (fx, fy, fz), (tx, ty, tz), (lx, ly, lz), (ax, ay, az) = self.force, self._torque, lever, axis
+        (fx, fy, fz), (tx, ty, tz), (lx, ly, lz), (ax, ay, az) = self.force, self.torque, lever, axis
         self.force = fx + force[0], fy + force[1], fz + force[2]
-        self._torque = (
+        self.torque = (
             tx + torque[0] + ly * az - lz * ay,
             ty + torque[1] + lz * ax - lx * az,
             tz + torque[2] + lx * ay - ly * ax,
         )
-        self._levers.append((2.0 * lx, 2.0 * ly, 2.0 * lz, ax, ay, az))
-
-    @property
-    def terms(self) -> tuple[Vector, Sequence[tuple[float, ...]]]:
-        """The summands of `torque_under`: the torque that does not depend on R, and 2 l and a of each axis."""
-        return self._torque, self._levers
+        self.levers.append((2.0 * lx, 2.0 * ly, 2.0 * lz, ax, ay, az))
 
     def torque_under(self, orientation: Quaternion) -> Vector:
         """Return the torque about the centre of mass (N m, world) for an orientation of the body."""
         # Vector operations are written out for speed; Dynamics has a copy of this code in its loop over sub-steps.
-        if not self._levers:
-            return self._torque
+        if not self.levers:
+            return self.torque
         x, y, z, w = orientation
-        sum_x, sum_y, sum_z = self._torque
-        for lx, ly, lz, ax, ay, az in self._levers:
+        sum_x, sum_y, sum_z = self.torque
+        for lx, ly, lz, ax, ay, az in self.levers:
             tx, ty, tz = y * lz - z * ly, z * lx - x * lz, x * ly - y * lx
             ux, uy, uz = w * tx + y * tz - z * ty, w * ty + z * tx - x * tz, w * tz + x * ty - y * tx
             sum_x += uy * az - uz * ay

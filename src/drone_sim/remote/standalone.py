@@ -21,7 +21,7 @@ def play(parameters: Parameters, over: Callable[[], bool], listening: Callable[[
     """
     remote_api = parameters.remote_api
     with closing(Simulation(parameters, started=False)) as simulation:
-        player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
+        player = Player(simulation, lambda _state: None, simulated_time=False)
         with closing(RemoteApiServer(player, remote_api.address, remote_api.port)) as server:
             listening(server)
             pacer = Pacer(period(parameters), sleep=server.wait)

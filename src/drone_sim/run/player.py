@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 
@@ -37,18 +38,16 @@ class Player:
     def __init__(
         self,
         simulation: Simulation,
-        step: Callable[[], None],
         tell: Callable[[str], None],
         simulated_time: bool,
         prepare: Callable[[Parameters], None] = lambda _parameters: None,
     ):
-        """`step` runs and publishes one step. With `simulated_time`, other nodes wait while the clock stands still.
+        """With `simulated_time`, other nodes wait while the clock stands still.
 
         `prepare` is called at each start as `Simulation.start` says.
         """
         self.simulation = simulation
         self._prepare = prepare
-        self._step = step
         self.paused = False
         self.begun = False  # whether it has started since this was last set to False
         self.failure: ScriptError | Diverged | None = None  # the error that ended the last run, if one did
@@ -90,7 +89,8 @@ class Player:
         """Read scene and scripts from disk and begin at time 0. Raises as Simulation.start, and is then stopped."""
         self.interrupt_steps("interrupted")
         self.paused, self.failure = False, None
-        self.attempt(lambda: self.simulation.start(scene_file, self._prepare))
+        with self._attempt():
+            self.simulation.start(scene_file, self._prepare)
         self.simulation.look()  # reads meshes and textures now, which would delay the first step
         self.begun = True
         self._pause_at_breakpoint()
@@ -164,11 +164,29 @@ class Player:
 
     def step(self) -> bool:
         """Run one step. If a script fails or the dynamics diverges, log it once, stop, and return False."""
+        with self.stepping():
+            self.simulation.step()
+        return self.end_step()
+
+    @contextlib.contextmanager
+    def stepping(self) -> Iterator[None]:
+        """Context of one step and its messages; call `end_step` after it.
+
+        If a script fails or the dynamics diverges, log it once, and stop; the error ends here.
+        """
         try:
-            self.attempt(self._step)
+            with self._attempt():
+                yield
         except (ScriptError, Diverged) as error:
             while self._orders:
                 self._orders.popleft().answer.set_exception(error)
+
+    def end_step(self) -> bool:
+        """Count an ordered step, pause at a breakpoint, and execute a script's request to stop or pause.
+
+        Return whether the simulation still runs; False if the step failed.
+        """
+        if self.failure is not None:
             return False
         self._count_ordered_step()
         self._pause_at_breakpoint()
@@ -190,11 +208,12 @@ class Player:
             _LOG.error(f"script error: {error}")
         return self.simulation.running
 
-    def attempt(self, action: Callable[[], None]) -> None:
-        """Run `action`, a start or a step. If it fails, log one line, run the scripts' cleanup, and raise again."""
+    @contextlib.contextmanager
+    def _attempt(self) -> Iterator[None]:
+        """Context of a start or a step. If it fails, log one line, run the scripts' cleanup, and raise again."""
         self.simulation.breakpoints.reached = None
         try:
-            action()
+            yield
         except (ScriptError, Diverged) as error:
             self.failure = error
             _LOG.error(self.why_stopped)

@@ -74,7 +74,6 @@ class Stepper:
     def refresh_vehicles(self) -> None:
         """Refresh the vehicle lists after a vehicle was added or removed."""
         self.flying = tuple(self._vehicles.values())
-        self._bodies = tuple(vehicle.body.number for vehicle in self.flying)
         self.update_wind_forces()
 
     def update_wind_forces(self) -> None:
@@ -114,7 +113,10 @@ class Stepper:
 
     def _sum_forces(self) -> dict[int, Wrench]:
         """Return the sum of each vehicle's forces, by body."""
-        return {number: vehicle.wrench() for number, vehicle in zip(self._bodies, self.flying)}
+        wrenches = {}
+        for vehicle in self.flying:
+            wrenches[vehicle.body.number] = vehicle.wrench()
+        return wrenches
 
     def _advance(self, wrenches: dict[int, Wrench], watch: Callable[[int], None] | None) -> None:
         """Take the sub-steps, with the vehicles' forces and instruments that follow each of them."""
@@ -141,7 +143,8 @@ class Stepper:
         """Take the pictures that are due, then let the scripts sense."""
         for vehicle in self.flying:
             vehicle.take_pictures(self._clock.steps)
-        self._follow_scripts()
+        if self._scripts.is_changed:
+            self._follow_scripts()
         self._clock.is_sensing = True
         try:
             for script in self._unordered or self._scripts.all():
@@ -153,13 +156,13 @@ class Stepper:
 
     def _follow_scripts(self) -> None:
         """Start and end scripts of objects that were added or removed."""
-        if self._scripts.is_changed:
-            self._scripts.follow(self._operations)
-            self.list_scripts()
+        self._scripts.follow(self._operations)
+        self.list_scripts()
 
     def _begin_step(self) -> None:
         """Apply changes of scripts and weather, then run each script thread until it yields."""
-        self._follow_scripts()
+        if self._scripts.is_changed:
+            self._follow_scripts()
         if self._weather_change_seen != self._context.weather.changes:
             self.update_wind_forces()
         for thread in self._threaded:

@@ -360,7 +360,8 @@ class Scene:
         """Link the bodies of linked dummies in the world, before a step."""
         if self._links.is_stale:
             self._links.find((record.entry, record.item) for record in self.records.values())
-        self._links.hold()
+        if self._links.pairs:
+            self._links.hold()
 
     def _place_free_children(self, added: Iterable[int]) -> None:
         """Move added free children to their entries' poses relative to the parent, now that it exists."""

@@ -34,7 +34,7 @@ class Camera(Sensor):
     def __init__(self, parameters: CameraParameters, mounting: CameraMounting, vision: Vision):
         super().__init__(parameters.every)
         self.kind = parameters.kind
-        self._photography = Photography(mounting.name, mounting.clock)
+        self.photography = Photography(mounting.name, mounting.clock)
         self.change(parameters)
         self.viewers: set[Callable[[], bool]] = set()  # each returns whether it wants images now
         self.shown = 0  # number of images delivered to the viewers
@@ -47,13 +47,13 @@ class Camera(Sensor):
 
     def watched(self) -> bool:
         """Return whether any viewer wants images now."""
-        return bool(self.viewers) and any(wants_images() for wants_images in self.viewers)
+        return any(wants_images() for wants_images in self.viewers)
 
     def change(self, parameters: CameraParameters) -> None:
         """Apply the rate, optics and imperfections of `parameters`."""
         self.period = parameters.every
         self.intrinsics = parameters.intrinsics()
-        self._photography.change(parameters)
+        self.photography.change(parameters)
         self._moment: FrameState | None = None  # of the last ground truth
         self._truth: PictureTruth | None = None  # requested since the last image
         self._drawn: tuple[int, Matrix, PictureTruth] | None = None  # scene changes, pose, truth of the last image
@@ -68,8 +68,8 @@ class Camera(Sensor):
         kind = kind or self.kind
         if kind != COLOR:
             return self._vision.picture(kind, self.intrinsics, self._matrix())
-        if not self._photography.is_perfect:
-            return self._photography.take(self.intrinsics, self._light)
+        if not self.photography.is_perfect:
+            return self.photography.take(self.intrinsics, self._light)
         requested, self._truth = self._truth, None
         truth = requested and self._vision.truth(self.intrinsics, self._matrix(), self._moment)
         if requested is None or truth is None:
@@ -79,10 +79,9 @@ class Camera(Sensor):
         self._drawn = self._vision.changes, self.pose(), truth
         return truth.output(COLOR)
 
-    def meter(self, steps: int) -> None:
-        """Measure the brightness for automatic exposure if an image is due at step `steps`."""
-        if self._photography.is_metering and self.is_due(steps):
-            self._photography.meter(self.intrinsics, self._light)
+    def meter(self) -> None:
+        """Measure the brightness for automatic exposure."""
+        self.photography.meter(self.intrinsics, self._light)
 
     def _light(self, lens: Intrinsics, shutter: Shutter) -> np.ndarray:
         return self._vision.light(lens, self._matrix(), np.concatenate(self._velocity()), shutter)
@@ -131,9 +130,9 @@ class Camera(Sensor):
         """Forget all images, and reset the exposure."""
         self.image = self.latest = self._moment = self._truth = self._drawn = None
         self._last.clear()
-        self._photography.reset()
+        self.photography.reset()
         self.age = 0.0
 
     def save_state(self) -> Restore:
         image = saved(self, "image", "age", "latest", "_last", "period", "intrinsics")
-        return in_turn(image, self._photography.save_state())
+        return in_turn(image, self.photography.save_state())

@@ -68,7 +68,7 @@ class Body:
         """Return to the start pose at rest; drop the scripts' forces and end a drag."""
         self.let_go()
         self._world.set_pose(self.number, self.start)
-        self._pending: list[Pushed] = []  # by scripts; acts in the next step
+        self.pending: list[Pushed] = []  # by scripts; acts in the next step
         self.refresh()
 
     def begin_on_floor(self) -> None:
@@ -113,7 +113,7 @@ class Body:
     def restored(self) -> None:
         """Read the state after the world was restored from a snapshot."""
         self.teleports += 1
-        self._pending = []
+        self.pending = []
         self.refresh()
 
     def place_visuals(self, places: Mapping[int, Place]) -> None:
@@ -135,18 +135,17 @@ class Body:
     def add_force(self, push: Pushed) -> None:
         """Add a force and a torque that act during the next step."""
         self.pushes += 1
-        self._pending.append(push)
+        self.pending.append(push)
 
     def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
         """Drop the forces, the torques or both that were added to a shape since the last step."""
-        self._pending = [push.without(forces, torques) if push.shape == shape else push for push in self._pending]
+        self.pending = [push.without(forces, torques) if push.shape == shape else push for push in self.pending]
 
-    def take_pushes(self) -> Wrench:
-        """Return the wrench of the scripts' forces for the step that begins, and clear them."""
-        wrench, pushed, self._pending = Wrench(), self._pending, []
-        for _, force, torque, point in pushed:
+    def take_pushes(self, wrench: Wrench) -> None:
+        """Add the scripts' forces to the wrench of the step that begins, and clear them."""
+        for _, force, torque, point in self.pending:
             wrench.add(force, torque, point)
-        return wrench
+        self.pending = []
 
     def apply(self, forces: Sequence[Force]) -> None:
         """Apply forces, evaluated at the state of the last refresh(), in the next sub-step; not while it is held."""

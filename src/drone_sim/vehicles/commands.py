@@ -19,21 +19,15 @@ class Commands:
 
     def __init__(self, bus: MessageBus, timeout: float, clock: Clock):
         """Create it for the child script's bus; `timeout` is cmd_vel_timeout (s; 0: none)."""
-        self._bus = bus
         self.timeout = timeout
         self._clock = clock
-        self.listening: list[MessageBus] = []  # of scripts on the vehicle's parts
+        self.buses = [bus]  # of the child script, then of scripts on the vehicle's parts
         self.link: RadioLink[Twist] | None = None  # that delays commands; None: no delay
         self.begin()
 
     def begin(self) -> None:
         self.now = Twist()
         self.age = 0.0  # s
-
-    @property
-    def buses(self) -> tuple[MessageBus, ...]:
-        """The buses of the child script and of scripts on the vehicle's parts."""
-        return self._bus, *self.listening
 
     def receive(self, twist: Twist) -> None:
         """Post a command to the scripts for the next step, or send it over the radio link if there is one."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
-from drone_sim.forces.propellers import PropellerParameters, Propellers
+from drone_sim.forces.propellers import PARTICLE_VELOCITY, PropellerParameters, Propellers
 from drone_sim.mechanics import frames, urdf
 from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector
 from drone_sim.mechanics.inertia import Inertia, Inertial, combined
@@ -18,7 +18,6 @@ from drone_sim.vehicles.quadricopter_objects import DRONE, joint, respondable
 from drone_sim.vehicles.types import VehicleType
 from drone_sim.world.pictures import Place
 
-PARTICLE_VELOCITY = "particleVelocity"
 _BLADE_TURN = 3.0  # rad per metre of air; slow enough that 20 images/s show the direction
 
 
@@ -108,6 +107,7 @@ class Propulsion:
         self._body = body
         self._names = [respondable(number) + suffix for number, _ in enumerate(rotors.links, start=1)]
         self._commanded: list[dict[str, Any]] = [{} for _ in self._names]  # parameters of the propellers' scripts
+        self._driven = list(self._commanded)  # those that the thrust model follows
         self._drone = DRONE + suffix
         links = dict(zip((self._drone, *self._names), (IDENTITY, *rotors.links)))
         self.shapes: dict[str, Matrix] = {  # inertial frame of the body from each of its dynamic shapes
@@ -120,7 +120,7 @@ class Propulsion:
         kind, links = self.rotors.kind, self.rotors.links
         points = [frames.position(frames.multiply(self._body.inertial_from_root, link)) for link in links]
         axes = [(link[2], link[6], link[10]) for link in links]
-        self.law = kind.thrust_model(law, axes, points, kind.senses, time_step, self._velocities)
+        self.law = kind.thrust_model(law, axes, points, kind.senses, time_step, self._driven)
         self._body.propellers = self.law
         self.blades.reset()
 
@@ -129,7 +129,7 @@ class Propulsion:
         for parameters in self._commanded:
             parameters.clear()
             parameters.update({PARTICLE_VELOCITY: 0.0, **particles(law)})
-        self._driven = list(self._commanded)
+        self._driven[:] = self._commanded
 
     @property
     def script_parameters(self) -> dict[str, dict[str, Any]]:
@@ -140,9 +140,6 @@ class Propulsion:
     def particle_velocities(self) -> tuple[float, ...]:
         """The commanded particle velocities (m/s) of propellers 1, 2, and so on."""
         return tuple([parameters[PARTICLE_VELOCITY] for parameters in self._commanded])
-
-    def _velocities(self) -> Sequence[float]:
-        return [parameters[PARTICLE_VELOCITY] for parameters in self._driven]
 
     def disable_thrust_model(self, name: str) -> dict[str, Any] | None:
         """Disable the built-in thrust model of a propeller, whose script applies the forces itself.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -57,6 +57,7 @@ class Vehicle:
             self.body.begin_on_floor()
         self.propulsion = Propulsion(rotors, self.body, suffix)
         self.handles: list[int] = []  # of its objects
+        self.step_calls: list[Callable[[], None]] = []  # always this list; see _update_step_calls
         self._cleared = -1  # the tree's count of clearings when the objects were added
         self.cameras: dict[str, Camera] = {}
         for name, item in parameters.cameras.items():
@@ -88,7 +89,7 @@ class Vehicle:
             if tree[handle].body is not None:
                 self.context.velocities.follow(handle)
         self.propulsion.attach(parameters.propellers)
-        self.commands.listening = []
+        self.commands.buses = [self.bus]
         for camera in self.cameras.values():
             camera.reset()
         self.instruments.reset()
@@ -122,11 +123,12 @@ class Vehicle:
         self._update_step_calls()
 
     def _update_step_calls(self) -> None:
-        """Update the calls that precede the scripts in every step; none without sensors and command link."""
-        self._step_calls = [self.instruments.clear] if self.instruments else []
+        """Update the calls before its script in every step: clear the last readings, post and age the command."""
         self.commands.link = self.faults.commands
+        self.step_calls[:] = [self.instruments.clear] if self.instruments else []
         if self.commands.link is not None:
-            self._step_calls.append(self.commands.take)
+            self.step_calls.append(self.commands.take)
+        self.step_calls.append(self.commands.advance)
 
     def _leave_tree(self) -> None:
         """Remove its objects from the tree, unless the tree was already cleared."""
@@ -180,16 +182,11 @@ class Vehicle:
 
     # ---- phases
 
-    def begin_step(self) -> None:
-        """Clear the readings of the last step, and post the command to the scripts."""
-        for call in self._step_calls:
-            call()
-        self.commands.advance()
-
     def wrench(self) -> Wrench:
         """Return the wrench for this step without the sub-step forces; zero while the body is held."""
-        body = self.body
-        wrench = body.take_pushes()
+        wrench, body = Wrench(), self.body
+        if body.pending:
+            body.take_pushes(wrench)
         for force in self._forces:
             force.add_to(wrench, body)
         if self.pushes.lasting:
@@ -202,9 +199,9 @@ class Vehicle:
         Cameras with automatic exposure measure the light whenever they are due.
         """
         for name, camera in self.cameras.items():
-            if not now:
-                camera.meter(steps)
-            is_watched = camera.watched()
+            if camera.photography.is_metering and not now and camera.is_due(steps):
+                camera.meter()
+            is_watched = camera.viewers and camera.watched()
             if is_watched or camera.image is not None:
                 is_rendered = is_watched and (now or camera.is_due(steps)) and camera.failure != "silent"
                 camera.show(steps, *self.faults.transmit(name, camera.look() if is_rendered else None))

@@ -9,11 +9,12 @@ from typing import Any
 
 import pybullet
 
-from drone_sim.mechanics.frames import Vector
-from drone_sim.mechanics.state import Motion
+from drone_sim.mechanics.frames import Vector, multiply_quaternions, turned
+from drone_sim.mechanics.state import UNTURNED, Pose, State
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.world.gyroscopic_term import SLOW, GyroscopicTerm, NoGyroscopicTerm, torque_of_turn
-from drone_sim.world.impacts import Impacts
+from drone_sim.world.impacts import Impacts, Motion
+from drone_sim.world.pictures import Pictures
 from drone_sim.world.queries import Queries
 
 # The load on a body in a step: the body, Wrench's force, torque and levers, its moments of inertia if the term ω x Iω
@@ -68,12 +69,23 @@ class Dynamics:
     Code that sets the pose or velocity of a body must call `moved` or `all_moved` after it.
     """
 
-    def __init__(self, client: int, sub_step: float, queries: Queries, *, gyroscopic: bool):
+    def __init__(
+        self,
+        client: int,
+        sub_step: float,
+        queries: Queries,
+        pictures: Pictures,
+        inertial_frames: Mapping[int, tuple[Pose, Pose]],
+        *,
+        gyroscopic: bool,
+    ):
         """Step the bodies of PyBullet's `client` by `sub_step` (s).
 
+        `inertial_frames` has, by body, the pose of the inertial frame in the root link's frame, and the inverse.
         `gyroscopic`: bodies rotate by Euler's equations; otherwise as in V-REP, without the term ω × Iω.
         """
-        self._client, self._sub_step, self._queries = client, sub_step, queries
+        self._client, self._sub_step, self._queries, self._pictures = client, sub_step, queries, pictures
+        self._inertial_frames = inertial_frames
         self.shape_forces = ShapeForces(client)
         self._gyroscopic_term = GyroscopicTerm(client) if gyroscopic else NoGyroscopicTerm(client)
         self._impacts = Impacts(client, sub_step)
@@ -102,12 +114,20 @@ class Dynamics:
         self._cached.clear()
         self.shape_forces.sums.clear()
 
-    def motion(self, body: int) -> Motion:
-        """Return the pose of a root's inertial frame (m, unit quaternion) and its velocities (m/s, rad/s)."""
-        motion = self._cached.get(body)
-        if motion is None:
-            motion = self._cached[body] = *_pose_of(body, self._client), *_velocity_of(body, self._client)
-        return motion
+    def state(self, body: int) -> State:
+        """Return pose and velocity of a body's root link; the same object as long as it does not move."""
+        if body in self._cached:
+            return self._cached[body][-1]
+        centre, axes = _pose_of(body, self._client)
+        linear, angular = _velocity_of(body, self._client)
+        inertial, from_root = self._inertial_frames[body]
+        orientation = axes if from_root.orientation is UNTURNED else multiply_quaternions(axes, from_root.orientation)
+        ax, ay, az = turned(orientation, inertial.position)  # from the root link to the centre of mass
+        (x, y, z), (vx, vy, vz), (wx, wy, wz) = centre, linear, angular
+        velocity = vx - (wy * az - wz * ay), vy - (wz * ax - wx * az), vz - (wx * ay - wy * ax)
+        state = State((x - ax, y - ay, z - az), orientation, velocity, angular)
+        self._cached[body] = centre, axes, linear, angular, state
+        return state
 
     # ---- steps
 
@@ -121,10 +141,13 @@ class Dynamics:
     def advance(
         self, wrenches: Mapping[int, Wrench], sub_steps: int, between: Callable[[int], None] | None = None
     ) -> None:
-        """See World.advance."""
+        """Take `sub_steps` sub-steps and re-apply each body's wrench in every one, since PyBullet clears it.
+
+        `between` is called with 0 before the first sub-step, and after each with the number of sub-steps so far.
+        """
         moments = self._gyroscopic_term.moments_to_cancel
         self._term_acts = self._gyroscopic_term.begin_step(wrenches)
-        loads = [[body, wrench.force, *wrench.terms, moments.get(body), None] for body, wrench in wrenches.items()]
+        loads = [[body, it.force, it.torque, it.levers, moments.get(body), None] for body, it in wrenches.items()]
         any_fast = self._impacts.begin_step(sub_steps, self._cached)
         if not any_fast:
             self._queries.begin_sub_step()
@@ -138,6 +161,7 @@ class Dynamics:
                 if between is not None:
                     between(count)
         self.shape_forces.sums.clear()
+        self._pictures.look_anew()
 
     def _step_in_parts(self, loads: Sequence[_Load], parts: int) -> None:
         """Advance by one sub-step, divided into equal parts."""
@@ -163,6 +187,7 @@ class Dynamics:
         # The simulation spends most of its time here. So names are local, PyBullet's arguments positional,
         # Wrench.torque_under is written out, and a body that has hardly rotated costs no call for its term w x Iw.
         client, cached, applied, term = self._client, self._cached, self._applied, self._gyroscopic_term
+        term_acts, acts_after_steps = self._term_acts, term.acts_after_steps
         sums, slow = self.shape_forces.sums, math.sqrt(SLOW) * duration / 2
         for count in range(1, steps + 1):
             for load in loads:
@@ -196,10 +221,10 @@ class Dynamics:
                 applied.clear()
             if sums:
                 self.shape_forces.apply()
-            if self._term_acts:
+            if term_acts:
                 term.begin_sub_step(duration)
             _step(client)
-            if term.acts_after_steps:
+            if acts_after_steps:
                 term.end_sub_step(duration)
             if cached:
                 cached.clear()

@@ -7,7 +7,7 @@ in a sub-step of length h, an explicit step: a tumbling body gains energy. A tor
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Mapping
+from collections.abc import Iterable, Mapping, Set
 
 import pybullet
 
@@ -28,13 +28,10 @@ class NoGyroscopicTerm:
         """Start with no bodies in PyBullet's `client`."""
         self._client = client
         self._roots: dict[int, Vector] = {}  # moments of inertia (kg m², along the principal axes), by body
+        # Those of the roots whose term `torque_of_turn` cancels.
+        self.moments_to_cancel: Mapping[int, Vector] = self._roots
         self._links: dict[int, dict[int, Vector]] = {}  # of all other links, by PyBullet's number
-        self._unpushed: dict[int, Vector] = {}  # of _roots, those that Dynamics does not push in this step
-
-    @property
-    def moments_to_cancel(self) -> Mapping[int, Vector]:
-        """Moments of inertia (kg m², along the principal axes) of the roots whose term `torque_of_turn` cancels."""
-        return self._roots
+        self._unpushed: Set[int] = set()  # of _roots, those that Dynamics does not push in this step
 
     def add(self, body: int) -> None:
         links = {}
@@ -51,18 +48,18 @@ class NoGyroscopicTerm:
         self._roots.pop(body, None)
         self._links.pop(body, None)
 
-    def begin_step(self, pushed: Container[int]) -> bool:
+    def begin_step(self, pushed: Iterable[int]) -> bool:
         """Take the bodies that Dynamics pushes in this step; return whether `begin_sub_step` has anything to do."""
-        self._unpushed = {body: moments for body, moments in self._roots.items() if body not in pushed}
+        self._unpushed = self._roots.keys() - pushed
         return bool(self._unpushed or self._links)
 
     def begin_sub_step(self, duration: float) -> None:
         """Apply torques for the next PyBullet step of `duration` (s) to all bodies that Dynamics does not push."""
-        for body, moments in self._unpushed.items():
+        for body in self._unpushed:
             velocity = pybullet.getBaseVelocity(body, self._client)[1]
             if _rotates(velocity):
                 attitude = pybullet.getBasePositionAndOrientation(body, self._client)[1]
-                torque = self._torque(moments, _in_frame(attitude, velocity), duration)
+                torque = self._torque(self._roots[body], _in_frame(attitude, velocity), duration)
                 _apply_torque(body, -1, torque, _ALONG_AXES, self._client)
         for body, links in self._links.items():
             states = pybullet.getLinkStates(body, list(links), 1, 1, self._client)  # with velocities, current attitudes
@@ -96,17 +93,17 @@ class GyroscopicTerm(NoGyroscopicTerm):
 
     acts_after_steps = True
 
-    @property
-    def moments_to_cancel(self) -> Mapping[int, Vector]:
-        """Empty: half of the term remains, and an attitude does not show the half that acts after a step."""
-        return {}
+    def __init__(self, client: int):
+        """Start with no bodies in PyBullet's `client`."""
+        super().__init__(client)
+        self.moments_to_cancel = {}  # half of the term remains, and an attitude does not show the half after a step
 
     def add(self, body: int) -> None:
         """Add a body; the term acts on its root."""
         super().add(body)
         self._links.pop(body, None)
 
-    def begin_step(self, pushed: Container[int]) -> bool:
+    def begin_step(self, pushed: Iterable[int]) -> bool:
         """As in the base class, but for all roots: Dynamics leaves those that it pushes to `begin_sub_step`, too."""
         return super().begin_step(())
 

@@ -8,9 +8,11 @@ from collections.abc import Iterator, Mapping
 
 import pybullet
 
-from drone_sim.mechanics.frames import Vector
-from drone_sim.mechanics.state import Motion
+from drone_sim.mechanics.frames import Quaternion, Vector
+from drone_sim.mechanics.state import State
 
+# Position of a body's centre of mass (m), orientation of its principal axes, velocities (m/s, rad/s), and its state.
+Motion = tuple[Vector, Quaternion, Vector, Vector, State]
 _MAX_MOTION = 0.001  # m, of a body in a part of a sub-step
 _GAIN = 2.0  # m/s by which a body may become faster in a step and still be noticed
 _MAX_PARTS = 1000

@@ -154,7 +154,9 @@ class Queries:
 
     def begin_sub_step(self, bodies: Iterable[int] = ()) -> None:
         """Forget the last sub-step's contacts; `end_part` will sum up those of `bodies`."""
-        self._contacts_of_parts = {body: {} for body in bodies}
+        self._contacts_of_parts.clear()
+        for body in bodies:
+            self._contacts_of_parts[body] = {}
 
     def end_part(self, share: float) -> None:
         """Add the forces on those bodies in a part of the sub-step; `share`: its share of the duration."""

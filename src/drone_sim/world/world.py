@@ -5,16 +5,15 @@ One thread owns it. Every call names its client, so several worlds can live in o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pybullet
 
-from drone_sim.mechanics.frames import Matrix, Vector, cross, multiply_quaternions, turned
+from drone_sim.mechanics.frames import Matrix, Vector, cross, turned
 from drone_sim.mechanics.inertia import Inertia
-from drone_sim.mechanics.state import Motion, Pose, State, compose, inverse
+from drone_sim.mechanics.state import UNTURNED, Pose, compose, inverse
 from drone_sim.mechanics.urdf import RigidBody
-from drone_sim.mechanics.wrench import Wrench
 from drone_sim.shapes.compound import parts_of
 from drone_sim.shapes.mass import inertia_of
 from drone_sim.shapes.shape import WHITE, DrawnShape, Rgba, SceneShape
@@ -30,13 +29,10 @@ from drone_sim.world.queries import Queries
 from drone_sim.world.rigid_links import RigidLinks
 from drone_sim.world.saved_states import SavedStates
 
-_IDENTITY = (0.0, 0.0, 0.0, 1.0)  # quaternion
 # (N s)²: the contact solver stops when the squared change of an impulse is below this. With PyBullet's default, 1e-7,
 # bodies at rest rattle by some 1e-3 m/s², which only accelerometers measure; with this, by less than 1e-6 m/s².
 _RESIDUAL_THRESHOLD = 1e-18
 _FAR_UP = 1e6  # m
-_NOWHERE = State((0.0, 0.0, 0.0), _IDENTITY, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-_UNKNOWN: tuple[Motion | None, State] = (None, _NOWHERE)  # of a body that has not been read yet
 _unused: list[int] = []  # clients
 
 
@@ -81,14 +77,15 @@ class World:
         pybullet.setTimeStep(self._sub_step, client)
         self._inertial_frames: dict[int, tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._made: bodies.Made = {}
-        self._states: dict[int, tuple[Motion, State]] = {}  # cached by body, with the motion that they are from
         self.pictures = Pictures(client, self._files, window=self._gui)
         self.joints = Joints(client, self.pictures.look_anew)
         self.collision_filter = CollisionFilter(client, self._forget_motion_of)
         self.queries = Queries(client, self.collision_filter)
         self.rigid_links = RigidLinks(client)
-        self._dynamics = Dynamics(client, self._sub_step, self.queries, gyroscopic=self._gyroscopic)
-        self.shape_forces, self.apply = self._dynamics.shape_forces, self._dynamics.apply
+        parts = self.queries, self.pictures, self._inertial_frames
+        dynamics = Dynamics(client, self._sub_step, *parts, gyroscopic=self._gyroscopic)
+        self._dynamics, self.shape_forces = dynamics, dynamics.shape_forces
+        self.state, self.apply, self.advance = dynamics.state, dynamics.apply, dynamics.advance
         self.saved_states = SavedStates(client, self._forget_all_motion)
 
     def _forget_motion_of(self, body: int) -> None:
@@ -177,7 +174,6 @@ class World:
         self.rigid_links.forget(body)
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
-        self._states.pop(body, None)
         self.saved_states.forget(body)
         self.joints.forget(body)
         self.collision_filter.forget(body)
@@ -204,8 +200,8 @@ class World:
         info = pybullet.getDynamicsInfo(number, -1, self._client)
         inertial = Pose(info[3], info[4])
         from_root = inverse(inertial)
-        if from_root.orientation == _IDENTITY:
-            from_root = Pose(from_root.position, _IDENTITY)  # the same object: `state` compares it in every step
+        if from_root.orientation == UNTURNED:
+            from_root = Pose(from_root.position)  # with the same object UNTURNED: `state` compares it in every step
         self._inertial_frames[number] = (inertial, from_root)
         self.pictures.add(number, from_root)
         self._dynamics.add(number)
@@ -227,22 +223,6 @@ class World:
         """Return the inertia of a link (-1: the root) along its principal axes, which are given in its frame."""
         _, _, (a, b, c), centre, orientation, *_ = pybullet.getDynamicsInfo(body, link, self._client)
         return Inertia((a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c), Pose(centre, orientation).matrix)
-
-    def state(self, body: int) -> State:
-        """Return pose and velocity of a body's root link; the same object as long as it does not move."""
-        motion = self._dynamics.motion(body)
-        cached_motion, cached_state = self._states.get(body, _UNKNOWN)
-        if cached_motion is motion:
-            return cached_state
-        (x, y, z), axes, (vx, vy, vz), angular = motion
-        inertial, from_root = self._inertial_frames[body]
-        orientation = axes if from_root.orientation is _IDENTITY else multiply_quaternions(axes, from_root.orientation)
-        ax, ay, az = turned(orientation, inertial.position)  # from the root link to the centre of mass
-        wx, wy, wz = angular
-        velocity = vx - (wy * az - wz * ay), vy - (wz * ax - wx * az), vz - (wx * ay - wy * ax)
-        state = State((x - ax, y - ay, z - az), orientation, velocity, angular)
-        self._states[body] = motion, state
-        return state
 
     def is_finite(self) -> bool:
         """Return whether the poses and velocities of all bodies are finite."""
@@ -268,16 +248,6 @@ class World:
         """End all contacts of a body by moving it far up: Bullet would keep them wherever else it is placed."""
         self.set_pose(body, Pose((0.0, 0.0, _FAR_UP)))
         pybullet.performCollisionDetection(self._client)
-
-    def advance(
-        self, wrenches: Mapping[int, Wrench], sub_steps: int, between: Callable[[int], None] | None = None
-    ) -> None:
-        """Take `sub_steps` sub-steps and re-apply each body's wrench in every one, since PyBullet clears it.
-
-        `between` is called with 0 before the first sub-step, and after each with the number of sub-steps so far.
-        """
-        self._dynamics.advance(wrenches, sub_steps, between)
-        self.pictures.look_anew()
 
     def keep_initial_poses(self) -> None:
         """Save the poses of all bodies, at rest, and restore them, so that all runs begin equal to the last bit."""

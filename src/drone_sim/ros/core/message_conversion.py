@@ -60,9 +60,9 @@ def odometry(stamp: rospy.Time, state: State, child: str) -> Odometry:
     """Return a state as a message: pose in the world, twist in the child frame; covariances are 0, meaning exact."""
     message = Odometry(header=Header(stamp=stamp, frame_id=WORLD_FRAME), child_frame_id=child)
     message.pose.pose = Pose(Point(*state.position), Quaternion(*state.orientation))
-    child_from_world = frames.invert(state.matrix)
-    velocities = state.linear_velocity, state.angular_velocity
-    message.twist.twist = twist(*(frames.rotate(child_from_world, velocity) for velocity in velocities))
+    matrix = state.matrix
+    linear = frames.rotate_back(matrix, state.linear_velocity)
+    message.twist.twist = twist(linear, frames.rotate_back(matrix, state.angular_velocity))
     return message
 
 

@@ -83,9 +83,7 @@ class Node:
         self._time = StepTime(self.simulation, use_sim_time())
         self._state = rospy.Publisher("~state", String, queue_size=10, latch=True)
         self._timeline = RunTimeline(parameters)
-        self.player = Player(
-            self.simulation, self._step_and_publish, self._state.publish, self._time.simulated, self._timeline.read
-        )
+        self.player = Player(self.simulation, self._state.publish, self._time.simulated, self._timeline.read)
         self._interventions = Interventions(self.simulation)
         self._remote = start_server(parameters.remote_api, self.player, backend, self._interventions.watched)
         self._pacer = Pacer(period(parameters), sleep=self._remote.wait)
@@ -204,7 +202,11 @@ class Node:
     def step(self) -> bool:
         """Process requests, run one step, and publish it under one stamp; return whether a step was run."""
         self._process_requests()
-        return self._is_running() and self.player.step()
+        if not self._is_running():
+            return False
+        with self.player.stepping():
+            self._step_and_publish()
+        return self.player.end_step()
 
     def _first(self) -> list[Vehicle]:
         """Return the first vehicle, if one flies."""

@@ -137,7 +137,7 @@ class VehicleInputs:
             twist = getattr(message, "twist", message)
             self.log.take(logged, sender(message), is_command and not any((*xyz(twist.linear), *xyz(twist.angular))))
             change = intervention(action, self._name, name, message) if action else None
-            self._inbox.put(lambda: execute(job, message), change)
+            self._inbox.put(partial(execute, job, message), change)
 
         def execute(job: _Job, message: Any) -> None:
             vehicle = self._simulation.vehicles.get(self._name)  # may have been removed or replaced since the check

@@ -78,7 +78,7 @@ class DummyLinks:
 
     def __init__(self, world: World):
         self._world = world
-        self._pairs: list[tuple[SceneObject, SceneObject]] = []
+        self.pairs: list[tuple[SceneObject, SceneObject]] = []
         self.is_stale = True  # whether `find` must be called, because an entry or object has changed
 
     def find(self, objects: Iterable[tuple[EntryParameters, SceneObject | None]]) -> None:
@@ -90,17 +90,15 @@ class DummyLinks:
             other = by_name.get(entry.linked)
             if item is not None and other is not None:
                 pairs[frozenset((entry.name, entry.linked))] = item, other
-        self._pairs = [*pairs.values()]
+        self.pairs = [*pairs.values()]
         self.is_stale = False
         if not pairs:
             self._world.rigid_links.set({})
 
     def hold(self) -> None:
         """Update the links in the world to where the linked dummies are on their bodies."""
-        if not self._pairs:
-            return
         links = {}
-        for first, second in self._pairs:
+        for first, second in self.pairs:
             ends = _anchor(first), _anchor(second)
             if ends[0][:2] != ends[1][:2] and (first.carrier is not None or second.carrier is not None):
                 links[first.name] = ends

@@ -35,7 +35,7 @@ class Matrices:
 
         `matrix` may be a pose (7 numbers), or a quaternion (x, y, z, w).
         """
-        m = _transform(matrix)
+        m = numbers(matrix, 12) if len(matrix) == 12 else _transform(matrix)
         if len(vector) == 3:
             return list(frames.transform(m, numbers(vector, 3)))
         values = numbers(vector, len(vector))
@@ -131,7 +131,7 @@ class Matrices:
 
 
 def _transform(values: Numbers) -> Matrix:
-    """Return the transform of 12 numbers, of a pose (7), or of a quaternion (4)."""
+    """Return the transform of a pose (7 numbers), of a quaternion (4), or of 12 numbers."""
     if len(values) == 4:
         return built((0.0, 0.0, 0.0), values)
     return built(values[:3], values[3:]) if len(values) == 7 else numbers(values, 12)

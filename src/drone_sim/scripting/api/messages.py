@@ -37,8 +37,16 @@ _TYPE = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
 _NAME = re.compile(r"(/[A-Za-z0-9_]+)+")  # like rosgraph.names.is_legal_name for complete names, but ASCII only
 # Called with a message handler; returns a function that ends the subscription.
 Begin = Callable[[Callable[[Any], None]], Callable[[], None]]
-_NO_CALLBACKS: list[Callback] = []
 _SERVICE = "service {}"  # stored in place of a topic, whose name begins with a slash
+
+
+class _Subscription(NamedTuple):
+    topic: str
+    kind: str
+    callback: Callback
+    messages: deque[Any]
+    begin: Begin
+    end: Callable[[], None]
 
 
 class _Publisher(NamedTuple):
@@ -59,10 +67,9 @@ class MessageBus:
         self._prefix = f"/{namespace}" if namespace else ""
         own = _OWN_TOPICS if own_topics is None else own_topics
         self._own_topics = {self.resolve(topic): kind for topic, kind in own.items()}
-        self._subscriptions = Subscriptions()
-        # Called in every step, so without another function call.
-        self.new_callbacks, self.deliver = self._subscriptions.new_callbacks, self._subscriptions.deliver
-        self.take = self._subscriptions.take
+        self._subscriptions: dict[int, _Subscription] = {}  # by handle
+        self._lock = threading.Lock()  # one thread owns the subscriptions; any thread may post a message
+        self._new_callbacks: list[Callback] = []
         self._publishers: dict[int, _Publisher] = {}
         self.own_messages: dict[str, Any] = {}  # the last message on each of the drone's own topics, by complete name
         self._last_handle = 0
@@ -75,9 +82,10 @@ class MessageBus:
         A second call with the same topic, type and callback returns the same handle.
         """
         resolved = self.resolved("topic", topic)
-        existing = self._subscriptions.same(resolved, kind, callback)
-        if existing is not None:
-            return existing
+        for handle, existing in self._subscriptions.items():
+            is_same_topic = existing.topic == resolved and existing.kind == kind
+            if is_same_topic and _are_same(existing.callback, callback):
+                return handle
 
         def begin(take: Callable[[Any], None]) -> Callable[[], None]:
             if resolved in self._own_topics:
@@ -88,14 +96,12 @@ class MessageBus:
             return self.backend.subscribe(resolved, kind, take)
 
         self._check_type(resolved, kind)
-        handle = self._new_handle()
-        self._subscriptions.add(handle, resolved, kind, callback, _length(queue), begin)
-        return handle
+        return self._add_subscription(resolved, kind, callback, _length(queue), begin)
 
     def offer(self, name: str, kind: str, callback: Callback) -> int:
         """Offer a service whose requests a callback answers; return a handle. Raises ValueError."""
         service = self.resolved("service", name)
-        if self._subscriptions.has(_SERVICE.format(service)):
+        if self._has_subscription(_SERVICE.format(service)):
             raise ValueError(f"this script already offers the service {service}")
         if not _TYPE.fullmatch(kind):
             raise ValueError(f"'{kind:.80}' is not a service type, such as std_srvs/Trigger")
@@ -112,9 +118,7 @@ class MessageBus:
 
             return close
 
-        handle = self._new_handle()
-        self._subscriptions.add(handle, _SERVICE.format(service), kind, callback, _MOST_WAITING, begin)
-        return handle
+        return self._add_subscription(_SERVICE.format(service), kind, callback, _MOST_WAITING, begin)
 
     def advertise(self, topic: str, kind: str, queue: int = 1, latch: bool = False) -> int:
         """Advertise a topic; return a handle. Raises ValueError."""
@@ -155,40 +159,89 @@ class MessageBus:
 
     def check_subscription(self, handle: int, is_service: bool = False) -> None:
         """Raise ValueError if no subscription (or no offered service) has this handle."""
-        self._subscriptions.check(handle, is_service)
+        if handle not in self._subscriptions or self._subscriptions[handle].topic.startswith("/") == is_service:
+            what = "service that the script offers" if is_service else "subscription"
+            raise ValueError(f"there is no {what} with the handle {handle}")
 
     def end_subscription(self, handle: int, is_service: bool = False) -> None:
         """End a subscription or an offered service. Raises ValueError for an unknown handle."""
-        self._subscriptions.check(handle, is_service)
-        self._subscriptions.end(handle)
+        self.check_subscription(handle, is_service)
+        self._end(handle)
 
     # ---- for the simulation
 
     @property
     def is_subscribed(self) -> bool:
-        return len(self._subscriptions) > 0
+        return bool(self._subscriptions)
 
     def post(self, topic: str, message: Any) -> None:
         """Store a message for the next step; any thread may call this."""
-        self._subscriptions.post(self.resolve(topic), message)
+        resolved = self.resolve(topic)
+        with self._lock:
+            for subscription in self._subscriptions.values():
+                if subscription.topic == resolved:
+                    subscription.messages.append(message)
 
     def hears(self, topic: str) -> bool:
         """Return whether the script is subscribed to a topic."""
-        return self._subscriptions.has(self.resolve(topic))
+        return self._has_subscription(self.resolve(topic))
+
+    def new_callbacks(self) -> list[Callback]:
+        """Return the callbacks of the subscriptions that were added since the last call."""
+        new, self._new_callbacks = self._new_callbacks, []
+        return new
+
+    def check_callbacks(self, script: Script) -> None:
+        """Raise ScriptError if the script has subscribed with the name of a function that does not exist."""
+        for callback in self.new_callbacks():
+            script.check(callback)
+
+    def deliver(self, script: Script) -> None:
+        """Check new callbacks, then pass every waiting message and request to the script.
+
+        For each subscription the oldest message is first. Raises ScriptError.
+        """
+        if self._new_callbacks:
+            self.check_callbacks(script)
+        for callback, message in self.take():
+            if type(message) is ServiceRequest:
+                execute(message, functools.partial(script.answer, callback))
+            else:
+                script.callback(callback, message)
+
+    def take(self) -> list[tuple[Callback, Any]]:
+        """Return and remove waiting messages and requests, with callbacks; for each subscription, the oldest first."""
+        waiting: list[tuple[Callback, Any]] = []
+        for subscription in self._subscriptions.values():  # not changed by other threads
+            while subscription.messages:
+                waiting.append((subscription.callback, subscription.messages.popleft()))
+        return waiting
 
     def close(self) -> None:
         """End all subscriptions, services and publications."""
-        self._subscriptions.close()
+        self._new_callbacks = []
+        for handle in list(self._subscriptions):
+            self._end(handle)
         for handle in list(self._publishers):
             self.end_publisher(handle)
 
     def save_state(self) -> Restore:
         """Return a function that restores the present subscriptions, publications and waiting messages."""
-        restore_subscriptions, kept = self._subscriptions.save_state(), dict(self._publishers)
+        subscriptions, kept = dict(self._subscriptions), dict(self._publishers)
+        waiting = {handle: _copied(subscription.messages) for handle, subscription in subscriptions.items()}
         last, kept_messages = self._last_handle, dict(self.own_messages)
 
         def restore() -> None:
-            restore_subscriptions()
+            for handle in set(self._subscriptions) - set(subscriptions):
+                self._end(handle)
+            for handle in set(subscriptions) - set(self._subscriptions):
+                ended = subscriptions[handle]
+                subscriptions[handle] = ended._replace(end=ended.begin(ended.messages.append))
+            with self._lock:
+                self._subscriptions = dict(subscriptions)
+                for handle, messages in waiting.items():
+                    subscriptions[handle].messages.clear()
+                    subscriptions[handle].messages.extend(_copied(messages))
             for handle in set(self._publishers) - set(kept):
                 self.end_publisher(handle)
             for handle in set(kept) - set(self._publishers):
@@ -199,6 +252,24 @@ class MessageBus:
             self.own_messages.update(kept_messages)
 
         return restore
+
+    def _add_subscription(self, topic: str, kind: str, callback: Callback, queue: int, begin: Begin) -> int:
+        """Subscribe to a topic, or offer a service; the last `queue` messages are kept. Return a handle."""
+        handle, messages = self._new_handle(), deque[Any](maxlen=queue)
+        subscription = _Subscription(topic, kind, callback, messages, begin, begin(messages.append))
+        with self._lock:
+            self._subscriptions[handle] = subscription
+        self._new_callbacks.append(callback)
+        return handle
+
+    def _has_subscription(self, topic: str) -> bool:
+        with self._lock:
+            return any(subscription.topic == topic for subscription in self._subscriptions.values())
+
+    def _end(self, handle: int) -> None:
+        with self._lock:
+            subscription = self._subscriptions.pop(handle)
+        subscription.end()
 
     def _add_publisher(self, begin: Callable[[], MessageSender | None]) -> int:
         handle = self._new_handle()
@@ -244,9 +315,6 @@ def _length(queue: int) -> int:
     return min(max(1, int(queue)), _LONGEST_QUEUE)
 
 
-# ---- subscriptions
-
-
 class OwnTopic:
     """Sender for a topic that the drone itself receives; a Backend sends all other topics."""
 
@@ -263,115 +331,6 @@ class OwnTopic:
 
     def shutdown(self) -> None:
         self._messages.pop(self._topic, None)
-
-
-class _Subscription(NamedTuple):
-    topic: str
-    kind: str
-    callback: Callback
-    messages: deque[Any]
-    begin: Begin
-    end: Callable[[], None]
-
-
-class Subscriptions:
-    """Subscriptions by handle. One thread owns them; any thread may post a message."""
-
-    def __init__(self) -> None:
-        self._by_handle: dict[int, _Subscription] = {}
-        self._lock = threading.Lock()
-        self._new_callbacks: list[Callback] = []
-
-    def __len__(self) -> int:
-        return len(self._by_handle)
-
-    def same(self, topic: str, kind: str, callback: Callback) -> int | None:
-        """Return the handle of an equal subscription, None if there is none."""
-        for handle, subscription in self._by_handle.items():
-            is_same_topic = subscription.topic == topic and subscription.kind == kind
-            if is_same_topic and _are_same(subscription.callback, callback):
-                return handle
-        return None
-
-    def add(self, handle: int, topic: str, kind: str, callback: Callback, queue: int, begin: Begin) -> None:
-        """Subscribe to a topic, or offer a service, of a type; the last `queue` messages are kept."""
-        messages: deque[Any] = deque(maxlen=queue)
-        subscription = _Subscription(topic, kind, callback, messages, begin, begin(messages.append))
-        with self._lock:
-            self._by_handle[handle] = subscription
-        self._new_callbacks.append(callback)
-
-    def check(self, handle: int, is_service: bool) -> None:
-        """Raise ValueError if no subscription (or no offered service) has this handle."""
-        if handle not in self._by_handle or self._by_handle[handle].topic.startswith("/") == is_service:
-            what = "service that the script offers" if is_service else "subscription"
-            raise ValueError(f"there is no {what} with the handle {handle}")
-
-    def end(self, handle: int) -> None:
-        """End a subscription. Raises ValueError for an unknown handle."""
-        with self._lock:
-            subscription = self._by_handle.pop(handle, None)
-        if subscription is None:
-            raise ValueError(f"there is no subscription with the handle {handle}")
-        subscription.end()
-
-    def close(self) -> None:
-        self._new_callbacks = []
-        for handle in list(self._by_handle):
-            self.end(handle)
-
-    def post(self, topic: str, message: Any) -> None:
-        """Post a message; any thread may call this."""
-        with self._lock:
-            for subscription in self._by_handle.values():
-                if subscription.topic == topic:
-                    subscription.messages.append(message)
-
-    def has(self, topic: str) -> bool:
-        """Return whether a topic is subscribed, or a service is offered; any thread may call this."""
-        with self._lock:
-            return any(subscription.topic == topic for subscription in self._by_handle.values())
-
-    def new_callbacks(self) -> list[Callback]:
-        """Return the callbacks of the subscriptions that were added since the last call."""
-        if not self._new_callbacks:
-            return _NO_CALLBACKS
-        new, self._new_callbacks = self._new_callbacks, []
-        return new
-
-    def deliver(self, script: Script) -> None:
-        """Pass every waiting message and request to the script, for each subscription the oldest first."""
-        for callback, message in self.take():
-            if type(message) is ServiceRequest:
-                execute(message, functools.partial(script.answer, callback))
-            else:
-                script.callback(callback, message)
-
-    def take(self) -> list[tuple[Callback, Any]]:
-        """Return and remove waiting messages and requests, with callbacks; for each subscription, the oldest first."""
-        waiting: list[tuple[Callback, Any]] = []
-        for subscription in self._by_handle.values():  # not changed by other threads
-            while subscription.messages:
-                waiting.append((subscription.callback, subscription.messages.popleft()))
-        return waiting
-
-    def save_state(self) -> Restore:
-        """Return a function that restores the present subscriptions and waiting messages."""
-        kept = dict(self._by_handle)
-        waiting = {handle: _copied(subscription.messages) for handle, subscription in kept.items()}
-
-        def restore() -> None:
-            for handle in set(self._by_handle) - set(kept):
-                self.end(handle)
-            for handle in set(kept) - set(self._by_handle):
-                kept[handle] = kept[handle]._replace(end=kept[handle].begin(kept[handle].messages.append))
-            with self._lock:
-                self._by_handle = dict(kept)
-                for handle, messages in waiting.items():
-                    kept[handle].messages.clear()
-                    kept[handle].messages.extend(_copied(messages))
-
-        return restore
 
 
 def _are_same(first: Callback, second: Callback) -> bool:

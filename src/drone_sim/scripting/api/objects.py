@@ -125,8 +125,8 @@ class Objects(Functions):
         self._put(handle, frame, place)
 
     def _matrix(self, handle: int, frame: int) -> frames.Matrix:
-        if handle < FIRST_FLAG:  # the usual case, several times in a step
-            return self._objects.matrix(handle, frame)
+        if frame == WORLD and handle < FIRST_FLAG:  # the usual case, several times in a step
+            return self._objects.by_handle[handle].matrix()
         return self._objects.matrix(bare(handle), frame, has(handle, BASE))
 
     def _put(self, handle: int, frame: int, matrix: frames.Matrix) -> None:

@@ -68,7 +68,7 @@ class Scripts:
 
     def clear(self) -> None:
         """Remove all; handles start again."""
-        self._by_handle: dict[int, Attachment] = {}
+        self.by_handle: dict[int, Attachment] = {}
         self._by_name: dict[tuple[str, int], Attachment] = {}
         self._numbers = itertools.count(FIRST)
         self.asked = 0  # number of parameters that scripts have read
@@ -79,14 +79,14 @@ class Scripts:
         existing = self._by_name.get((name, kind))
         handle = next(self._numbers) if existing is None else existing.handle
         attachment = Attachment(handle, name, parameters, is_law, kind)
-        self._by_handle[handle] = self._by_name[name, kind] = attachment
+        self.by_handle[handle] = self._by_name[name, kind] = attachment
         return attachment
 
     def remove(self, name: str, kind: int = CHILD) -> None:
         """Remove the script of an object, if there is one."""
         removed = self._by_name.pop((name, kind), None)
         if removed is not None:
-            del self._by_handle[removed.handle]
+            del self.by_handle[removed.handle]
 
     def rename(self, name: str, new: str, kind: int = CHILD) -> None:
         renamed = self._by_name[new, kind] = self._by_name.pop((name, kind))
@@ -94,21 +94,17 @@ class Scripts:
 
     def __iter__(self) -> Iterator[Attachment]:
         """Return an iterator in the order of handles."""
-        return iter(self._by_handle.values())
+        return iter(self.by_handle.values())
 
     def __contains__(self, name: str) -> bool:
         """Return whether a child script is attached to an object."""
         return (name, CHILD) in self._by_name
 
-    def get(self, handle: int) -> Attachment | None:
-        """Return the script with a handle, None for an unknown handle."""
-        return self._by_handle.get(handle)
-
     def __getitem__(self, handle: int) -> Attachment:
         """Return the script with a handle. Raises ValueError for an unknown handle."""
-        if handle not in self._by_handle:
+        if handle not in self.by_handle:
             raise ValueError(f"there is no script with the handle {handle}")
-        return self._by_handle[handle]
+        return self.by_handle[handle]
 
     def find(self, name: str, kind: int = CHILD) -> Attachment | None:
         """Return the script of an object, None if there is none."""

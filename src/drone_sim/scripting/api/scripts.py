@@ -67,7 +67,7 @@ class _OnScripts(Functions):
         if not isinstance(handle, (int, float)):
             raise WrongValue("expected the handle of a script")
         number = int(handle)
-        item = self._objects.get(number)
+        item = self._objects.by_handle.get(number)
         return self._script_of(number) if item is not None and item.kind == "script" else self._scripts[number]
 
     def _script_of(self, handle: int) -> Attachment:
@@ -124,7 +124,7 @@ class ScriptFunctions(_OnScripts):
         and those of ancestors; with sim.handle_all, in every script. An unknown parameter of a propeller raises an
         error if its name is similar to a known one; otherwise the log says that nothing reads it.
         """
-        found = self._scripts.get(script)
+        found = self._scripts.by_handle.get(script)
         if found and found is not self._own and name in found.parameters and type(value) is float and isfinite(value):
             found.parameters[name] = value  # fast, because it is called for each propeller in every step
             return

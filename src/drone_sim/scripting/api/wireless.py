@@ -98,7 +98,7 @@ class Wireless(Functions):
 
     def _is_for(self, broadcast: Broadcast) -> bool:
         """Return whether data are sent to this script."""
-        sender = self._context.scripts.get(broadcast.sender)
+        sender = self._context.scripts.by_handle.get(broadcast.sender)
         if broadcast.target == _ALL or sender is None or broadcast.target not in (_TREE, _CHAIN):
             return broadcast.target in (_ALL, self._own.handle)
         objects = self._objects

@@ -57,7 +57,7 @@ class Mirror:
                 continue
             (handle,) = read[1]
             self._poses[handle] = result
-            item = self.objects.get(handle)
+            item = self.objects.by_handle.get(handle)
             if item is None:
                 item = SceneObject((str(handle),), "", None)
                 self.objects.reserve({item.name: handle})
