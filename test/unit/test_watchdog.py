@@ -12,8 +12,9 @@ SOURCE = os.pathsep.join(path for path in sys.path if path)
 HANGS = 90.0  # s; nothing here takes nearly as long unless it hangs
 BEGIN = """
 import ctypes, os, signal, sys, threading, time
-from drone_sim.run.watchdog import Watchdog
-watchdog = Watchdog("it")
+from drone_sim.run import watchdog
+watchdog._SCRIPT_PATIENCE = 1.0  # s, more than which a script may take outside of its time, and after it
+watchdog = watchdog.Watchdog("it")
 def hang():
     mutex = ctypes.create_string_buffer(64)
     while True: ctypes.PyDLL(None).pthread_mutex_lock(mutex)
@@ -30,7 +31,7 @@ def hide():
     _signal.pthread_sigmask(_signal.SIG_BLOCK, {{_signal.SIGALRM}})
     time.sleep(1000)
 def pause():
-    limit.outside(lambda: time.sleep(7))
+    limit.outside(lambda: time.sleep(3))
 limit = TimeLimit(0.5)
 limit.label = Labels("some.py", limit)["init"]
 limit.run({})
@@ -55,7 +56,7 @@ PROGRAMS = {
     ),
     "a script in a call that holds Python's lock": (READY + SCRIPT.format("lambda: " + HANG), None),
     "a script that hides from the alarm": (READY + SCRIPT.format("hide"), None),
-    "a script that pauses": (READY + SCRIPT.format("pause") + "time.sleep(7)\nsys.exit(4)", None),
+    "a script that pauses": (READY + SCRIPT.format("pause") + "time.sleep(3)\nsys.exit(4)", None),
     "ends beside a thread": (
         READY + "threading.Thread(target=time.sleep, args=(1000,)).start()\nwatchdog.end(3)",
         None,
