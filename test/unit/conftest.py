@@ -98,6 +98,10 @@ def pytest_collection_finish():
     gc.freeze()  # so that no collection, here or in a fork, looks through all the tests again
 
 
+def pytest_sessionfinish():
+    gc.unfreeze()  # for nanobind, which tells of what is left at the end
+
+
 def pytest_terminal_summary(terminalreporter, config):
     seed = getattr(config.option, "randomly_seed", None)
     if isinstance(seed, int):
