@@ -1,6 +1,7 @@
 """Fixtures of several test files, and the options of all."""
 
 import contextlib
+import gc
 import signal
 from importlib.util import find_spec
 
@@ -90,6 +91,15 @@ def pytest_collection_modifyitems(items):
         for item in items:
             if item.get_closest_marker("ros"):
                 item.add_marker(pytest.mark.skip(reason="needs ROS"))
+
+
+def pytest_collection_finish():
+    gc.collect()
+    gc.freeze()  # so that no collection, here or in a fork, looks through all the tests again
+
+
+def pytest_sessionfinish():
+    gc.unfreeze()  # for nanobind, which tells of what is left at the end
 
 
 def pytest_terminal_summary(terminalreporter, config):

@@ -6,8 +6,6 @@ import pytest
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Twist, Vector3
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
 pytestmark = pytest.mark.long
 
@@ -20,9 +18,9 @@ MINUTE = 60.0  # s
 class Flight:
     """A drone among objects, and the worst that it went through."""
 
-    def __init__(self, *objects, yaw=0.0, **overrides):
+    def __init__(self, new_simulation, *objects, yaw=0.0, **overrides):
         scene = {"floor": {"size": 60}, "objects": list(objects)}
-        self.simulation = Simulation(parameters.load({"scene": scene, "drone": {"yaw": yaw}, **overrides}))
+        self.simulation = new_simulation({"scene": scene, "drone": {"yaw": yaw}, **overrides})
         self.fastest_turn = self.most_tilt = 0.0
 
     def fly(self, command, seconds):
@@ -51,8 +49,8 @@ class Flight:
 
 
 @pytest.mark.parametrize(("speed", "yaw"), [(0.5, 0.0), (0.5, math.pi), (1.0, 0.0), (1.0, 0.5), (1.0, -1.2)])
-def test_a_minute_against_a_wall(speed, yaw):
-    flight = Flight(WALL, yaw=yaw)
+def test_a_minute_against_a_wall(new_simulation, speed, yaw):
+    flight = Flight(new_simulation, WALL, yaw=yaw)
     pushed = flight.fly((speed, 0, 0, 0), MINUTE)
     assert pushed.position[0] == pytest.approx(1.85, abs=0.05)
     assert pushed.position[2] == pytest.approx(0.8, abs=0.15)
@@ -63,16 +61,16 @@ def test_a_minute_against_a_wall(speed, yaw):
     "command",
     [(0.3, 1, 0, 0), (0.5, 1, 0, 0), (1, 1, 0, 0), (1, -1, 0, 0), (1, 0, 0.3, 0), (1, 0, 0, 1), (0.6, -0.6, 0, 0)],
 )
-def test_scraping_along_a_wall(command):
-    flight = Flight(WALL)
+def test_scraping_along_a_wall(new_simulation, command):
+    flight = Flight(new_simulation, WALL)
     scraped = flight.fly(command, 10)
     assert scraped.position[0] < 1.9
     flight.assert_comes_free()
 
 
 @pytest.mark.parametrize("things, top", [((), 0.0), ((BOX,), 0.4), ((EDGE,), 0.4)])
-def test_landing_and_leaving(things, top):
-    flight = Flight(*things)
+def test_landing_and_leaving(new_simulation, things, top):
+    flight = Flight(new_simulation, *things)
     landed = flight.fly((0, 0, -0.5, 0), MINUTE)
     assert landed.position[2] == pytest.approx(top + 0.01, abs=0.01)
     flown = flight.fly((0, 0, 0.5, 0), 5)
@@ -80,11 +78,11 @@ def test_landing_and_leaving(things, top):
     assert flight.most_tilt < 0.05
 
 
-def test_propellers_have_limits():
+def test_propellers_have_limits(new_simulation):
     """Without them the bare law throws the drone off the wall at hundreds of m/s of particle velocity."""
     bare = {"thrust_limits": "none", "recovery_margin": "none"}
-    thrown = Flight(WALL, control=bare, propellers={"velocity_limits": "none"})
+    thrown = Flight(new_simulation, WALL, control=bare, propellers={"velocity_limits": "none"})
     thrown.fly((1, 0, 0, 0), 10)
-    held = Flight(WALL, control=bare, propellers={"velocity_limits": [0, 12]})
+    held = Flight(new_simulation, WALL, control=bare, propellers={"velocity_limits": [0, 12]})
     held.fly((1, 0, 0, 0), 10)
     assert held.fastest_turn < 5.0 < thrown.fastest_turn

@@ -314,17 +314,28 @@ def sysCall_cleanup():
     assert {len(row) for row in rows} == {len(header)}
 
 
+HANG = """
+import ctypes, time
+
+def hang():  # in a call that holds Python's lock, and that no signal ends
+    mutex = ctypes.create_string_buffer(64)
+    while True:
+        ctypes.PyDLL(None).pthread_mutex_lock(mutex)
+
+"""
+
+
 @pytest.mark.parametrize(
     ("does", "number", "status", "killed"),
     [
         ("try: time.sleep(0.01)\n    except KeyboardInterrupt: raise SystemExit", signal.SIGINT, 130, False),
         ("pass", signal.SIGTERM, 143, False),
-        ("sum(range(10**13))", signal.SIGINT, -signal.SIGKILL, True),
+        ("hang()", signal.SIGINT, -signal.SIGKILL, True),
     ],
     ids=["a script that would catch it", "SIGTERM", "a script that does not return"],
 )
 def test_a_signal_ends_the_flight_whatever_a_script_does(script, does, number, status, killed):
-    path = script(f"import time\n\ndef sysCall_actuation():\n    print('flying', flush=True)\n    {does}\n")
+    path = script(f"{HANG}def sysCall_actuation():\n    print('flying', flush=True)\n    {does}\n")
     process = subprocess.Popen(
         [sys.executable, str(ROOT / "scripts" / "fly"), "--script", path, "--duration", "1e6"],
         env=environment(),

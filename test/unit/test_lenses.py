@@ -125,7 +125,7 @@ def corners(renderer, lens):
     for pose in views(lens):
         picture = renderer.render(lens, AHEAD, AHEAD @ pose @ local)
         grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
-        is_there, places = cv2.findChessboardCornersSB(grey, (COLUMNS, ROWS), flags=cv2.CALIB_CB_ACCURACY)
+        is_there, places = cv2.findChessboardCornersSB(grey, (COLUMNS, ROWS))
         if is_there:
             found.append(places.reshape(-1, 2))
     return flat.astype(np.float32), found

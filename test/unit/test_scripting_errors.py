@@ -13,8 +13,8 @@ from drone_sim.scripting.api.constants import PHASES
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.time_limit import ScriptStopped, TimeLimit
 
-LIMIT = 0.5  # s, of a script that does not return; what else fails does so at once, or later on a busy machine
-STOPPED = f"stopped after {LIMIT} s without returning (script_time_limit)"
+LIMIT = 0.2  # s, of a script that does not return; what else fails does so at once, or later on a busy machine
+STOPPED = "stopped after {} s without returning (script_time_limit)"
 
 
 def run(path, steps=3, limit=60.0):
@@ -38,10 +38,10 @@ def run(path, steps=3, limit=60.0):
 
 @pytest.fixture(name="fails")
 def _fails(tmp_path):
-    def check(ending, source, phase, line, *words):
+    def check(ending, source, phase, line, *words, limit=60.0):
         path = tmp_path / f"script.{ending}"
         path.write_text(source, encoding="utf-8")
-        said = run(path, limit=LIMIT if STOPPED in words else 60.0)
+        said = run(path, limit=limit)
         assert len(said) == 1 and "\n" not in said[0]
         assert said[0].startswith(f"[{phase}] {path}:{line}: ")
         for word in words:
@@ -175,7 +175,7 @@ LOOP = "while true do end"
     ],
 )  # fmt: skip
 def test_endless_lua_is_stopped(fails, source, phase, line):
-    fails("lua", source, phase, line, STOPPED)
+    fails("lua", source, phase, line, STOPPED.format(LIMIT), limit=LIMIT)
 
 
 @pytest.mark.parametrize(
@@ -191,13 +191,13 @@ def test_endless_lua_is_stopped(fails, source, phase, line):
     ],
 )
 def test_endless_python_is_stopped(fails, source, phase, line):
-    fails("py", source, phase, line, STOPPED)
+    fails("py", source, phase, line, STOPPED.format(LIMIT), limit=LIMIT)
 
 
 def test_endless_python_is_stopped_though_somebody_switched_the_timer_off(fails):
     off = "import _signal, time\n_signal.setitimer(_signal.ITIMER_REAL, 0)\ntime.sleep(0.3)\n"  # past what a script may
     later = "def sysCall_init():\n    time.sleep(0.3)\ndef sysCall_actuation():\n    while True: pass"
-    fails("py", off + later, "actuation", 7, STOPPED)
+    fails("py", off + later, "actuation", 7, STOPPED.format(0.5), limit=0.5)
 
 
 def test_a_callback_that_does_not_exist_is_named(tmp_path):

@@ -117,7 +117,8 @@ def test_topics_come_back_under_their_handles():
 
 def test_a_stopped_script_has_no_snapshots(new_simulation):
     limit = {"script_time_limit": 2.0}  # s, more than a snapshot takes on a busy machine
-    simulation = new_simulation(limit, lua="function sysCall_sensing() string.find(('x'):rep(1e5), '.-.-.-.-.-y') end")
+    search = "string.find(('x'):rep(100), '.-.-.-.-.-y')"  # of some 10 s, which go on when this test has ended
+    simulation = new_simulation(limit, lua=f"function sysCall_sensing() {search} end")
     snapshot = simulation.snapshot()
     for attempt in (simulation.step, simulation.step, simulation.snapshot, lambda: simulation.restore(snapshot)):
         with pytest.raises(ScriptError, match="stopped after"):

@@ -64,11 +64,9 @@ def test_a_misspelt_phase_is_refused_with_its_line(load, ending, name, meant):
 
 
 @ENDINGS
-@pytest.mark.parametrize(
-    "name", ["sensing", "init", "set_actuation", "scale_actuation", "call_init", "system", "Sysiphus"]
-)
-def test_a_name_of_the_scripts_own_is_its_own(load, caplog, ending, name):
-    assert load(ending, define(ending, "sysCall_actuation") + define(ending, name))[0] == ""
+def test_a_name_of_the_scripts_own_is_its_own(load, caplog, ending):
+    names = ["sensing", "init", "set_actuation", "scale_actuation", "call_init", "system", "Sysiphus"]
+    assert load(ending, "".join(define(ending, name) for name in ("sysCall_actuation", *names)))[0] == ""
     assert not caplog.records
 
 
@@ -163,45 +161,42 @@ SET = "sim.setScriptSimulationParameter({}, '{}', 5.0)"
 PROPELLER = "sim.getScriptHandle('Quadricopter_propeller_respondable1')"
 
 
-@ENDINGS
-@pytest.mark.parametrize("handle", [PROPELLER, "sim.handle_tree"])
-@pytest.mark.parametrize(
-    "name", ["particleVelocty", "particlevelocity", "particle_velocity", "ParticleVelocity", "particleSpeedVelocity"]
-)
-def test_a_misspelt_parameter_of_a_propeller_is_refused(load, ending, handle, name):
-    said, path = load(ending, define(ending, "sysCall_init", SET.format(handle, name)))
-    assert said.startswith(
-        f"[init] {path}:2: sim.setScriptSimulationParameter: a propeller has no script parameter '{name}'"
-    )
-    assert "near names are particleVelocity" in said
+TRY = {
+    "py": "try:\n        {}\n    except ValueError as error:\n        print(error)",
+    "lua": "print(select(2, pcall(function() {} end)))",
+}
 
 
 @ENDINGS
-@pytest.mark.parametrize(
-    "handle, name, told",
-    [
-        (PROPELLER, "velocity", "nothing reads 'velocity' of a propeller; particleVelocity drives it"),
-        (
-            "sim.handle_self",
-            "particleVelocity",
-            "'particleVelocity' is a parameter of the propellers; in the script of Drone",
+def test_a_misspelt_parameter_of_a_propeller_is_refused(load, caplog, ending):
+    caplog.set_level("INFO")
+    names = ["particleVelocty", "particlevelocity", "particle_velocity", "ParticleVelocity", "particleSpeedVelocity"]
+    calls = [SET.format(handle, name) for handle in (PROPELLER, "sim.handle_tree") for name in names]
+    tries = "\n    ".join(TRY[ending].format(one) for one in calls)
+    assert load(ending, define(ending, "sysCall_init", tries))[0] == ""
+    said = [record.getMessage() for record in caplog.records]
+    assert len(said) == len(calls)
+    for line, name in zip(said, 2 * names):
+        assert f"a propeller has no script parameter '{name}'; near names are particleVelocity" in line
+    said, path = load(ending, define(ending, "sysCall_init", calls[0]))
+    assert said.startswith(f"[init] {path}:2: sim.setScriptSimulationParameter: a propeller has no script parameter")
+
+
+@ENDINGS
+def test_any_other_parameter_is_the_scripts_own_and_told_once_if_a_propeller_gets_it(load, caplog, ending):
+    told = {
+        (PROPELLER, "velocity"): "nothing reads 'velocity' of a propeller; particleVelocity drives it",
+        ("sim.handle_self", "particleVelocity"): (
+            "'particleVelocity' is a parameter of the propellers; in the script of Drone"
         ),
-        ("sim.handle_self", "Kzreff", ""),
-        ("sim.handle_self", "mine", ""),
-        (PROPELLER, "particlesAreVisible", ""),
-        ("sim.handle_tree", "particlesAreVisible", ""),
-        (PROPELLER, "particleVelocity", ""),
-    ],
-)
-def test_any_other_parameter_is_the_scripts_own_and_told_once_if_a_propeller_gets_it(
-    load, caplog, ending, handle, name, told
-):
-    call = SET.format(handle, name)
-    source = define(ending, "sysCall_init", call) + define(ending, "sysCall_cleanup", call)
+    }
+    untold = [("sim.handle_self", name) for name in ("Kzreff", "mine")]
+    untold += [(PROPELLER, "particlesAreVisible"), ("sim.handle_tree", "particlesAreVisible")]
+    calls = [SET.format(*one) for one in (*told, *untold, (PROPELLER, "particleVelocity"))]
+    source = "".join(define(ending, phase, "\n    ".join(calls)) for phase in ("sysCall_init", "sysCall_cleanup"))
     assert load(ending, source)[0] == ""
-    records = [record.getMessage() for record in caplog.records]
-    assert len(records) == bool(told)
-    assert not told or told in records[0]
+    said = [record.getMessage() for record in caplog.records]
+    assert len(said) == len(told) and all(words in line for words, line in zip(told.values(), said))
 
 
 # ---- subscriptions

@@ -11,14 +11,19 @@ import pytest
 SOURCE = os.pathsep.join(path for path in sys.path if path)
 HANGS = 90.0  # s; nothing here takes nearly as long unless it hangs
 BEGIN = """
-import os, signal, sys, threading, time
-from drone_sim.run.watchdog import Watchdog
-watchdog = Watchdog("it")
+import ctypes, os, signal, sys, threading, time
+from drone_sim.run import watchdog
+watchdog._SCRIPT_PATIENCE = 1.0  # s, more than which a script may take outside of its time, and after it
+watchdog = watchdog.Watchdog("it")
+def hang():
+    mutex = ctypes.create_string_buffer(64)
+    while True: ctypes.PyDLL(None).pthread_mutex_lock(mutex)
 """
 
 
 # What runs after BEGIN, and the signal that it gets then. All run at once: most of their time is patience.
-SPIN, LOOKS = "sum(range(10**13))", "while not watchdog.asked: time.sleep(0.01)\n"
+HANG = "hang()"  # in a call that holds Python's lock, and that no signal ends
+LOOKS = "while not watchdog.asked: time.sleep(0.01)\n"
 SCRIPT = """
 from drone_sim.scripting.time_limit import Labels, TimeLimit
 def hide():
@@ -26,14 +31,14 @@ def hide():
     _signal.pthread_sigmask(_signal.SIG_BLOCK, {{_signal.SIGALRM}})
     time.sleep(1000)
 def pause():
-    limit.outside(lambda: time.sleep(7))
+    limit.outside(lambda: time.sleep(3))
 limit = TimeLimit(0.5)
 limit.label = Labels("some.py", limit)["init"]
 limit.run({})
 """
 READY = "watchdog.ready()\nprint('begun')\n"
 PROGRAMS = {
-    "in a call that holds Python's lock": (READY + SPIN, signal.SIGINT),
+    "in a call that holds Python's lock": (READY + HANG, signal.SIGINT),
     "in a call that lets go of it": (READY + "while True: time.sleep(1000)", signal.SIGTERM),
     "in Python": (READY + "while True: time.sleep(0.01)", signal.SIGHUP),
     "more signals": (READY + "while True: time.sleep(0.1); os.kill(os.getpid(), signal.SIGINT)", None),
@@ -43,22 +48,22 @@ PROGRAMS = {
         "time.sleep(3)\nsys.exit(watchdog.asked)",
         None,
     ),
-    "not ready": ("print('begun')\n" + SPIN, signal.SIGINT),
+    "not ready": ("print('begun')\n" + HANG, signal.SIGINT),
     "counts": (READY + "watchdog.count()\ntime.sleep(1000)", None),
     "stands down": (
         READY + LOOKS + "watchdog.stand_down()\nprint('in hand')\ntime.sleep(3)\nos.kill(os.getpid(), signal.SIGINT)",
         signal.SIGINT,
     ),
-    "a script in a call that holds Python's lock": (READY + SCRIPT.format("lambda: " + SPIN), None),
+    "a script in a call that holds Python's lock": (READY + SCRIPT.format("lambda: " + HANG), None),
     "a script that hides from the alarm": (READY + SCRIPT.format("hide"), None),
-    "a script that pauses": (READY + SCRIPT.format("pause") + "time.sleep(7)\nsys.exit(4)", None),
+    "a script that pauses": (READY + SCRIPT.format("pause") + "time.sleep(3)\nsys.exit(4)", None),
     "ends beside a thread": (
         READY + "threading.Thread(target=time.sleep, args=(1000,)).start()\nwatchdog.end(3)",
         None,
     ),
     "ends with atexit": (READY + "import atexit\natexit.register(time.sleep, 1000)\nwatchdog.end(3)", None),
     "ends": (READY + "import atexit\natexit.register(print, 'saved')\nwatchdog.end(3)", None),
-    "killed": (READY + SPIN, signal.SIGKILL),
+    "killed": (READY + HANG, signal.SIGKILL),
     "a fork": (
         "watchdog.ready()\nchild = os.fork()\nif child == 0:\n    time.sleep(1000)\n"
         "os.kill(child, signal.SIGTERM)\nassert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGTERM\n"
