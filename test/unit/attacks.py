@@ -45,7 +45,7 @@ class Attacker:
         self._process.wait(HANGS)
 
 
-def flight(path, limit, snapshots=2):
+def flight(path, limit, snapshots=3):
     """Fly a script for a step and so many more with a snapshot in each, with a command; return what was said."""
     from drone_sim.mechanics.state import Twist
     from drone_sim.run import parameters

@@ -60,7 +60,7 @@ def fails_in_one_line(build):
     def check(call, answers, words):
         """Let the drone's script call what is attached to the target, in vain."""
         own = f"function ask() end function sysCall_actuation() {call} end"
-        limit = 0.2 if words.startswith("stopped after") else 60.0
+        limit = 0.5 if words.startswith("stopped after") else 60.0
         scripts = {"Floor": "function sysCall_init() end", "DronePosition": answers}
         simulation = build(scripts, own, script_time_limit=limit)
         with pytest.raises(ScriptError, match=words) as caught:
@@ -292,7 +292,7 @@ def test_scripts_call_each_other_by_value(build, asking, answering):
         ("'f@Quadricopter_propeller_respondable1', 1", "which has no functions"),
         ("'back@DronePosition', 1", "cannot be called back"),
         ("'add', 99", "no script with the handle 99"),
-        ("'hangs@DronePosition', 1", "stopped after 0.2 s"),
+        ("'hangs@DronePosition', 1", "stopped after 0.5 s"),
     ],
 )
 def test_a_call_that_fails_gets_one_line(fails_in_one_line, call, words):
@@ -401,7 +401,7 @@ def test_a_text_is_run_in_another_script(build, asks, answers):
 @pytest.mark.parametrize(
     "text, answers, words",
     [
-        ("'while true do end', sim.getScriptHandle('DronePosition')", LUA_RUNS, "stopped after 0.2 s"),
+        ("'while true do end', sim.getScriptHandle('DronePosition')", LUA_RUNS, "stopped after 0.5 s"),
         ("'1', sim.getScriptHandle('DronePosition')", PYTHON_RUNS, "only Python scripts may"),
         ("'1@python', sim.getScriptHandle('DronePosition')", LUA_RUNS, "'DronePosition' is in Lua, not Python"),
         ("'1@', sim.scripttype_sandboxscript", LUA_RUNS, "every script belongs to an object"),
@@ -421,7 +421,7 @@ def test_a_call_of_ones_own_is_on_ones_own_time(build):
     function sysCall_init() end
     function sysCall_actuation() while true do pcall(sim.callScriptFunction, 'hangs', sim.handle_self) end end
     """
-    with pytest.raises(ScriptError, match=r"stopped after 0.2 s without returning"):
+    with pytest.raises(ScriptError, match=r"stopped after 0.5 s without returning"):
         build({}, own, script_time_limit=0.2).step()
 
 

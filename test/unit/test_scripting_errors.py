@@ -13,7 +13,7 @@ from drone_sim.scripting.api.constants import PHASES
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.time_limit import ScriptStopped, TimeLimit
 
-LIMIT = 0.2  # s, of a script that does not return; what else fails does so at once, or later on a busy machine
+LIMIT = 0.5  # s, of a script that does not return; what else fails does so at once, or later on a busy machine
 STOPPED = "stopped after {} s without returning (script_time_limit)"
 
 
