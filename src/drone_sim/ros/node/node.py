@@ -14,6 +14,7 @@ import logging
 import time
 from collections.abc import Callable, Iterable, Iterator
 
+import cv2
 import rospy
 from std_msgs.msg import String
 
@@ -349,6 +350,7 @@ def main(watchdog: Watchdog) -> int:
     # The time of messages is the simulation's; hearing its own /clock would cost the node half of its speed.
     if not init_node(_NAME, is_required=True, disable_signals=True, disable_rostime=True):
         return 1
+    cv2.setNumThreads(1)  # its threads wait busily after each picture, which costs more than they save
     shutdown = Shutdown(watchdog)
     nodes = []
 

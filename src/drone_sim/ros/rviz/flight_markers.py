@@ -26,6 +26,8 @@ _SHADOW = 0.24, 0.05  # m, radius on the floor, and increase for each metre of h
 _SHADOW_OPACITY = 0.55  # in the middle
 _MILLIMETRES = 3  # decimals; the markers of a hovering drone stay equal, and are sent once
 _RIM = 24  # corners
+_ANGLES = [2 * math.pi * number / _RIM for number in range(_RIM)]
+_DISC = fan(Point(), [Point(math.cos(angle), math.sin(angle), 0.0) for angle in _ANGLES])
 _TICK = 0.5  # m
 _MAX_TICKS = 40
 _LINE_WIDTH = 0.006  # m
@@ -115,10 +117,8 @@ def _shadow(state: State) -> Marker:
     """Return a disc on the floor; it is larger and paler for a greater height."""
     x, y, height = state.position
     radius = round(_SHADOW[0] + _SHADOW[1] * height, _MILLIMETRES)
-    angles = [2 * math.pi * number / _RIM for number in range(_RIM)]
-    rim = [(math.cos(angle), math.sin(angle), 0.0) for angle in angles]
-    points = fan((0.0, 0.0, 0.0), rim)
-    marker = new_marker(Marker.TRIANGLE_LIST, (0, 0, 0, 0.99), (radius, radius, 1), points, ns="shadow")
+    marker = new_marker(Marker.TRIANGLE_LIST, (0, 0, 0, 0.99), (radius, radius, 1), ns="shadow")
+    marker.points = _DISC
     opacity = _SHADOW_OPACITY * (_SHADOW[0] / radius) ** 0.5
     marker.colors = [ColorRGBA(0, 0, 0, opacity), ColorRGBA(0, 0, 0, 0), ColorRGBA(0, 0, 0, 0)] * _RIM
     marker.pose.position = Point(x, y, _ABOVE_FLOOR)
