@@ -12,7 +12,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.frames import Quaternion, Vector
 from drone_sim.mechanics.state import State, Twist
 from drone_sim.ros.rviz.marker_topics import TEXT_PERIOD, FleetMarkers, attach_upright, band, fan, new_marker
 from drone_sim.run.pacing import Throttle
@@ -51,13 +51,14 @@ class HeightMarkers(FleetMarkers):
 
     name = "height"
 
-    def _inputs(self, vehicle: Vehicle) -> State:
-        return vehicle.body.state
+    def _inputs(self, vehicle: Vehicle) -> tuple[Vector, bool, Quaternion]:
+        x, y, height = vehicle.body.state.position
+        return (x, y, round(height, _MILLIMETRES)), height > 0, vehicle.body.state.orientation
 
-    def _markers(self, vehicle: Vehicle, inputs: State) -> Sequence[Marker | None]:
-        height = inputs.position[2]
-        line = attach_upright(vehicle, _plumb_line(round(height, _MILLIMETRES)))
-        return [_shadow(inputs), line] if height > 0 else [None, None]
+    def _markers(self, vehicle: Vehicle, inputs: tuple[Vector, bool, Quaternion]) -> Sequence[Marker | None]:
+        position, is_above, _ = inputs
+        line = attach_upright(vehicle, _plumb_line(position[2]))
+        return [_shadow(position), line] if is_above else [None, None]
 
 
 class CommandMarkers(FleetMarkers):
@@ -94,10 +95,10 @@ class StateText(FleetMarkers):
             self._texts = {name: self._text(vehicle) for name, vehicle in self._simulation.vehicles.items()}
         super().update()
 
-    def _inputs(self, vehicle: Vehicle) -> tuple[str, State]:
-        return self._texts.get(vehicle.name, ""), vehicle.body.state
+    def _inputs(self, vehicle: Vehicle) -> tuple[str, Quaternion]:
+        return self._texts.get(vehicle.name, ""), vehicle.body.state.orientation
 
-    def _markers(self, vehicle: Vehicle, inputs: tuple[str, State]) -> Sequence[Marker | None]:
+    def _markers(self, vehicle: Vehicle, inputs: tuple[str, Quaternion]) -> Sequence[Marker | None]:
         marker = new_marker(Marker.TEXT_VIEW_FACING, _INK, (0, 0, _TEXT_SIZE))
         marker.text, marker.pose.position.z = inputs[0], _TEXT_ABOVE
         return [attach_upright(vehicle, marker)]
@@ -113,9 +114,9 @@ class StateText(FleetMarkers):
         return f"{name}{activity}  {simulation.time:.1f} s\nheight {state.position[2]:.2f} m  speed {speed:.2f} m/s"
 
 
-def _shadow(state: State) -> Marker:
+def _shadow(position: Vector) -> Marker:
     """Return a disc on the floor; it is larger and paler for a greater height."""
-    x, y, height = state.position
+    x, y, height = position
     radius = round(_SHADOW[0] + _SHADOW[1] * height, _MILLIMETRES)
     marker = new_marker(Marker.TRIANGLE_LIST, (0, 0, 0, 0.99), (radius, radius, 1), ns="shadow")
     marker.points = _DISC
@@ -214,8 +215,9 @@ class _Path:
 
     @property
     def key(self) -> _PathKey:
-        """A value that changes whenever the path changes."""
-        return [len(line) for line in self._lines], self._position
+        """A value that changes whenever the path changes by a millimetre."""
+        x, y, z = (round(value, _MILLIMETRES) for value in self._position)
+        return [len(line) for line in self._lines], (x, y, z)
 
     def lines(self) -> list[list[Vector]]:
         """Return the lines; the last one ends at the vehicle's present position."""
