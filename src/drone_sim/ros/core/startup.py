@@ -260,11 +260,12 @@ def _send(queued: QueuedConnection, data: bytes) -> bool:
     thread still sends what the kernel does not take at once, and finds a broken connection.
     """
     connection, sent = queued._connection, 0
+    own = connection.socket  # None after the end of the connection
     with queued._lock:
         is_idle = not queued._queue and queued._cond_data_available._waiters
-        if is_idle and connection.socket is not None and len(data) <= _MAX_AT_ONCE:
+        if is_idle and own is not None and len(data) <= _MAX_AT_ONCE:
             with contextlib.suppress(OSError):
-                sent = connection.socket.send(data, socket.MSG_DONTWAIT)
+                sent = own.send(data, socket.MSG_DONTWAIT)
     connection.stat_bytes += sent
     if sent == len(data):
         connection.stat_num_msg += 1
