@@ -84,6 +84,6 @@ def test_a_slow_subscriber_gets_the_last_message_and_holds_nobody_up(connection)
 @pytest.mark.parametrize(("asked", "given"), [("7", 7), ("0", 0), ("", 0), ("many", 0), ("-3", 0), ("99", 0)])
 def test_a_node_gives_way_as_the_environment_says(asked, given):
     code = "import os; from drone_sim.ros.core.startup import give_way; give_way(); give_way(); print(os.nice(0))"
-    given_environment = {**os.environ, "DRONE_SIM_NICENESS": asked}
-    said = subprocess.run([sys.executable, "-c", code], env=given_environment, capture_output=True, text=True, check=True)
-    assert int(said.stdout) == max(given, os.nice(0))
+    environment = {**os.environ, "DRONE_SIM_NICENESS": asked}
+    said = subprocess.check_output([sys.executable, "-c", code], env=environment, text=True)
+    assert int(said) == max(given, os.nice(0))

@@ -77,7 +77,7 @@ class FleetMarkers:
     def __init__(self, simulation: Simulation):
         self._simulation = simulation
         self._topic = MarkerTopic(f"{namespace(simulation)}/view/{self.name}", self.period)
-        self._published: list[tuple[Vehicle, Any]] = []  # with the inputs of their markers
+        self._published: list[Any] = []  # each vehicle, with the inputs of its markers
 
     def update(self) -> None:
         """Publish the markers if they have changed and there are subscribers."""
