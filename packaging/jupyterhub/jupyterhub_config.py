@@ -20,6 +20,15 @@ if Path("/run/systemd/system").exists():
     c.Spawner.mem_limit = "2G"
     c.Spawner.cpu_limit = 1.0  # cores
 c.Spawner.notebook_dir = "~"
+# A package that checks international addresses in schemas takes half of a server's start.
+server = [
+    "import sys",
+    "sys.path[:] = filter(None, sys.path)  # without the student's home",
+    "sys.modules['rfc3987_syntax'] = None",
+    "from jupyterhub.singleuser import main",
+    "main()",
+]
+c.Spawner.cmd = [sys.executable, "-c", "\n".join(server)]
 c.Spawner.default_url = "/lab"  # "/drone_sim/" opens the simulator at once
 c.Spawner.start_timeout = c.Spawner.http_timeout = 120  # s, for many that start at once
 
@@ -30,6 +39,9 @@ environment = {name: os.environ[name] for name in ros if name in os.environ}
 environment["DRONE_SIM_TASKS"] = "/srv/drone_sim/tasks"
 environment["DRONE_SIM_HAND_IN"] = "/srv/drone_sim/handed_in"
 environment["DRONE_SIM_CLASSROOM"] = "/srv/drone_sim/classroom"  # what the teachers' page shows, and tells all
+# Each simulator draws, and converts its pictures, in one thread of its own: all of them need the cores.
+environment["LP_NUM_THREADS"], environment["OPENCV_FOR_THREADS_NUM"] = "0", "1"
+environment["DRONE_SIM_NICENESS"] = "5"  # flying simulators give way to those that start, and to the hub
 c.Spawner.environment = environment
 
 # The teachers' page, http://THE-MACHINE:8000/services/course/, if there is a system user for it.
@@ -48,3 +60,5 @@ if any(user.pw_name == "drone_sim" for user in pwd.getpwall()):
 
 # A server whose pages have been closed for an hour ends, with its simulator. Files stay.
 c.Spawner.args = ["--ServerApp.shutdown_no_activity_timeout=3600", "--MappingKernelManager.cull_idle_timeout=3600"]
+# Language servers are not looked for, since that starts Node.js: without this line, those that you install are found.
+c.Spawner.args += ["--LanguageServerManager.autodetect=False"]

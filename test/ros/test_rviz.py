@@ -39,10 +39,12 @@ def mesh(marker):
     return lines, cv2.imread(str(path.parent / lines["map_Kd"][0][0]))
 
 
-def ahead(marker):
-    """Return the world axes' vector from the middle of an arrow's tail to its tip."""
+def ahead(marker, tilt):
+    """Return the vector, in the world, from the middle of an arrow's tail to its tip; `tilt` is the drone's."""
     left, right, *_, tip = (np.array([p.x, p.y, p.z]) for p in marker.points)
-    return tip - (left + right) / 2
+    q = marker.pose.orientation
+    turn = frames.multiply_quaternions(tilt, (q.x, q.y, q.z, q.w))
+    return np.array(frames.turned(turn, tip - (left + right) / 2))
 
 
 def lines(message):
@@ -158,8 +160,8 @@ class Rviz(unittest.TestCase):
         self.assertEqual((arrow.header.frame_id, arrow.frame_locked), ("base_link", True))
         c, s = math.cos(0.5), math.sin(0.5)  # the drone's yaw: the command counts in Track_base
         expected = (0.6 * c + 0.3 * s, 0.6 * s - 0.3 * c, 0.2)
-        arrow = command.wait_for(lambda m: abs(ahead(m.markers[0])[2] - 0.2) < 1e-3).markers[0]
-        np.testing.assert_allclose(ahead(arrow), expected, atol=0.05)
+        body = self.node.simulation.drone.body
+        np.testing.assert_allclose(ahead(arrow, body.state.orientation), expected, atol=0.05)
         self.command(turn=0.5)
         turning = command.wait_for(lambda m: m.markers[0].action == Marker.DELETE and m.markers[1].points).markers
         first, last = turning[1].points[0], turning[1].points[-1]

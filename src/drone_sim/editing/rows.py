@@ -13,11 +13,12 @@ from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.run.scene_document import PLACE, vehicles_in
 from drone_sim.run.simulation import Simulation
 from drone_sim.run.simulation_setup import own_script
-from drone_sim.scene.entry import EntryParameters, place_of
+from drone_sim.scene.entry import EntryParameters, place_of, rounded
 from drone_sim.scene.scene_parameters import AttachedScriptParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
 _ROW_KEYS = ("name", "alias", "model", "parent", "position", "rpy", "shape", "kind")  # with own fields in a row
+_DECIMALS = 4  # of the poses (m) by which a row has changed: a hovering vehicle moves by less in each step
 Of = Literal["scene", "vehicle", "floor"]
 
 
@@ -74,7 +75,7 @@ class SceneRows:
             script = scripts.get(item.name)
             content = self._other_content(item, vehicle, written) if entry is None else entry
             state = (
-                item.name, item.alias, item.is_model, parent, item.matrix(), content, script,
+                item.name, item.alias, item.is_model, parent, rounded(item.matrix(), _DECIMALS), content, script,
                 vehicle.name if vehicle else "", getattr(item, "value", 0.0), getattr(item, "is_static", None),
             )  # fmt: skip
             if self._known.get(handle) != state:

@@ -33,7 +33,7 @@ from drone_sim.ros.cockpit.topics import FoundTopics, find_topics
 from drone_sim.ros.core.master_watch import MasterWatch
 from drone_sim.ros.core.simulator import FAILURES, Simulator
 
-_PERIOD = 0.05  # s between two updates of the scene
+_PERIOD, _IDLE_PERIOD = 0.05, 0.1  # s between two updates of the scene, and without one
 _MARKER_DELAY = 0.008  # s, within which the markers of a step arrive after its frames
 _DRAG_PERIOD = 0.1  # s between two updates of dragged objects
 _MASTER_PERIOD = 2.0  # s between two requests to the master
@@ -79,7 +79,8 @@ class Cockpit:
         while not rospy.is_shutdown():
             began = time.monotonic()
             self._update(began)
-            time.sleep(max(0.0, 0.8 * _PERIOD - (time.monotonic() - began)))
+            period = _IDLE_PERIOD if self._view is None else 0.8 * _PERIOD
+            time.sleep(max(0.0, period - (time.monotonic() - began)))
             if self._view is not None:
                 self._view.wait(_PERIOD)  # for the next step of the simulation
                 time.sleep(_MARKER_DELAY)

@@ -21,12 +21,14 @@ import threading
 import time
 import xmlrpc.client
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import rosgraph
 import rospkg
 import rospy
 from rospy.impl import tcpros_base
+from rospy.impl.tcpros_pubsub import QueuedConnection
 
 from drone_sim.ros.core.network import FAILURES, addresses, call, check_master_uri, is_reachable, launched_nodes
 from drone_sim.scripting.errors import ScriptError
@@ -40,7 +42,9 @@ _TURN_TIMEOUT = 60.0  # s, for another process of the same name to become a node
 _POLL_PERIOD = 0.05  # s
 _MASTER_POLL_PERIOD, _QUIET_PERIOD = 0.1, 5.0  # s, between two requests; until a line says what the tool waits for
 _MAX_PENDING = 128  # connections that wait to be accepted, as many as rospy's XML-RPC server allows
+_MAX_AT_ONCE = 1 << 16  # bytes of a message that is sent in the thread that publishes it
 _FIRST_BYTE_TIMEOUT = 10.0  # s, after which a connection that has sent nothing is closed
+_NICENESS = "DRONE_SIM_NICENESS"  # of a simulator that flies, in a course on one machine
 _Result = TypeVar("_Result")
 _ConnectionHandler = Callable[[socket.socket, Any], None]
 
@@ -243,6 +247,42 @@ def _handle_connections_in_threads() -> None:
         threading.Thread(target=handle_after_first_byte, args=(connection, address), daemon=True).start()
 
     server.inbound_handler = start_thread
+    QueuedConnection.write_data = _send
+
+
+_send_by_thread = QueuedConnection.write_data
+
+
+def _send(queued: QueuedConnection, data: bytes) -> bool:
+    """Send a message to a subscriber in the thread that publishes it, if no other message waits for this subscriber.
+
+    rospy wakes a thread of the connection for each message, which takes more processor time than the message. That
+    thread still sends what the kernel does not take at once, and finds a broken connection.
+    """
+    connection, sent = queued._connection, 0
+    own = connection.socket  # None after the end of the connection
+    with queued._lock:
+        is_idle = not queued._queue and queued._cond_data_available._waiters
+        if is_idle and own is not None and len(data) <= _MAX_AT_ONCE:
+            with contextlib.suppress(OSError):
+                sent = own.send(data, socket.MSG_DONTWAIT)
+    connection.stat_bytes += sent
+    if sent == len(data):
+        connection.stat_num_msg += 1
+        return True
+    _send_by_thread(queued, data[sent:])
+    while sent and queued._queue and not queued.done:  # rospy drops messages from a full queue, but not half a message
+        time.sleep(0)
+    return True
+
+
+def give_way() -> None:
+    """Let other processes of the machine go first, by as much as the environment says (a niceness, from 0 to 19)."""
+    niceness = os.environ.get(_NICENESS, "0")
+    if niceness.isdecimal() and os.nice(0) < int(niceness) <= 19:
+        os.nice(int(niceness) - os.nice(0))
+        with contextlib.suppress(OSError):  # Linux may compare sessions instead of processes, and each node is one
+            Path("/proc/self/autogroup").write_text(niceness, encoding="ascii")
 
 
 # ---- tools that wait for the simulator, and then run another program

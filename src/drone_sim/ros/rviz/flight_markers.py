@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, Quaternion
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Vector
-from drone_sim.mechanics.state import State, Twist
+from drone_sim.mechanics.state import Twist
+from drone_sim.ros.core.message_conversion import BASE_LINK, frame
 from drone_sim.ros.rviz.marker_topics import TEXT_PERIOD, FleetMarkers, attach_upright, band, fan, new_marker
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
@@ -25,7 +26,10 @@ _ABOVE_FLOOR = 0.004  # m, so that the floor does not hide the shadow
 _SHADOW = 0.24, 0.05  # m, radius on the floor, and increase for each metre of height
 _SHADOW_OPACITY = 0.55  # in the middle
 _MILLIMETRES = 3  # decimals; the markers of a hovering drone stay equal, and are sent once
+_ROTATION_DECIMALS = 3  # of a rotation: finer differences are smaller than a millimetre at the tip of an arrow
 _RIM = 24  # corners
+_ANGLES = [2 * math.pi * number / _RIM for number in range(_RIM)]
+_DISC = fan(Point(), [Point(math.cos(angle), math.sin(angle), 0.0) for angle in _ANGLES])
 _TICK = 0.5  # m
 _MAX_TICKS = 40
 _LINE_WIDTH = 0.006  # m
@@ -49,13 +53,14 @@ class HeightMarkers(FleetMarkers):
 
     name = "height"
 
-    def _inputs(self, vehicle: Vehicle) -> State:
-        return vehicle.body.state
+    def _inputs(self, vehicle: Vehicle) -> tuple[Vector, bool, frames.Quaternion]:
+        x, y, height = vehicle.body.state.position
+        return (x, y, round(height, _MILLIMETRES)), height > 0, vehicle.body.state.orientation
 
-    def _markers(self, vehicle: Vehicle, inputs: State) -> Sequence[Marker | None]:
-        height = inputs.position[2]
-        line = attach_upright(vehicle, _plumb_line(round(height, _MILLIMETRES)))
-        return [_shadow(inputs), line] if height > 0 else [None, None]
+    def _markers(self, vehicle: Vehicle, inputs: tuple[Vector, bool, frames.Quaternion]) -> Sequence[Marker | None]:
+        position, is_above, _ = inputs
+        line = attach_upright(vehicle, _plumb_line(position[2]))
+        return [_shadow(position), line] if is_above else [None, None]
 
 
 class CommandMarkers(FleetMarkers):
@@ -63,16 +68,18 @@ class CommandMarkers(FleetMarkers):
 
     name = "command"
 
-    def _inputs(self, vehicle: Vehicle) -> tuple[Twist, frames.Matrix, State] | None:
-        """Return None without a command."""
-        command = vehicle.commands.now
-        is_moving = any((*command.linear, command.angular[2]))
-        return (command, vehicle.track.matrix(), vehicle.body.state) if is_moving else None
+    def _inputs(self, vehicle: Vehicle) -> tuple[Twist, list[float]]:
+        """Return the command, and the rotation of its frame in base_link, which stays equal while the drone turns."""
+        turn = frames.relative_turn(vehicle.body.matrix, vehicle.track.matrix())
+        return vehicle.commands.now, [round(value, _ROTATION_DECIMALS) for value in turn]
 
-    def _markers(self, vehicle: Vehicle, _inputs: Any) -> Sequence[Marker | None]:
-        command, track = vehicle.commands.now, vehicle.track.matrix()
-        markers = [_velocity_arrow(command, track), _yaw_arc(command, track)]
-        return [attach_upright(vehicle, marker) if marker else None for marker in markers]
+    def _markers(self, vehicle: Vehicle, inputs: tuple[Twist, list[float]]) -> Sequence[Marker | None]:
+        command, turn = inputs
+        markers = _velocity_arrow(command), _yaw_arc(command)
+        for marker in filter(None, markers):
+            marker.header.frame_id, marker.frame_locked = frame(vehicle.parameters, BASE_LINK), True
+            marker.pose.orientation = Quaternion(*frames.to_quaternion(turn))
+        return markers
 
 
 class StateText(FleetMarkers):
@@ -92,13 +99,16 @@ class StateText(FleetMarkers):
             self._texts = {name: self._text(vehicle) for name, vehicle in self._simulation.vehicles.items()}
         super().update()
 
-    def _inputs(self, vehicle: Vehicle) -> tuple[str, State]:
-        return self._texts.get(vehicle.name, ""), vehicle.body.state
+    def _inputs(self, vehicle: Vehicle) -> tuple[str, list[float]]:
+        """Return the text, and the way up in base_link."""
+        up = [round(value, _ROTATION_DECIMALS) for value in vehicle.body.matrix[8:11]]
+        return self._texts.get(vehicle.name, ""), up
 
-    def _markers(self, vehicle: Vehicle, inputs: tuple[str, State]) -> Sequence[Marker | None]:
+    def _markers(self, vehicle: Vehicle, inputs: tuple[str, list[float]]) -> Sequence[Marker | None]:
         marker = new_marker(Marker.TEXT_VIEW_FACING, _INK, (0, 0, _TEXT_SIZE))
-        marker.text, marker.pose.position.z = inputs[0], _TEXT_ABOVE
-        return [attach_upright(vehicle, marker)]
+        marker.text, marker.pose.position = inputs[0], Point(*(_TEXT_ABOVE * value for value in inputs[1]))
+        marker.header.frame_id, marker.frame_locked = frame(vehicle.parameters, BASE_LINK), True
+        return [marker]
 
     def _text(self, vehicle: Vehicle) -> str:
         simulation, state = self._simulation, vehicle.body.state
@@ -111,14 +121,12 @@ class StateText(FleetMarkers):
         return f"{name}{activity}  {simulation.time:.1f} s\nheight {state.position[2]:.2f} m  speed {speed:.2f} m/s"
 
 
-def _shadow(state: State) -> Marker:
+def _shadow(position: Vector) -> Marker:
     """Return a disc on the floor; it is larger and paler for a greater height."""
-    x, y, height = state.position
+    x, y, height = position
     radius = round(_SHADOW[0] + _SHADOW[1] * height, _MILLIMETRES)
-    angles = [2 * math.pi * number / _RIM for number in range(_RIM)]
-    rim = [(math.cos(angle), math.sin(angle), 0.0) for angle in angles]
-    points = fan((0.0, 0.0, 0.0), rim)
-    marker = new_marker(Marker.TRIANGLE_LIST, (0, 0, 0, 0.99), (radius, radius, 1), points, ns="shadow")
+    marker = new_marker(Marker.TRIANGLE_LIST, (0, 0, 0, 0.99), (radius, radius, 1), ns="shadow")
+    marker.points = _DISC
     opacity = _SHADOW_OPACITY * (_SHADOW[0] / radius) ** 0.5
     marker.colors = [ColorRGBA(0, 0, 0, opacity), ColorRGBA(0, 0, 0, 0), ColorRGBA(0, 0, 0, 0)] * _RIM
     marker.pose.position = Point(x, y, _ABOVE_FLOOR)
@@ -134,15 +142,15 @@ def _plumb_line(height: float) -> Marker:
     return new_marker(Marker.LINE_LIST, _PALE_INK, (_LINE_WIDTH, 0, 0), points, ns="plumb line")
 
 
-def _velocity_arrow(command: Twist, base: frames.Matrix) -> Marker | None:
-    """Return the arrow relative to the drone's position; the command is in the frame `base`, Track_base."""
+def _velocity_arrow(command: Twist) -> Marker | None:
+    """Return the arrow relative to the drone's position, in the command's frame, Track_base."""
     speed = math.hypot(*command.linear)
     if not speed:
         return None
-    ahead = np.array(frames.rotate(base, command.linear)) / speed
+    ahead = np.array(command.linear) / speed
     side = np.cross((0.0, 0.0, 1.0), ahead)
     if not side.any():  # straight up or down
-        side = np.array(frames.rotate(base, (0.0, 1.0, 0.0)))
+        side = np.array((0.0, 1.0, 0.0))
     side /= np.linalg.norm(side)
     length = _SECONDS * speed
     shaft = max(length - _HEAD, 0.0)
@@ -150,14 +158,15 @@ def _velocity_arrow(command: Twist, base: frames.Matrix) -> Marker | None:
     return _flat_arrow(center_line, np.array([side, side]), ahead * (_DISTANCE + length))
 
 
-def _yaw_arc(command: Twist, base: frames.Matrix) -> Marker | None:
+def _yaw_arc(command: Twist) -> Marker | None:
     """Return an arc from the front, as long as the angle that is commanded for _SECONDS, at most 3 rad."""
     angle = max(-3.0, min(3.0, _SECONDS * command.angular[2]))
     if not angle:
         return None
     shaft = angle - math.copysign(min(_HEAD / _DISTANCE, abs(angle)), angle)
-    rays = [(math.cos(a), math.sin(a), 0.0) for a in (*(shaft * part / 24 for part in range(25)), angle)]
-    *sides, tip = np.array([frames.rotate(base, ray) for ray in rays])
+    *sides, tip = np.array([
+        (math.cos(a), math.sin(a), 0.0) for a in (*(shaft * part / 24 for part in range(25)), angle)
+    ])  # fmt: skip
     return _flat_arrow(_DISTANCE * np.array(sides), np.array(sides), _DISTANCE * tip)
 
 
@@ -214,8 +223,9 @@ class _Path:
 
     @property
     def key(self) -> _PathKey:
-        """A value that changes whenever the path changes."""
-        return [len(line) for line in self._lines], self._position
+        """A value that changes whenever the path changes by a millimetre."""
+        x, y, z = (round(value, _MILLIMETRES) for value in self._position)
+        return [len(line) for line in self._lines], (x, y, z)
 
     def lines(self) -> list[list[Vector]]:
         """Return the lines; the last one ends at the vehicle's present position."""

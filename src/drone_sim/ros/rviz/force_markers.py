@@ -15,8 +15,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import Vector, cross
-from drone_sim.mechanics.state import State
+from drone_sim.mechanics.frames import Quaternion, Vector, cross
 from drone_sim.ros.core.message_conversion import BASE_LINK, frame
 from drone_sim.ros.rviz.marker_topics import FleetMarkers, attach_upright, new_marker
 from drone_sim.run.simulation import Simulation
@@ -42,8 +41,8 @@ _CORNERS: tuple[Vector, ...] = ((1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, -1, 1))
 
 
 class _ActingForces(NamedTuple):
-    state: State
-    thrusts: tuple[float, ...]  # N
+    orientation: Quaternion
+    lengths: tuple[float, ...]  # m, of the thrusts' arrows
     effectiveness: tuple[float, ...]
     wind: Vector | None  # m/s, world; None without weather
     contacts: tuple[Contact, ...]
@@ -62,9 +61,13 @@ class ForceMarkers(FleetMarkers):
     def _inputs(self, vehicle: Vehicle) -> _ActingForces:
         law = vehicle.propulsion.law
         wind = vehicle.body.wind if self._simulation.context.weather.is_felt else None
-        return _ActingForces(
-            vehicle.body.state, tuple(law.thrusts), law.effectiveness, wind, self._step_contacts(vehicle)
-        )
+        scale = self._scale(vehicle)
+        lengths = tuple(round(scale * thrust, _DECIMALS) for thrust in law.thrusts)
+        orientation, contacts = vehicle.body.state.orientation, self._step_contacts(vehicle)
+        return _ActingForces(orientation, lengths, law.effectiveness, wind, contacts)
+
+    def _scale(self, vehicle: Vehicle) -> float:
+        return metres_per_newton(vehicle.body.mass, self._simulation.parameters.gravity)
 
     def _step_contacts(self, vehicle: Vehicle) -> tuple[Contact, ...]:
         """Return the contacts of the last step; none if the vehicle was set to another pose after it."""
@@ -78,8 +81,8 @@ class ForceMarkers(FleetMarkers):
         return tuple(vehicle.body.contacts())
 
     def _markers(self, vehicle: Vehicle, inputs: _ActingForces) -> Sequence[Marker | None]:
-        scale = metres_per_newton(vehicle.body.mass, self._simulation.parameters.gravity)
-        return [_thrusts(vehicle, inputs, scale), *_wind(vehicle, inputs.wind), *_contacts(inputs.contacts, scale)]
+        contacts = _contacts(inputs.contacts, self._scale(vehicle))
+        return [_thrusts(vehicle, inputs), *_wind(vehicle, inputs.wind), *contacts]
 
 
 def metres_per_newton(mass: float, gravity: float) -> float:
@@ -87,13 +90,13 @@ def metres_per_newton(mass: float, gravity: float) -> float:
     return HOVER / (mass * (abs(gravity) or _EARTH) / 4)
 
 
-def _thrusts(vehicle: Vehicle, forces: _ActingForces, scale: float) -> Marker | None:
+def _thrusts(vehicle: Vehicle, forces: _ActingForces) -> Marker | None:
     """Return the arrows of all propellers: red for a weakened one, a red cross for a lost one."""
     points: list[Vector] = []
     colors: list[ColorRGBA] = []
-    for link, thrust, effectiveness in zip(vehicle.propulsion.rotors.links, forces.thrusts, forces.effectiveness):
-        start, vector = frames.position(link), _times(round(scale * thrust, _DECIMALS), (link[2], link[6], link[10]))
-        lines = arrow(start, vector) if abs(scale * thrust) > _MIN_LENGTH else []
+    for link, length, effectiveness in zip(vehicle.propulsion.rotors.links, forces.lengths, forces.effectiveness):
+        start, vector = frames.position(link), _times(length, (link[2], link[6], link[10]))
+        lines = arrow(start, vector) if abs(length) > _MIN_LENGTH else []
         corners = [] if effectiveness else _CORNERS  # diagonals of a cube look like a cross from every side
         lines += [_sum(start, _times(reach, corner)) for corner in corners for reach in (-_CROSS, _CROSS)]
         points += lines

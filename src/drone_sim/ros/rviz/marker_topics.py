@@ -77,17 +77,16 @@ class FleetMarkers:
     def __init__(self, simulation: Simulation):
         self._simulation = simulation
         self._topic = MarkerTopic(f"{namespace(simulation)}/view/{self.name}", self.period)
-        self._published: list[Any] = []  # the inputs of the markers
+        self._published: list[Any] = []  # each vehicle, with the inputs of its markers
 
     def update(self) -> None:
         """Publish the markers if they have changed and there are subscribers."""
         if not self._topic.is_due():
             return
-        vehicles = list(self._simulation.vehicles.values())
-        inputs = [self._inputs(vehicle) for vehicle in vehicles]
+        inputs = [(vehicle, self._inputs(vehicle)) for vehicle in self._simulation.vehicles.values()]
         if inputs != self._published:
             self._published = inputs
-            self._topic.show([marker for pair in zip(vehicles, inputs) for marker in self._markers(*pair)])
+            self._topic.show([marker for pair in inputs for marker in self._markers(*pair)])
 
     def _inputs(self, vehicle: Vehicle) -> Any:
         """Return the values that a vehicle's markers depend on."""
