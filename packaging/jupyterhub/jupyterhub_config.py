@@ -41,7 +41,6 @@ environment["DRONE_SIM_HAND_IN"] = "/srv/drone_sim/handed_in"
 environment["DRONE_SIM_CLASSROOM"] = "/srv/drone_sim/classroom"  # what the teachers' page shows, and tells all
 # Each simulator draws, and converts its pictures, in one thread of its own: all of them need the cores.
 environment["LP_NUM_THREADS"], environment["OPENCV_FOR_THREADS_NUM"] = "0", "1"
-environment["DRONE_SIM_NICENESS"] = "5"  # flying simulators give way to those that start, and to the hub
 c.Spawner.environment = environment
 
 # The teachers' page, http://THE-MACHINE:8000/services/course/, if there is a system user for it.

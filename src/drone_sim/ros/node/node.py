@@ -24,7 +24,7 @@ from drone_sim.ros.core.launch_parameters import parameters_of, use_sim_time
 from drone_sim.ros.core.master_watch import MasterWatch
 from drone_sim.ros.core.publishing import StepTime
 from drone_sim.ros.core.shutdown import Shutdown
-from drone_sim.ros.core.startup import MASTER_FAILURES, give_way, init_node, release_name, status_of_node
+from drone_sim.ros.core.startup import MASTER_FAILURES, init_node, release_name, status_of_node
 from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.inspection import InspectionTopics, SignalTopic
 from drone_sim.ros.node.interventions import Interventions
@@ -149,7 +149,6 @@ class Node:
         gc.freeze()  # what is there by now stays: the collector, looking through it again and again, makes steps late
         rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; {self._describe_command_topics()}")
         self._diagnostics.start()
-        give_way()
         steps, seconds = 0, 0.0
         self._pacer.restart()
         while not over():
