@@ -36,11 +36,11 @@ import sys, time
 from drone_sim.run.watchdog import Watchdog
 watchdog = Watchdog("drone_sim")
 from drone_sim.ros.node import node
-from drone_sim.world import World
+from drone_sim.world.dynamics import Dynamics
 def stuck(*_arguments, **_options):
     print("flying into it", flush=True)
     {call}
-World.{function} = stuck
+Dynamics.{function} = stuck
 sys.exit(node.main(watchdog))
 """
 HOLDS_THE_LOCK, LETS_GO_OF_IT = "sum(range(10**13))", "time.sleep(1000)"

@@ -421,7 +421,7 @@ def test_a_call_of_ones_own_is_on_ones_own_time(build):
     function sysCall_init() end
     function sysCall_actuation() while true do pcall(sim.callScriptFunction, 'hangs', sim.handle_self) end end
     """
-    with pytest.raises(ScriptError, match=r"stopped after 0.5 s without returning"):
+    with pytest.raises(ScriptError, match=r"stopped after 0.2 s without returning"):
         build({}, own, script_time_limit=0.2).step()
 
 

@@ -20,7 +20,7 @@ from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose
 from drone_sim.ros.core import message_conversion
 from drone_sim.ros.core.inbox import Inbox
-from drone_sim.ros.core.message_conversion import WORLD_FRAME, xyz, xyzw
+from drone_sim.ros.core.message_conversion import WORLD_FRAME
 from drone_sim.ros.core.validation import intervention, read_pose
 from drone_sim.ros.rviz.marker_topics import band, namespace, new_marker
 from drone_sim.ros.rviz.scene_markers import bodiless_markers, marker_of
@@ -35,7 +35,6 @@ from drone_sim.vehicles.quadricopter_objects import DRONE, TARGET
 TIMEOUT = 1.0  # s; while a handle is held, rviz sends feedback every 0.25 s
 _UPRIGHT = Quaternion(0, 2**-0.5, 0, 2**-0.5)  # turns a control's x axis, along or about which it acts, to z
 _PERIOD = 0.19  # s of real time, between two updates
-_VISIBLE = 1e-4  # m, or of a quaternion: a hovering vehicle moves by less in each step
 _WARNING_PERIOD = 5.0  # s, between two warnings
 _ARROW_SIZES = 0.5, 5.0  # m, smallest and largest
 _INVISIBLE = (0.2, 0.6, 1.0, 0.01)  # rviz does not pick a marker that is entirely transparent
@@ -159,12 +158,8 @@ class VehicleHandles:
         self._show(self._handles())
         objects = self._simulation.context.objects
         for name in self._shown.keys() - self._held.names():
-            pose = message_conversion.pose(level(objects.matrix(objects.handle(self._shown[name].object))))
-            before, now = (
-                (*xyz(each.position), *xyzw(each.orientation)) for each in (self._server.get(name).pose, pose)
-            )
-            if max(abs(one - other) for one, other in zip(before, now)) > _VISIBLE:  # each update costs a whole handle
-                self._server.setPose(name, pose)
+            matrix = objects.matrix(objects.handle(self._shown[name].object))
+            self._server.setPose(name, message_conversion.pose(level(matrix)))
         self._server.applyChanges()
 
     def _handles(self) -> dict[str, _VehicleHandle]:

@@ -174,8 +174,9 @@ class Transforms:
             return
         self._new_subscribers.take()  # the messages below reach them, too
         now, vehicles = self._stamp(), self._simulation.vehicles.values()
-        kinds = (_moving, _turning) if self._display_throttle.passes() else (_moving,)
-        self._moving.publish(TFMessage([each for kind in kinds for own in vehicles for each in kind(now, own)]))
+        self._moving.publish(TFMessage([each for vehicle in vehicles for each in _moving(now, vehicle)]))
+        if self._display_throttle.passes():
+            self._moving.publish(TFMessage([each for vehicle in vehicles for each in _turning(now, vehicle)]))
 
     def tell_new_subscribers(self) -> None:
         """Send the moving frames, with the present stamp, to new subscribers only."""
