@@ -337,16 +337,18 @@ class Lockstep(unittest.TestCase):
             flown = flight.until(SECONDS)
             call = {name: rospy.ServiceProxy(f"/drone_sim/{name}", Trigger) for name in ("restart", "step")}
             pause = rospy.ServiceProxy("/drone_sim/pause", SetBool)
-            self.assertTrue(pause(True).success)
+            paused = pause(True)
+            self.assertTrue(paused.success)
+            # Odometry up to the pause may still be under way.
+            before = float(paused.message.removeprefix("paused at t = ").removesuffix(" s"))
             rospy.set_param("/drone_sim/step_count", 0)
             self.assertIn("step_count = 0: must be a whole number from 1 to 1000000", call["step"]().message)
             rospy.set_param("/drone_sim/step_count", 20)
-            before = flight.rows[-1][0]
             for number in (1, 2):
-                self.assertEqual(call["step"]().message, f"t = {before * 1e-9 + number:.2f} s")
-                flight.until(before * 1e-9 + number)
-            stepped = flight.until(before * 1e-9 + 2)
-            self.assertEqual(len({row[0] for row in stepped}), round(before / FIRST) - 1 + 40)
+                self.assertEqual(call["step"]().message, f"t = {before + number:.2f} s")
+                flight.until(before + number)
+            stepped = flight.until(before + 2)
+            self.assertEqual(len({row[0] for row in stepped}), round(1e9 * before / FIRST) - 1 + 40)
             self.assertEqual(stepped[: len(flown)], flown)
 
     @unittest.skipUnless(importlib.util.find_spec("gymnasium"), "needs gymnasium, of requirements-dev.txt")
