@@ -1,9 +1,12 @@
 """JupyterHub for a course on one machine, each student with an own system user: docs/classroom.md. Run it as root."""
 
+import functools
 import os
 import pwd
 import sys
 from pathlib import Path
+
+import jupyterhub.utils
 
 c = get_config()  # noqa: F821 # of JupyterHub
 
@@ -30,6 +33,8 @@ server = [
 ]
 c.Spawner.cmd = [sys.executable, "-c", "\n".join(server)]
 c.Spawner.default_url = "/lab"  # "/drone_sim/" opens the simulator at once
+# The hub looks for a new server ever more seldom: a student would wait up to 5 s for one that is there.
+jupyterhub.utils.exponential_backoff = functools.partial(jupyterhub.utils.exponential_backoff, max_wait=0.5)
 c.Spawner.start_timeout = c.Spawner.http_timeout = 120  # s, for many that start at once
 
 # The simulator finds ROS as the shell does in which the hub was started.
@@ -41,6 +46,7 @@ environment["DRONE_SIM_HAND_IN"] = "/srv/drone_sim/handed_in"
 environment["DRONE_SIM_CLASSROOM"] = "/srv/drone_sim/classroom"  # what the teachers' page shows, and tells all
 # Each simulator draws, and converts its pictures, in one thread of its own: all of them need the cores.
 environment["LP_NUM_THREADS"], environment["OPENCV_FOR_THREADS_NUM"] = "0", "1"
+environment["DRONE_SIM_NICENESS"] = "10"  # flying simulators give way to those that start, and to the hub
 c.Spawner.environment = environment
 
 # The teachers' page, http://THE-MACHINE:8000/services/course/, if there is a system user for it.

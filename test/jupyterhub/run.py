@@ -20,6 +20,7 @@ import sys
 import tempfile
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import requests
@@ -174,9 +175,15 @@ class Student:
 
     def open(self):
         """Log in, and open the simulator."""
+        self.start_server()
+        until(lambda: self.sees(self.name))
+
+    def start_server(self):
+        """Log in, and wait for the server that the hub starts."""
         self.log_in()
         self.session.get(f"http://{HOST}/hub/spawn/{self.name}")
-        until(lambda: self.sees(self.name))
+        address = f"http://{HOST}/user/{self.name}/api"
+        until(lambda: self.session.get(address, timeout=PATIENCE).url == address)
 
     def log_in(self):
         login = self.session.get(f"http://{HOST}/hub/login")
@@ -206,7 +213,8 @@ class Student:
     def fly(self, name):
         """Wait until a student's simulator says that its drone flies. Raises InvalidStatus if it is refused."""
         with self.connect(name) as socket:
-            until(lambda: '"flying"' in str(socket.recv(timeout=PATIENCE)))
+            while '"flying"' not in str(socket.recv(timeout=PATIENCE)):
+                pass
 
     def hand_in(self, text):
         """Write a text over the script of the task hover, and hand it in."""
@@ -402,12 +410,17 @@ def measure_load(names):
     pages = []
     for student in map(Student, names):
         began = time.monotonic()
-        student.open()
+        student.start_server()
+        served = time.monotonic()
+        until(partial(student.sees, student.name))
         student.fly(student.name)
-        print(f"{student.name} flies after {time.monotonic() - began:.1f} s", flush=True)
+        flies = time.monotonic() - served
+        print(f"{student.name}: server after {served - began:.1f} s, flies {flies:.1f} s later", flush=True)
         pages.append(Page(student.connect(student.name)))
     time.sleep(WARM_UP)
+    drawn = [page.pictures for page in pages]
     busy = used(names)
+    rates = [(page.pictures - before) / MEASURED for page, before in zip(pages, drawn)]
     paces = [float(page.pace or 0) for page in pages]
     for page in pages:
         page.socket.close()
@@ -415,7 +428,8 @@ def measure_load(names):
     idle = used(names)
     each = 1 / len(names)
     print(f"{len(names)} students fly with open pages: {busy[0] * each:.2f} cores and {busy[1] * each:.0f} MB each,")
-    print(f"at {min(paces):.2f} to {max(paces):.2f} times real time; with closed pages {idle[0] * each:.2f} cores each")
+    print(f"at {min(paces):.2f} to {max(paces):.2f} times real time; {min(rates):.0f} to {max(rates):.0f} pictures/s;")
+    print(f"with closed pages {idle[0] * each:.3f} cores each")
 
 
 class Page(threading.Thread):
@@ -423,7 +437,7 @@ class Page(threading.Thread):
 
     def __init__(self, socket):
         super().__init__(daemon=True)
-        self.socket, self.pace = socket, ""
+        self.socket, self.pace, self.pictures = socket, "", 0
         socket.send(json.dumps({"id": 1, "ask": "camera", "topic": "/drone/front", "on": True}))
         socket.send(json.dumps({"id": 2, "ask": "panel"}))
         self.start()
@@ -433,6 +447,7 @@ class Page(threading.Thread):
             for message in self.socket:
                 if isinstance(message, bytes):
                     head = json.loads(message[: message.index(b"\n")])
+                    self.pictures += "picture" in head
                     self.socket.send(json.dumps({"shown": head.get("picture", "scene")}))
                 else:
                     self.pace = json.loads(message).get("panel", {}).get("pace", self.pace)

@@ -44,13 +44,31 @@ def make(period=0.05):
     [
         (0.05, [0.01] * 4, [0.05, 0.1, 0.15, 0.2], 0),
         (0.0, [0.01] * 4, [0.0, 0.01, 0.02, 0.03], 0),  # as fast as it can
-        (0.05, [0.01, 0.12, 0.01, 0.01], [0.05, 0.1, 0.22, 0.27], 1),
+        (0.05, [0.01, 0.06, 0.045, 0.01, 0.01], [0.05, 0.1, 0.16, 0.205, 0.25], 2),  # 10 and 5 ms late
+        (0.05, [0.01, 0.17, 0.01, 0.01, 0.01], [0.05, 0.1, 0.27, 0.28, 0.32], 2),  # only 50 of 120 ms are caught up
+        (0.05, [0.07] * 4, [0.05, 0.12, 0.19, 0.26], 3),  # always too slow
     ],
 )
-def test_one_pass_per_period_and_an_overrun_is_counted_and_not_caught_up(period, works, times, overruns):
+def test_one_pass_per_period_and_a_short_delay_is_caught_up(period, works, times, overruns):
     pacer, clock = make(period)
     assert passes(pacer, clock, works) == times
-    assert (pacer.overruns, round(pacer.worst, 9)) == (overruns, 0.07 * overruns)
+    assert pacer.overruns == overruns
+
+
+def test_a_period_is_late_if_it_began_late_without_an_excuse():
+    pacer, clock = make()
+    late = []
+    for work in (0.01, 0.07, 0.01, 0.07, 0.01):
+        late.append(round(pacer.wait(), 9))
+        assert pacer.is_late == (late[-1] > 0)
+        clock.work(work)
+    assert late == [0, 0, 0.02, 0, 0.02] and round(pacer.worst, 9) == 0.02
+    pacer.wait()
+    clock.work(0.07)
+    pacer.wait()
+    assert pacer.is_late
+    pacer.excuse()
+    assert not pacer.is_late, "as in a pause"
 
 
 def test_late_wake_ups_do_not_add_up():

@@ -2,6 +2,8 @@
 
 import os
 import socket
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -78,3 +80,11 @@ def test_a_slow_subscriber_gets_the_last_message_and_holds_nobody_up(connection)
     assert len(received) % startup._MAX_AT_ONCE == 0
     whole = [received[at : at + startup._MAX_AT_ONCE] for at in range(0, len(received), startup._MAX_AT_ONCE)]
     assert all(len(set(message)) == 1 for message in whole), "each message is whole"
+
+
+@pytest.mark.parametrize(("asked", "given"), [("7", 7), ("0", 0), ("", 0), ("many", 0), ("-3", 0), ("99", 0)])
+def test_a_node_gives_way_as_the_environment_says(asked, given):
+    code = "import os; from drone_sim.ros.core.startup import give_way; give_way(); give_way(); print(os.nice(0))"
+    environment = {**os.environ, "DRONE_SIM_NICENESS": asked}
+    said = subprocess.check_output([sys.executable, "-c", code], env=environment, text=True)
+    assert int(said) == max(given, os.nice(0))

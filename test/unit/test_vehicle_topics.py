@@ -1,6 +1,9 @@
-"""Which vehicles keep their topics when another scene is loaded."""
+"""Which vehicles keep their topics when another scene is loaded, and what late steps leave out."""
 
+import contextlib
 from types import SimpleNamespace
+from typing import ClassVar
+from unittest import mock
 
 import pytest
 
@@ -11,7 +14,7 @@ import rospy
 from drone_sim.grading import plan as plans
 from drone_sim.ros.core.publishing import StepTime
 from drone_sim.ros.grading.simulator import scene_file
-from drone_sim.ros.vehicle import vehicle_topics
+from drone_sim.ros.vehicle import cameras, vehicle_topics
 from drone_sim.run import parameters
 
 PLAN = """
@@ -106,3 +109,46 @@ def test_what_was_measured_within_a_step_is_stamped_shortly_before_it(monkeypatc
     time.begin()
     assert time.stamp() == rospy.Time.from_sec(clock[0])
     assert (time.stamp() - time.stamp(ago=0.01)).to_sec() == pytest.approx(apart, abs=1e-6)
+
+
+class Publisher:
+    """It counts subscribers, and publishes nothing."""
+
+    subscribers: ClassVar[dict] = {}  # by topic
+
+    def __init__(self, topic, *_, **__):
+        self.topic = topic
+
+    def get_num_connections(self):
+        return self.subscribers.get(self.topic, 0)
+
+
+@pytest.mark.parametrize("every", [1, 2])
+def test_late_steps_leave_out_pictures_that_only_go_out_compressed(monkeypatch, new_simulation, fleet, every):
+    monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
+    monkeypatch.setattr(rospy, "Publisher", Publisher)
+    monkeypatch.setattr(cameras, "Server", mock.Mock())
+    small = {"width": 16, "height": 12, "every": every}
+    simulation = fleet._simulation = new_simulation({"cameras": {"front": small}})
+    vehicle = simulation.drone
+    camera, own = vehicle.cameras["front"], vehicle.parameters
+    output = cameras.CameraOutput(own, camera, own.cameras["front"], None)
+    fleet._topics = {"drone": SimpleNamespace(cameras=[("front", output)])}
+
+    def pictures(is_late, *heard):
+        """Fly 16 steps that are late or not; return the steps with a picture."""
+        Publisher.subscribers = dict.fromkeys(heard, 1)
+        before = simulation.steps
+        for _ in range(16):
+            with fleet.hurrying() if is_late else contextlib.nullcontext():
+                simulation.step()
+            if camera.image is not None:
+                yield simulation.steps - before
+
+    raw, compressed = "drone/front", "drone/front/compressed"
+    all_of_them = list(range(every, 17, every))
+    assert list(pictures(False, compressed)) == all_of_them
+    assert list(pictures(True, compressed)) == all_of_them[3::4], "no more than three are left out in a row"
+    assert list(pictures(True, compressed, raw)) == all_of_them
+    assert list(pictures(True)) == []
+    assert list(pictures(False, compressed)) == all_of_them

@@ -17,7 +17,7 @@ _SLICE = 0.1  # s; long sleeps are split, so that a shutdown is noticed
 
 
 class Pacer:
-    """Rate of a loop, like rospy.Rate. A step that is late is counted, and its delay is never caught up."""
+    """Rate of a loop, like rospy.Rate: late steps are counted, and a delay of up to one period is caught up."""
 
     def __init__(
         self,
@@ -28,6 +28,7 @@ class Pacer:
         """Start the first period now. `period` is in s of real time (0: unpaced); `clock` must be monotonic."""
         self.overruns = 0
         self.worst = 0.0  # s, the longest overrun
+        self.is_late = False  # whether the present period began late
         self._period = period
         self._clock = clock
         self._sleep = sleep
@@ -48,13 +49,14 @@ class Pacer:
     def wait(self, interrupted: Callable[[], bool] = lambda: False) -> float:
         """Sleep until the next period begins, or until interrupted; return the lateness in seconds.
 
-        Due times are multiples of the period after the start, so late wake-ups do not add up. If a
-        step took longer than its period, the following ones are delayed by the excess.
+        Due times are multiples of the period after the start, so that late wake-ups and single long steps do not add
+        up. What exceeds a period is not caught up, nor is a delay that was excused.
         """
         late = max(0.0, self._clock() - self._due) if self._period else 0.0
-        self._due += late
+        self._due += late if self._is_excused else max(0.0, late - self._period)
         if self._is_excused:
             late, self._is_excused = 0.0, False
+        self.is_late = late > 0
         if late:
             self.overruns += 1
             self.worst = max(self.worst, late)
@@ -65,11 +67,11 @@ class Pacer:
 
     def excuse(self) -> None:
         """Do not count the next step as late, because something else delayed it."""
-        self._is_excused = True
+        self._is_excused, self.is_late = True, False
 
     def restart(self) -> None:
         """Start a new period, as after a pause: the next step is due one period from now."""
-        self._due = self._clock() + self._period
+        self._due, self.is_late = self._clock() + self._period, False
 
 
 class Throttle:

@@ -32,11 +32,13 @@ from drone_sim.ros.cockpit.teleop import CommandPublisher, HeldCommands
 from drone_sim.ros.cockpit.topics import FoundTopics, find_topics
 from drone_sim.ros.core.master_watch import MasterWatch
 from drone_sim.ros.core.simulator import FAILURES, Simulator
+from drone_sim.ros.core.startup import give_way
 
 _PERIOD, _IDLE_PERIOD = 0.05, 0.1  # s between two updates of the scene, and without one
 _MARKER_DELAY = 0.008  # s, within which the markers of a step arrive after its frames
 _DRAG_PERIOD = 0.1  # s between two updates of dragged objects
-_MASTER_PERIOD = 2.0  # s between two requests to the master
+# s between two requests to the master: while a browser waits for the simulator, with it, and without a browser.
+_SEARCH_PERIOD, _MASTER_PERIOD, _UNSEEN_PERIOD = 0.3, 2.0, 10.0
 
 
 class Cockpit:
@@ -96,7 +98,8 @@ class Cockpit:
     def _update(self, now: float) -> None:
         browsers = self._socket.browsers
         scene = self._editing.scene
-        if scene != self._scene or now - self._asked_master_at > _MASTER_PERIOD:
+        period = _MASTER_PERIOD if self._topics.namespace else _SEARCH_PERIOD
+        if scene != self._scene or now - self._asked_master_at > (period if browsers else _UNSEEN_PERIOD):
             self._scene, self._asked_master_at = scene, now  # at once, so that no picture of the old scene stays
             self._ask_master()
         self._inspector.update(bool(self._topics.namespace))
@@ -117,6 +120,8 @@ class Cockpit:
         if self._view is not None:
             self._view.close()
         self._view = SceneView(self._state, self._meshes, namespace) if namespace else None
+        if namespace:
+            give_way()
         self._panel.listen(bool(namespace))
         if not namespace:
             self._editing.subscribe(False)

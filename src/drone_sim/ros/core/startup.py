@@ -21,6 +21,7 @@ import threading
 import time
 import xmlrpc.client
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import rosgraph
@@ -43,6 +44,7 @@ _MASTER_POLL_PERIOD, _QUIET_PERIOD = 0.1, 5.0  # s, between two requests; until 
 _MAX_PENDING = 128  # connections that wait to be accepted, as many as rospy's XML-RPC server allows
 _MAX_AT_ONCE = 1 << 16  # bytes of a message that is sent in the thread that publishes it
 _FIRST_BYTE_TIMEOUT = 10.0  # s, after which a connection that has sent nothing is closed
+_NICENESS = "DRONE_SIM_NICENESS"  # of a simulator that flies and its cockpit, in a course on one machine
 _Result = TypeVar("_Result")
 _ConnectionHandler = Callable[[socket.socket, Any], None]
 
@@ -272,6 +274,15 @@ def _send(queued: QueuedConnection, data: bytes) -> bool:
     while sent and queued._queue and not queued.done:  # rospy drops messages from a full queue, but not half a message
         time.sleep(0)
     return True
+
+
+def give_way() -> None:
+    """Let other processes of the machine go first, by as much as the environment says (a niceness, from 0 to 19)."""
+    niceness = os.environ.get(_NICENESS, "0")
+    if niceness.isdecimal() and os.nice(0) < int(niceness) <= 19:
+        os.nice(int(niceness) - os.nice(0))
+        with contextlib.suppress(OSError):  # Linux may compare sessions instead of processes, and each node is one
+            Path("/proc/self/autogroup").write_text(niceness, encoding="ascii")
 
 
 # ---- tools that wait for the simulator, and then run another program

@@ -24,7 +24,7 @@ from drone_sim.ros.core.launch_parameters import parameters_of, use_sim_time
 from drone_sim.ros.core.master_watch import MasterWatch
 from drone_sim.ros.core.publishing import StepTime
 from drone_sim.ros.core.shutdown import Shutdown
-from drone_sim.ros.core.startup import MASTER_FAILURES, init_node, release_name, status_of_node
+from drone_sim.ros.core.startup import MASTER_FAILURES, give_way, init_node, release_name, status_of_node
 from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.inspection import InspectionTopics, SignalTopic
 from drone_sim.ros.node.interventions import Interventions
@@ -40,6 +40,7 @@ from drone_sim.ros.rviz.force_markers import ForceMarkers
 from drone_sim.ros.rviz.handles import ObjectHandles, VehicleHandles
 from drone_sim.ros.rviz.marker_topics import namespace
 from drone_sim.ros.rviz.scene_markers import RvizMeshes, SceneMarkers, SurroundingsMarkers, VehicleMarkers
+from drone_sim.ros.vehicle.cameras import MAX_LEFT_OUT
 from drone_sim.ros.vehicle.script_backend import RosBackend
 from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.ros.vehicle.vehicle_topics import FleetTopics
@@ -128,6 +129,7 @@ class Node:
         self._diagnostics = Diagnostics(self._findings, self._time.stamp, self._inbox)
         self._beat = Beat(_CHANGED_PERIOD, _IDLE_PERIOD)
         self._shown = -1  # the world's changes, when it was shown
+        self._left_out = 0  # times in a row that markers were left out, because the step was late
         for camera in [camera for vehicle in self._first() for camera in vehicle.cameras.values()]:
             camera.look()  # the first picture takes long: compiling shaders must not make a step late
 
@@ -149,6 +151,7 @@ class Node:
         gc.freeze()  # what is there by now stays: the collector, looking through it again and again, makes steps late
         rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; {self._describe_command_topics()}")
         self._diagnostics.start()
+        give_way()
         steps, seconds = 0, 0.0
         self._pacer.restart()
         while not over():
@@ -222,7 +225,10 @@ class Node:
         if self._lockstep is not None:
             self._time.stamp()  # publishes the present time after a restore, which is no trigger of the step
             self._lockstep.begin_waits()
-        self.simulation.step()
+        # Not in lockstep: a node that the step waits for may answer pictures.
+        is_hurried = self._pacer.is_late and self._lockstep is None
+        with self._topics.hurrying() if is_hurried else contextlib.nullcontext():
+            self.simulation.step()
         if self._lockstep is not None:
             self._lockstep.begin_late_waits()
             self._time.end(at_once=True)
@@ -286,12 +292,14 @@ class Node:
 
     def _publish_displays(self) -> None:
         self._topics.publish_command()
-        for markers in self._rviz:
-            markers.update()
+        self._left_out = self._left_out + 1 if self._pacer.is_late and self._left_out < MAX_LEFT_OUT else 0
+        if not self._left_out:
+            for markers in self._rviz:
+                markers.update()
+            self._editing.update()
         self._windows.update()
         self._signals.update()
         self._inspection.update()
-        self._editing.update()
         self._interventions.update()
         if self._parameters.gui:
             for track in [vehicle.track.matrix() for vehicle in self._first()]:

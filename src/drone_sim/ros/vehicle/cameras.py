@@ -44,6 +44,7 @@ try:
 except ImportError:  # Debian has no package of it
     Detection2DArray = Detection3DArray = None
 
+MAX_LEFT_OUT = 3  # pictures, or messages for displays, in a row, while steps are late
 _ERROR_PERIOD = 5.0  # s, between two errors in the log
 _ENCODINGS = {"color": "rgb8", "depth": "32FC1"}
 _COMPRESSION = {
@@ -75,6 +76,7 @@ class CameraOutput:
         self._compressed = CompressedPublisher(topic, new_subscribers) if parameters.kind == "color" else None
         self._info_publisher = rospy.Publisher(info_topic, CameraInfo, queue_size=1)
         self._truth = TruthOutput(topic, self._frame, new_subscribers) if parameters.truth else None
+        self.late_step: int | None = None  # number of the present step, if it is late
         self.follow(camera)
 
     def follow(self, camera: Camera) -> None:
@@ -95,8 +97,14 @@ class CameraOutput:
             self._truth.close()
 
     def _has_viewers(self) -> bool:
-        publishers = [self._image, self._compressed.publisher] if self._compressed is not None else [self._image]
-        return any(publisher.get_num_connections() for publisher in publishers)
+        """Return whether anybody wants the present picture. Who takes it compressed does not need all of them."""
+        if self._image.get_num_connections():
+            return True
+        if self._compressed is None or not self._compressed.publisher.get_num_connections():
+            return False
+        last = self._camera.latest
+        is_left_out = self.late_step and last and self.late_step - last.at <= MAX_LEFT_OUT * self._camera.period
+        return not is_left_out
 
     def publish(self, stamp: Stamp) -> None:
         """Publish the picture and its camera_info, stamped with the time of the picture.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
+from collections.abc import Iterator
 from typing import Any
 from xml.etree import ElementTree as Xml
 
@@ -135,6 +137,18 @@ class FleetTopics:
             topics.outputs.publish_state(topics.vehicle, self._stamp)
             for message in topics.driver.messages:
                 message.publish(topics.vehicle, self._stamp)
+
+    @contextlib.contextmanager
+    def hurrying(self) -> Iterator[None]:
+        """In a late step, leave out some of the pictures that are only sent compressed."""
+        cameras = [camera for topics in self._topics.values() for _, camera in topics.cameras]
+        for camera in cameras:
+            camera.late_step = self._simulation.steps + 1
+        try:
+            yield
+        finally:
+            for camera in cameras:
+                camera.late_step = None
 
     def publish_pictures(self) -> None:
         for topics in self._topics.values():
