@@ -90,6 +90,8 @@ def main():
     parser.add_argument("--load", type=int, metavar="N", help="measure the load of N students")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="save a picture of the teachers' page there")
     options = parser.parse_args()
+    if subprocess.run(["test", "-r", __file__], user="nobody", group="nogroup", extra_groups=[]).returncode:
+        return f"jupyterhub: the students cannot read {ROOT}: move it to a folder that all users can open"
     if INSIDE not in os.environ:
         with tempfile.TemporaryDirectory(dir="/var/tmp") as folder:
             command = [*NAMESPACES, *REAPER, sys.executable, __file__, *sys.argv[1:]]
