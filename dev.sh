@@ -346,7 +346,7 @@ case "$command" in
     ;;
   two-hosts) setup; exec .venv/bin/python test/two_hosts/run.py "$@" ;;
   jupyterhub)
-    install_packages iproute2
+    install_packages iproute2 chromium
     command -v npm > /dev/null || install_packages nodejs npm # also other packages have it
     setup
     make_venv "${ALL[@]}" requirements-web.txt requirements-jupyterhub.txt
