@@ -225,9 +225,7 @@ class Node:
         if self._lockstep is not None:
             self._time.stamp()  # publishes the present time after a restore, which is no trigger of the step
             self._lockstep.begin_waits()
-        # Not in lockstep: a node that the step waits for may answer pictures.
-        is_hurried = self._pacer.is_late and self._lockstep is None
-        with self._topics.hurrying() if is_hurried else contextlib.nullcontext():
+        with self._topics.hurrying() if self._is_hurried else contextlib.nullcontext():
             self.simulation.step()
         if self._lockstep is not None:
             self._lockstep.begin_late_waits()
@@ -251,6 +249,11 @@ class Node:
         else:
             self.simulation.look()
             self._publish()
+
+    @property
+    def _is_hurried(self) -> bool:
+        """Whether a late step leaves out what is only looked at; in lockstep, nodes may answer pictures."""
+        return self._pacer.is_late and self._lockstep is None
 
     def _findings(self) -> list[Finding]:
         return self._diagnosis.look() + ([self._lockstep.finding()] if self._lockstep is not None else [])
@@ -292,7 +295,7 @@ class Node:
 
     def _publish_displays(self) -> None:
         self._topics.publish_command()
-        self._left_out = self._left_out + 1 if self._pacer.is_late and self._left_out < MAX_LEFT_OUT else 0
+        self._left_out = self._left_out + 1 if self._is_hurried and self._left_out < MAX_LEFT_OUT else 0
         if not self._left_out:
             for markers in self._rviz:
                 markers.update()
