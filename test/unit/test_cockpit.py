@@ -646,3 +646,22 @@ def test_another_scene_is_looked_for_at_once(tmp_path, monkeypatch):
         shown._update(10.0)
     assert asked == [("", "drone"), ("a.yaml", "drone"), ("a.yaml", "")]
     shown._server.stop()
+
+
+@pytest.mark.parametrize(
+    ("browsers", "namespace", "period"),
+    [({1}, "", 0.3), ({1}, "/drone", 2.0), (set(), "", 10.0), (set(), "/drone", 10.0)],
+)
+def test_the_master_is_asked_often_while_a_page_waits_for_the_simulator(
+    tmp_path, monkeypatch, browsers, namespace, period
+):
+    shown, asked = Cockpit(PageServer("127.0.0.1", 0), "drone_sim", tmp_path), []
+    monkeypatch.setattr(shown, "_ask_master", lambda: asked.append(now))
+    monkeypatch.setattr(shown, "_open", lambda _namespace: None)
+    monkeypatch.setattr(type(shown._socket), "browsers", property(lambda _: browsers))
+    shown._topics = FoundTopics(namespace)
+    for tenth in range(1000, 1300):  # 30 s
+        now = tenth / 10
+        shown._update(now)
+    assert 30.0 / (period + 0.2) <= len(asked) <= 30.0 / period + 1
+    shown._server.stop()
