@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import moderngl
@@ -39,7 +40,8 @@ class FrameState(NamedTuple):
     poses: np.ndarray
 
 
-class _View(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _View:
     """The arguments of `Renderer.render_outputs`."""
 
     intrinsics: Lens | Tiles
@@ -53,6 +55,27 @@ class _View(NamedTuple):
     def tiles(self) -> int:
         """How often everything is drawn, each time clipped to another rectangle of the image."""
         return len(self.intrinsics.bounds) if isinstance(self.intrinsics, Tiles) else 1
+
+    @cached_property
+    def clip_from_world(self) -> np.ndarray:
+        """The projection, (4, 4) or (tiles, 4, 4), with the camera as the world's origin."""
+        return self.intrinsics.projection() @ _optical_from_world(self.camera_pose)
+
+    @cached_property
+    def uniforms(self) -> dict[str, bytes]:
+        """The uniforms of the programs that depend on the camera."""
+        lens = self.intrinsics
+        uniforms = {
+            "clip_from_world": _bytes(self.clip_from_world),
+            "optical_from_world": _bytes(_optical_from_world(self.camera_pose)),
+        }
+        if self.before is not None:
+            uniforms["optical_before_from_world"] = _bytes(_optical_from_world(self.before.camera_pose))
+        if isinstance(lens, Tiles):
+            uniforms["bounds"] = lens.bounds.astype(np.float32).tobytes()
+        if isinstance(lens, Orthographic):
+            uniforms["parallel"] = np.array([lens.near, lens.far - lens.near], np.float32).tobytes()
+        return uniforms
 
     @property
     def max_instance(self) -> int:
@@ -199,11 +222,11 @@ class Renderer:
 
     def _draw(self, names: tuple[str, ...], view: _View, out: np.ndarray | None = None) -> dict[str, np.ndarray]:
         """Render colour, outputs or both; colour into `out` if given."""
-        view = view._replace(poses=np.asarray(view.poses, dtype=np.float64))
+        view = replace(view, poses=np.asarray(view.poses, dtype=np.float64))
         if not isinstance(view.intrinsics, Distorted):
             return self._draw_undistorted(names, view, partial(without_alpha, out=out))
         lens_view = self._lens_view(view.intrinsics)
-        tiles = view._replace(intrinsics=lens_view.tiles)
+        tiles = replace(view, intrinsics=lens_view.tiles)
         rotation = None if view.before is None else view.before.camera_pose[:3, :3].T @ view.camera_pose[:3, :3]
         return lens_view.seen(names, lambda drawn, colors: self._draw_undistorted(drawn, tiles, colors), rotation, out)
 
@@ -262,7 +285,7 @@ class Renderer:
         if role not in self._skies:
             content = [(self._dome, "3f 3f", "direction", "tint")]
             self._skies[role] = gl.vertex_array(self._programs.one(role), content)
-        self._set_projection(self._programs.one(role), view)
+        _set_uniforms(self._programs.one(role), view)
         self._skies[role].render(instances=view.tiles)
 
     def _draw_batches(self, gl: moderngl.Context, batches: Sequence[Batch], role: Role) -> None:
@@ -277,7 +300,7 @@ class Renderer:
     def _upload(self, names: Sequence[str], view: _View, floor_height: float | None = None) -> None:
         """Upload the poses of the visuals and the attributes for the outputs `names`; `floor_height` as for `move`."""
         batches, origin = self._batches, view.camera_pose[:3, 3]
-        batches.move(origin, view.poses, _clip_from_world(view), floor_height)
+        batches.move(origin, view.poses, view.clip_from_world, floor_height)
         if "instance" in names:
             batches.identify(np.zeros(len(batches.visuals)) if view.instances is None else view.instances)
         if "before" in names:
@@ -289,22 +312,8 @@ class Renderer:
         """Prepare the batches for a role, and set the uniforms that depend on the camera."""
         programs = self._programs.of(role)
         self._batches.link(role, programs)
-        matrices = {"optical_from_world": _bytes(_optical_from_world(view.camera_pose))}
-        if view.before is not None:
-            matrices["optical_before_from_world"] = _bytes(_optical_from_world(view.before.camera_pose))
-        lens = view.intrinsics
         for program in set(programs.values()):
-            self._set_projection(program, view)
-            for name, matrix in matrices.items():
-                if name in program:
-                    program[name].write(matrix)
-            if "parallel" in program:
-                program["parallel"] = lens.near, lens.far - lens.near
-
-    def _set_projection(self, program: Any, view: _View) -> None:
-        program["clip_from_world"].write(_bytes(_clip_from_world(view)))
-        if isinstance(view.intrinsics, Tiles) and "bounds" in program:
-            program["bounds"].write(view.intrinsics.bounds.astype(np.float32).tobytes())
+            _set_uniforms(program, view)
 
     def _clear_target(self, names: tuple[str, ...], view: _View, alpha: float) -> Target:
         """Return the cleared and bound framebuffer for the outputs `names`."""
@@ -337,14 +346,17 @@ def _optical_from_world(camera_pose: np.ndarray) -> np.ndarray:
     return rotation
 
 
-def _clip_from_world(view: _View) -> np.ndarray:
-    """Return the view's projection, (4, 4) or (tiles, 4, 4), with the camera as the world's origin."""
-    return view.intrinsics.projection() @ _optical_from_world(view.camera_pose)
-
-
 def _bytes(matrix: np.ndarray) -> bytes:
     """Return one or several matrices as GLSL stores them, column by column."""
     return bytes(matrix.swapaxes(-1, -2).astype(np.float32).tobytes())
+
+
+def _set_uniforms(program: moderngl.Program, view: _View) -> None:
+    """Set the uniforms that depend on the camera, and that the program has."""
+    for name, value in view.uniforms.items():
+        uniform = program.get(name, None)
+        if uniform is not None:
+            uniform.write(value)
 
 
 # ---- pixel counts of objects, each rendered alone, without occlusion by others
