@@ -351,7 +351,7 @@ def _bytes(matrix: np.ndarray) -> bytes:
     return bytes(matrix.swapaxes(-1, -2).astype(np.float32).tobytes())
 
 
-def _set_uniforms(program: moderngl.Program, view: _View) -> None:
+def _set_uniforms(program: Any, view: _View) -> None:
     """Set the uniforms that depend on the camera, and that the program has."""
     for name, value in view.uniforms.items():
         uniform = program.get(name, None)
