@@ -13,11 +13,12 @@ from drone_sim.message_text import near_names, shown
 from drone_sim.run.parameters import PaceParameters, Parameters
 from drone_sim.run.simulation import Simulation
 
+_MAX_CAUGHT_UP = 0.2  # s of a delay, so that a busy machine does not slow the flight
 _SLICE = 0.1  # s; long sleeps are split, so that a shutdown is noticed
 
 
 class Pacer:
-    """Rate of a loop, like rospy.Rate: late steps are counted, and a delay of up to one period is caught up."""
+    """Rate of a loop, like rospy.Rate: late steps are counted, and a delay of up to 0.2 s is caught up."""
 
     def __init__(
         self,
@@ -50,10 +51,10 @@ class Pacer:
         """Sleep until the next period begins, or until interrupted; return the lateness in seconds.
 
         Due times are multiples of the period after the start, so that late wake-ups and single long steps do not add
-        up. What exceeds a period is not caught up, nor is a delay that was excused.
+        up. What exceeds _MAX_CAUGHT_UP is not caught up, nor is a delay that was excused.
         """
         late = max(0.0, self._clock() - self._due) if self._period else 0.0
-        self._due += late if self._is_excused else max(0.0, late - self._period)
+        self._due += late if self._is_excused else max(0.0, late - _MAX_CAUGHT_UP)
         if self._is_excused:
             late, self._is_excused = 0.0, False
         self.is_late = late > 0
