@@ -14,6 +14,7 @@ import rospy
 from drone_sim.grading import plan as plans
 from drone_sim.ros.core.publishing import StepTime
 from drone_sim.ros.grading.simulator import scene_file
+from drone_sim.ros.node.node import Node
 from drone_sim.ros.vehicle import cameras, vehicle_topics
 from drone_sim.run import parameters
 
@@ -123,32 +124,66 @@ class Publisher:
         return self.subscribers.get(self.topic, 0)
 
 
-@pytest.mark.parametrize("every", [1, 2])
-def test_late_steps_leave_out_pictures_that_only_go_out_compressed(monkeypatch, new_simulation, fleet, every):
+@pytest.fixture(name="pictures")
+def _pictures(monkeypatch, new_simulation, fleet):
+    """Return a function that flies 16 steps, late or not, and returns those with a picture for who is heard."""
     monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
     monkeypatch.setattr(rospy, "Publisher", Publisher)
     monkeypatch.setattr(cameras, "Server", mock.Mock())
-    small = {"width": 16, "height": 12, "every": every}
-    simulation = fleet._simulation = new_simulation({"cameras": {"front": small}})
-    vehicle = simulation.drone
-    camera, own = vehicle.cameras["front"], vehicle.parameters
-    output = cameras.CameraOutput(own, camera, own.cameras["front"], None)
-    fleet._topics = {"drone": SimpleNamespace(cameras=[("front", output)])}
 
-    def pictures(is_late, *heard):
-        """Fly 16 steps that are late or not; return the steps with a picture."""
-        Publisher.subscribers = dict.fromkeys(heard, 1)
-        before = simulation.steps
-        for _ in range(16):
-            with fleet.hurrying() if is_late else contextlib.nullcontext():
-                simulation.step()
-            if camera.image is not None:
-                yield simulation.steps - before
+    def begin(every=1, **faults):
+        small = {"width": 16, "height": 12, "every": every}
+        simulation = fleet._simulation = new_simulation({"cameras": {"front": small}, "faults": faults})
+        vehicle = simulation.drone
+        camera, own = vehicle.cameras["front"], vehicle.parameters
+        output = cameras.CameraOutput(own, camera, own.cameras["front"], None)
+        fleet._topics = {"drone": SimpleNamespace(cameras=[("front", output)])}
 
-    raw, compressed = "drone/front", "drone/front/compressed"
-    all_of_them = list(range(every, 17, every))
-    assert list(pictures(False, compressed)) == all_of_them
-    assert list(pictures(True, compressed)) == all_of_them[3::4], "no more than three are left out in a row"
-    assert list(pictures(True, compressed, raw)) == all_of_them
-    assert list(pictures(True)) == []
-    assert list(pictures(False, compressed)) == all_of_them
+        def fly(is_late, *heard):
+            Publisher.subscribers = dict.fromkeys(heard, 1)
+            before, seen = simulation.steps, []
+            for _ in range(16):
+                with fleet.hurrying() if is_late else contextlib.nullcontext():
+                    simulation.step()
+                if camera.image is not None:
+                    seen.append(simulation.steps - before)
+            return seen
+
+        return fly
+
+    return begin
+
+
+RAW, COMPRESSED = "drone/front", "drone/front/compressed"
+
+
+@pytest.mark.parametrize("every", [1, 2])
+def test_late_steps_leave_out_pictures_that_only_go_out_compressed(pictures, every):
+    fly, all_of_them = pictures(every), list(range(every, 17, every))
+    assert fly(False, COMPRESSED) == all_of_them
+    assert fly(True, COMPRESSED) == all_of_them[3::4], "no more than three are left out in a row"
+    assert fly(True, COMPRESSED, RAW) == all_of_them
+    assert fly(True) == []
+    assert fly(False, COMPRESSED) == all_of_them
+
+
+def test_pictures_that_a_fault_delays_come_as_late_as_it_says_also_in_late_steps(pictures):
+    fly = pictures(images={"latency": 0.15})
+    assert fly(True, COMPRESSED) == list(range(4, 17))
+
+
+@pytest.mark.parametrize(("lockstep", "shown"), [(None, [3, 7, 11]), (mock.Mock(), list(range(12)))])
+def test_late_steps_leave_out_markers_but_three_times_in_a_row_at_most(lockstep, shown):
+    node, markers, seen = Node.__new__(Node), mock.Mock(), []
+    vars(node).update(_pacer=SimpleNamespace(is_late=True), _lockstep=lockstep, _rviz=[markers], _left_out=0)
+    vars(node).update(_parameters=SimpleNamespace(gui=False))
+    others = ("topics", "windows", "signals", "inspection", "editing", "interventions", "beat")
+    vars(node).update({f"_{other}": mock.Mock() for other in others})
+    for step in range(12):
+        markers.update.side_effect = lambda step=step: seen.append(step)
+        node._publish_displays()
+    assert seen == shown and node._editing.update.call_count == len(shown)
+    assert node._topics.publish_command.call_count == 12
+    node._pacer.is_late = False
+    node._publish_displays()
+    assert seen == [*shown, 11], "the step after"
