@@ -322,7 +322,7 @@ case "$command" in
     install_packages chromium
     setup
     make_venv "${ALL[@]}" requirements-web.txt
-    exec "$venv/bin/python" -m pytest test/web "$@" -p no:randomly ;; # all share one simulation
+    exec "$venv/bin/python" -m pytest test/web -n 2 --dist worksteal "$@" -p no:randomly ;; # those of a worker share one simulation
   lint) install_packages git; setup; lint ;;
   docs) install_packages python3-venv; make_docs ;;
   bench) setup; make_venv "${ALL[@]}"; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;

@@ -338,7 +338,7 @@ def test_an_interrupted_compilation_leaves_nothing(machine, how):
 def test_the_tests_in_a_browser_are_run_once(machine, status):
     (machine.checkout / "requirements-web.txt").write_text("playwright==1\n", encoding="utf-8")
     ended, _ = machine.run("test-web", "-k", "page", env={"STATUS": str(status)})
-    assert (ended, machine.asked("-m pytest test/web -k page")) == (status, 1)
+    assert (ended, machine.asked("-m pytest test/web -n 2 --dist worksteal -k page")) == (status, 1)
 
 
 MAKE = """#!/bin/bash

@@ -36,7 +36,8 @@ from drone_sim.ros.core.startup import give_way
 
 _PERIOD, _IDLE_PERIOD = 0.05, 0.1  # s between two updates of the scene, and without one
 _MARKER_DELAY = 0.008  # s, within which the markers of a step arrive after its frames
-_DRAG_PERIOD = 0.1  # s between two updates of dragged objects
+_HELD_PERIOD = 0.1  # s between two messages for held keys and dragged objects
+_SLEEP = 0.5  # s between two looks for the end of the node, without a browser
 # s between two requests to the master: while a browser waits for the simulator, with it, and without a browser.
 _SEARCH_PERIOD, _MASTER_PERIOD, _UNSEEN_PERIOD = 0.3, 2.0, 10.0
 
@@ -54,10 +55,10 @@ class Cockpit:
         self._scene: tuple[object, ...] = ()  # when the master was last asked
         self._state, self._meshes, self._lessons = SceneState(), MeshStore(), Lessons()
         self._commands = CommandPublisher()
-        held = HeldCommands(self._commands.send)
+        self._held = HeldCommands(self._commands.send)
         answers: dict[str, Answer] = {}  # filled below, before the socket serves browsers
         handlers = {"drag": self._drag, "push": self._push}
-        self._socket = PageSocket(held, answers, handlers, scene=self._state.since)
+        self._socket = PageSocket(self._held, answers, handlers, scene=self._state.since)
         store = ScriptStore(scripts)
         self._inspector = ScriptInspector(node, store, self._socket.tell)
         self._editing = SceneBackend(node, scripts, self._socket.tell_tree, lambda: self._commands.vehicle)
@@ -70,7 +71,7 @@ class Cockpit:
             answers.update(part.answers)
         server.begin(self._socket.serve, self._find)
         room = Classroom(self._panel.board, lambda: bool(self._socket.browsers), self._camera, editor.for_teachers)
-        for loop in (lambda: held.run(lambda: not rospy.is_shutdown()), self._hold_dragged, room.run):
+        for loop in (self._repeat_held, room.run):
             threading.Thread(target=loop, daemon=True).start()
         self._panel.pulse.start()
 
@@ -79,6 +80,7 @@ class Cockpit:
         logging.getLogger("rosout").addFilter(_is_not_repeated)
         MasterWatch(meanwhile="the page waits for it").start()
         while not rospy.is_shutdown():
+            self._socket.wait_for_browser(_SLEEP)
             began = time.monotonic()
             self._update(began)
             period = _IDLE_PERIOD if self._view is None else 0.8 * _PERIOD
@@ -88,10 +90,15 @@ class Cockpit:
                 time.sleep(_MARKER_DELAY)
         self._server.stop()
 
-    def _hold_dragged(self) -> None:
-        """Keep holding dragged objects; in a thread of its own, because `run` waits for the master's replies."""
+    def _repeat_held(self) -> None:
+        """Repeat the commands of held keys, and keep holding dragged objects.
+
+        In a thread of its own, because `run` waits for the master's replies.
+        """
         while not rospy.is_shutdown():
-            time.sleep(_DRAG_PERIOD)
+            time.sleep(_HELD_PERIOD)
+            self._socket.wait_for_browser(_SLEEP)
+            self._held.repeat()
             if (view := self._view) is not None:
                 view.keep(self._socket.browsers)
 

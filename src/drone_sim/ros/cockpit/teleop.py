@@ -14,7 +14,6 @@ from std_msgs.msg import Empty
 from drone_sim.ros.core.message_conversion import twist
 from drone_sim.ros.tools.commands import Command
 
-_PERIOD = 0.1  # s between two commands while keys are held
 _SILENCE = 1.5  # s without a message from a browser, after which its keys are released
 _FASTEST = 20.0  # m/s, rad/s; the page requests less
 REQUESTS = ("takeoff", "land", "home", "reset")
@@ -45,7 +44,10 @@ class HeldCommands:
         self.hold(browser, Command())
 
     def repeat(self) -> None:
-        """Send the present command again, and release the keys of browsers that have been silent for _SILENCE."""
+        """Send the present command again, and release the keys of browsers that have been silent for _SILENCE.
+
+        Must be called every 0.1 s while a browser is connected.
+        """
         with self._lock:
             now = self._clock()
             silent = [browser for browser, (_, at) in self._held.items() if now - at > _SILENCE]
@@ -59,12 +61,6 @@ class HeldCommands:
         if command != Command() or self._sent != Command():
             self._sent = command
             self._send(command)
-
-    def run(self, is_running: Callable[[], bool]) -> None:
-        """Call `repeat` every _PERIOD while `is_running` returns true."""
-        while is_running():
-            time.sleep(_PERIOD)
-            self.repeat()
 
 
 def read_command(given: Any) -> Command:

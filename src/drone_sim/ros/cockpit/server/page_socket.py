@@ -9,6 +9,7 @@ import json
 import logging
 import math
 import socket
+import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -54,6 +55,7 @@ class PageSocket:
         self._scene = scene
         self._numbers = itertools.count()
         self._queues: dict[int, tuple[asyncio.AbstractEventLoop, SendQueue]] = {}
+        self._has_browsers = threading.Event()
 
     async def serve(self, connection: ServerConnection) -> None:
         """Serve one browser until it disconnects."""
@@ -65,6 +67,7 @@ class PageSocket:
         query = urlsplit(connection.request.path).query if connection.request else ""
         only_watches = "watch" in parse_qs(query, keep_blank_values=True)
         self._queues[browser] = asyncio.get_running_loop(), queue
+        self._has_browsers.set()
         requests = asyncio.Queue[tuple[Answer, dict[str, Any]]](_MAX_REQUESTS)
         running = [asyncio.create_task(task) for task in (_send(queue, connection), _answer(requests, connection))]
         try:
@@ -74,6 +77,8 @@ class PageSocket:
             pass
         finally:
             del self._queues[browser]
+            if not self._queues:
+                self._has_browsers.clear()
             for task in running:
                 task.cancel()
             await asyncio.to_thread(self._held.release, browser)
@@ -84,6 +89,10 @@ class PageSocket:
     def browsers(self) -> set[int]:
         """The numbers of the connected browsers."""
         return set(self._queues)
+
+    def wait_for_browser(self, timeout: float) -> None:
+        """Return when a browser is connected, or after `timeout` (s)."""
+        self._has_browsers.wait(timeout)
 
     def show_scene(self) -> None:
         """Send the changes of the scene to each browser that has shown the last ones."""
