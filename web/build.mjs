@@ -1,5 +1,5 @@
-// Builds the page. Run `npm ci && npm run build` in web/. The script's first line has a digest of the sources, so that a
-// test can check that the script was built from them.
+// Build of the page: run `npm ci && npm run build` in web/. The first line of the built script has a digest of the sources,
+// by which a test checks that it was built from them.
 import { createHash } from "node:crypto";
 import { copyFileSync, readFileSync, readdirSync } from "node:fs";
 import { build } from "esbuild";
@@ -20,10 +20,10 @@ await build({
   bundle: true,
   minify: true,
   target: "es2020",
-  charset: "utf8", // as the server says
-  tsconfigRaw: {}, // esbuild would take `strict` from the settings of the check
+  charset: "utf8", // the charset that the server sends
+  tsconfigRaw: {}, // ignores tsconfig.json, whose `strict` is for the type check only
   banner: { js: `// built from web/src, sha256 ${digest()}` },
 });
 for (const name of readdirSync("src").filter((one) => /\.(html|css)$/.test(one))) copyFileSync(`src/${name}`, `${PAGE}/${name}`);
-copyFileSync("../src/drone_sim/grading/outputs/html/files/card.css", `${PAGE}/card.css`); // the report's
+copyFileSync("../src/drone_sim/grading/outputs/html/files/card.css", `${PAGE}/card.css`); // the styles of the report
 copyFileSync("node_modules/uplot/dist/uPlot.min.css", `${PAGE}/uPlot.min.css`);

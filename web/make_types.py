@@ -41,7 +41,7 @@ _CONTAINERS = {list: "Array<{}>", dict: "Record<{}, {}>", Mapping: "Record<{}, {
 
 
 def typescript(kind: Any) -> str:
-    """Return a type of Python in TypeScript, as JSON has its values. Raises KeyError for one that is not known here."""
+    """Return the TypeScript type of a Python type's values in JSON. Raise KeyError for an unknown type."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return typescript(arguments[0])
@@ -56,7 +56,7 @@ def typescript(kind: Any) -> str:
 
 
 def keys_of(record: Any) -> Iterator[tuple[str, Any, bool]]:
-    """Yield the keys of a record in JSON, their types, and whether each may be left out."""
+    """Yield (key, type, whether it is optional) for each key of a record in JSON."""
     if issubclass(record, BaseModel):
         for name, field in record.model_fields.items():
             yield field.alias or name, field.annotation, not field.is_required()
@@ -82,7 +82,7 @@ class _Elements(HTMLParser):
 
 
 def text() -> str:
-    """Return the content of the file."""
+    """Return the content of generated.d.ts."""
     elements = _Elements()
     elements.feed((WEB / "src/index.html").read_text(encoding="utf-8"))
     operations = " | ".join(record.__name__ for record in records.OPERATIONS)

@@ -1,4 +1,4 @@
-// What the node says of the panels, by part; whoever shows a part hears it at once, and when it changes.
+// The latest panel contents from the cockpit, by part. A listener is called at once, and whenever its part changes.
 export class Board {
   constructor() {
     this.parts = new Map();
@@ -6,7 +6,7 @@ export class Board {
     this.hearing = new Map();
   }
 
-  // A whole that is older than what has been told since does not overwrite it.
+  // Store the parts of a message and call their listeners. A part is skipped if a newer version of it has arrived before.
   take({ panel, version }) {
     for (const [part, content] of Object.entries(panel)) {
       if (version < (this.versions.get(part) ?? -1)) continue;
@@ -16,7 +16,7 @@ export class Board {
     }
   }
 
-  // Another node counts anew.
+  // Forget all version numbers, because a restarted cockpit counts from the beginning.
   begin() {
     this.versions.clear();
   }

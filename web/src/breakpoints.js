@@ -1,13 +1,13 @@
-// Breakpoints: a click beside a line, or F9. They go with their lines while the text changes.
+// The editor's breakpoints, toggled by F9 or by a click beside a line. They move with their lines when the text changes.
 import { EditorView, Decoration, GutterMarker, gutter, keymap, lineNumbers } from "@codemirror/view";
 import { RangeSet, StateEffect, StateField } from "@codemirror/state";
 
-// A line at which nothing happens, or nothing but that a function is made.
+// A line without a breakpoint: empty, a comment, a decorator, a docstring, the head of a definition, else, try, finally or end.
 const NOTHING = /^\s*(?:(?:#|--|@|(?:async\s+)?def\b|class\b|(?:local\s+)?function\b|"""|''').*|end|else:?|try:|finally:)?\s*$/;
 
-/** @type {import("@codemirror/state").StateEffectType<number>} the beginning of a line */
+/** @type {import("@codemirror/state").StateEffectType<number>} the position of a line's first character */
 const toggled = StateEffect.define({ map: (at, changes) => changes.mapPos(at) });
-/** @type {import("@codemirror/state").StateEffectType<number>} the number of a line, 0 for none */
+/** @type {import("@codemirror/state").StateEffectType<number>} a line number, 0 for none */
 const pausedAt = StateEffect.define();
 
 class Marker extends GutterMarker {
@@ -19,22 +19,22 @@ class Marker extends GutterMarker {
 }
 const marker = new Marker();
 marker.elementClass = "cm-breakpoint";
-const spacer = new Marker(); // as wide
+const spacer = new Marker(); // reserves the gutter's width
 
 const breakpoints = StateField.define({
   create: () => RangeSet.empty,
   update(set, transaction) {
     set = set.map(transaction.changes);
     for (const { value: at } of transaction.effects.filter((one) => one.is(toggled))) {
-      let there = false;
-      set.between(at, at, (from) => void (there = from === at));
-      set = there ? set.update({ filter: (from) => from !== at }) : set.update({ add: [marker.range(at)], sort: true });
+      let isSet = false;
+      set.between(at, at, (from) => void (isSet = from === at));
+      set = isSet ? set.update({ filter: (from) => from !== at }) : set.update({ add: [marker.range(at)], sort: true });
     }
     return transaction.docChanged ? onLines(set, transaction.state.doc) : set;
   },
 });
 
-// Each at the beginning of a line, and one for each line.
+// Return the breakpoints moved to the beginnings of their lines, at most one for each line.
 function onLines(set, doc) {
   const starts = new Set();
   for (let at = set.iter(); at.value; at.next()) starts.add(doc.lineAt(at.from).from);
@@ -47,15 +47,15 @@ const paused = StateField.define({
     set = set.map(transaction.changes);
     for (const { value: line } of transaction.effects.filter((one) => one.is(pausedAt))) {
       const { doc } = transaction.state;
-      const isThere = line >= 1 && line <= doc.lines;
-      set = isThere ? Decoration.set([Decoration.line({ class: "cm-paused" }).range(doc.line(line).from)]) : Decoration.none;
+      const exists = line >= 1 && line <= doc.lines;
+      set = exists ? Decoration.set([Decoration.line({ class: "cm-paused" }).range(doc.line(line).from)]) : Decoration.none;
     }
     return set;
   },
   provide: (field) => EditorView.decorations.from(field),
 });
 
-// A line at which nothing happens is never reached: the next one that does something has it.
+// Return the start of line `number`, or of the next line that can be reached, for a breakpoint.
 function lineFrom(doc, number) {
   let line = doc.line(number);
   while (NOTHING.test(line.text) && line.number < doc.lines) line = doc.line(line.number + 1);
@@ -71,15 +71,15 @@ function toggle(view, at) {
 }
 
 export function linesOf(state) {
-  const found = [];
+  const lines = [];
   const set = state.field(breakpoints, false);
-  for (let at = set?.iter(); at?.value; at.next()) found.push(state.doc.lineAt(at.from).number);
-  return found;
+  for (let at = set?.iter(); at?.value; at.next()) lines.push(state.doc.lineAt(at.from).number);
+  return lines;
 }
 
 export const showPaused = (view, line) => view.dispatch({ effects: pausedAt.of(line) });
 
-// `onChange` hears that there are others now.
+// Return the editor extensions for breakpoints; `onChange()` is called when the set of breakpoints changes.
 export function breakpointGutter(onChange) {
   const click = { mousedown: (view, line, event) => event.button === 0 && toggle(view, line.from) };
   return [

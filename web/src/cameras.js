@@ -1,4 +1,4 @@
-// The list of cameras: each is switched on by itself, and its picture floats over the scene.
+// The list of cameras, with a checkbox for each. The picture of a camera that is on floats over the scene.
 import { at, create } from "./dom.js";
 
 export class Cameras {

@@ -1,4 +1,4 @@
-// The page: the scene, held keys, the script in an editor with its text, panels, and what floats over the scene.
+// The main module of the page: creates scene, editor, lesson, panels, windows and manual control, and connects them.
 import { Teleop, nameKeys } from "./teleop.js";
 import { Desk } from "./desk.js";
 import { isWatching } from "./course.js";
@@ -30,17 +30,17 @@ function show({ lists, script, of, question }) {
 }
 
 function offer({ groups, lessons, folder }) {
-  const made = groups.map(({ name, scripts }) => {
+  const optionGroups = groups.map(({ name, scripts }) => {
     const group = document.createElement("optgroup");
     group.label = name === "mine" ? `mine: ${folder}` : name;
     group.append(...scripts.map((one) => new Option(one, one)));
     return group;
   });
-  at("script").replaceChildren(...made);
+  at("script").replaceChildren(...optionGroups);
   lesson.offer(lessons);
 }
 
-// A question above the text, with an answer for each button.
+// Show a question above the script, with a button for each answer; null hides it.
 function ask(question) {
   at("question").hidden = !question;
   if (!question) return;
@@ -56,7 +56,7 @@ function ask(question) {
 const tell = (error) => store.say("trouble", error.message);
 
 /** @param {wire.Told} message */
-function told(message) {
+function handleMessage(message) {
   panels.told(message);
   if (message.windows) windows.show(message.windows);
   if (message.pictures) windows.showPictures(message.pictures);
@@ -65,15 +65,15 @@ function told(message) {
   if (message.variables !== undefined) desk.take(message.variables);
 }
 
-// A message of bytes is a line of JSON, and what belongs to it.
+// Handle a binary message: a header, which is a line of JSON, and the data of a scene or a camera picture.
 /** @param {ArrayBuffer} data */
-function took(data) {
+function handleBytes(data) {
   const bytes = new Uint8Array(data);
   const end = bytes.indexOf(LINE_FEED);
-  const said = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
-  const rest = bytes.subarray(end + 1);
-  if ("scene" in said) scene.take(said, rest);
-  else windows.picture(said, rest);
+  const header = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
+  const content = bytes.subarray(end + 1);
+  if ("scene" in header) scene.take(header, content);
+  else windows.picture(header, content);
 }
 
 const run = () => fly(true);
@@ -108,13 +108,13 @@ const beginTutorial = () => {
   const text = lesson.all.find((one) => !one.task && one.script);
   if (text) open(text.script);
 };
-// The next Tab of who uses keys alone goes on in the text.
+// Start a task. After a start by keyboard, the focus moves to the task's text, so that the next Tab continues there.
 const beginTask = async (name, byKey) => {
   await lesson.take(name);
   if (byKey) at("lesson-body").focus();
 };
 const scene = new Scene(at("scene"), { say: (message) => socket.say(message) });
-window.scene = scene; // for who looks into it from the browser's console, and for tests
+window.scene = scene; // for debugging in the browser's console, and for tests
 const replay = new Replay(scene, store);
 const panels = new Panels({
   store,
@@ -135,11 +135,11 @@ const lesson = new Lesson(
   { open, put, run, save: () => scripts.save(), replay: (...flight) => replay.open(...flight).catch(tell) },
 );
 const socket = new PageSocket(store, {
-  tell: told,
-  picture: took,
+  tell: handleMessage,
+  picture: handleBytes,
   open: () => {
     panels.connected().catch(tell);
-    socket.ask("windows").then(told, () => {}); // told anyway, once the node is ready
+    socket.ask("windows").then(handleMessage, () => {}); // after an error, the cockpit sends them once it is ready
     scripts.connected().catch(tell);
     desk.connected().catch(tell);
     lesson.connected();
@@ -174,8 +174,8 @@ window.addEventListener("keydown", (event) => {
 });
 window.addEventListener("beforeunload", (event) => scripts.drafts.isSafe(scripts.is.script) || event.preventDefault());
 split(at("beside"), "--editor", "x", 300, () => Math.max(300, window.innerWidth - 320), (event) => window.innerWidth - event.clientX);
-const above = () => at("lesson-body").getBoundingClientRect().top;
-split(at("under"), "--lesson", "y", 60, () => window.innerHeight - 260, (event) => event.clientY - above());
+const lessonTop = () => at("lesson-body").getBoundingClientRect().top;
+split(at("under"), "--lesson", "y", 60, () => window.innerHeight - 260, (event) => event.clientY - lessonTop());
 teleop.listenTo(window);
 nameKeys(document.querySelectorAll(".flight-keys kbd"));
 teleop.stick(at("left"), "wz", "vz");

@@ -1,5 +1,5 @@
-// What may be written where the cursor is, and what a name means: from the declarations of the API, as the node lists
-// them, and from the names of the scene that flies.
+// Completion and help on hovering. The names are those of the API, as the cockpit lists them, and the objects and
+// parameters of the running scene.
 import { completeAnyWord, snippetCompletion } from "@codemirror/autocomplete";
 import { EditorState } from "@codemirror/state";
 import { hoverTooltip } from "@codemirror/view";
@@ -14,11 +14,11 @@ const PHASES = {
 const SELF = /\bself\.([A-Za-z_]\w*)/g;
 const IN_CALL = /\bsim\w*[.\w]*\s*\([^()]*$/;
 const OF_PARAMETERS = /param/i;
-const LONGEST_LINE = 1000; // characters before the cursor that are looked at
+const LONGEST_LINE = 1000; // characters; longer lines get neither completion nor help
 
-const made = (tag, className, textContent) => Object.assign(document.createElement(tag), { className, textContent });
+const createElement = (tag, className, textContent) => Object.assign(document.createElement(tag), { className, textContent });
 
-// Returns where the text begins that stands open before the cursor, -1 outside of strings and in comments.
+// Return the index at which a string begins that is still open at the end of `line`, -1 outside strings and in comments.
 function openString(line, comment) {
   let quote = "";
   let from = -1;
@@ -35,11 +35,11 @@ function openString(line, comment) {
   return quote ? from : -1;
 }
 
-// The API, asked for once, and the names of the scene, which may change.
+// The known names: those of the API, requested once, and those of the scene, which may change.
 export class Known {
   constructor() {
-    this.modules = new Map(); // of functions, by name
-    this.flat = new Map(); // of names in 3.x
+    this.modules = new Map(); // function entries by function name, by module name
+    this.flat = new Map(); // entries by the flat names of CoppeliaSim 3, such as simGetObjectPosition
     this.constants = new Map();
     /** @type {wire.Questions["inspect"][1]} */
     this.names = { objects: [], parameters: [] };
@@ -47,10 +47,10 @@ export class Known {
 
   take({ functions, constants }) {
     for (const [module, name, flat, generations, given, sentence, page, isIgnored] of functions) {
-      const one = { label: name, shown: `${module}.${name}(${given})`, flat, generations, given, sentence, page, isIgnored };
+      const entry = { label: name, shown: `${module}.${name}(${given})`, flat, generations, given, sentence, page, isIgnored };
       if (!this.modules.has(module)) this.modules.set(module, new Map());
-      this.modules.get(module).set(name, one);
-      this.flat.set(flat, { ...one, label: flat, shown: `${flat}(${given})` });
+      this.modules.get(module).set(name, entry);
+      this.flat.set(flat, { ...entry, label: flat, shown: `${flat}(${given})` });
     }
     for (const [name, value] of Object.entries(constants)) {
       const sentence = `A constant of CoppeliaSim's: ${value}.`;
@@ -59,7 +59,7 @@ export class Known {
     }
   }
 
-  // What a name means, in a module or by itself.
+  // Return the entry of a name in `module`, or of a flat name or callback if `module` is undefined; undefined if unknown.
   find(module, name) {
     if (!module) return this.flat.get(name) ?? this.phase(name);
     return this.modules.get(module)?.get(name) ?? (module === "sim" ? this.constants.get(name) : undefined);
@@ -71,22 +71,22 @@ export class Known {
   }
 }
 
-// Returns what is shown of a name: how it is called, one sentence, and where there is more.
+// Return the help card of an entry: the call, one sentence, and a link to the manual.
 function card({ shown, sentence, page }) {
-  const dom = made("div", "api-card", "");
-  dom.append(made("code", "", shown), made("p", "", sentence));
+  const dom = createElement("div", "api-card", "");
+  dom.append(createElement("code", "", shown), createElement("p", "", sentence));
   if (page) {
-    const link = made("a", "", "CoppeliaSim's manual");
+    const link = createElement("a", "", "CoppeliaSim's manual");
     Object.assign(link, { href: page, target: "_blank", rel: "noopener noreferrer" });
     dom.append(link);
   }
   return dom;
 }
 
-function option(one, type) {
-  const boost = one.generations === undefined ? -1 : one.isIgnored ? -2 : one.generations.includes("5") ? 1 : 0;
-  const detail = one.given === undefined ? String(one.value ?? "") : `(${one.given})`;
-  return { label: one.label, type, detail, boost, info: () => card(one) };
+function option(entry, type) {
+  const boost = entry.generations === undefined ? -1 : entry.isIgnored ? -2 : entry.generations.includes("5") ? 1 : 0;
+  const detail = entry.given === undefined ? String(entry.value ?? "") : `(${entry.given})`;
+  return { label: entry.label, type, detail, boost, info: () => card(entry) };
 }
 
 const phases = (isLua) =>
@@ -98,19 +98,19 @@ const phases = (isLua) =>
   });
 
 function moduleOptions(known, module) {
-  const functions = [...(known.modules.get(module)?.values() ?? [])].map((one) => option(one, "function"));
-  const constants = module === "sim" ? [...known.constants.values()].map((one) => option(one, "constant")) : [];
+  const functions = [...(known.modules.get(module)?.values() ?? [])].map((entry) => option(entry, "function"));
+  const constants = module === "sim" ? [...known.constants.values()].map((entry) => option(entry, "constant")) : [];
   return [...functions, ...constants];
 }
 
-function ofSelf(doc, written) {
+function selfOptions(doc, written) {
   const names = new Set([...doc.matchAll(SELF)].map((one) => one[1]));
-  if ([...doc.matchAll(new RegExp(`\\bself\\.${written}\\b`, "g"))].length < 2) names.delete(written); // only here
+  if ([...doc.matchAll(new RegExp(`\\bself\\.${written}\\b`, "g"))].length < 2) names.delete(written); // its only match is the word at the cursor
   return [...names].map((label) => ({ label, type: "property" }));
 }
 
-// Names of objects and parameters, within a string: where a function of the API is called, or where one is begun.
-function inString(known, line, start, at, explicit) {
+// Complete names of objects or parameters inside a string: on request, in a call of the API, or once 3 characters match one.
+function stringOptions(known, line, start, at, explicit) {
   const before = line.slice(0, start - 1);
   const written = line.slice(start);
   const isParameter = OF_PARAMETERS.test(before.slice(before.lastIndexOf("sim")));
@@ -129,11 +129,11 @@ function source(known, isLua) {
     const line = whole.text.slice(0, pos - whole.from);
     const comment = isLua ? "--" : "#";
     const start = openString(line, comment);
-    if (start >= 0) return inString(known, line, start, pos, explicit);
+    if (start >= 0) return stringOptions(known, line, start, pos, explicit);
     if (openString(`${line}"`, comment) < 0) return null; // in a comment
     const dotted = /(?<![\w.])(self|sim\w*)\.(\w*)$/.exec(line);
     if (dotted) {
-      const options = dotted[1] === "self" ? ofSelf(state.doc.toString(), dotted[2]) : moduleOptions(known, dotted[1]);
+      const options = dotted[1] === "self" ? selfOptions(state.doc.toString(), dotted[2]) : moduleOptions(known, dotted[1]);
       return { from: pos - dotted[2].length, options, validFor: /^\w*$/ };
     }
     const word = /(?<![\w.:])[A-Za-z_]\w*$/.exec(line);
@@ -145,7 +145,7 @@ function source(known, isLua) {
   };
 }
 
-// After `def ` or `function ` the name alone is missing.
+// Return the callbacks; after `def ` or `function `, each inserts only its name and parentheses.
 function phasesFor(line, word, isLua) {
   const isNamed = /\b(?:def|function)\s+$/.test(line.slice(0, word.index));
   return isNamed ? phases(isLua).map(({ label, type, info, boost }) => ({ label, type, info, boost, apply: isLua ? `${label}()` : `${label}():` })) : phases(isLua);
@@ -155,17 +155,17 @@ function hover(known) {
   return hoverTooltip((view, pos) => {
     const { from, text } = view.state.doc.lineAt(pos);
     if (text.length > LONGEST_LINE) return null;
-    for (const one of text.matchAll(/(?:(?<![\w.])(sim\w*)\s*\.\s*)?([A-Za-z_]\w*)/g)) {
-      const end = from + one.index + one[0].length;
-      const start = end - one[2].length;
-      const found = start <= pos && pos <= end && known.find(one[1], one[2]);
-      if (found) return { pos: start, end, above: true, create: () => ({ dom: card(found) }) };
+    for (const match of text.matchAll(/(?:(?<![\w.])(sim\w*)\s*\.\s*)?([A-Za-z_]\w*)/g)) {
+      const end = from + match.index + match[0].length;
+      const start = end - match[2].length;
+      const entry = start <= pos && pos <= end && known.find(match[1], match[2]);
+      if (entry) return { pos: start, end, above: true, create: () => ({ dom: card(entry) }) };
     }
     return null;
   });
 }
 
-// What the editor needs for a language.
+// Return the editor extensions for completion and help in Lua or Python.
 export function completion(known, isLua) {
   const data = (autocomplete) => EditorState.languageData.of(() => [{ autocomplete }]);
   return [data(source(known, isLua)), isLua ? data(completeAnyWord) : [], hover(known)];

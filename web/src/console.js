@@ -1,6 +1,6 @@
-// What the simulation says, and its script with it, under the script: counts instead of repeats, lines to click.
+// The list of messages from the simulation and its script. Repeats are counted, and places in scripts are links.
 const MOST = 200; // lines
-const RECENT = 5; // lines among which one is sought that says the same
+const RECENT = 5; // last lines; a repeat of one of these is counted, not added
 const PLACE = /(\/[^\s:]+\.(?:py|lua)):(\d+)/;
 const OF_TIME = /^(?:warning: step late by|(?:paused|stopped\b[^:]*): \/clock)/;
 
@@ -9,11 +9,11 @@ export class Console {
   constructor(list, goTo) {
     this.list = list;
     this.goTo = goTo;
-    this.current = ""; // the line that is shown as long as it is true
+    this.current = ""; // the line that showCurrent has shown
   }
 
   add(line) {
-    const same = line.startsWith("warning: ") ? line.replace(/\d+/g, "0") : line; // "step late by 80 ms (3 so far)"
+    const same = line.startsWith("warning: ") ? line.replace(/\d+/g, "0") : line; // ignores the numbers in "step late by 80 ms (3 so far)"
     const follows = this.list.scrollTop + this.list.clientHeight >= this.list.scrollHeight - 20;
     let item = [...this.list.children].slice(-RECENT).find((one) => one.same === same);
     if (!item) {
@@ -28,7 +28,7 @@ export class Console {
     if (follows) this.list.scrollTop = this.list.scrollHeight;
   }
 
-  // Shows a line only as long as it is true; "" ends it. Returns whether there was none before.
+  // Show a line about a condition that still holds, in place of the one before; "" removes it. Return whether one appeared.
   showCurrent(line) {
     const before = this.current;
     if (line === before) return false;
@@ -38,21 +38,21 @@ export class Console {
     return !before;
   }
 
-  // The place of an error is a button that goes there.
+  // Return the parts of a line; a place in a script becomes a button that goes there.
   parts(line) {
-    const found = PLACE.exec(line);
-    if (!found) return [line];
-    const [place, file, number] = found;
+    const match = PLACE.exec(line);
+    if (!match) return [line];
+    const [place, file, number] = match;
     const button = Object.assign(document.createElement("button"), {
       textContent: `${file.split("/").pop()}:${number}`,
       title: `Go to line ${number} of ${file}`,
       className: "place",
       onclick: () => this.goTo(file, Number(number)),
     });
-    return [line.slice(0, found.index), button, line.slice(found.index + place.length)];
+    return [line.slice(0, match.index), button, line.slice(match.index + place.length)];
   }
 
-  // Shows what is said of lateness and clocks, or not.
+  // Show or hide the messages about late steps and the clock.
   showTime(on) {
     this.list.classList.toggle("without-time", !on);
   }
@@ -61,7 +61,7 @@ export class Console {
     this.list.replaceChildren();
   }
 
-  // Begins with nothing, for another flight.
+  // Empty the list before another flight.
   begin() {
     this.clear();
     this.current = "";

@@ -1,14 +1,14 @@
-// The page's part in a course: what a teacher tells all students, and the page on which a teacher only watches.
+// The page's functions for a course: the teacher's message to all students, and the page on which a teacher only watches.
 import { at } from "./dom.js";
 import { keep, kept } from "./storage.js";
 
-const PUT_AWAY = "to-all"; // the time of the last message that was put away
+const PUT_AWAY = "to-all"; // the storage key of the time of the last message that the user closed
 
-// The cockpit refuses everything that such a page would change.
+// Whether this page only watches (`?watch`): the cockpit refuses all its changes.
 export const isWatching = new URLSearchParams(location.search).has("watch");
 
 export class ToAll {
-  // `take(lesson)` begins a task, `load(scene)` flies in a scene of the list.
+  // `take(lesson)` starts a task, `load(scene)` loads a scene of the list.
   /** @param {import("./board.js").Board} board */
   constructor(board, take, load) {
     const [words, task, scene, close] = at("to-all").children;

@@ -1,4 +1,4 @@
-// What stands around the editor: the menu of files, and below it console and variables.
+// The parts around the editor: the file menu, and the console and the variables below the script.
 import { Console } from "./console.js";
 import { Known } from "./completion.js";
 import { at } from "./dom.js";
@@ -7,11 +7,11 @@ import { split } from "./split.js";
 import { consoleWords, pauseOf } from "./state/words.js";
 import { Variables } from "./variables.js";
 
-const AGAIN = 1000; // ms between two words to the node on what is looked at
-const page = Math.random().toString(36).slice(2); // this page's name
+const AGAIN = 1000; // ms between two "inspect" requests
+const page = Math.random().toString(36).slice(2); // a random name for this page in "inspect" requests
 
 export class Desk {
-  // `socket` answers questions; `show` shows questions, as the page's.
+  // `show` is the page's show(): it displays questions to the user.
   /**
    * @param {import("./socket.js").PageSocket} socket
    * @param {import("./state/store.js").Store} store
@@ -23,7 +23,7 @@ export class Desk {
     this.known = new Known();
     this.console = new Console(at("console"), (file, line) => this.goTo(file, line));
     this.variables = new Variables(at("variables-of"), at("variables-body"));
-    this.pause = ""; // the one that was shown last
+    this.pause = ""; // the pause that was shown last, as file:line:time
     at("late").onchange = () => this.console.showTime(at("late").checked);
     at("clear").onclick = () => this.console.clear();
     at("live").onchange = () => this.look();
@@ -34,7 +34,7 @@ export class Desk {
     setInterval(() => this.look(), AGAIN);
   }
 
-  // Takes the scripts, which need this one's `known` to be made.
+  // Set the scripts and create the file menu. The constructor cannot, because Scripts needs `known`.
   serve(scripts) {
     this.scripts = scripts;
     const item = (name) => [name, at(/** @type {"file-as"} */ (`file-${name}`))];
@@ -78,14 +78,14 @@ export class Desk {
     this.look();
   }
 
-  // ---- between the node and the editor
+  // ---- between the cockpit and the editor
 
   async connected() {
     if (!this.known.modules.size) this.known.take(await this.socket.ask("api"));
     await this.look();
   }
 
-  // Says what is looked at, and hears which names there are.
+  // Report the breakpoints and whether the variables are visible, and get the names for completion.
   async look() {
     if (!this.socket.open || !this.scripts) return;
     const { breakpoints } = this.scripts.editor;
@@ -95,14 +95,14 @@ export class Desk {
     this.known.names = { objects, parameters };
   }
 
-  // Shows what the scripts hold; null if the simulation does not tell it any more.
+  // Show the variables of the scripts; null means that the simulation no longer sends them.
   take(state) {
     if (state) this.variables.take(state, this.scripts.is.file);
     else this.variables.clear();
     this.store.take("variables", state);
   }
 
-  // Shows what keeps a script from flying, and the line of a breakpoint when the flight pauses there.
+  // Show the error that keeps a script from starting, and the line of a breakpoint when the flight pauses there.
   follow(now) {
     if (this.console.showCurrent(consoleWords(now))) this.choose(at("tab-console"));
     const pause = pauseOf(now);
@@ -113,7 +113,7 @@ export class Desk {
     if (!pause) return;
     this.choose(at("tab-variables"));
     const isOurs = pause.file === this.scripts.is.file || Object.keys(this.scripts.editor.breakpoints).length > 0;
-    if (isOurs) this.goTo(pause.file, pause.line); // or another browser has set it
+    if (isOurs) this.goTo(pause.file, pause.line); // otherwise another browser has set the breakpoint
   }
 
   goTo(file, line) {

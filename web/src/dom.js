@@ -1,4 +1,4 @@
-// Elements, and the pictures on buttons.
+// Functions that find and create elements, and the icons of buttons (SVG paths in a 20 x 20 box; "!" marks a filled one).
 const ICONS = {
   home: "M3 9.5 10 3.5l7 6M5 8.5V16h3.6v-4.2h2.8V16H15V8.5",
   play: "!M6 4v12l10-6z",
@@ -64,7 +64,7 @@ export const at = (id) => /** @type {PageElements[Id]} */ (document.getElementBy
 /**
  * @template {keyof HTMLElementTagNameMap} Tag
  * @param {Tag} tag
- * @param {Record<string, any>} properties of the element, of any type, or attributes
+ * @param {Record<string, any>} properties of the element, of any type; "role" and names with "-" are attributes
  * @param {(Node | string)[]} children
  */
 export function create(tag, properties = {}, ...children) {
@@ -89,7 +89,7 @@ export function icon(name) {
   return svg;
 }
 
-// A button with a picture alone: its name is what a pointer, and a screen reader, is told.
+// Return a button that has only an icon; `name` is its tooltip and its label for screen readers.
 export function iconButton(picture, name, onclick) {
   return create("button", { className: "plain", title: name, "aria-label": name, type: "button", onclick }, icon(picture));
 }
@@ -100,5 +100,5 @@ export function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(address), 1000);
 }
 
-// A time that a file's name can have.
+// Return the time (UTC) in a form that file names allow.
 export const stamp = () => new Date().toISOString().slice(0, 19).replace(/[T:]/g, "-");

@@ -1,5 +1,5 @@
-// Texts that the node has not saved yet: { text, version } by script. The browser stores them, so that neither a node
-// that ends nor a reload loses them. Drafts that another tab writes later are not this page's.
+// Texts that the cockpit has not saved yet: { text, version, name? } by script. The browser stores them, so that neither
+// the end of the cockpit nor a reload loses them. Drafts that another tab stores later are not visible to this page.
 import { forget, isStored, keep, kept, keysBelow } from "./storage.js";
 
 const PREFIX = "draft/";
@@ -31,7 +31,7 @@ export class Drafts {
     forget(PREFIX + script);
   }
 
-  // Whether the page may be closed: there is no draft, or the browser has stored it.
+  // Return whether the page may be closed: there is no draft of the script, or the browser has stored it.
   isSafe(script) {
     return !this.drafts.has(script) || isStored(PREFIX + script, this.drafts.get(script));
   }

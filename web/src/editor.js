@@ -1,5 +1,5 @@
-// The text of one script at a time; each keeps its own cursor, its own history of changes, and its breakpoints. The
-// browser remembers the cursor and what was in sight.
+// The code editor. It shows one script at a time, and keeps cursor, undo history and breakpoints of each. The browser
+// stores the cursor and the first visible line.
 import { basicSetup } from "codemirror";
 import { indentWithTab } from "@codemirror/commands";
 import { EditorState, Prec } from "@codemirror/state";
@@ -15,10 +15,10 @@ import { numberAt } from "./numbers.js";
 import { keep, kept } from "./storage.js";
 
 const QUIET = 500; // ms without a key before the text is checked
-const PLACES = "places"; // the key of cursors and first visible lines
-const PLACED = 300; // ms without a move after which the cursor is remembered
-const MOST_PLACES = 100; // scripts whose cursors are remembered
-const FLOWN = "flight"; // the source of a failure while it flew
+const PLACES = "places"; // the storage key of cursors and first visible lines
+const PLACED = 300; // ms without a move after which the cursor is stored
+const MOST_PLACES = 100; // scripts whose cursors are stored
+const FLOWN = "flight"; // the diagnostic source of runtime errors
 
 export const colors = HighlightStyle.define([
   { tag: [tags.keyword, tags.operatorKeyword, tags.modifier], color: "var(--code-keyword)" },
@@ -30,7 +30,7 @@ export const colors = HighlightStyle.define([
   { tag: tags.invalid, color: "var(--bad)" },
 ]);
 
-// Puts another text there, as one change; what is the same stays, and the cursor with it. `annotations` are the change's.
+// Replace the text in one change with `annotations`. Equal text at both ends stays, and so does the cursor in it.
 /**
  * @param {EditorView} view
  * @param {string} text
@@ -46,7 +46,7 @@ export function fillWith(view, text, annotations) {
   view.dispatch({ changes: { from, to: before.length - end, insert: text.slice(from, text.length - end) }, annotations });
 }
 
-// Selects the number under the pointer as a whole; a double click selects words otherwise, which end at a point.
+// Select the whole number under the pointer, and return whether there is one. By default, a double click stops at its point.
 function selectNumber(view, event) {
   const position = view.posAtCoords({ x: event.clientX, y: event.clientY });
   if (position === null) return false;
@@ -59,10 +59,10 @@ function selectNumber(view, event) {
 export const isLua = (script) => script.endsWith(".lua");
 
 export class Editor {
-  // `on` has change(), run(), check(text, isLua), which answers with findings, checked(findings), moved(line), which hears
-  // where the line of a failure is now, 0 if it was written anew, and breakpoints(); `known` is the API.
+  // `on` has the callbacks change(), run(), breakpoints(), check(text, isLua), which returns findings, checked(findings), and
+  // moved(line) with the new line of a failure, 0 if the user has edited that line. `known` has the names for completion.
   constructor(parent, on, known) {
-    this.states = new Map(); // of scripts that have been open, by name
+    this.states = new Map(); // the editor states of scripts that have been open, by name
     this.script = "";
     this.on = on;
     this.known = known;
@@ -73,7 +73,7 @@ export class Editor {
       this.follow(update);
       if (!this.filling) on.change();
     });
-    const run = { key: "Mod-Enter", run: () => (on.run(), true) }; // else it would begin a line, too
+    const run = { key: "Mod-Enter", run: () => (on.run(), true) }; // `true`, or the key would also insert a line
     this.common = [
       Prec.highest(keymap.of([run])),
       breakpointGutter(() => on.breakpoints()),
@@ -99,13 +99,13 @@ export class Editor {
     return this.view.state.doc.toString();
   }
 
-  // Shows a script where it was left; its text is what the disk has now.
+  // Show a script with `text` from the disk, at the cursor and the scroll position where the user left it.
   show(script, text) {
     this.leave();
     this.script = script;
     const known = this.states.get(script);
     this.view.setState(known?.state ?? this.begin(script, text));
-    this.view.scrollDOM.scrollTo(0, 0); // else it would stay where the script before was scrolled to
+    this.view.scrollDOM.scrollTo(0, 0); // otherwise the scroll position of the previous script would stay
     this.fill(text);
     if (known) this.view.dispatch({ effects: known.scroll });
     else this.restorePlace();
@@ -130,7 +130,7 @@ export class Editor {
     if (this.script === script) this.script = "";
   }
 
-  // Puts another text there, as one change that can be undone; what is the same stays, and the cursor with it.
+  // Replace the text in one change that can be undone, without on.change(). Equal text stays, and so does the cursor in it.
   fill(text) {
     if (text === this.text) return;
     this.filling = true;
@@ -145,14 +145,14 @@ export class Editor {
     this.view.focus();
   }
 
-  // ---- where one was
+  // ---- cursor and scroll position
 
   placeSoon() {
     clearTimeout(this.placing);
     this.placing = setTimeout(() => this.keepPlace(), PLACED);
   }
 
-  // Remembers cursor and first visible line of the script.
+  // Store cursor and first visible line of the script in the browser.
   keepPlace() {
     clearTimeout(this.placing);
     if (!this.script) return;
@@ -171,23 +171,23 @@ export class Editor {
     const within = (position) => Math.min(Math.max(0, position), doc.length);
     const top = doc.line(Math.min(Math.max(1, place.top), doc.lines)).from;
     const selection = { anchor: within(place.anchor), head: within(place.head) };
-    const effects = top ? EditorView.scrollIntoView(top, { y: "start", yMargin: 0 }) : []; // above the first line is a margin
+    const effects = top ? EditorView.scrollIntoView(top, { y: "start", yMargin: 0 }) : []; // scrolling to line 1 would hide the margin above it
     this.view.dispatch({ selection, effects });
   }
 
-  // ---- what is wrong
+  // ---- diagnostics
 
   get diagnostics() {
-    const found = [];
-    forEachDiagnostic(this.view.state, (one, from, to) => found.push({ ...one, from, to }));
-    return found;
+    const diagnostics = [];
+    forEachDiagnostic(this.view.state, (one, from, to) => diagnostics.push({ ...one, from, to }));
+    return diagnostics;
   }
 
   put(diagnostics) {
     this.view.dispatch(setDiagnostics(this.view.state, diagnostics));
   }
 
-  // Tells where the line of a failure is after a change; a line that was written anew has not failed.
+  // Report the new line of a failure after a change, 0 if the user has edited that line: it is not the line that failed.
   follow({ startState, state, changes }) {
     forEachDiagnostic(startState, (one, from, to) => {
       if (one.source !== FLOWN) return;
@@ -196,16 +196,16 @@ export class Editor {
     });
   }
 
-  // Shows a failure at its line, or none.
+  // Mark the line of a failure and scroll to it; null removes the mark.
   mark(failure) {
     const { doc } = this.view.state;
-    const found = this.diagnostics.filter((one) => one.source !== FLOWN);
+    const diagnostics = this.diagnostics.filter((one) => one.source !== FLOWN);
     if (failure && failure.line >= 1 && failure.line <= doc.lines) {
       const { from, to } = doc.line(failure.line);
-      found.push({ from, to, severity: "error", message: failure.said, source: FLOWN });
+      diagnostics.push({ from, to, severity: "error", message: failure.said, source: FLOWN });
       this.view.dispatch({ effects: EditorView.scrollIntoView(from, { y: "center" }) });
     }
-    this.put(found);
+    this.put(diagnostics);
   }
 
   checkSoon() {
@@ -213,17 +213,17 @@ export class Editor {
     this.later = setTimeout(() => this.check(), QUIET);
   }
 
-  // Underlines what is wrong with the text; returns that. What was written meanwhile is checked later.
+  // Check the text, underline the findings and return them. If the text has changed meanwhile, a later check underlines them.
   async check() {
     clearTimeout(this.later);
     const { script, text } = this;
     if (!script) return [];
-    const found = await this.on.check(text, isLua(script)).catch(() => null);
-    if (!found || script !== this.script || text !== this.text) return found ?? [];
+    const findings = await this.on.check(text, isLua(script)).catch(() => null);
+    if (!findings || script !== this.script || text !== this.text) return findings ?? [];
     const flown = this.diagnostics.filter((one) => one.source === FLOWN);
-    this.put([...flown, ...found.map((one) => this.placed(one))]);
-    this.on.checked(found);
-    return found;
+    this.put([...flown, ...findings.map((one) => this.placed(one))]);
+    this.on.checked(findings);
+    return findings;
   }
 
   placed({ line, column, end, said, severity }) {
@@ -236,14 +236,14 @@ export class Editor {
 
   // ---- breakpoints
 
-  // The lines of all scripts that have any.
+  // The lines with breakpoints, by script; scripts without breakpoints are left out.
   get breakpoints() {
     const states = [...this.states].filter(([script]) => script !== this.script).map(([script, { state }]) => [script, linesOf(state)]);
     if (this.script) states.push([this.script, linesOf(this.view.state)]);
     return Object.fromEntries(states.filter(([, lines]) => lines.length));
   }
 
-  // Shows where it is paused, 0 for nowhere.
+  // Mark the line at which the script is paused; 0 removes the mark.
   paused(line) {
     showPaused(this.view, line);
   }

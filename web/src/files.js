@@ -1,4 +1,4 @@
-// New, rename, duplicate, delete, download and upload: what the menu beside Run does with the files of scripts.
+// The file menu beside Run: new, save as, rename, duplicate, download, upload, revert and delete.
 import { Menu } from "./menu.js";
 import { isLua } from "./editor.js";
 import { template } from "./templates.js";
@@ -9,14 +9,14 @@ const stem = (script) => script.split("/").pop().replace(/\.(?:py|lua)$/, "");
 const ending = (script) => (isLua(script) ? ".lua" : ".py");
 
 export class Files {
-  // `parts`: more, menu, form, label, name, said, confirm, cancel, drop, pick, and the menu's items in `items` by their
-  // names. `show` shows messages and questions, as the page's.
+  // `parts` are elements: more, menu, form, label, name, said, cancel, drop, pick, and the menu's items in `items`, by name.
+  // `show` is the page's show(): it displays questions to the user.
   constructor(parts, scripts, show) {
     this.parts = parts;
     this.scripts = scripts;
     this.show = show;
     this.menu = new Menu(parts.more, parts.menu);
-    const does = {
+    const actions = {
       "new-python": () => this.begin("Name of the new script", "my_script", (name) => scripts.create(this.named(name, ".py"), template(false))),
       "new-lua": () => this.begin("Name of the new script", "my_script", (name) => scripts.create(this.named(name, ".lua"), template(true))),
       as: () => this.begin("Save as", stem(this.script), (name) => scripts.saveAs(this.named(name))),
@@ -27,7 +27,7 @@ export class Files {
       revert: () => scripts.revert(),
       delete: () => this.remove(),
     };
-    for (const [name, action] of Object.entries(does)) parts.items[name].onclick = () => this.attempt(action);
+    for (const [name, action] of Object.entries(actions)) parts.items[name].onclick = () => this.attempt(action);
     parts.more.addEventListener("click", () => this.aim());
     parts.form.onsubmit = (event) => {
       event.preventDefault();
@@ -48,7 +48,7 @@ export class Files {
     return this.scripts.is.script;
   }
 
-  // What is of the package can be neither renamed nor deleted.
+  // Disable Rename and Delete for scripts of the package.
   aim() {
     for (const name of ["rename", "delete"]) this.parts.items[name].disabled = !this.scripts.isOwn;
   }
@@ -57,12 +57,12 @@ export class Files {
     return Promise.resolve().then(action).catch((error) => this.scripts.store.say("trouble", error.message));
   }
 
-  // A name without an ending gets that of the script.
+  // Return `name` with an ending: its own, or else `end`, by default that of the open script.
   named(name, end = ending(this.script)) {
     return /\.(?:py|lua)$/.test(name) ? name : name + end;
   }
 
-  // ---- a name is asked for
+  // ---- the form for a name
 
   begin(label, name, done) {
     const { form, label: shown, name: field, said } = this.parts;
@@ -76,9 +76,9 @@ export class Files {
 
   finish() {
     const { name, said } = this.parts;
-    const given = name.value.trim();
-    if (!given) return void (said.textContent = "Needs a name.");
-    this.done(given).then(
+    const newName = name.value.trim();
+    if (!newName) return void (said.textContent = "Needs a name.");
+    this.done(newName).then(
       () => this.close(),
       (error) => {
         said.textContent = error.message; // beside the name
@@ -96,9 +96,9 @@ export class Files {
 
   async remove() {
     const script = await this.scripts.remove();
-    const again = ["Undo", () => this.scripts.bringBack(script)];
-    const fine = ["OK", async () => this.show({ question: null })];
-    this.show({ question: { said: `${script} is deleted.`, choices: [again, fine] } });
+    const undo = ["Undo", () => this.scripts.bringBack(script)];
+    const accept = ["OK", async () => this.show({ question: null })];
+    this.show({ question: { said: `${script} is deleted.`, choices: [undo, accept] } });
   }
 
   download() {
@@ -110,27 +110,27 @@ export class Files {
   }
 
   listen(place) {
-    const isOfFiles = (event) => event.dataTransfer?.types.includes("Files");
-    const over = (on) => (event) => {
-      if (!isOfFiles(event)) return;
+    const hasFiles = (event) => event.dataTransfer?.types.includes("Files");
+    const dragHandler = (on) => (event) => {
+      if (!hasFiles(event)) return;
       event.preventDefault();
       place.classList.toggle("drop", on);
     };
-    place.addEventListener("dragover", over(true), true);
-    place.addEventListener("dragleave", over(false), true);
+    place.addEventListener("dragover", dragHandler(true), true);
+    place.addEventListener("dragleave", dragHandler(false), true);
     place.addEventListener(
       "drop",
       (event) => {
-        if (!isOfFiles(event)) return;
-        over(false)(event);
-        event.stopPropagation(); // the editor would write the file's text where the mouse is
+        if (!hasFiles(event)) return;
+        dragHandler(false)(event);
+        event.stopPropagation(); // otherwise the editor would insert the file's text at the pointer
         this.attempt(() => this.upload(event.dataTransfer.files));
       },
       true,
     );
   }
 
-  // The first file is a script; where its name is taken, another one is asked for.
+  // Upload the first file as a script. If that fails, for example because its name is taken, ask for another name.
   async upload([file]) {
     if (!file) return;
     if (!/\.(?:py|lua)$/.test(file.name)) throw new Error(`${file.name}: a script's name ends in .py or .lua`);

@@ -1,8 +1,8 @@
-// What a grade says: how far it is, the result card of each flight, and the best points of each task.
+// The display of a grade: its progress, the result card of each flight, and the user's best points for each task.
 import { create } from "./dom.js";
 import { keep, kept } from "./storage.js";
 
-const BEST = "best"; // the key of the best grade of each task: { task: { points, of } }
+const BEST = "best"; // the storage key of the best grade of each task: { task: { points, of } }
 
 const digits = (points) => String(Number(points.toFixed(2)));
 
@@ -19,7 +19,7 @@ export function keepBest(task, { points, of }) {
   keep(BEST, { ...kept(BEST, {}), [task]: { points, of } });
 }
 
-// `flights` of `seeds` have been flown.
+// Show the progress of a grade: `flights` of `seeds` flights are done; `seeds` is 0 until it is known.
 export function showProgress(element, { flights = 0, seeds = 0 }) {
   const words = seeds ? `Flying without pictures: seed ${Math.min(flights, seeds - 1)}, flight ${Math.min(flights + 1, seeds)} of ${seeds}` : "Flying without pictures ...";
   if (element.querySelector(".progress")?.textContent === words) return;
@@ -27,13 +27,13 @@ export function showProgress(element, { flights = 0, seeds = 0 }) {
   element.replaceChildren(create("p", { className: "progress" }, words), bar);
 }
 
-// The card of a flight is HTML of the cockpit's own templates, which escape all other text.
+// Return the card of a flight. `html` comes from the cockpit's own templates, which escape all other text.
 function cardOf(html, page, replay) {
   const template = create("template", { innerHTML: html });
   for (const link of template.content.querySelectorAll("a.when")) {
     Object.assign(link, { href: `${page}${link.getAttribute("href")}`, title: "Replay this second in the scene" });
     link.onclick = (event) => {
-      if (event.ctrlKey || event.metaKey || event.shiftKey) return; // another tab: the report
+      if (event.ctrlKey || event.metaKey || event.shiftKey) return; // the report opens in another tab
       event.preventDefault();
       replay(Number(link.dataset.at));
     };
@@ -43,7 +43,7 @@ function cardOf(html, page, replay) {
 
 const seedWords = ({ seed, passed, points, of }) => `${passed ? "✓" : "✗"} seed ${seed}: ${digits(points)}/${digits(of)}`;
 
-// Shows the flights, and the card of the worst. `replay(folder, flight, seed, second)` shows a second in the scene.
+// Show the flights, and the card of the worst one. `replay(folder, flight, seed, second)` shows a flight in the scene.
 /**
  * @param {HTMLElement} element
  * @param {{ script: string, isOld: boolean }} graded

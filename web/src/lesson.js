@@ -1,17 +1,17 @@
-// The text beside the script: a section of the tutorial, or a task. What it says of a scene, Run flies in.
+// The lesson above the script: a section of the tutorial, or a task. If a lesson has a scene, Run flies in that scene.
 import { create } from "./dom.js";
 import { keepBest, showGrade, showProgress } from "./graded.js";
 import { render } from "./markdown.js";
 import { hasFunctions } from "./snippets.js";
 import { forget, keep, kept } from "./storage.js";
 
-const ASK_AGAIN = 500; // ms, for what is being graded
-const GRADE = "grade"; // the key of the last grade: { task, script, number, isOld }; a reload goes on with it
+const ASK_AGAIN = 500; // ms between two requests for the state of a grade
+const GRADE = "grade"; // the storage key of the last grade: { task, script, number, isOld }; a reloaded page continues it
 
 export class Lesson {
-  // `parts` are elements: choice, before, after, fold, body, start, flies, grade, handIn, graded, text. Of `script`, `open` opens one,
-  // `save` saves it, `put` puts lines of Python into it, `run` flies it;
-  // `replay` shows a second of a graded flight in the scene.
+  // `parts` are elements: choice, before, after, fold, body, start, flies, grade, handIn, graded, text. `open(script)` opens
+  // a script; `save()` saves the open script, `put(code)` puts Python into it, and `run()` runs it. `replay(folder, flight,
+  // seed, second)` shows a graded flight in the scene.
   /**
    * @param {import("./state/store.js").Store} store
    * @param {wire.Ask} ask
@@ -26,11 +26,11 @@ export class Lesson {
     this.run = run;
     this.replay = replay;
     this.graded = kept(GRADE, null);
-    this.result = null; // of this.graded, null while it flies
-    this.edits = 0; // of the store, when the graded script was saved
-    this.all = []; // { lesson, title, task, script } in the order of reading
+    this.result = null; // the result of this.graded, null during its flights
+    this.edits = 0; // the store's count of edits when the graded script was saved
+    this.all = []; // { lesson, title, task, script } in reading order
     this.name = "";
-    this.taken = ""; // the text that the user chooses, until it is there
+    this.taken = ""; // the lesson that the user has chosen, until it is shown
     this.opened = { script: "", lesson: "" };
     parts.choice.onchange = () => this.take(parts.choice.value);
     parts.before.onclick = () => this.turn(-1);
@@ -45,11 +45,11 @@ export class Lesson {
   offer(all) {
     if (JSON.stringify(all) === JSON.stringify(this.all)) return;
     this.all = all;
-    const group = (label, some) => {
-      const made = document.createElement("optgroup");
-      made.label = label;
-      made.append(...some.map(({ lesson, title }) => new Option(title, lesson)));
-      return made;
+    const group = (label, lessons) => {
+      const element = document.createElement("optgroup");
+      element.label = label;
+      element.append(...lessons.map(({ lesson, title }) => new Option(title, lesson)));
+      return element;
     };
     const groups = [group("tutorial", all.filter((one) => !one.task)), group("tasks", all.filter((one) => one.task))];
     this.parts.choice.replaceChildren(new Option("Tutorial and tasks ...", ""), ...groups);
@@ -57,7 +57,7 @@ export class Lesson {
     this.aim();
   }
 
-  // Shows a text, none for ''. `script` is the one that is in the editor.
+  // Show a lesson; "" shows none. Its script is the open script if that belongs to the lesson.
   async show(name) {
     if (name === this.name) return;
     this.name = name;
@@ -65,9 +65,9 @@ export class Lesson {
     this.aim();
     if (!name) return this.folded(true);
     const { text, folder, script, flies } = await this.ask("lesson", { lesson: name });
-    if (name !== this.name) return; // another one has been chosen meanwhile
+    if (name !== this.name) return; // another lesson has been chosen meanwhile
     this.showGraded();
-    this.script = this.opened.lesson === name ? this.opened.script : script; // there may be several
+    this.script = this.opened.lesson === name ? this.opened.script : script; // a lesson may have several scripts
     this.parts.flies.textContent = flies && `Run flies ${flies}.`;
     this.folded(false);
     const knows = (to) => to.script || this.all.some((one) => one.lesson === to.lesson);
@@ -82,19 +82,19 @@ export class Lesson {
     });
   }
 
-  // What can be done with lines of Python in the text.
+  // Return the buttons for a block of Python in the lesson.
   actions(code) {
     const put = { label: "Put into the script", title: "Replaces the function of the same name; other lines go to the cursor", act: () => this.put(code) };
     const run = { label: "Run", title: "Put it into the script, and fly", act: () => this.put(code) && this.run() };
     return hasFunctions(code) ? [put, run] : [put];
   }
 
-  // Shows the text of the script that has been opened, unless the user has chosen another text meanwhile.
+  // Show the lesson of the script that has been opened, unless the user has chosen another lesson meanwhile.
   follow(name) {
     return this.taken && this.taken !== name ? Promise.resolve() : this.go(name);
   }
 
-  // Goes to a text, and to its script where it has one.
+  // Show a lesson, and open its script if it has one.
   async take(name) {
     this.taken = name;
     await this.go(name);
@@ -109,7 +109,7 @@ export class Lesson {
 
   // ---- grades
 
-  // Grades the script by this task, beside what flies, and shows how it did; `byKey`: the button keeps the focus.
+  // Grade the script by this task and show the result; the current flight goes on. With `byKey`, the button keeps the focus.
   async grade(byKey) {
     const task = this.name;
     this.store.take("grading", true);
@@ -128,29 +128,29 @@ export class Lesson {
       return;
     }
     await this.followGrade();
-    if (byKey && document.activeElement === document.body) this.parts.grade.focus(); // which it has lost meanwhile
+    if (byKey && document.activeElement === document.body) this.parts.grade.focus(); // the disabled button lost it
   }
 
-  // Copies the script, as it is now, to the folder of the course.
+  // Save the script and copy it to the folder of the course.
   async handIn() {
     const task = this.name;
-    let said;
+    let message;
     try {
       await this.save();
       const { script } = this.opened;
       const { time, digest } = await this.ask("hand in", { script, lesson: task });
       const at = new Date(time.replaceAll(".", ":")).toLocaleString();
-      said = `${script} handed in: ${at}, digest ${digest}. You can hand in again: the last copy counts.`;
+      message = `${script} handed in: ${at}, digest ${digest}. You can hand in again: the last copy counts.`;
     } catch (error) {
-      said = error.message;
+      message = error.message;
     }
     const { graded } = this.parts;
     if (task !== this.name) return;
     graded.querySelector(".handed-in")?.remove();
-    graded.prepend(create("p", { className: "handed-in" }, said));
+    graded.prepend(create("p", { className: "handed-in" }, message));
   }
 
-  // Goes on with a grade that was begun before the page was loaded, or before the connection was lost.
+  // Continue with a grade that was started before the page was loaded, or before the connection was lost.
   connected() {
     if (this.graded && !this.result) this.followGrade(true);
   }
@@ -176,7 +176,7 @@ export class Lesson {
     }
   }
 
-  // A lost connection ends no grade. Another cockpit does not know it, nor does one that has graded another script.
+  // Forget a grade that the cockpit does not know: it was restarted, or has graded another script. A lost connection ends none.
   forgetGrade(why) {
     if (this.store.now.connection !== "connected") return;
     forget(GRADE);
@@ -191,7 +191,7 @@ export class Lesson {
     else showProgress(graded, {});
   }
 
-  // Says it when the graded script is changed.
+  // Mark the grade as old when the graded script is changed.
   age({ open, edits }) {
     if (!this.graded || this.graded.isOld || open.script !== this.graded.script || edits === this.edits) return;
     this.graded.isOld = true;
@@ -203,7 +203,7 @@ export class Lesson {
     return this.all.findIndex((one) => one.lesson === this.name);
   }
 
-  // Hears which script is in the editor, and to which text it belongs: no button is needed for that.
+  // Set the open script and its lesson, and update the buttons: a script that is open needs no button to open it.
   has(script, lesson) {
     this.opened = { script, lesson };
     if (lesson && lesson === this.name) this.script = script;

@@ -1,4 +1,4 @@
-// What the simulation says of itself: why it does not fly, and its log, with counts instead of repeats.
+// The log panel: the simulation's diagnostics, and its log, in which repeats are counted.
 import { Console } from "./console.js";
 import { at, create } from "./dom.js";
 

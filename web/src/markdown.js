@@ -1,44 +1,44 @@
-// Texts of the package as HTML: whatever stands in a file is text; no HTML of its own, and no script, comes from there.
+// The package's Markdown texts as HTML. HTML and scripts in a Markdown file are shown as text, and never run.
 import MarkdownIt from "markdown-it";
 import temml from "temml";
 import { classHighlighter, highlightCode } from "@lezer/highlight";
 import { pythonLanguage } from "@codemirror/lang-python";
 
-const FORMULA = /\$\$([\s\S]+?)\$\$|\$(?!\s)((?:[^$\\`]|\\.)+?)(?<!\s)\$(?!\d)/y; // $$on a line of its own$$, $in a line$
+const FORMULA = /\$\$([\s\S]+?)\$\$|\$(?!\s)((?:[^$\\`]|\\.)+?)(?<!\s)\$(?!\d)/y; // $$block$$ or $inline$
 const STAGE = /^\/docs\/tutorial\/([0-9][^/]*\.(?:py|lua))$/;
 const SOLUTION = /^\/docs\/tutorial\/(solutions\/[^/]+\.(?:py|lua))$/;
 const BUILT_IN = /^\/src\/drone_sim\/child_scripts\/([^/]+\.(?:py|lua))$/;
 const PICTURE = /^\/(?:docs\/pictures|tasks\/\w+)\/\w+\.png$/;
 
-const markdown = new MarkdownIt({ html: false, highlight: coloured });
+const markdown = new MarkdownIt({ html: false, highlight: highlightPython });
 
 markdown.inline.ruler.after("escape", "formula", (state, silent) => {
   FORMULA.lastIndex = state.pos;
-  const found = state.src[state.pos] === "$" && FORMULA.exec(state.src);
-  if (!found) return false;
-  if (!silent) Object.assign(state.push("formula", "math", 0), { content: found[1] ?? found[2], block: Boolean(found[1]) });
-  state.pos += found[0].length;
+  const match = state.src[state.pos] === "$" && FORMULA.exec(state.src);
+  if (!match) return false;
+  if (!silent) Object.assign(state.push("formula", "math", 0), { content: match[1] ?? match[2], block: Boolean(match[1]) });
+  state.pos += match[0].length;
   return true;
 });
 
 markdown.renderer.rules.formula = (tokens, index) =>
   temml.renderToString(tokens[index].content, { displayMode: tokens[index].block, throwOnError: false });
 
-function coloured(code, language) {
+function highlightPython(code, language) {
   if (language !== "python") return "";
   const escape = markdown.utils.escapeHtml;
-  let made = "";
+  let html = "";
   highlightCode(
     code,
     pythonLanguage.parser.parse(code),
     classHighlighter,
-    (text, classes) => (made += classes ? `<span class="${classes}">${escape(text)}</span>` : escape(text)),
-    () => (made += "\n"),
+    (text, classes) => (html += classes ? `<span class="${classes}">${escape(text)}</span>` : escape(text)),
+    () => (html += "\n"),
   );
-  return made;
+  return html;
 }
 
-// The place of a link in the package, null for what is not in it.
+// Return the URL of a link inside the package, null if it leads outside.
 function within(link, folder) {
   try {
     const url = new URL(link, `http://package/${folder}/`);
@@ -48,7 +48,7 @@ function within(link, folder) {
   }
 }
 
-// Where a link of a text leads: out into the web, to a script of ours, to another text, or nowhere.
+// Return the target of a link: { web }, { script }, { lesson }, or {} if the page cannot show it.
 function target(href, folder) {
   if (/^https?:/i.test(href)) return { web: href };
   const url = within(href, folder);
@@ -59,7 +59,7 @@ function target(href, folder) {
   return script ? { script } : {};
 }
 
-// A picture that a click, or Enter, shows as large as the window is.
+// Put a picture into a button that shows it as large as the window.
 function enlargeable(picture) {
   const button = document.createElement("button");
   button.className = "enlarge";
@@ -84,28 +84,28 @@ function enlarge({ src, alt }) {
   dialog.showModal();
 }
 
-// What can be done with a block of Python: a row of buttons below it, one for each of `actions(code)`.
+// Add a row of buttons below a block of Python, one for each of `actions(code)`.
 function withButtons(code, actions) {
   const row = document.createElement("p");
   row.className = "do";
-  const made = actions(code.textContent).map(({ label, title, act }) => {
+  const buttons = actions(code.textContent).map(({ label, title, act }) => {
     const button = document.createElement("button");
     Object.assign(button, { textContent: label, title, onclick: act });
     return button;
   });
-  row.append(...made);
+  row.append(...buttons);
   code.parentElement.after(row);
 }
 
-// A paragraph that is nothing but the link goes with it.
+// Replace a link by its text; if the link is a whole paragraph, remove the paragraph.
 function withoutLink(link) {
   const paragraph = link.closest("p");
   if (paragraph?.textContent === link.textContent && !link.firstElementChild) paragraph.remove();
   else link.replaceWith(...link.childNodes);
 }
 
-// Fills an element with a text whose links and pictures are seen from `folder`; `go` follows a link that is ours.
-// `knows` tells whether there is such a text or script; `actions` returns { label, title, act } for a block of Python.
+// Fill an element with a Markdown text; its links and pictures are relative to `folder`. `go(target)` follows a link inside
+// the package, `knows(target)` returns whether its lesson or script exists, `actions(code)` returns buttons for a block of Python.
 /** @param {(code: string) => { label: string, title: string, act: () => void }[]} [actions] */
 export function render(element, text, folder, knows, go, actions = () => []) {
   element.innerHTML = markdown.render(text);
@@ -115,7 +115,7 @@ export function render(element, text, folder, knows, go, actions = () => []) {
     else if ((to.lesson || to.script) && knows(to)) {
       link.href = "#";
       link.onclick = (event) => (event.preventDefault(), go(to));
-    } else withoutLink(link); // it leads to what is only in the repository
+    } else withoutLink(link); // its target is only in the repository
   }
   for (const picture of element.querySelectorAll("img")) {
     const path = within(picture.getAttribute("src"), folder)?.pathname;

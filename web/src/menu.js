@@ -1,6 +1,6 @@
-// A menu below a button, by mouse and keys.
+// A menu below a button, for mouse and keyboard.
 export class Menu {
-  // `button` opens `list`, whose children with the role menuitem do something.
+  // `button` shows and hides `list`; the items are the children with the role menuitem.
   constructor(button, list) {
     this.button = button;
     this.list = list;

@@ -1,5 +1,5 @@
-// The message over the scene's lower edge. The store says when it ends: it can be read for some seconds; an error stays
-// until the next action, until a script has started, or until the user puts it away.
+// The message over the scene's lower edge. The store removes it after some seconds; an error stays until the next action,
+// until a script has started, or until the user closes it.
 import { at } from "./dom.js";
 
 export class Notice {
@@ -18,7 +18,7 @@ export class Notice {
     this.store.take("notice", { text, bad });
   }
 
-  // Says something that takes no error away.
+  // Show a message, unless an error is shown.
   warn(text) {
     if (!this.store.now.notice?.bad) this.say(text);
   }

@@ -1,13 +1,13 @@
-// Numbers in a line of a script.
+// The search for numbers in a line of a script.
 const NUMBER = /(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?(?!\w)/gi;
-const SIGN = /(?:^|[^\w\s)\]"']|\b(?:return|and|or|not|in|if|else))\s*([-+])$/; // a sign that does not subtract
+const SIGN = /(?:^|[^\w\s)\]"']|\b(?:return|and|or|not|in|if|else))\s*([-+])$/; // ends in a unary sign
 
-// Returns { from, to } of the number that a place in the line touches, with its sign and its point; null for none.
+// Return the range { from, to } of the number at an index of the line, with its sign; null if there is no number.
 export function numberAt(line, place) {
-  for (const found of line.matchAll(NUMBER)) {
-    const to = found.index + found[0].length;
-    if (place < found.index || place > to) continue;
-    return { from: found.index - (SIGN.test(line.slice(0, found.index)) ? 1 : 0), to };
+  for (const match of line.matchAll(NUMBER)) {
+    const to = match.index + match[0].length;
+    if (place < match.index || place > to) continue;
+    return { from: match.index - (SIGN.test(line.slice(0, match.index)) ? 1 : 0), to };
   }
   return null;
 }

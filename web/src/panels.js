@@ -1,4 +1,4 @@
-// Toolbar, side panels, start page and message line: everything of the page but the scene and the editor.
+// The parts of the page other than scene and editor: toolbar, side panels, start page and notice.
 import { Board } from "./board.js";
 import { Build } from "./edit/build.js";
 import { Cameras } from "./cameras.js";
@@ -13,19 +13,19 @@ import { Toolbar } from "./toolbar.js";
 import { Tune } from "./tune.js";
 import { View } from "./view.js";
 
-const NO_EFFECT = /^warning: .*: no effect: /; // in the log: why a button did nothing
-const STARTED = /^started(?: in |$)/; // in the log: the simulation has begun anew
-const NARROW = matchMedia("(max-width: 1120px)"); // where the scene is not edited beside the script
-const TOUCH = matchMedia("(pointer: coarse), (max-width: 900px)"); // where the script covers the scene
+const NO_EFFECT = /^warning: .*: no effect: /; // a line of the log: why a button had no effect
+const STARTED = /^started(?: in |$)/; // a line of the log: the simulation was started
+const NARROW = matchMedia("(max-width: 1120px)"); // too narrow to edit the scene beside the script
+const TOUCH = matchMedia("(pointer: coarse), (max-width: 900px)"); // screens on which the script covers the scene
 
 /**
- * A question whose answer is shown.
+ * Sends a request and shows its reply.
  * @typedef {<Name extends "call" | "request" | "speed" | "scene" | "vehicle" | "camera">(ask: Name, more: wire.Questions[Name][0]) => Promise<void>} Act
  */
 
 export class Panels {
-  // `socket()` and `scene()` are there once the page is; `go` has what the buttons of the start page do, `open(script)`
-  // opens one, `goTo(file, line)` a file's line.
+  // `socket` and `scene` are functions, because the socket is created later. `go` has the actions of the start page;
+  // `open(script)` opens a script, `goTo(file, line)` shows a line of a file.
   /**
    * @param {{ store: import("./state/store.js").Store, socket: () => import("./socket.js").PageSocket,
    *   scene: () => import("./scene/scene.js").Scene,
@@ -53,7 +53,7 @@ export class Panels {
     this.side = new Side((panel) => {
       this.plots.show(panel === "plots");
       this.edits = panel === "edit";
-      if (this.isConnected) this.turnEditing(); // else once it is
+      if (this.isConnected) this.turnEditing(); // otherwise, connected() does it
       if (this.edits && NARROW.matches) this.showScript(false);
       if (panel === "view") this.view.list();
       this.markPlace(panel);
@@ -83,7 +83,7 @@ export class Panels {
     go();
   }
 
-  // ---- the tabs of a tablet that is held upright
+  // ---- the tabs on a tablet in portrait orientation
 
   get places() {
     return [...document.querySelectorAll("[data-place]")];
@@ -106,7 +106,7 @@ export class Panels {
     for (const button of this.places) button.setAttribute("aria-pressed", String(button.dataset.place === now));
   }
 
-  // Asks, and shows the answer on the message line.
+  // Send a request, and show its reply or its error as a notice.
   /** @type {Act} */
   async act(ask, more) {
     this.notice.clear();
@@ -132,13 +132,13 @@ export class Panels {
     });
   }
 
-  // The node sends changes of the object tree only to pages that edit.
+  // Turn editing on or off. The cockpit sends changes of the object tree only to pages that edit.
   turnEditing() {
     this.say({ follow_tree: Boolean(this.edits) });
     this.build.turn(this.edits);
   }
 
-  // ---- what the node says
+  // ---- messages from the cockpit
 
   async connected() {
     const whole = await this.ask("panel");
@@ -155,14 +155,14 @@ export class Panels {
   told(message) {
     const { panel, version = 0, log = "" } = message;
     if (panel) {
-      if (version > this.version + 1) this.connected().catch(() => {}); // it missed something
+      if (version > this.version + 1) this.connected().catch(() => {}); // a message was missed: request all parts
       this.version = version;
       this.board.take({ panel, version });
     }
     if (log) this.log.add(log);
     if (STARTED.test(log)) {
       this.store.take("started");
-      this.scene().select(""); // its handles would be in the picture of the flight
+      this.scene().select(""); // the handles of a selected object would stay in view during the flight
     }
     if (message.pulse) this.store.take("pulse", message.pulse);
     if (NO_EFFECT.test(log)) this.notice.warn(log);
@@ -171,7 +171,7 @@ export class Panels {
   }
 
   lost() {
-    this.version = undefined; // another node counts anew
+    this.version = undefined; // a restarted cockpit counts from the beginning
     this.board.begin();
     this.build.edit.lost();
   }

@@ -1,9 +1,9 @@
-// Charts of the last half minute: those that are chosen, in the panel or enlarged over the scene; saved as PNG and CSV.
+// The charts of the last 30 s of flight: chosen by the user, in the panel or enlarged over the scene, saved as PNG or CSV.
 import uPlot from "uplot";
 import { at, create, iconButton, save, stamp } from "./dom.js";
 import { keep, kept } from "./storage.js";
 
-const AGAIN = 250; // ms between two questions for what is new
+const AGAIN = 250; // ms between two requests for new values
 const SECONDS = 30;
 const FIRST = ["height", "velocity"];
 const SMALL = 150; // px, height of a chart in the panel
@@ -13,7 +13,7 @@ const DASHED = /, commanded$/;
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const dark = matchMedia("(prefers-color-scheme: dark)");
 
-// As many digits as two neighbouring ticks need to differ.
+// Return the labels of ticks, with as many digits as two neighboring ticks need to differ.
 export function ticks(values) {
   const step = Math.abs(values[1] - values[0]) || 1;
   const digits = Math.max(0, Math.min(9, -Math.floor(Math.log10(step) + 1e-9)));
@@ -22,16 +22,16 @@ export function ticks(values) {
   return values.map((one) => (one === 0 ? (0).toFixed(digits) : one.toFixed(digits)));
 }
 
-// What an axis shows: all values with a little air, at least `least`, and never nothing.
+// Return the range of an axis: all values and the range `least`, with a margin of 5 %, and never an empty range.
 export function extent(low, high, least) {
   if (low === null || high === null || !Number.isFinite(low)) return least ?? [-1, 1];
   let [from, to] = least ? [Math.min(low, least[0]), Math.max(high, least[1])] : [low, high];
   if (to - from < 1e-9 * Math.max(Math.abs(to), 1e-3)) {
-    const air = Math.abs(to) * 0.1 || 1;
-    return [from - air, to + air];
+    const margin = Math.abs(to) * 0.1 || 1;
+    return [from - margin, to + margin];
   }
-  const air = (to - from) * 0.05;
-  return [from - air, to + air];
+  const margin = (to - from) * 0.05;
+  return [from - margin, to + margin];
 }
 
 class Chart {
@@ -68,7 +68,7 @@ class Chart {
     return { width: Math.max(this.place.clientWidth, 120), height: isLarge ? Math.max(this.place.clientHeight - legend, 100) : SMALL };
   }
 
-  // Made anew when colours are others.
+  // Draw the chart again, in the colors of the current color scheme.
   paint() {
     this.chart.destroy();
     this.chart = this.draw();
@@ -87,7 +87,7 @@ class Chart {
         ...lines.map((label, index) => ({
           label, stroke: style(COLORS[index % COLORS.length]), width: 1.75, spanGaps: false,
           dash: DASHED.test(label) ? [6, 4] : undefined, points: { show: false },
-          value: (_, value) => (value ?? this.rows.at(-1)?.[index + 1])?.toPrecision(3) ?? "", // without a pointer, the last one
+          value: (_, value) => (value ?? this.rows.at(-1)?.[index + 1])?.toPrecision(3) ?? "", // without a pointer, the last value
         })),
       ],
       cursor: { y: false, drag: { x: false, y: false } },
@@ -131,15 +131,15 @@ class Chart {
 
   saveNumbers() {
     const { lines, unit } = this.described;
-    const quoted = (text) => `"${text.replace(/"/g, '""')}"`;
-    const head = ["t, s", ...lines.map((one) => (unit ? `${one}, ${unit}` : one))].map(quoted);
+    const quote = (text) => `"${text.replace(/"/g, '""')}"`;
+    const head = ["t, s", ...lines.map((one) => (unit ? `${one}, ${unit}` : one))].map(quote);
     const first = this.rows[0]?.[0];
     const rows = this.rows.map(([time, ...values]) => [(time - first).toFixed(3), ...values]);
     const text = [head, ...rows].map((row) => row.join(",")).join("\n");
     save(new Blob([`${text}\n`], { type: "text/csv" }), `${this.file}.csv`);
   }
 
-  // The chart with its title and what its colours mean, on a ground of its own.
+  // Save the chart as PNG, with its title, a legend of its colors, and a background.
   savePicture() {
     const from = this.chart.ctx.canvas;
     const ratio = from.width / this.chart.width;
@@ -179,7 +179,7 @@ export class Plots {
   constructor(board, ask) {
     this.ask = ask;
     this.board = board;
-    this.charts = new Map(); // those that are drawn, by name
+    this.charts = new Map(); // the charts that are drawn, by name
     this.isOpen = false;
     board.on("charts", () => this.offer());
     dark.addEventListener("change", () => this.charts.forEach((one) => one.paint()));
@@ -190,7 +190,7 @@ export class Plots {
     return kept("plots", FIRST);
   }
 
-  // Charts are drawn while the panel is open, and while they are enlarged.
+  // Open or close the panel. Charts are drawn while it is open, and while they are enlarged.
   show(isOpen) {
     this.isOpen = isOpen;
     this.offer();
@@ -205,8 +205,8 @@ export class Plots {
     });
     at("plot-list").replaceChildren(...(rows.length ? rows : ["There is nothing to plot."]));
     for (const [name, chart] of this.charts) {
-      const there = all.find((one) => one.chart === name);
-      const isSame = there && JSON.stringify(there) === JSON.stringify(chart.described);
+      const offered = all.find((one) => one.chart === name);
+      const isSame = offered && JSON.stringify(offered) === JSON.stringify(chart.described);
       const isWanted = this.chosen.includes(name) && (this.isOpen || chart.element.closest("#enlarged"));
       if (!isSame || !isWanted) this.drop(name);
     }

@@ -1,10 +1,10 @@
-// A button that records what a stream shows, and saves it as a film when it is pressed once more.
+// A button that records a stream, and saves the video when it is pressed again.
 import { save, stamp } from "./dom.js";
 
 const KIND = "video/webm";
 
 export class Recorder {
-  // `stream()` gives a MediaStream when the recording begins; `ended` hears of its end.
+  // `stream()` returns the MediaStream when a recording begins; `ended()` is called when it ends.
   constructor(button, stream, name, notice, ended = () => {}) {
     this.button = button;
     this.stream = stream;
@@ -34,7 +34,7 @@ export class Recorder {
       save(new Blob(parts, { type: KIND }), `drone_sim-${this.name}-${stamp()}.webm`);
       this.notice.say("the video is in your browser's downloads");
     };
-    this.recorder.start(1000); // ms: so much is lost at most
+    this.recorder.start(1000); // ms of video in each part
     this.button.setAttribute("aria-pressed", "true");
     this.notice.say("recording: press again to stop and save the video");
   }

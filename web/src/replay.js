@@ -1,4 +1,4 @@
-// A graded flight in the scene: its drone, its path and the objects of its scene, at the second that a slider chooses.
+// The replay of a graded flight in the scene: drone, path and boxes around the flight's objects, with a slider for the time.
 import * as THREE from "three";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
@@ -9,10 +9,10 @@ import { FREE } from "./scene/view.js";
 
 const WIDTH = 3; // px, of the path
 const BOX = 0x364fc7;
-const NEAR = 0.5; // m, what is framed about the drone
+const NEAR = 0.5; // m, radius around the drone that the camera shows
 const EDGES = [0, 1, 2, 3, 4, 5, 6, 7].flatMap((corner) => [1, 2, 4].filter((side) => !(corner & side)).map((side) => [corner, corner | side]));
 
-// Values of a file that a report's page loads as a script: report.NAME = {...};
+// Return the value in a file of a report. The report's page loads the file as a script: report.NAME = {...};
 async function valueOf(address) {
   const answer = await fetch(address);
   if (!answer.ok) throw new Error("the recording of this flight is gone: grade the script again");
@@ -30,11 +30,11 @@ export class Replay {
     this.store = store;
     this.flight = null;
     this.starts = 0;
-    this.second = 0; // which is shown, s
-    this.ghost = this.group = new THREE.Group(); // the drone, and all that is shown of the flight
+    this.second = 0; // s, the time that is shown
+    this.ghost = this.group = new THREE.Group(); // the drone, and everything that is drawn for the flight
     /** @type {{ view: string, focus: HTMLElement | null }} */
     this.before = { view: FREE, focus: null };
-    this.asked = 0; // the next picture, while it plays
+    this.asked = 0; // the animation frame that is requested during playback
     at("replay-play").onclick = () => this.play(!this.isPlaying);
     at("replay-time").oninput = () => (this.play(false), this.show(at("replay-time").valueAsNumber));
     at("replay-close").onclick = () => this.close();
@@ -42,7 +42,7 @@ export class Replay {
     store.on(({ starts }) => starts !== this.starts && this.close());
   }
 
-  // Shows a second of a flight of a report; `folder` is that of its page.
+  // Show a flight of a report at `second`, s; `folder` is the folder of the report's page.
   async open(folder, flight, seed, second) {
     const address = `${folder}flights/${flight}.js`;
     if (this.flight?.address !== address) {
@@ -86,11 +86,11 @@ export class Replay {
     this.before.focus?.focus();
   }
 
-  // Puts the drone where it was at a second, s; the eyes go with it.
+  // Move the drone to its pose at `second`, s, and the camera by the same distance.
   show(second) {
     const { t, x, y, z, roll, pitch, yaw } = this.flight;
-    const found = t.findIndex((one) => one >= second);
-    const row = found < 0 ? t.length - 1 : found;
+    const next = t.findIndex((one) => one >= second);
+    const row = next < 0 ? t.length - 1 : next;
     const place = new THREE.Vector3(x[row], y[row], z[row]);
     this.scene.view.center.add(place.clone().sub(this.ghost.position));
     this.ghost.position.copy(place);
@@ -123,7 +123,7 @@ export class Replay {
   }
 }
 
-// The drone of the scene in one colour, or a ball where there is none.
+// Return the scene's drone in one color, or a sphere if the scene has no drone.
 function ghostOf(scene) {
   const paint = new THREE.MeshLambertMaterial({ color: ACCENT, transparent: true, opacity: 0.8, side: THREE.DoubleSide });
   const ghost = new THREE.Group();
@@ -141,8 +141,8 @@ function ghostOf(scene) {
 }
 
 function own(object) {
-  object.userData.isOwn = true;
-  object.raycast = () => {};
+  object.userData.isOwn = true; // close() disposes its geometry
+  object.raycast = () => {}; // the pointer does not hit it
   return object;
 }
 
@@ -156,7 +156,7 @@ function pathOf({ t, x, y, z }) {
   return lines(points, { color: ACCENT, linewidth: WIDTH });
 }
 
-// The edges of boxes about what stood in the scene of the flight, which may not be the scene that is shown.
+// Return the edges of boxes around the objects of the flight's scene, which may differ from the scene that is shown.
 function outlines(boxes) {
   const points = boxes.flatMap(({ corners }) => EDGES.flatMap(([from, to]) => [...corners[from], ...corners[to]]));
   return points.length ? lines(points, { color: BOX, linewidth: 1 }) : new THREE.Group();

@@ -1,16 +1,16 @@
-// The scripts: opened, written to the node's disk soon after every change, watched, and flown. No edit is ever lost.
+// The scripts: opened, saved by the cockpit soon after every change, compared with the disk, and run. No edit is lost.
 import { Drafts } from "./drafts.js";
 import { Editor, isLua } from "./editor.js";
 import { NOT_STARTED, isSyntaxError } from "./state/store.js";
 import { markedLines } from "./state/words.js";
 import { keep, kept } from "./storage.js";
 
-const QUIET = 800; // ms without a key before it is saved
-const LOOK = 1000; // ms between two looks at the file
-const RETRY = 4000; // ms after which what could not be saved is tried again
+const QUIET = 800; // ms without a key before the text is saved
+const LOOK = 1000; // ms between two comparisons with the file
+const RETRY = 4000; // ms after a failed save before the next attempt
 const LARGEST = 1 << 20; // bytes
 
-const DEFAULT = "built-in/pilot.py"; // flies if the launch names no script
+const DEFAULT = "built-in/pilot.py"; // the script that flies if the launch names none
 const SCRIPT = "script"; // the storage key of the open script
 const FLOWN = "flown"; // the storage key of the script that the simulator had last
 const COPIES = "copies"; // the storage key of the user's latest copy of each script of the package
@@ -18,7 +18,7 @@ const COPIES = "copies"; // the storage key of the user's latest copy of each sc
 const size = (text) => new TextEncoder().encode(text).length;
 
 export class Scripts {
-  // `page` has show({ lists, script, of, question }); `onOpen` hears of the text that a script has.
+  // `page` has show({ lists, script, of, question }); `onOpen(lesson)` is called with the lesson of an opened script.
   /**
    * @param {HTMLElement} parent
    * @param {import("./socket.js").PageSocket} socket
@@ -34,24 +34,24 @@ export class Scripts {
     this.drafts = new Drafts();
     const check = async (text, lua) => {
       const { found, unchecked } = socket.open ? await this.ask("check", { text, lua }) : {};
-      return unchecked ? null : found; // of a text that is too large, or takes too long, nothing is known
+      return unchecked ? null : found; // null: the text is too large, or its check takes too long
     };
     const checked = (found) => this.store.take("checked", { file: this.is.file, found });
     const moved = (line) => this.store.take("moved", line);
     this.editor = new Editor(parent, { change: () => this.change(), run: () => this.onRun(), check, checked, moved, breakpoints: onBreakpoints }, known);
-    this.is = { script: "", file: "", version: "", text: "" }; // what the disk has, as far as we know
-    this.onRun = () => {}; // what Ctrl+Enter does
+    this.is = { script: "", file: "", version: "", text: "" }; // the open script, as the disk had it last
+    this.onRun = () => {}; // called on Ctrl+Enter
     this.dirty = false;
     this.conflict = false;
-    this.marked = {}; // what `mark` has shown
+    this.marked = {}; // the marks that `mark` has set
     /** @type {Promise<unknown>} */
-    this.turn = Promise.resolve(); // of whatever was done last
+    this.turn = Promise.resolve(); // settles with the last action of inTurn
     setInterval(() => this.watch(), LOOK);
     document.addEventListener("visibilitychange", () => this.watch());
     store.on((now) => this.mark(now));
   }
 
-  // One after the other: the second would not know the version that the first has made.
+  // Run an action after all earlier ones: it needs to know the version of the file that they have made.
   /**
    * @template Result
    * @param {() => Promise<Result>} action
@@ -62,7 +62,7 @@ export class Scripts {
     return done;
   }
 
-  // ---- what there is
+  // ---- the list, and opening
 
   async list() {
     const lists = await this.ask("scripts");
@@ -72,7 +72,7 @@ export class Scripts {
     return lists;
   }
 
-  // After the connection is there, again: what was not saved comes first.
+  // Handle a new connection: save what was not saved, then, on the first connection, open a script.
   async connected() {
     const isFirst = !this.is.script;
     const last = isFirst ? this.lastOpen() : [];
@@ -83,21 +83,21 @@ export class Scripts {
     for (const script of left) await this.open(script).catch((error) => this.store.say("trouble", error.message));
     if (!isFirst || this.conflict) return;
     const all = groups.flatMap(({ scripts }) => scripts);
-    const isNews = flown !== DEFAULT && flown !== (before ?? flown); // another launch flies another script
-    const found = (isNews ? [flown, ...last] : [...last, flown]).find((one) => all.includes(one));
-    if (found && found !== this.is.script) await this.open(found);
-    if (found) return;
+    const isNews = flown !== DEFAULT && flown !== (before ?? flown); // this launch flies another script than the last one
+    const firstScript = (isNews ? [flown, ...last] : [...last, flown]).find((one) => all.includes(one));
+    if (firstScript && firstScript !== this.is.script) await this.open(firstScript);
+    if (firstScript) return;
     await this.open(DEFAULT);
     if (flown) this.store.say("elsewhere", `${flown} flies, from another folder than ${folder}: Upload (⋯) makes a copy that you can edit`);
   }
 
-  // Returns the user's copy of the last open script, if the user has changed a script of the package, and that script.
+  // Return the user's copy of the last open script, undefined if there is none, and the last open script.
   lastOpen() {
     const open = kept(SCRIPT, "");
     return [kept(COPIES, {})[open], open];
   }
 
-  // Hears which script the simulator has.
+  // Note which script the simulator has.
   hear(flown) {
     if (flown === this.store.now.flown) return;
     this.store.take("flown", flown);
@@ -121,7 +121,7 @@ export class Scripts {
     this.conflict = this.dirty = false;
     this.page.show({ script, of: answer.lesson, question: null });
     this.editor.show(script, answer.text);
-    this.marked = {}; // those of the text that was shown before
+    this.marked = {}; // the marks were those of the previous text
     this.store.take("opened", { script, file: answer.file });
     keep(SCRIPT, script);
     if (draft && draft.text !== answer.text) this.resume(draft, failure);
@@ -129,7 +129,7 @@ export class Scripts {
     this.onOpen(answer.lesson);
   }
 
-  // Goes on with what was not saved.
+  // Show a draft that was not saved, and save it; ask the user first if the file has changed since.
   resume(draft, failure) {
     this.editor.fill(draft.text);
     this.editor.restorePlace();
@@ -140,14 +140,14 @@ export class Scripts {
   }
 
   get isOwn() {
-    return this.is.script.startsWith("mine/"); // all others are never written: they become a copy
+    return this.is.script.startsWith("mine/"); // the others are never overwritten: saving makes a copy
   }
 
   know({ script, file, version, text = this.editor.text }) {
     this.is = { script, file, version, text };
   }
 
-  // ---- what is changed here
+  // ---- changes by the user
 
   change() {
     this.dirty = true;
@@ -159,7 +159,7 @@ export class Scripts {
     this.later = setTimeout(() => this.save().catch(() => {}), QUIET);
   }
 
-  // Its name lets the cockpit find the copy of a script of the package that it has made of an earlier text.
+  // Store the text as a draft. For a script of the package, the draft's name lets the cockpit find the copy it has made already.
   draft() {
     const { script, version } = this.is;
     const { name = Math.random().toString(36).slice(2) } = this.drafts.get(script) ?? {};
@@ -192,7 +192,7 @@ export class Scripts {
     const before = this.is.script;
     this.know({ ...answer, text });
     this.drafts.drop(before);
-    this.dirty = this.editor.text !== text; // more has been written meanwhile
+    this.dirty = this.editor.text !== text; // the user has typed more meanwhile
     if (this.dirty) this.draft();
     if (before !== this.is.script) this.editor.rename(this.is.script);
     const { script, file } = this.is;
@@ -215,7 +215,7 @@ export class Scripts {
 
   // ---- files
 
-  // Makes a new script with a text, and opens it.
+  // Create a script with a text, and open it.
   async create(name, text) {
     await this.save();
     const { script } = await this.inTurn(() => this.ask("save_as", { name, text }));
@@ -230,7 +230,7 @@ export class Scripts {
       const { script, text } = this.is;
       const answer = await this.ask("rename", { script, name });
       if (isLua(answer.script) === isLua(script)) return this.written(answer, text);
-      // The editor opens the file again in the other language; what was typed since the save goes with it.
+      // Open the file again, in the other language. A draft keeps what was typed since the save.
       if (this.dirty) this.drafts.put(answer.script, { text: this.editor.text, version: answer.version });
       this.drafts.drop(script);
       this.editor.forget(script);
@@ -245,7 +245,7 @@ export class Scripts {
     await this.open(script);
   }
 
-  // Deletes the script that is shown, and opens the one that flies, or any other; returns what it was called.
+  // Delete the open script, and open the one that flies, or any other. Return the name of the deleted script.
   async remove() {
     await this.save();
     const { script } = this.is;
@@ -266,7 +266,7 @@ export class Scripts {
     await this.open(script);
   }
 
-  // Goes to a line of a file, be it that of another script.
+  // Go to a line of a file; if it belongs to another script, open that first.
   async goTo(file, line) {
     if (file !== this.is.file) {
       const { script } = await this.ask("locate", { file });
@@ -283,7 +283,7 @@ export class Scripts {
     this.change();
   }
 
-  // ---- what others change
+  // ---- changes by other programs
 
   watch() {
     if (document.hidden || !this.socket.open || !this.is.script || this.looking) return;
@@ -303,17 +303,17 @@ export class Scripts {
     else if (this.dirty && Date.now() - (this.failed ?? 0) > RETRY) await this.write();
   }
 
-  // The file is not what we have last seen: it is told, and nothing of either text is lost.
+  // Handle a change of the file by another program: take its text, or ask the user if both texts have changed.
   async compare() {
     const { script } = this.is;
     const theirs = await this.ask("open", { script }).catch((error) => ({ error }));
     if ("error" in theirs && !this.socket.open) throw theirs.error;
     if ("error" in theirs) return this.disagree(theirs.error);
-    const isTouched = theirs.text === this.is.text || !this.isOwn; // another version of the same
+    const isTouched = theirs.text === this.is.text || !this.isOwn; // no conflict: only the version differs, or saving makes a copy
     const isOurs = theirs.text === this.editor.text;
     if (this.dirty && !isTouched && !isOurs) return this.disagree();
     this.know(theirs);
-    if (this.dirty && !isOurs) return this.write(); // with the version of now
+    if (this.dirty && !isOurs) return this.write(); // with the version of the changed file
     this.dirty = false;
     this.drafts.drop(script);
     if (isOurs) return;
@@ -325,15 +325,15 @@ export class Scripts {
   disagree(failure) {
     this.conflict = true;
     const { script } = this.is;
-    const gone = failure?.kind === "NoSuchScript";
+    const isGone = failure?.kind === "NoSuchScript";
     const keep = (mine) => () => this.keep(mine);
     this.drafts.put(script, { text: this.editor.text, version: this.is.version });
-    const said = gone
+    const said = isGone
       ? `${script} has been removed or renamed by another program. Its text is still here.`
       : failure?.message ?? `${script} has been changed by another program while you wrote. Both texts will be kept; which stays under this name?`;
     const again = ["Write it again", keep(true)];
-    const others = gone ? ["Let it go", () => this.letGo()] : ["The other's", keep(false)];
-    const choices = failure && !gone ? [again] : [gone ? again : ["Mine", keep(true)], others];
+    const others = isGone ? ["Let it go", () => this.letGo()] : ["The other's", keep(false)];
+    const choices = failure && !isGone ? [again] : [isGone ? again : ["Mine", keep(true)], others];
     this.store.take("unsaved", "not saved");
     this.page.show({ question: { said, choices } });
   }
@@ -361,10 +361,10 @@ export class Scripts {
     return this.connected();
   }
 
-  // ---- flown
+  // ---- running
 
-  // Saves what is shown, and flies that, unless it cannot even be read. With `mayAsk`, nothing happens if that would leave
-  // a scene of the user's; the name of the text's scene is returned then.
+  // Save the open script and run it, unless it has a syntax error. With `mayAsk`, a run that would leave the user's scene for
+  // that of the lesson is not started; the name of the lesson's scene is returned.
   async run(lesson, mayAsk) {
     await this.save();
     const wrong = (await this.editor.check()).find(isSyntaxError);
@@ -383,7 +383,7 @@ export class Scripts {
     else this.store.say(done ? "started" : "refused", said);
   }
 
-  // Marks the lines at which the open script failed, and at which it is paused. The editor moves the marks with the text.
+  // Mark the lines at which the open script failed, and at which it is paused. The editor moves the marks with the text.
   mark(now) {
     const { failed, paused } = markedLines(now);
     const failure = failed && `${now.failure.told} ${now.failure.said}`;

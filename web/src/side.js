@@ -1,11 +1,11 @@
-// The icons at the scene's edge, and the one panel that they unfold; which, how wide and on which side is remembered.
+// The icons at the scene's edge, and the panel that they open. The browser stores which panel is open, its width and side.
 import { at } from "./dom.js";
 import { keep, kept } from "./storage.js";
 import { split } from "./split.js";
 
 export class Side {
   constructor(onShow) {
-    this.onShow = onShow; // hears the name of the panel that is open, '' for none
+    this.onShow = onShow; // called with the name of the open panel, "" for none
     this.buttons = [...document.querySelectorAll("#rail button[data-panel]")];
     for (const button of this.buttons) button.onclick = () => this.open(button.dataset.panel === this.now && at("panel").checkVisibility() ? "" : button.dataset.panel);
     at("fold-side").onclick = () => this.open("");

@@ -1,17 +1,17 @@
-// Our socket: questions with answers, and what the node tells by itself. It connects again when the node is back.
+// The page's WebSocket to the cockpit: requests with replies, and messages of the cockpit. It reconnects after a loss.
 import { isWatching } from "./course.js";
 import { SILENCE } from "./state/facts.js";
 
-const AGAIN = [1000, 1000, 2000, 4000, 8000]; // ms before each further attempt; the last one counts from then on
-const REFUSED = 30_000; // ms, while the cockpit does not know this page: nothing changes without the user
-const ABANDON = 7 * SILENCE * 1000; // ms of silence after which another connection is tried
+const AGAIN = [1000, 1000, 2000, 4000, 8000]; // ms before each further attempt; the last one is repeated
+const REFUSED = 30_000; // ms between attempts while the cockpit refuses this page: only the user can change that
+const ABANDON = 7 * SILENCE * 1000; // ms of silence after which the page connects again
 const PATIENCE = 10_000; // ms for a connection to be opened
 const FORBIDDEN = 403;
-const RETURN = "return"; // relative to the page: where a page that an earlier cockpit let in asks for a challenge, and signs it
+const RETURN = "return"; // relative to the page: gives a challenge, and takes its signature by a page that an earlier cockpit let in
 
 const hex = (bytes) => [...new Uint8Array(bytes)].map((one) => one.toString(16).padStart(2, "0")).join("");
 
-// Signs a challenge with the key; null where the browser cannot (crypto.subtle is for this machine and https alone).
+// Return the signature of a challenge, null if the browser cannot sign: it has crypto.subtle only on localhost and https.
 async function sign(key, challenge) {
   if (!globalThis.crypto?.subtle) return null;
   const algorithm = { name: "HMAC", hash: "SHA-256" };
@@ -21,7 +21,7 @@ async function sign(key, challenge) {
 }
 
 export class PageSocket {
-  // `on` has tell(message), picture(bytes), open() and close(); the store hears of the connection.
+  // `on` has the callbacks tell(message), picture(bytes), open() and close(); the store gets the state of the connection.
   /**
    * @param {import("./state/store.js").Store} store
    * @param {{ tell: (message: wire.Told) => void, picture: (bytes: ArrayBuffer) => void, open: () => void, close: () => void }} on
@@ -32,8 +32,8 @@ export class PageSocket {
     this.waiting = new Map();
     this.number = 0;
     this.attempts = 0;
-    this.key = ""; // by which this page returns to the next cockpit of the port; never stored, and never sent
-    this.begun = 0; // ms, when it last began to connect
+    this.key = ""; // signs this page's return to the next cockpit on the port; never stored, and never sent
+    this.begun = 0; // ms, start of the last attempt to connect
     this.socket = this.connect();
     setInterval(() => this.watch(), 500);
   }
@@ -76,7 +76,7 @@ export class PageSocket {
     this.tryAgain(connection !== "connected");
   }
 
-  // Waits longer after every attempt. If the node answers and refuses this page, the page asks to be let in again.
+  // Connect again, after a longer wait with every attempt. If the cockpit may have refused this page, ask first to be let in.
   async tryAgain(mayBeRefused) {
     const attempt = this.attempts++;
     const answer = mayBeRefused ? await this.askToReturn() : "nobody";
@@ -85,8 +85,8 @@ export class PageSocket {
     this.later = setTimeout(() => (this.socket = this.connect()), wait);
   }
 
-  // Returns "nobody" if no cockpit answers (a proxy may answer in its place), "allowed" if it lets this page in, "refused"
-  // if it does not. A cockpit lets a page in that an earlier one on this port has let in: the page signs a challenge with the key it got from that one.
+  // Return "nobody" if no cockpit answers (a proxy may answer in its place), "allowed" if it lets this page in, else "refused".
+  // It lets in a page that an earlier cockpit on this port let in, and which signs a challenge with the key of that cockpit.
   async askToReturn() {
     try {
       const answer = await fetch(RETURN, { signal: AbortSignal.timeout(PATIENCE) });
@@ -102,7 +102,7 @@ export class PageSocket {
     }
   }
 
-  // Gives a connection up that is silent, or is not opened: the node may be stopped, or the network has lost it.
+  // Replace a connection that is silent or does not open: the cockpit may be stopped, or the network has dropped it.
   watch() {
     this.store.take("tick");
     const { connection, heard, at } = this.store.now;

@@ -1,4 +1,4 @@
-// The start page: where a visitor begins, the gallery of tasks, and the way back to what was open last.
+// The start page: buttons for the first steps, the gallery of tasks, and a button that opens the last script again.
 import { at, create } from "./dom.js";
 import { isWatching } from "./course.js";
 import { bestWords } from "./graded.js";
@@ -7,8 +7,8 @@ import { keep, kept } from "./storage.js";
 const QUESTION = "A quadricopter, its script, and you. Where do you begin?";
 
 export class Start {
-  // `go` has what each button does: tutorial, fly, build; `gallery` has list(), which returns the tasks, the easiest first,
-  // and take(lesson, byKey), which begins one; `open(script)` opens the last script again.
+  // `go` has an action for each button: tutorial, fly, build. `gallery` has list(), which returns the tasks, the easiest
+  // first, and take(lesson, byKey), which starts one. `open(script)` opens the last script again.
   constructor(go, gallery, open) {
     const dialog = at("start-page");
     this.gallery = gallery;
@@ -24,7 +24,7 @@ export class Start {
       dialog.close();
       open(kept("script", ""));
     };
-    dialog.onclick = (event) => event.target === dialog && dialog.close(); // beside it
+    dialog.onclick = (event) => event.target === dialog && dialog.close(); // a click on the backdrop
     dialog.onclose = () => keep("started", true);
     at("start-close").onclick = () => dialog.close();
     at("home").onclick = () => this.show();
@@ -44,7 +44,7 @@ export class Start {
     const best = bestWords(lesson);
     const begin = (event) => {
       at("start-page").close();
-      this.gallery.take(lesson, event.detail === 0); // no click: it was a key
+      this.gallery.take(lesson, event.detail === 0); // `detail` is 0 for a key press
     };
     return create(
       "button", { type: "button", onclick: begin },
@@ -64,7 +64,7 @@ export class Start {
     at("start-page").showModal();
   }
 
-  // The page is served before the pictures are.
+  // Load the pictures, once the page is connected: the page is served before they are.
   load() {
     for (const picture of at("start-page").querySelectorAll("img")) picture.src ||= picture.dataset.src ?? "";
   }

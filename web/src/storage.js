@@ -1,5 +1,5 @@
-// The values that the browser stores for the page. A value that it cannot store is kept until the page is closed.
-// Behind a proxy, several cockpits have the same origin, each with its own folder; without one, this is drone_sim/.
+// Values that the browser stores for the page. A value that it cannot store is kept until the page is closed.
+// Behind a proxy, several cockpits have the same origin, each with its own path; without one, the prefix is drone_sim/.
 const PREFIX = `drone_sim${new URL(".", location.href).pathname}`;
 const unstored = new Map(); // values that the browser could not store, by key, as text
 
@@ -11,7 +11,7 @@ function read(key) {
   }
 }
 
-// Returns a stored value, `otherwise` if there is none or another program has written it.
+// Return a stored value, or `otherwise` if there is none or it is not JSON.
 export function kept(key, otherwise) {
   try {
     return JSON.parse(read(key)) ?? otherwise;
@@ -39,7 +39,7 @@ export function forget(key) {
   }
 }
 
-// Returns the keys that begin with `prefix`, without it.
+// Return the keys that begin with `prefix`, each without the prefix.
 export function keysBelow(prefix) {
   let stored = [];
   try {
@@ -51,7 +51,7 @@ export function keysBelow(prefix) {
   return [...all].filter((key) => key.startsWith(prefix)).map((key) => key.slice(prefix.length));
 }
 
-// Whether `value` will still be there after the page was closed.
+// Return whether the browser has stored `value`, so that it survives the closing of the page.
 export function isStored(key, value) {
   try {
     return localStorage.getItem(PREFIX + key) === JSON.stringify(value);

@@ -1,9 +1,9 @@
-// Keys, sticks and gamepad, held as in a game: what they ask for is said at once, and again while they are held.
+// Manual control by keys, touch sticks and gamepads. Changes of keys and sticks are sent at once; nonzero commands are repeated.
 const SPEED = 1; // m/s, rad/s
-const FAST = 2.5; // times, with Shift
-const AGAIN = 100; // ms
-const DEAD = 0.1; // of a stick's way
-// The one map of keys: key_teleop has it, too (KEY_MAPS in src/drone_sim/ros/tools/commands.py), as a test sees.
+const FAST = 2.5; // factor while Shift is held
+const AGAIN = 100; // ms between two commands
+const DEAD = 0.1; // dead zone of a gamepad's axes, which go from -1 to 1
+// key_teleop has the same keys (KEY_MAPS in src/drone_sim/ros/tools/commands.py), which a test checks.
 const KEYS = {
   KeyW: ["vx", 1], KeyS: ["vx", -1], KeyA: ["vy", 1], KeyD: ["vy", -1], KeyQ: ["wz", 1], KeyE: ["wz", -1],
   KeyR: ["vz", 1], KeyF: ["vz", -1], ArrowUp: ["vx", 1], ArrowDown: ["vx", -1], ArrowLeft: ["vy", 1], ArrowRight: ["vy", -1],
@@ -11,8 +11,8 @@ const KEYS = {
 const PAD = { vx: [3, -1], vy: [2, -1], vz: [1, -1], wz: [0, -1] }; // the standard gamepad's axes: down and right are +1
 const AXES = ["vx", "vy", "vz", "wz"];
 
-// Shows which letters this keyboard has at the places of W, A, S and D: the places fly, and a French keyboard has Z, Q, S and
-// D there. Only Chromium tells, and only on this machine or by https.
+// Show the letters that this keyboard has at the positions of W, A, S and D, because the positions count: a French keyboard
+// has Z, Q, S and D there. Only Chromium knows the letters, and only on localhost or by https.
 export async function nameKeys(elements) {
   const letters = await navigator.keyboard?.getLayoutMap?.().catch(() => {});
   for (const element of elements) element.textContent = letters?.get(`Key${element.textContent}`)?.toUpperCase() ?? element.textContent;
@@ -28,7 +28,7 @@ export class Teleop {
     setInterval(() => this.tell(true), AGAIN);
   }
 
-  // Keys count in the page and in the scene, but not where somebody writes, reads or moves a bar; slider and tree have their arrows.
+  // Listen to the keys of the page, except in fields, texts, bars and the start page; sliders and trees keep their arrow keys.
   listenTo(window) {
     const writes = (target) => target.closest?.("input:not([type=checkbox], [type=radio]), textarea, select, article, [contenteditable], [role=separator]");
     const takes = ({ code, target }) => window.document.querySelector("#start-page[open]") || writes(target) || (code.startsWith("Arrow") && target.closest?.("[role=slider], [role=tree]"));
@@ -57,10 +57,10 @@ export class Teleop {
   stick(element, across, along) {
     const knob = element.firstElementChild;
     const move = (x, y) => {
-      const far = Math.max(1, Math.hypot(x, y));
-      this.sticks[across] = -x / far;
-      this.sticks[along] = -y / far;
-      knob.style.transform = `translate(${(30 * x) / far}px, ${(30 * y) / far}px)`;
+      const length = Math.max(1, Math.hypot(x, y));
+      this.sticks[across] = -x / length;
+      this.sticks[along] = -y / length;
+      knob.style.transform = `translate(${(30 * x) / length}px, ${(30 * y) / length}px)`;
       this.tell();
     };
     const follow = (event) => {

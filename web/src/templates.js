@@ -1,4 +1,4 @@
-// What a new script begins with: V-REP's four phases.
+// The text of a new script: functions for V-REP's four phases.
 const PYTHON = `# A child script: the simulation calls each of these functions.
 
 

@@ -1,4 +1,4 @@
-// The buttons above the scene, and their keys.
+// The toolbar above the scene, and its keyboard shortcuts.
 import { Recorder } from "./recorder.js";
 import { at, create, save, stamp } from "./dom.js";
 
@@ -7,16 +7,16 @@ const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 0];
 
 const speedText = (factor) => (factor === 0 ? "fastest" : `${factor} ×`);
 
-// The texts without those that another one repeats and continues: a script's error is that of its vehicle, too.
+// Return the texts without duplicates and without beginnings of others: a script's error is also reported for its vehicle.
 const distinct = (texts) => [...new Set(texts)].filter((one, _, all) => !all.some((other) => other !== one && other.startsWith(one)));
 
-// Whoever writes, reads or moves a bar presses no keys of ours; on a focused button Space is that button's own.
-const hasKeys = ({ target, key }) =>
+// Return whether a key belongs to its target: any key in fields, texts, bars and dialogs, Space and Enter on buttons and links.
+const usesKey = ({ target, key }) =>
   target.closest?.("input, textarea, select, article, summary, [contenteditable], [role=separator], dialog") ||
   ([" ", "Enter"].includes(key) && target.closest?.("button, a"));
 
 export class Toolbar {
-  // `act(ask, more)` asks the node, and shows its answer; `scene()` is the scene, once it is there.
+  // `act(ask, more)` sends a request and shows its reply; `scene()` returns the scene.
   /**
    * @param {import("./state/store.js").Store} store
    * @param {import("./board.js").Board} board
@@ -75,7 +75,7 @@ export class Toolbar {
     at("toolbar-more").setAttribute("aria-expanded", String(open));
   }
 
-  // A click leaves no focus behind: the next Space would press the same button again.
+  // Add the keyboard shortcuts. A clicked button loses the focus, or the next Space would press it again.
   listen() {
     const buttons = [...document.querySelectorAll("button")].filter(({ dataset }) => dataset.key);
     for (const button of buttons) {
@@ -83,10 +83,10 @@ export class Toolbar {
       button.addEventListener("click", (event) => event.detail && button.blur());
     }
     window.addEventListener("keydown", (event) => {
-      if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || event.repeat || hasKeys(event)) return;
+      if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || event.repeat || usesKey(event)) return;
       const key = event.key === " " ? "Space" : event.key.length === 1 ? event.key.toUpperCase() : event.key;
-      const found = buttons.find((one) => one.dataset.key?.split(" ").includes(key));
-      const button = key === "Enter" && this.is("stopped") ? at("sim-start") : found;
+      const shortcutButton = buttons.find((one) => one.dataset.key?.split(" ").includes(key));
+      const button = key === "Enter" && this.is("stopped") ? at("sim-start") : shortcutButton;
       if (!button || button.disabled) return;
       event.preventDefault();
       button.click();
@@ -100,8 +100,8 @@ export class Toolbar {
   }
 
   offer(select, all, now) {
-    const named = (one) => (one === "none" ? "as launched" : one.slice(one.lastIndexOf("/") + 1));
-    const options = all.map((one) => create("option", { value: one, title: one, textContent: named(one) }));
+    const labelOf = (one) => (one === "none" ? "as launched" : one.slice(one.lastIndexOf("/") + 1));
+    const options = all.map((one) => create("option", { value: one, title: one, textContent: labelOf(one) }));
     select.replaceChildren(...options);
     select.value = now;
   }

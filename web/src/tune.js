@@ -1,12 +1,12 @@
-// Gains and other parameters: sliders and numbers, sent as they are moved, one at a time and at last the latest.
+// The panel of gains and other parameters. Changes are sent at once, one request at a time for each, and the latest value last.
 import { at, create } from "./dom.js";
 import { keep, kept } from "./storage.js";
 
-const OPEN = ["Gains", "Script parameters"]; // groups that are unfolded at first
-const STEPS = 200; // of a slider
-const WIDE = 20; // times the value: a range that is wider than this needs a slider of its own
+const OPEN = ["Gains", "Script parameters"]; // groups that are open at first
+const STEPS = 200; // positions of a slider
+const WIDE = 20; // a slider covers a parameter's whole range if that is at most this many times `limit`
 
-const shown = (value) => (typeof value === "number" ? String(Number(value.toPrecision(7))) : value);
+const format = (value) => (typeof value === "number" ? String(Number(value.toPrecision(7))) : value);
 
 export class Tune {
   /**
@@ -18,18 +18,18 @@ export class Tune {
     this.ask = ask;
     this.notice = notice;
     this.board = board;
-    this.fields = new Map(); // what shows a value, by name
-    this.waiting = new Map(); // the latest value of each name that is being set
+    this.fields = new Map(); // functions that show a value, by parameter name
+    this.waiting = new Map(); // the latest value of each parameter that is being set
     board.on("tuning", (groups) => this.build(groups));
     board.on("values", (values) => this.fill(values));
     at("tune-filter").oninput = () => this.filter();
   }
 
   build(groups) {
-    const { id = "", value } = /** @type {HTMLInputElement} */ (document.activeElement ?? {}); // who is writing goes on to
+    const { id = "", value } = /** @type {HTMLInputElement} */ (document.activeElement ?? {}); // the focused field, and its text, are restored below
     this.fields.clear();
-    const made = groups.map(({ group, fields }) => this.group(group, fields));
-    at("tune-groups").replaceChildren(...made);
+    const elements = groups.map(({ group, fields }) => this.group(group, fields));
+    at("tune-groups").replaceChildren(...elements);
     this.fill(this.board.get("values", {}));
     this.filter();
     const field = id.startsWith("tune ") && at(/** @type {`tune ${string}`} */ (id));
@@ -61,13 +61,13 @@ export class Tune {
     return row;
   }
 
-  // A number is taken as it is written; its slider goes as far as a hand can choose from.
   /**
+   * Adds a field, which takes any number, and a slider, whose range is narrow enough to choose a value by hand.
    * @param {HTMLElement} row
    * @param {wire.Field} field
    */
   number(row, { name, kind, low, high }, id) {
-    const range = [low, high].map((end) => (end === null ? "" : shown(end))).join(" to ");
+    const range = [low, high].map((end) => (end === null ? "" : format(end))).join(" to ");
     const text = create("input", { id, type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false });
     const slider = create("input", { type: "range", step: "any", "aria-label": `${name}, slider`, tabIndex: -1 });
     text.title = range.trim() === "to" ? name : `${name}: ${range}`;
@@ -82,23 +82,23 @@ export class Tune {
     slider.oninput = () => {
       const fine = (Number(slider.max) - Number(slider.min)) / STEPS;
       const rounded = Number((Math.round(slider.valueAsNumber / fine) * fine).toPrecision(6));
-      text.value = shown(kind === "int" ? Math.round(slider.valueAsNumber) : rounded);
+      text.value = format(kind === "int" ? Math.round(slider.valueAsNumber) : rounded);
       this.set(name, Number(text.value));
     };
     row.append(text, slider);
     this.fields.set(name, (value) => {
-      if (document.activeElement !== text || !this.isWritten(text)) text.value = shown(value);
-      text.dataset.holds = shown(value);
+      if (document.activeElement !== text || !this.isWritten(text)) text.value = format(value);
+      text.dataset.holds = format(value);
       if (document.activeElement === slider) return;
-      const far = Math.max(Math.abs(value) * 2, 1);
-      const isNarrow = low !== null && high !== null && high - low <= WIDE * far;
-      slider.min = String(isNarrow ? low : Math.max(low ?? -far, value < 0 ? -far : 0));
-      slider.max = String(isNarrow ? high : Math.min(high ?? far, far));
+      const limit = Math.max(Math.abs(value) * 2, 1);
+      const isNarrow = low !== null && high !== null && high - low <= WIDE * limit;
+      slider.min = String(isNarrow ? low : Math.max(low ?? -limit, value < 0 ? -limit : 0));
+      slider.max = String(isNarrow ? high : Math.min(high ?? limit, limit));
       slider.value = value;
     });
   }
 
-  // Whether somebody is writing something else than what held before: that is not overwritten.
+  // Return whether the user is typing something other than the current value; that must not be overwritten.
   isWritten(text) {
     return text.value !== text.dataset.holds;
   }
@@ -117,40 +117,40 @@ export class Tune {
 
   refuse(name, said) {
     this.notice.say(said, true);
-    const holds = this.board.get("values", {})[name];
+    const current = this.board.get("values", {})[name];
     document.activeElement?.blur?.();
-    if (holds !== undefined) this.fields.get(name)?.(holds);
+    if (current !== undefined) this.fields.get(name)?.(current);
   }
 
   async set(name, value) {
-    const isGoing = this.waiting.has(name);
+    const isSending = this.waiting.has(name);
     this.waiting.set(name, value);
-    if (isGoing) return; // its answer sends this one
+    if (isSending) return; // the loop of that call sends this value next
     while (this.waiting.has(name)) {
-      const wanted = this.waiting.get(name);
-      const done = await this.ask("tune", { name, value: wanted }).then(
+      const sentValue = this.waiting.get(name);
+      const done = await this.ask("tune", { name, value: sentValue }).then(
         ({ said }) => this.notice.say(said) ?? true,
         (error) => this.notice.say(error.message, true) ?? false,
       );
-      if (this.waiting.get(name) !== wanted) continue;
+      if (this.waiting.get(name) !== sentValue) continue;
       this.waiting.delete(name);
-      const holds = this.board.get("values", {})[name];
-      if (!done && holds !== undefined) document.activeElement?.closest?.("#tune-panel") && document.activeElement.blur();
-      if (holds !== undefined) this.fields.get(name)?.(done ? wanted : holds);
+      const current = this.board.get("values", {})[name];
+      if (!done && current !== undefined) document.activeElement?.closest?.("#tune-panel") && document.activeElement.blur();
+      if (current !== undefined) this.fields.get(name)?.(done ? sentValue : current);
     }
   }
 
   filter() {
-    const sought = at("tune-filter").value.trim().toLowerCase();
+    const query = at("tune-filter").value.trim().toLowerCase();
     for (const group of at("tune-groups").querySelectorAll("details")) {
-      let some = !sought;
+      let hasMatch = !query;
       for (const row of group.querySelectorAll(".field")) {
-        row.hidden = !row.dataset.name?.includes(sought);
-        some ||= !row.hidden;
+        row.hidden = !row.dataset.name?.includes(query);
+        hasMatch ||= !row.hidden;
       }
-      group.hidden = !some;
+      group.hidden = !hasMatch;
       const { name = "" } = group.dataset;
-      group.open = sought ? some : kept(`tune/${name}`, OPEN.includes(name));
+      group.open = query ? hasMatch : kept(`tune/${name}`, OPEN.includes(name));
     }
   }
 }

@@ -1,48 +1,48 @@
-// The variables of a script as a table, as they were at a breakpoint, or as they are; changed ones stand out.
+// The table of a script's variables, at a breakpoint or live. Changed values are highlighted.
 import { pauseOf } from "./state/words.js";
 
-const made = (tag, className, textContent = "") => Object.assign(document.createElement(tag), { className, textContent });
+const createElement = (tag, className, textContent = "") => Object.assign(document.createElement(tag), { className, textContent });
 
-// Returns all variables in the order in which they are shown; `way` is such as self/pid/sum.
+// Return all variables in display order. `way` is the path of a variable, such as self/pid/sum.
 function flat(scopes) {
-  const found = [];
+  const variables = [];
   for (const [scope, rows] of scopes) {
     for (const [name, type, value, inside] of rows) {
       const way = `${scope}/${name}`;
-      found.push({ way, scope, name, type, value, above: "", folds: inside.length > 0 });
-      for (const [inner, kind, shown] of inside) found.push({ way: `${way}/${inner}`, scope, name: inner, type: kind, value: shown, above: way, folds: false });
+      variables.push({ way, scope, name, type, value, above: "", folds: inside.length > 0 });
+      for (const [inner, kind, shown] of inside) variables.push({ way: `${way}/${inner}`, scope, name: inner, type: kind, value: shown, above: way, folds: false });
     }
   }
-  return found;
+  return variables;
 }
 
 export class Variables {
-  // `caption` says where and when, `body` gets the tables.
+  // `caption` shows script and time of the values, `body` gets the tables.
   constructor(caption, body) {
     this.caption = caption;
     this.body = body;
-    this.open = new Set(); // ways of what is unfolded
-    this.lines = new Map(); // the rows that are shown, by ways
-    this.built = ""; // the ways for which they are
-    this.before = new Map(); // values by ways, at the time before this one
+    this.open = new Set(); // paths of the unfolded variables
+    this.lines = new Map(); // the rows of the tables, by path
+    this.built = ""; // the paths of these rows, as JSON
+    this.before = new Map(); // values by path, at the time before this one
     this.now = { time: null, values: new Map() };
     this.hint = caption.textContent;
-    this.of = null; // whose values are shown, and when: { name, time }
+    this.of = null; // script and time of the values: { name, time (s) }
   }
 
-  // Shows what the simulation told; `file` is that of the script in the editor.
+  // Show the variables that the simulation sent; `file` is the file of the open script.
   take(state, file) {
     const { reached, scripts } = state;
     const script = scripts.find((one) => one.file === file) ?? scripts[0];
     const isAt = Boolean(reached.file);
     this.of = { name: (script?.file ?? "").split("/").pop(), time: state.time };
-    const found = flat(isAt ? reached.scopes : script?.scopes ?? []);
-    const ways = JSON.stringify(found.map(({ way, folds }) => [way, folds]));
-    if (ways !== this.built) this.build(found); // else every row stays, and what is focused in it
+    const variables = flat(isAt ? reached.scopes : script?.scopes ?? []);
+    const ways = JSON.stringify(variables.map(({ way, folds }) => [way, folds]));
+    if (ways !== this.built) this.build(variables); // otherwise all rows stay, and the focus in them
     this.built = ways;
     if (state.time !== this.now.time) this.before = this.now.values;
-    this.now = { time: state.time, values: new Map(found.map(({ way, value }) => [way, value])) };
-    for (const one of found) this.fill(one);
+    this.now = { time: state.time, values: new Map(variables.map(({ way, value }) => [way, value])) };
+    for (const one of variables) this.fill(one);
   }
 
   clear() {
@@ -52,7 +52,7 @@ export class Variables {
     this.body.replaceChildren();
   }
 
-  // Says where the flight is paused, or whose values these are.
+  // Show in the caption where the flight is paused, or whose values these are.
   say(now) {
     const words = this.words(pauseOf(now), now.status);
     if (this.caption.textContent !== words) this.caption.textContent = words;
@@ -64,10 +64,10 @@ export class Variables {
     return this.of.name ? `${this.of.name}: ${status}, values of t = ${this.of.time.toFixed(2)} s` : "No script is loaded.";
   }
 
-  build(found) {
+  build(variables) {
     const tables = new Map();
     this.lines.clear();
-    for (const one of found) {
+    for (const one of variables) {
       if (!tables.has(one.scope)) {
         tables.set(one.scope, document.createElement("table"));
         tables.get(one.scope).createCaption().textContent = one.scope;
@@ -86,15 +86,15 @@ export class Variables {
     line.hidden = above !== "";
     line.above = above;
     if (folds) {
-      line.button = made("button", "unfold", "▸");
+      line.button = createElement("button", "unfold", "▸");
       line.button.setAttribute("aria-label", name);
       line.button.setAttribute("aria-expanded", "false");
       line.button.onclick = () => this.unfold(way, !this.open.has(way));
       key.append(line.button);
     }
-    key.append(made("span", "", name));
+    key.append(createElement("span", "", name));
     line.shown = line.insertCell();
-    line.kind = made("small", "");
+    line.kind = createElement("small", "");
     line.insertCell().append(line.kind);
     return line;
   }

@@ -1,4 +1,4 @@
-// From where one looks at the scene, what is shown in it, and which of its objects has handles. The scene remembers it.
+// The view panel: viewpoint, visible aids and selected object of the scene. The scene stores viewpoint and visible aids.
 import { at, create } from "./dom.js";
 import { keep, kept } from "./storage.js";
 
@@ -14,8 +14,8 @@ const SHOWN = {
 };
 const WORDS = { behind: "Behind the drone", free: "Free", track: "tracking" };
 
-// A camera's frame under the name that people use: drone/front_optical is the front camera.
-const called = (view) => {
+// Return the label of a view: "front" for the camera frame drone/front_optical.
+const labelOf = (view) => {
   const name = view.split("/").pop().replace(/_optical$/, "");
   return WORDS[name] ?? name;
 };
@@ -51,7 +51,7 @@ export class View {
 
   offer() {
     const buttons = this.scene.views.map((view) => {
-      const button = create("button", { type: "button", textContent: called(view), title: view });
+      const button = create("button", { type: "button", textContent: labelOf(view), title: view });
       button.dataset.view = view;
       button.onclick = () => this.scene.look(view);
       return button;

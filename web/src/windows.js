@@ -1,4 +1,4 @@
-// What floats over the scene: pictures of cameras, and what scripts open: views, dialogs, consoles. All text is text.
+// The windows over the scene: camera pictures, and views, dialogs and consoles of scripts. No text is read as HTML.
 import { create, icon } from "./dom.js";
 import { Overlay } from "./overlay.js";
 import { Recorder } from "./recorder.js";
@@ -14,7 +14,7 @@ export class Windows {
     this.socket = socket; // { ask, say }
     this.notice = notice;
     this.open = new Map(); // windows, by kind and handle or topic
-    this.labels = new Map(); // of views, by topic
+    this.labels = new Map(); // labels of views, by topic
   }
 
   /** @param {wire.Windows} windows */
@@ -35,7 +35,7 @@ export class Windows {
     this.keep("picture", topics.map((topic) => ({ handle: topic })), (one) => this.figure(one.handle));
   }
 
-  // Leaves of one kind the windows that are listed; what is new is made, what has changed is filled anew.
+  // Update the windows of one kind: remove those that are not listed, create new ones, refill or replace changed ones.
   keep(kind, listed, make) {
     const keys = new Set(listed.map(({ handle }) => `${kind} ${handle}`));
     for (const [key, { element, end }] of this.open) {
@@ -47,14 +47,14 @@ export class Windows {
     for (const one of listed) {
       const key = `${kind} ${one.handle}`;
       const now = JSON.stringify(one);
-      const there = this.open.get(key);
-      if (there?.now === now) continue;
-      if (there?.fill) there.fill(one);
+      const existing = this.open.get(key);
+      if (existing?.now === now) continue;
+      if (existing?.fill) existing.fill(one);
       else {
-        const made = make(one);
-        if (there) there.element.replaceWith(made.element);
-        else this.parent.append(made.element);
-        this.open.set(key, made);
+        const created = make(one);
+        if (existing) existing.element.replaceWith(created.element);
+        else this.parent.append(created.element);
+        this.open.set(key, created);
       }
       this.open.get(key).now = now;
     }
@@ -107,41 +107,41 @@ export class Windows {
     const film = create("button", { className: "plain", title: "Record a video of this camera", "aria-label": `Record ${topic}` }, icon("video"));
     const turn = (overlay, on) => this.socket.ask("overlay", { topic, overlay, on }).catch((error) => this.notice.say(error.message, true));
     const over = new Overlay(topic, turn);
-    const made = { element, image, note, over, title: element.querySelector("span") };
-    const recorder = new Recorder(film, () => this.film(made), name, this.notice, () => (made.canvas = null));
-    made.end = () => recorder.stop(); // the film is saved
+    const figure = { element, image, note, over, title: element.querySelector("span") };
+    const recorder = new Recorder(film, () => this.film(figure), name, this.notice, () => (figure.canvas = null));
+    figure.end = () => recorder.stop(); // saves the video
     element.querySelector("header button")?.before(...over.buttons, film);
     element.append(create("div", { className: "seen" }, image, over.svg), note, over.legend);
-    return made;
+    return figure;
   }
 
-  // What a camera shows, as a stream: each picture is drawn on a canvas that nobody sees.
+  // Return a stream of a camera's pictures, which are drawn on a canvas outside the page.
   film(figure) {
     figure.canvas = create("canvas", { width: figure.image.naturalWidth || 640, height: figure.image.naturalHeight || 480 });
     figure.canvas.getContext("2d").drawImage(figure.image, 0, 0, figure.canvas.width, figure.canvas.height);
     return figure.canvas.captureStream();
   }
 
-  // A picture is answered for when it is on the screen; only then the node sends another.
+  // Show a camera's picture, and acknowledge it once it is on the screen; the cockpit sends the next one only then.
   /**
-   * @param {wire.Picture} said
+   * @param {wire.Picture} header
    * @param {Uint8Array<ArrayBuffer>} bytes
    */
-  picture(said, bytes) {
-    const shown = () => requestAnimationFrame(() => this.socket.say({ shown: said.picture }));
-    const there = this.open.get(`picture ${said.picture}`);
-    if (!there) return shown();
+  picture(header, bytes) {
+    const acknowledge = () => requestAnimationFrame(() => this.socket.say({ shown: header.picture }));
+    const figure = this.open.get(`picture ${header.picture}`);
+    if (!figure) return acknowledge();
     const address = URL.createObjectURL(new Blob([bytes]));
-    there.image.onload = there.image.onerror = () => {
-      const { canvas } = there;
-      canvas?.getContext("2d").drawImage(there.image, 0, 0, canvas.width, canvas.height);
+    figure.image.onload = figure.image.onerror = () => {
+      const { canvas } = figure;
+      canvas?.getContext("2d").drawImage(figure.image, 0, 0, canvas.width, canvas.height);
       URL.revokeObjectURL(address);
-      there.over.show(said, there.image);
-      shown();
+      figure.over.show(header, figure.image);
+      acknowledge();
     };
-    there.image.src = address;
-    there.title.textContent = this.labels.get(said.picture) ?? said.name;
-    there.note.textContent = said.note;
+    figure.image.src = address;
+    figure.title.textContent = this.labels.get(header.picture) ?? header.name;
+    figure.note.textContent = header.note;
   }
 }
 

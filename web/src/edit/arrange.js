@@ -1,9 +1,9 @@
-// What is done to what is selected as it lies: dropped to the floor, aligned with the last one, copied in rows.
+// Operations on the selected objects: drop to the floor, align with the last selected object, copy in rows.
 import * as THREE from "three";
 import { onGrid } from "./handles.js";
 
 const AXES = ["x", "y", "z"];
-const GAP = 0.2; // m, between what is duplicated
+const GAP = 0.2; // m, between an object and its duplicate
 const shifted = (matrix, by) => new THREE.Matrix4().setPosition(by).multiply(matrix);
 
 export class Arrange {
@@ -16,28 +16,28 @@ export class Arrange {
     return this.edit.objects.roots(this.edit.selected).filter((one) => this.edit.mayMove(one));
   }
 
-  // Each by itself, with its lowest point on z = 0.
+  // Move each selected object vertically so that its lowest point is at z = 0.
   dropToFloor() {
     this.shift("Drop", (box) => new THREE.Vector3(0, 0, -box.min.z));
   }
 
-  // Along an axis, with the low end (-1), the middle (0) or the high end (1) of the last one.
+  // Align the low ends (`end` = -1), middles (0) or high ends (1) along `axis` (0..2) with those of the last selected object.
   align(axis, end) {
     const { last } = this.edit;
-    if (last === undefined || !this.edit.objects.get(last)) return; // it has just been made, and is not told yet
-    const ends = (box) => [box.min, box.getCenter(new THREE.Vector3()), box.max][end + 1].getComponent(axis);
-    const to = ends(this.edit.seen.boxOf([last]));
-    this.shift(`Align ${AXES[axis]}:`, (box) => new THREE.Vector3().setComponent(axis, to - ends(box)), last);
+    if (last === undefined || !this.edit.objects.get(last)) return; // the object is new, and the node has not sent it yet
+    const endOf = (box) => [box.min, box.getCenter(new THREE.Vector3()), box.max][end + 1].getComponent(axis);
+    const to = endOf(this.edit.seen.boxOf([last]));
+    this.shift(`Align ${AXES[axis]}:`, (box) => new THREE.Vector3().setComponent(axis, to - endOf(box)), last);
   }
 
-  shift(verb, by, without) {
+  shift(verb, offsetOf, excluded) {
     const { edit, roots } = this;
-    const moved = roots.filter((one) => one !== without);
-    const places = new Map(moved.map((one) => [one, shifted(edit.objects.existing(one).matrix, by(edit.seen.boxOf([one])))]));
+    const moved = roots.filter((one) => one !== excluded);
+    const places = new Map(moved.map((one) => [one, shifted(edit.objects.existing(one).matrix, offsetOf(edit.seen.boxOf([one])))]));
     if (places.size) return edit.place(places, edit.named(verb, moved));
   }
 
-  // How far a copy is put aside, so that it does not stand in what it is a copy of: m.
+  // Return the distance (m) along x at which a copy does not overlap its original.
   aside() {
     const size = this.edit.seen.boxOf(this.roots).getSize(new THREE.Vector3());
     return Math.max(0.1, onGrid(size.x + GAP));

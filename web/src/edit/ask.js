@@ -1,23 +1,23 @@
-// A small window that asks for some values: names, numbers, one of several.
+// A dialog that asks for some values: texts, numbers, choices.
 import { at, create } from "../dom.js";
 
-// `fields`: { label, value, type: "text", "number" or "choice", choices: [[value, words]], hint }; `act(values)` does
-// what is asked for, and what it throws is told in the window. `verb` is on the button.
+// Show the dialog. `fields`: { label, value, type: "text", "number" or "choice", choices: [[value, words]], hint, and for
+// numbers low, high, step }; the button `verb` calls `act(values)`, and the dialog shows the error that it throws.
 export function askFor(title, fields, verb, act) {
   const dialog = at("ask");
-  const said = create("p", { className: "said", role: "alert" });
+  const message = create("p", { className: "said", role: "alert" });
   const inputs = fields.map(inputOf);
   const form = create("form", { method: "dialog" });
   const cancel = create("button", { type: "button", textContent: "Cancel", onclick: () => dialog.close() });
   const rows = fields.map(({ label, hint }, number) => create("label", { title: hint ?? "" }, create("span", { textContent: label }), inputs[number]));
-  form.append(create("h2", { textContent: title }), ...rows, said, create("div", { className: "buttons" }, cancel, create("button", { className: "main", textContent: verb })));
+  form.append(create("h2", { textContent: title }), ...rows, message, create("div", { className: "buttons" }, cancel, create("button", { className: "main", textContent: verb })));
   form.onsubmit = async (event) => {
     event.preventDefault();
     try {
       await act(inputs.map((one) => (one.type === "number" ? one.valueAsNumber : one.value.trim())));
       dialog.close();
     } catch (error) {
-      said.textContent = error.message;
+      message.textContent = error.message;
       inputs[0]?.focus();
     }
   };

@@ -1,29 +1,29 @@
-// What has been asked for, and is not told yet: until then it counts, or a second number that one writes would bring
-// back the first as it was.
+// Values that the page has requested and the node has not sent yet. The page shows them meanwhile; otherwise a second
+// number that the user enters would restore the old value of the first.
 export class Assumed {
   /** @param {import("./objects.js").Objects} objects */
   constructor(objects) {
     this.objects = objects;
-    this.busy = 0; // edits that are not answered
-    this.known = 0; // the revision that has been told
-    this.told = new Map(); // what has been told of objects that are shown otherwise, by handle
+    this.busy = 0; // number of edits without an answer yet
+    this.known = 0; // the revision that the node has sent
+    this.told = new Map(); // { one, matrix, values } as sent by the node, of objects with assumed values, by handle
     this.reached = 0; // the revision of the last answer
     /** @type {Map<number, import("three").Matrix4>} */
-    this.matrices = new Map(); // of the world, by handle
+    this.matrices = new Map(); // assumed poses in the world, by handle
     /** @type {Map<number, Record<string, any>>} */
-    this.values = new Map(); // by handle
+    this.values = new Map(); // assumed values of keys, by handle
   }
 
-  // Lets what has been told be seen.
+  // Drop the assumed values, and restore those that the node has sent.
   clear() {
     for (const { one, ...told } of this.told.values()) Object.assign(one, told);
     this.reached = 0;
-    for (const all of [this.matrices, this.values, this.told]) all.clear();
+    for (const map of [this.matrices, this.values, this.told]) map.clear();
   }
 
   put(handle, matrix) {
-    const way = matrix.clone().multiply(this.objects.existing(handle).matrix.clone().invert());
-    for (const one of this.objects.withBelow(handle)) this.matrices.set(one, way.clone().multiply(this.objects.existing(one).matrix));
+    const motion = matrix.clone().multiply(this.objects.existing(handle).matrix.clone().invert());
+    for (const one of this.objects.withBelow(handle)) this.matrices.set(one, motion.clone().multiply(this.objects.existing(one).matrix));
     this.apply();
   }
 
@@ -33,13 +33,13 @@ export class Assumed {
   }
 
   /**
-   * Hears of an edit; returns its answer.
-   * @param {Promise<wire.EditAnswer>} asked
+   * Wait for the answer to an edit and return it. If the edit is refused, the assumed values are dropped.
+   * @param {Promise<wire.EditAnswer>} request
    */
-  async during(asked) {
+  async during(request) {
     this.busy++;
     try {
-      const answer = await asked;
+      const answer = await request;
       this.reached = Math.max(this.reached, answer.revision ?? 0);
       return answer;
     } catch (error) {
@@ -51,14 +51,14 @@ export class Assumed {
     }
   }
 
-  // Hears what the node tells, up to this revision.
+  // The node has sent the objects of `revision`: apply the assumed values to them, unless they contain all of them.
   tell(revision) {
     this.known = revision;
     this.settle();
     this.apply();
   }
 
-  // The answer to an edit may come before the node tells of it, or after that.
+  // Drop the assumed values if all edits are answered and sent. An answer may come before or after the changed objects.
   settle() {
     if (!this.busy && this.known >= this.reached) this.clear();
   }

@@ -1,4 +1,4 @@
-// The Edit panel, the bar and the shelf of models about the scene: what V-REP's window is for who builds a scene.
+// Edit mode of the page: the Edit panel, and the toolbar and the shelf of models around the scene, like V-REP's window.
 import { Menu } from "../menu.js";
 import { at, create } from "../dom.js";
 import { keep, kept } from "../storage.js";
@@ -19,7 +19,7 @@ import { SceneText } from "./scene_text.js";
 const ENDS = [["low", -1, "low ends"], ["middle", 0, "middles"], ["high", 1, "high ends"]];
 
 export class Build {
-  // `openScript(file)` opens one in the editor, `showScript(is)` shows the place where that is, and the text.
+  // `openScript(file)` opens a file in the editor; `showScript(isShown)` shows the side with the editor and the scene's text.
   /**
    * @param {import("../scene/scene.js").Scene} scene
    * @param {wire.Ask} ask
@@ -47,7 +47,7 @@ export class Build {
     this.show();
   }
 
-  // ---- for the page
+  // ---- called by the page
 
   turn(on) {
     document.body.classList.toggle("editing", on);
@@ -62,7 +62,7 @@ export class Build {
     if (tree) this.edit.take(tree);
   }
 
-  // ---- what the buttons, menus and keys do
+  // ---- actions of buttons, menus and keys
 
   actions() {
     const { edit, arrange, files, hierarchy } = this;
@@ -89,7 +89,7 @@ export class Build {
   connect() {
     for (const button of document.querySelectorAll("[data-edit]")) {
       button.onclick = (event) => {
-        if (event.detail) button.blur(); // the next Space would press it again
+        if (event.detail) button.blur(); // otherwise Space would press the button again
         this.acts[button.dataset.edit]();
       };
     }
@@ -102,7 +102,7 @@ export class Build {
     window.addEventListener("keydown", (event) => this.escape(event));
     at("edit-panel").addEventListener("keydown", (event) => {
       if (event.key !== "Escape") return;
-      event.stopPropagation(); // it would fold the panel
+      event.stopPropagation(); // Escape would also fold the panel
       this.escape(event);
     });
   }
@@ -145,13 +145,13 @@ export class Build {
 
   aligns(axis, number) {
     const buttons = ENDS.map(([word, end, words]) => {
-      const said = { type: "button", textContent: word, title: `The ${words} along ${axis}`, "aria-label": `Align the ${words} along ${axis}` };
-      return create("button", { ...said, onclick: () => this.arrange.align(number, end) });
+      const attributes = { type: "button", textContent: word, title: `The ${words} along ${axis}`, "aria-label": `Align the ${words} along ${axis}` };
+      return create("button", { ...attributes, onclick: () => this.arrange.align(number, end) });
     });
     return create("span", { role: "group", "aria-label": `Along ${axis}` }, axis, ...buttons);
   }
 
-  // ---- what is shown
+  // ---- display
 
   showText(on) {
     if (on === this.text.isShown) return;
@@ -194,7 +194,7 @@ export class Build {
     at("align").hidden = count < 2;
     at("attached").hidden = count !== 1 || !(one?.of === "scene" || one?.root);
     at("attached-none").hidden = Boolean(one?.script);
-    at("detach").hidden = Boolean(one?.root); // a vehicle has always one
+    at("detach").hidden = Boolean(one?.root); // a vehicle always has a script
     at("attached-one").hidden = !one?.script;
     at("attached-open").onclick = () => one && edit.openScript(one);
     at("attached-open").textContent = `Open ${one?.script?.split("/").pop() ?? ""}`;

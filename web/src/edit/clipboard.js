@@ -1,6 +1,6 @@
-// Copy and paste by the system's clipboard: objects are YAML there, as in a scene file, for another scene, another page or
-// an editor, and from one.
-const MOST = 4e6; // characters that the node is asked to paste
+// Copy and paste of objects by the system's clipboard. They are YAML there, as in a scene file, so that they can be copied
+// to and from another scene, page or editor.
+const MOST = 4e6; // characters, limit for a paste
 
 export class Clipboard {
   /** @param {import("./edit.js").Edit} edit */
@@ -28,7 +28,7 @@ export class Clipboard {
     return edit.make([{ do: "paste", text }], "Paste", true);
   }
 
-  // Without the key, a browser may ask whether the page may see the clipboard, or not give it.
+  // Paste without Ctrl+V, as by the menu. The browser may ask the user for permission to read the clipboard, or refuse.
   async ask() {
     try {
       await this.paste(await navigator.clipboard.readText());
@@ -38,7 +38,7 @@ export class Clipboard {
   }
 }
 
-// Of a page that came from another machine without https, browsers take a text only while a copy is under way.
+// Write a text to the clipboard. Without https, a page from another machine can do this only during a copy event.
 async function write(text) {
   if (navigator.clipboard) return navigator.clipboard.writeText(text);
   const fill = (event) => {

@@ -1,17 +1,17 @@
-// Values of arithmetic that somebody writes into a number field: 2*pi, 0.5+0.1, -(3 - 1)/4, 2^3.
+// Parser for arithmetic in a number field: 2*pi, 0.5+0.1, -(3 - 1)/4, 2^3.
 const TOKEN = /\s*(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+(?:e[+-]?\d+)?|pi|π|[-+*/^()])/iy;
 
-// Returns the value of a text, NaN where it is no arithmetic.
+// Return the value of a text, NaN if it is not valid arithmetic.
 export function compute(text) {
   const tokens = [];
   TOKEN.lastIndex = 0;
   for (let at = 0, end = text.trimEnd().length; at < end; at = TOKEN.lastIndex) {
-    const found = TOKEN.exec(text);
-    if (!found) return NaN;
-    tokens.push(found[1].toLowerCase());
+    const match = TOKEN.exec(text);
+    if (!match) return NaN;
+    tokens.push(match[1].toLowerCase());
   }
   const value = sum(tokens);
-  return tokens.length ? NaN : value; // what is left cannot be read
+  return tokens.length ? NaN : value; // tokens that are left over are an error
 }
 
 function sum(tokens) {

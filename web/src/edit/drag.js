@@ -1,13 +1,13 @@
-// One drag of what is selected: seen at once, told to the node as it goes, and one step of undo in the end.
+// A drag of the selected objects: shown at once, sent to the node at intervals, and a single step of undo.
 import * as THREE from "three";
 
-const SAID = 120; // ms between two words to the node
-const NOTHING = new THREE.Matrix4().elements.join();
+const PERIOD = 120; // ms between two moves that are sent to the node
+const IDENTITY = new THREE.Matrix4().elements.join();
 let drags = 0;
-const page = Math.random().toString(36).slice(2); // this page's name
+const page = Math.random().toString(36).slice(2); // random name of this page, for keys of drags
 
 export class Drag {
-  // Of the objects `roots`, and of all that hangs on them.
+  // Begin a drag of the objects `roots` with all their descendants.
   /**
    * @param {import("./edit.js").Edit} edit
    * @param {number[]} roots
@@ -21,29 +21,29 @@ export class Drag {
     const all = roots.flatMap((one) => edit.objects.withBelow(one));
     const names = new Set(all.map((one) => edit.objects.existing(one)).filter(({ of }) => of === "scene").map(({ name }) => name));
     const { scene, glyphs } = edit;
-    const shown = [...scene.tree.markers.values()].filter(({ userData: { said } }) => said.layer === "scene" && names.has(said.ns));
-    this.shown = [...shown, ...all.map((one) => glyphs.get(one)).filter(Boolean)].map((one) => [one, one.matrixWorld.clone()]);
+    const markers = [...scene.tree.markers.values()].filter(({ userData: { said } }) => said.layer === "scene" && names.has(said.ns));
+    this.shown = [...markers, ...all.map((one) => glyphs.get(one)).filter(Boolean)].map((one) => [one, one.matrixWorld.clone()]);
   }
 
-  // `change`: a matrix of the world, and factors along the own axes, null for none.
+  // Apply `change`: a motion as a matrix in the world, and scale factors along the last object's axes, null for none.
   go(change) {
     this.change = change;
     this.edit.scene.change();
     if (this.isResize(change)) return;
-    this.saying ??= setTimeout(() => this.tell(this.change).then(() => (this.saying = undefined)), SAID);
+    this.saying ??= setTimeout(() => this.tell(this.change).then(() => (this.saying = undefined)), PERIOD);
   }
 
   isResize({ factors }) {
     return Boolean(factors) && factors.toArray().some((one) => one !== 1);
   }
 
-  // Shows it where it will be, before each picture: the node's word comes later.
+  // Show the objects where they will be, before each frame: the node's answer comes later.
   show({ matrix, factors } = this.change) {
-    const whole = matrix.clone();
+    const motion = matrix.clone();
     const own = this.from.get(this.roots[this.roots.length - 1]);
-    if (factors && own) whole.multiply(own.clone().scale(factors).multiply(own.clone().invert()));
+    if (factors && own) motion.multiply(own.clone().scale(factors).multiply(own.clone().invert()));
     for (const [object, from] of this.shown) {
-      const local = from.clone().premultiply(whole).premultiply(object.parent.matrixWorld.clone().invert());
+      const local = from.clone().premultiply(motion).premultiply(object.parent.matrixWorld.clone().invert());
       if (!object.matrixAutoUpdate) object.matrix.copy(local);
       local.decompose(object.position, object.quaternion, object.scale);
       object.matrixWorldNeedsUpdate = true;
@@ -62,7 +62,7 @@ export class Drag {
     clearTimeout(this.saying);
     for (const [object] of this.shown) object.scale.setScalar(1);
     const { edit, roots } = this;
-    const isMoved = this.isTold || change.matrix.elements.join() !== NOTHING;
+    const isMoved = this.isTold || change.matrix.elements.join() !== IDENTITY;
     /** @type {wire.Scale} */
     const resize = { do: "scale", objects: roots, factors: change.factors?.toArray().map((one) => Number(one.toFixed(6))) };
     const done = this.isResize(change) ? await edit.do([resize], edit.named("Resize", roots)) : isMoved && (await this.tell(change));

@@ -1,5 +1,5 @@
-// Editing of the scene: what is selected, what is done to it, and who is told of that. The node has the scene; here is
-// what it tells of it.
+// Editing of the scene: selection, requests for changes, and events for the panels. The node owns the scene; `objects` is a
+// copy of what it has sent.
 import * as THREE from "three";
 import { FREE } from "../scene/view.js";
 import { Assumed } from "./assumed.js";
@@ -12,13 +12,13 @@ import { Objects, WORLD } from "./objects.js";
 import { poseOf } from "./poses.js";
 import { Seen } from "./seen.js";
 
-const TARGET = "target"; // the alias of the green sphere: what of a vehicle is moved by itself
-const AWAY = 60; // m from the middle of the floor, of an eye that sees nothing of the scene
+const TARGET = "target"; // alias of the green sphere, the only part of a vehicle that can be moved alone
+const AWAY = 60; // m from the middle of the floor: a camera farther away sees nothing of the scene
 /** @type {wire.EditorState} */
 const NOTHING = { file: "", new: false, modified: false, read_only: false, state: "", undo: "", redo: "", draft: null, revision: 0 };
 
 export class Edit {
-  // `ask` asks the node, `notice` is the message line, `openScript(file)` opens one in the editor.
+  // `ask` sends a request to the node, `notice` is the message line, `openScript(file)` opens a file in the editor.
   /**
    * @param {import("../scene/scene.js").Scene} scene
    * @param {wire.Ask} ask
@@ -32,14 +32,14 @@ export class Edit {
     this.openScriptFile = openScript;
     this.objects = new Objects();
     this.assumed = new Assumed(this.objects);
-    this.is = NOTHING; // of the scene as a whole
+    this.is = NOTHING; // state of the scene as a whole
     /** @type {number[]} */
-    this.selected = []; // handles, the last one last
-    this.expected = new Set(); // selected, but not told yet
-    this.hearing = new Map();
+    this.selected = []; // handles, in the order of selection
+    this.expected = new Set(); // handles of new objects that are selected, but not sent by the node yet
+    this.hearing = new Map(); // callbacks, by event
     this.isOn = false;
-    this.frame = "world"; // the axes of the handles
-    this.isAway = false; // the handles go when a flight starts, until something is selected
+    this.frame = "world"; // the frame whose axes the handles have
+    this.isAway = false; // the handles are hidden from the start of a flight until something is selected
     this.glyphs = new Glyphs(scene.world);
     this.handles = new Handles(scene.camera, { changed: (change) => this.drag(change) });
     this.seen = new Seen(this);
@@ -55,7 +55,7 @@ export class Edit {
     for (const act of this.hearing.get(what) ?? []) act();
   }
 
-  // ---- begin and end
+  // ---- begin and end of editing
 
   turn(on) {
     if (on === this.isOn) return;
@@ -83,14 +83,14 @@ export class Edit {
   connected() {
     if (!this.isOn || this.asking) return;
     this.asking = true;
-    this.missed = undefined; // once, however much is missed meanwhile
-    // What has been told meanwhile may be newer.
+    this.missed = undefined; // one request at a time, however many changes are missed during it
+    // Changes that arrived during the request may be newer than the answer.
     const take = ({ tree }) => tree.version >= (this.objects.version ?? tree.version) && this.take(tree);
-    const end = () => {
+    const finish = () => {
       this.asking = false;
-      if (this.missed !== undefined && this.missed > (this.objects.version ?? -1)) this.connected(); // the answer was on its way before
+      if (this.missed !== undefined && this.missed > (this.objects.version ?? -1)) this.connected(); // the answer is older
     };
-    return this.ask("tree").then(take, (error) => this.wrong(error.message)).finally(end);
+    return this.ask("tree").then(take, (error) => this.wrong(error.message)).finally(finish);
   }
 
   lost() {
@@ -102,38 +102,38 @@ export class Edit {
     this.show();
   }
 
-  // ---- what the node tells
+  // ---- messages of the node
 
-  /** @param {wire.TreeChange} told */
-  take(told) {
+  /** @param {wire.TreeChange} change */
+  take(change) {
     if (!this.isOn) return void (this.objects.version = null);
-    const changed = this.objects.take(told);
+    const changed = this.objects.take(change);
     if (changed === "missed") {
-      this.missed = told.version;
+      this.missed = change.version;
       return void this.connected();
     }
-    const { objects, gone, version, since, ...is } = told;
+    const { objects, gone, version, since, ...is } = change;
     const isFlying = is.state !== "stopped";
     const hasEnded = !isFlying && this.is.state !== is.state;
     this.isAway = isFlying && (this.isAway || this.is.state === "stopped");
     this.is = is;
     this.assumed.tell(is.revision);
     for (const one of [...this.expected]) if (this.objects.get(one)) this.expected.delete(one);
-    const still = this.selected.filter((one) => this.objects.get(one) || this.expected.has(one));
+    const kept = this.selected.filter((one) => this.objects.get(one) || this.expected.has(one));
     if (changed === "tree") this.emit("tree");
     this.emit("objects");
-    if (still.length !== this.selected.length || changed === "tree") this.choose(still);
+    if (kept.length !== this.selected.length || changed === "tree") this.choose(kept);
     this.show();
     if (hasEnded) this.comeBack();
   }
 
-  // Paints anew what is seen of the objects, and of what is selected.
+  // Update the glyphs, and the visibility and outlines of objects.
   show() {
     this.glyphs.show(this.isOn ? this.seen.bodiless() : null);
     this.scene.rearrange();
   }
 
-  // ---- what is selected
+  // ---- selection
 
   get last() {
     return this.selected.at(-1);
@@ -166,17 +166,17 @@ export class Edit {
     this.scene.rearrange();
   }
 
-  // What a click on an object selects: its outermost model first, what it is a part of next, then the part itself.
+  // Return what a click on an object selects: its outermost model first, then the next inner one, at last the object.
   shownAs(handle) {
     const models = this.objects.above(handle).filter((one) => this.objects.existing(one).model || this.objects.existing(one).root);
-    const way = [...models.reverse(), handle];
-    const at = way.findLastIndex((one) => this.has(one));
-    return way[Math.min(at + 1, way.length - 1)];
+    const path = [...models.reverse(), handle];
+    const at = path.findLastIndex((one) => this.has(one));
+    return path[Math.min(at + 1, path.length - 1)];
   }
 
-  // ---- the handles: the scene asks while one edits
+  // ---- handles; the scene calls these while editing
 
-  // The object that has them, undefined for none.
+  // The object that has the handles, undefined for none.
   get held() {
     const one = this.objects.get(this.last);
     const isShown = this.isOn && !this.isAway && !this.hand.measuring && this.scene.shown.handles;
@@ -189,7 +189,7 @@ export class Edit {
     this.handles.put(held ? this.frameOf(held.handle, frame) : null, held && new THREE.Vector3().setFromMatrixPosition(held.matrix));
   }
 
-  // A drone that flew away has taken the view with it, so that nothing of the scene could be seen.
+  // Show the floor if the camera is too far away to see the scene, as after it has followed a drone that flew away.
   comeBack() {
     const size = this.objects.named("Floor")?.values.size;
     if (size && this.scene.camera.position.length() > Math.max(AWAY, 2 * size)) this.frameFloor();
@@ -202,7 +202,7 @@ export class Edit {
     this.scene.change();
   }
 
-  // ---- frames and places
+  // ---- frames and permissions
 
   mayMove(handle) {
     const one = this.objects.get(handle);
@@ -219,10 +219,10 @@ export class Edit {
     return (which === "parent" && this.objects.get(one?.parent)?.matrix) || new THREE.Matrix4();
   }
 
-  // ---- what is done
+  // ---- changes
 
-  // Does some operations as one edit; returns the answer, undefined where it was refused. It is asked for at once: the
-  // node does in turn what a page asks, so a start, a save or an undo that is asked for later comes after it.
+  // Do operations as one edit; return the answer, undefined if the node refused it. The request is sent at once: the node
+  // handles a page's requests in order, so that a later start, save or undo comes after the edit.
   /**
    * @param {wire.Operation[]} operations
    * @param {string} name
@@ -232,23 +232,23 @@ export class Edit {
     try {
       const { is } = this;
       const answer = await this.assumed.during(this.ask("edit", { edit: operations, name, ...(merge ? { merge } : {}) }));
-      this.emit("objects"); // what was told meanwhile counts now
-      const first = answer.until_stop && !this.hasTold;
-      if (first) this.notice.say("The simulation runs: stop will undo your edits. To keep them, stop first.");
+      this.emit("objects"); // show what the node sent during the request
+      const isFirst = answer.until_stop && !this.hasTold;
+      if (isFirst) this.notice.say("The simulation runs: stop will undo your edits. To keep them, stop first.");
       this.hasTold = Boolean(answer.until_stop) && is.state !== "stopped";
       return answer;
     } catch (error) {
       this.wrong(error.message);
-      this.connected(); // what was assumed is not so
+      this.connected(); // replaces the values that were assumed
     }
   }
 
-  // Does what makes objects, and selects the first of them, or all.
+  // Do operations that create objects, and select the first new object, or all.
   /** @param {wire.Operation[]} operations */
   async make(operations, name, isAll = false) {
     const answer = await this.do(operations, name);
-    const made = answer?.handles ?? [];
-    const chosen = isAll ? made : made.slice(0, 1);
+    const created = answer?.handles ?? [];
+    const chosen = isAll ? created : created.slice(0, 1);
     for (const one of chosen) if (!this.objects.get(one)) this.expected.add(one);
     if (chosen.length) this.select(chosen);
     return answer;
@@ -260,20 +260,20 @@ export class Edit {
 
   /**
    * @param {"undo" | "redo"} which
-   * @param {string} [merge] of one drag, whatever others have done since
+   * @param {string} [merge] the key of a drag: undo this drag, even if other edits came after it
    */
   async undo(which, merge) {
     try {
       const { said, handles = [] } = await this.ask(which, merge ? { merge } : {});
       this.notice.say(said);
-      const there = handles.filter((one) => this.objects.get(one));
-      if (there.length) this.select(there);
+      const existing = handles.filter((one) => this.objects.get(one));
+      if (existing.length) this.select(existing);
     } catch (error) {
       this.wrong(error.message);
     }
   }
 
-  // Puts objects at places: matrices of the world, by handle.
+  // Move objects; `places` has their matrices in the world, by handle.
   place(places, name = this.named("Move", [...places.keys()]), merge) {
     for (const [handle, matrix] of places) this.assumed.put(handle, matrix);
     this.glyphs.show(this.seen.bodiless());
@@ -289,7 +289,7 @@ export class Edit {
     return `${verb} ${handles.length === 1 ? this.objects.get(handles[0])?.name ?? "" : `${handles.length} objects`}`;
   }
 
-  // Selects the object that has the name already.
+  // Rename an object. If another one has the name already, select that one.
   async rename({ handle, name: before }, name) {
     const answer = await this.do([{ do: "rename", object: handle, name }], `Rename ${before}`);
     const other = this.objects.named(name);

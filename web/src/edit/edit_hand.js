@@ -1,12 +1,12 @@
-// What the mouse does to the scene while one builds: it selects, drags by handles or as a thing on a level, and measures.
+// Mouse input in the scene in edit mode: select, drag by handles or along a horizontal plane, measure.
 import * as THREE from "three";
 import { onGrid } from "./handles.js";
 
 const up = new THREE.Vector3(0, 0, 1);
 
-export const isFree = (event) => event.ctrlKey || event.metaKey;
+export const isFree = (event) => event.ctrlKey || event.metaKey; // the key that switches the grid off or on during a drag
 
-// Beside the flight's hand, whose looking about stays.
+// Replaces some callbacks of hand.js; the camera's remain.
 export class EditHand {
   /**
    * @param {import("../scene/scene.js").Scene} scene
@@ -18,12 +18,12 @@ export class EditHand {
     this.edit = edit;
     this.handles = handles;
     this.caster = new THREE.Raycaster();
-    this.began = this.from = new THREE.Vector3(); // of a slide: what was met, and where the thing was
-    this.level = new THREE.Plane(); // on which it slides
-    this.measuring = null; // takes points while one measures
+    this.began = this.from = new THREE.Vector3(); // of a slide: the point under the mouse, and the object's position
+    this.level = new THREE.Plane(); // the horizontal plane of a slide
+    this.measuring = null; // the Measure that gets the points, while measuring
   }
 
-  // What of the pointer's acts is another while one builds.
+  // The pointer's callbacks that differ from hand.js.
   get acts() {
     return {
       take: (event) => this.take(event),
@@ -45,19 +45,19 @@ export class EditHand {
     return this.caster;
   }
 
-  // What is under the mouse: { object, point, normal }, the floor's plane where there is nothing; null in the sky.
+  // Return { object, point, normal } under the mouse, for the floor's plane if no object is there; null in the sky.
   meet(event, without = new Set()) {
     const ray = this.ray(event);
     const things = [...this.scene.things(), ...this.edit.glyphs.all].filter((one) => one.visible && one.parent);
-    for (const met of ray.intersectObjects(things, true)) {
+    for (const hit of ray.intersectObjects(things, true)) {
       /** @type {THREE.Object3D | null} */
-      let object = met.object;
+      let object = hit.object;
       while (object && !object.userData.said) object = object.parent;
-      const found = object && this.edit.seen.objectOf(object.userData.said);
-      if (found && without.has(found.handle)) continue;
-      const normal = met.face ? met.face.normal.clone().transformDirection(met.object.matrixWorld) : up.clone();
+      const target = object && this.edit.seen.objectOf(object.userData.said);
+      if (target && without.has(target.handle)) continue;
+      const normal = hit.face ? hit.face.normal.clone().transformDirection(hit.object.matrixWorld) : up.clone();
       if (normal.dot(ray.ray.direction) > 0) normal.negate();
-      return { object: found, point: met.point, normal };
+      return { object: target, point: hit.point, normal };
     }
     const point = ray.ray.intersectPlane(new THREE.Plane(up, 0), new THREE.Vector3());
     return point && { object: undefined, point, normal: up.clone() };
@@ -76,22 +76,22 @@ export class EditHand {
     const before = this.handles.controls.axis;
     const isHandle = !this.measuring && this.handles.hover(this.place(event));
     if (this.handles.controls.axis !== before) this.scene.change();
-    const met = isHandle ? null : this.meet(event);
-    this.measuring?.over(met?.point);
-    this.scene.canvas.dom.style.cursor = this.measuring ? "crosshair" : isHandle ? "grab" : met?.object ? "pointer" : "";
-    this.edit.hover(met?.object?.handle);
+    const hit = isHandle ? null : this.meet(event);
+    this.measuring?.over(hit?.point);
+    this.scene.canvas.dom.style.cursor = this.measuring ? "crosshair" : isHandle ? "grab" : hit?.object ? "pointer" : "";
+    this.edit.hover(hit?.object?.handle);
   }
 
   click(event) {
-    const met = this.meet(event);
-    if (this.measuring) return void (met && this.measuring.take(met.point));
-    const handle = met?.object && this.edit.shownAs(met.object.handle);
+    const hit = this.meet(event);
+    if (this.measuring) return void (hit && this.measuring.take(hit.point));
+    const handle = hit?.object && this.edit.shownAs(hit.object.handle);
     if (handle === undefined) return event.shiftKey || this.edit.select([]);
     if (event.shiftKey || event.ctrlKey || event.metaKey) this.edit.toggle(handle);
     else this.edit.select([handle]);
   }
 
-  // Takes a handle, or what is selected itself, which slides on its level.
+  // Start a drag by a handle, or a slide of the selected object in a horizontal plane; return "part", "thing", or null for none.
   take(event) {
     if (this.measuring) return null;
     if (this.handles.take(this.place(event), isFree(event))) {
@@ -99,19 +99,19 @@ export class EditHand {
       this.edit.beginDrag();
       return "part";
     }
-    const met = this.meet(event);
-    const handle = met?.object && [met.object.handle, ...this.edit.objects.above(met.object.handle)].find((one) => this.edit.has(one));
-    if (!met || handle === undefined || !this.edit.mayMove(handle)) return null;
+    const hit = this.meet(event);
+    const handle = hit?.object && [hit.object.handle, ...this.edit.objects.above(hit.object.handle)].find((one) => this.edit.has(one));
+    if (!hit || handle === undefined || !this.edit.mayMove(handle)) return null;
     this.dragging = "thing";
-    this.began = met.point.clone();
+    this.began = hit.point.clone();
     this.from = new THREE.Vector3().setFromMatrixPosition(this.edit.objects.existing(handle).matrix);
-    this.level = new THREE.Plane(up, -met.point.z);
+    this.level = new THREE.Plane(up, -hit.point.z);
     this.edit.beginDrag();
     return "thing";
   }
 
   drag(event) {
-    if (!this.dragging) return; // Escape has ended it
+    if (!this.dragging) return; // Escape has cancelled the drag
     if (this.dragging === "handle") this.handles.drag(this.place(event), isFree(event));
     else this.slide(event);
     this.scene.change();
@@ -134,7 +134,7 @@ export class EditHand {
     this.scene.change();
   }
 
-  // Lets go, and all is where it was; tells whether anything was dragged.
+  // Cancel the drag and move its objects back; return whether there was one.
   cancel() {
     if (!this.dragging) return false;
     if (this.dragging === "handle") this.handles.cancel();

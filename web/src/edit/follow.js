@@ -1,12 +1,12 @@
-// Follows a pointer that has been pressed, wherever it goes, until it is let go.
+// Call `move(event)` for a pressed pointer anywhere in the window, then `end(event, isCancelled)` at its release.
 export function follow({ pointerId }, move, end) {
-  const isOurs = (act) => (event) => event.pointerId === pointerId && act(event);
-  const stop = new AbortController();
-  const on = (name, act) => window.addEventListener(name, isOurs(act), { signal: stop.signal });
+  const ofPointer = (handler) => (event) => event.pointerId === pointerId && handler(event);
+  const controller = new AbortController();
+  const on = (name, handler) => window.addEventListener(name, ofPointer(handler), { signal: controller.signal });
   on("pointermove", move);
   for (const name of ["pointerup", "pointercancel"]) {
     on(name, (event) => {
-      stop.abort();
+      controller.abort();
       end(event, name === "pointercancel");
     });
   }

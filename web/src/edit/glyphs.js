@@ -1,12 +1,12 @@
-// What has no body is seen while one builds: a dummy is three bars, a camera its picture's pyramid, a joint its axis.
+// Glyphs for objects without a body, in edit mode: three bars for a dummy, the view pyramid for a camera, the axis for a joint.
 import * as THREE from "three";
 import { ACCENT, INK, SHAPES, axes, material } from "../scene/looks.js";
 
 const AXIS = [0.9, 0.35, 0.05, 1];
 const BODY = [0.25, 0.28, 0.32, 1];
-const EYE = 0.06; // m, a camera's housing
-const DEPTH = 0.25; // m, of what is drawn of its view
-const DUMMY = 0.08; // m
+const EYE = 0.06; // m, size of a sensor's housing
+const DEPTH = 0.25; // m, length of the pyramid of a camera
+const DUMMY = 0.08; // m, least length of the bars
 
 const edges = new THREE.LineBasicMaterial({ color: INK });
 edges.userData.shared = true;
@@ -15,7 +15,7 @@ export class Glyphs {
   constructor(world) {
     this.group = new THREE.Group();
     world.add(this.group);
-    this.there = new Map(); // of objects, by handle: { made, looks }
+    this.there = new Map(); // glyphs by their object's handle: { made, looks }, where `looks` are the values that it depends on
   }
 
   get all() {
@@ -26,7 +26,7 @@ export class Glyphs {
     return this.there.get(handle)?.made;
   }
 
-  // Shows those of all objects that have none of their own, `null` hides them.
+  // Show the glyphs of `objects`, of those types that have one; `null` hides all.
   show(objects) {
     const wanted = new Map((objects ?? []).filter(({ type }) => type in KINDS).map((one) => [one.handle, one]));
     for (const [handle, { made }] of this.there) {
@@ -62,9 +62,9 @@ function box(size, color, place = [0, 0, 0]) {
 
 function lines(points) {
   const geometry = new THREE.BufferGeometry().setFromPoints(points.map((one) => new THREE.Vector3(...one)));
-  const made = new THREE.LineSegments(geometry, edges);
-  made.raycast = () => {};
-  return made;
+  const result = new THREE.LineSegments(geometry, edges);
+  result.raycast = () => {};
+  return result;
 }
 
 function dummy({ size }) {
@@ -74,7 +74,7 @@ function dummy({ size }) {
   return axes(length, length / 40).add(grip);
 }
 
-// Looks along its z axis, with y up.
+// The camera looks along z, with y up; `fov` (rad) is the angle along the larger side of its picture.
 function camera({ fov = 1, width = 640, height = 480 }) {
   const larger = DEPTH * Math.tan(Math.min(fov, 2.6) / 2);
   const [x, y] = width >= height ? [larger, (larger * height) / width] : [(larger * width) / height, larger];
@@ -85,17 +85,17 @@ function camera({ fov = 1, width = 640, height = 480 }) {
   return new THREE.Group().add(box([EYE, EYE, EYE], BODY, [0, 0, -EYE / 2]), lines(rim));
 }
 
-// A vehicle's: its angle is from left to right.
+// A vehicle's camera has a horizontal angle instead.
 function vehicleCamera({ horizontal_fov: fov, width, height }) {
   return camera({ fov: width < height ? 2 * Math.atan((Math.tan(fov / 2) * height) / width) : fov, width, height });
 }
 
 function proximity({ range = 1, angle = 0.3, type }) {
-  const far = Math.min(range, 0.5);
-  const wide = type === "ray" ? 0 : far * Math.tan(Math.min(angle, 2.6) / 2);
-  const around = [...Array(12).keys()].map((one) => [wide * Math.cos((one * Math.PI) / 6), wide * Math.sin((one * Math.PI) / 6), far]);
-  const rim = around.flatMap((one, number) => [one, around[(number + 1) % 12]]);
-  for (const one of around.filter((_, number) => number % 3 === 0)) rim.push([0, 0, 0], one);
+  const length = Math.min(range, 0.5);
+  const radius = type === "ray" ? 0 : length * Math.tan(Math.min(angle, 2.6) / 2);
+  const circle = [...Array(12).keys()].map((one) => [radius * Math.cos((one * Math.PI) / 6), radius * Math.sin((one * Math.PI) / 6), length]);
+  const rim = circle.flatMap((one, number) => [one, circle[(number + 1) % 12]]);
+  for (const one of circle.filter((_, number) => number % 3 === 0)) rim.push([0, 0, 0], one);
   return new THREE.Group().add(box([EYE, EYE, EYE / 2], [0.7, 0.2, 0.6, 1]), lines(rim));
 }
 
@@ -109,6 +109,6 @@ function joint() {
 
 const force = () => new THREE.Group().add(box([0.06, 0.06, 0.02], [0.2, 0.6, 0.3, 1]));
 
-const range = ({ max_range: range }) => proximity({ range, type: "ray" }); // a vehicle's
+const range = ({ max_range: range }) => proximity({ range, type: "ray" }); // on a vehicle
 
 const KINDS = { dummy, camera, vision_sensor: camera, vehicle_camera: vehicleCamera, proximity_sensor: proximity, range_sensor: range, joint, force_sensor: force };

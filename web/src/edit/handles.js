@@ -1,18 +1,18 @@
-// Handles that move, turn and resize what is selected, along the axes of the world, of its parent or of itself.
+// Handles that move, turn and resize the selected objects, along the axes of the world, of the parent or of the object.
 import * as THREE from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 
 const GRID = 0.1; // m
-const TURN = Math.PI / 12; // rad
-const LARGER = 0.1; // of a size
-const SIZE = 0.75;
+const TURN = Math.PI / 12; // rad, step of a rotation
+const LARGER = 0.1; // step of a scale factor
+const SIZE = 0.75; // on the screen, relative to the default of three.js
 
 export class Handles {
-  // `camera` sees them; `on.changed(change)` hears what a drag has done so far, as `change` says.
+  // `camera` is the one that shows them; `on.changed(change)` is called during a drag, with the value of `change` below.
   constructor(camera, on) {
     this.scene = new THREE.Scene();
-    this.base = new THREE.Group(); // the axes along which it goes
-    this.taken = new THREE.Object3D(); // what the handles hold
+    this.base = new THREE.Group(); // the frame whose axes the handles have
+    this.taken = new THREE.Object3D(); // the object that TransformControls moves
     this.scene.add(this.base);
     this.base.add(this.taken);
     this.controls = new TransformControls(camera, null);
@@ -22,7 +22,7 @@ export class Handles {
     this.on = on;
     this.controls.addEventListener("objectChange", () => this.on.changed(this.change));
     this.isSnapped = true;
-    this.began = new THREE.Matrix4(); // where the drag has begun
+    this.began = new THREE.Matrix4(); // pose in the world at the start of the drag
   }
 
   get isDragging() {
@@ -37,7 +37,7 @@ export class Handles {
     return this.controls.mode;
   }
 
-  // Stands at a place with the axes of a frame, both matrices of the world; null hides them.
+  // Show the handles at `place` with the axes of `frame`, a position and a matrix in the world; a null frame hides them.
   put(frame, place) {
     if (this.isDragging) return;
     if (!frame) return void this.controls.detach();
@@ -50,7 +50,7 @@ export class Handles {
     if (this.controls.object !== this.taken) this.controls.attach(this.taken);
   }
 
-  // What the drag has done so far: a matrix of the world, and how many times as large it is along its axes.
+  // The effect of the drag so far: the motion as a matrix in the world, and the scale factors along the handles' axes.
   get change() {
     this.taken.updateWorldMatrix(true, false);
     const { position, quaternion, scale } = this.taken;
@@ -58,7 +58,7 @@ export class Handles {
     return { matrix: now.multiply(this.began.clone().invert()), factors: scale.clone() };
   }
 
-  // ---- the mouse, at x and y from -1 to 1
+  // ---- mouse input; x and y of `at` are from -1 to 1
 
   hover(at) {
     if (this.controls.object) this.controls.pointerHover(at);
@@ -73,27 +73,27 @@ export class Handles {
     return this.isDragging;
   }
 
-  // `isFree`: without the grid, while its key is held.
+  // `isFree`, while its key is held: off the grid if it is on, else on the grid.
   drag(at, isFree) {
     this.snap(isFree);
     this.controls.pointerMove(pointer(at, -1));
   }
 
   snap(isFree) {
-    const snaps = this.isSnapped !== isFree;
-    this.controls.setTranslationSnap(snaps ? GRID : null);
-    this.controls.setRotationSnap(snaps ? TURN : null);
-    this.controls.setScaleSnap(snaps ? LARGER : null);
+    const isOnGrid = this.isSnapped !== isFree;
+    this.controls.setTranslationSnap(isOnGrid ? GRID : null);
+    this.controls.setRotationSnap(isOnGrid ? TURN : null);
+    this.controls.setScaleSnap(isOnGrid ? LARGER : null);
   }
 
-  // Lets go; returns what the drag has done.
+  // End the drag; return its effect.
   drop() {
     const { change } = this;
     this.controls.pointerUp(pointer(null, 0));
     return change;
   }
 
-  // Lets go, as if nothing had been done.
+  // End the drag without an effect.
   cancel() {
     this.controls.reset();
     this.controls.pointerUp(pointer(null, 0));
@@ -107,8 +107,8 @@ export class Handles {
   }
 }
 
-/** What the controls read of a pointer; three's types say that it is an event. @returns {any} */
+/** Return what TransformControls reads of a pointer event; three's types demand a whole event. @returns {any} */
 const pointer = (at, button) => ({ x: at?.x, y: at?.y, button });
 
-// A number on the grid.
+// Return `value` rounded to the grid.
 export const onGrid = (value, step = GRID) => Number((Math.round(value / step) * step).toFixed(6));

@@ -1,12 +1,12 @@
-// The tree of objects beside the scene. Only the rows that are in view are made: 2000 objects stay fluent.
+// Object tree beside the scene. Only the rows in view have elements, so that 2000 objects scroll smoothly.
 import { create, icon } from "../dom.js";
 import { iconOf } from "./kinds.js";
 import { RowDrag } from "./row_drag.js";
 import { WORLD } from "./objects.js";
 
-const ROW = 32; // px, as high as a finger needs
-const MORE = 8; // rows above and below those that are seen
-const INDENT = 14; // px
+const ROW = 32; // px, height of a row, large enough for a finger
+const MORE = 8; // rows with elements above and below those in view
+const INDENT = 14; // px per level
 
 /** @typedef {import("./objects.js").SceneObject} SceneObject */
 
@@ -21,9 +21,9 @@ export class Hierarchy {
     this.tree = tree;
     this.find = find;
     this.edit = edit;
-    this.folded = new Set(); // handles
-    this.known = new Set(); // handles of models that have been folded, or not, by the user
-    this.rows = []; // { handle, depth } of what is unfolded, from top to bottom
+    this.folded = new Set(); // handles of folded rows
+    this.known = new Set(); // handles whose rows were folded at first, or folded or unfolded by the user
+    this.rows = []; // { handle, depth } of all rows that are not hidden by folding or the search, from top to bottom
     this.body = create("div", { className: "rows", role: "presentation" });
     tree.append(this.body);
     tree.onscroll = () => this.draw();
@@ -40,9 +40,9 @@ export class Hierarchy {
     return this.edit.objects;
   }
 
-  // ---- which rows there are
+  // ---- list of the rows
 
-  // Shows what is sought, from the first one.
+  // Show the objects that match the search, from the first one.
   seek() {
     this.tree.scrollTop = 0;
     this.list();
@@ -50,35 +50,35 @@ export class Hierarchy {
 
   list() {
     for (const one of this.objects.all()) this.begin(one);
-    const shown = this.found();
+    const matches = this.found();
     this.rows = [];
-    const walk = (handle, depth) => {
-      if (shown && !shown.has(handle)) return;
+    const addRows = (handle, depth) => {
+      if (matches && !matches.has(handle)) return;
       this.rows.push({ handle, depth });
-      if (shown || !this.folded.has(handle)) for (const child of this.objects.children(handle)) walk(child, depth + 1);
+      if (matches || !this.folded.has(handle)) for (const child of this.objects.children(handle)) addRows(child, depth + 1);
     };
-    for (const handle of this.objects.children(WORLD)) walk(handle, 0);
+    for (const handle of this.objects.children(WORLD)) addRows(handle, 0);
     this.body.style.height = `${this.rows.length * ROW}px`;
     this.draw();
   }
 
-  // A model begins folded, and so do a vehicle's propellers: what they are made of is seldom looked at.
+  // Fold a new model, vehicle or part of a vehicle except dummies: their children are seldom of interest.
   begin({ handle, model, of, type }) {
     if (!(model || (of === "vehicle" && type !== "dummy")) || this.known.has(handle)) return;
     this.known.add(handle);
     this.folded.add(handle);
   }
 
-  // The objects that are sought, with all above them; null where nothing is sought.
+  // Return the handles of objects that match the search, with their ancestors; null without a search.
   found() {
-    const sought = this.find.value.trim().toLowerCase();
-    if (!sought) return null;
-    const shown = new Set();
+    const term = this.find.value.trim().toLowerCase();
+    if (!term) return null;
+    const matches = new Set();
     for (const one of this.objects.all()) {
-      if (!`${one.alias} ${one.name} ${one.type}`.toLowerCase().includes(sought)) continue;
-      for (let above = /** @type {SceneObject | undefined} */ (one); above && !shown.has(above.handle); above = this.objects.get(above.parent)) shown.add(above.handle);
+      if (!`${one.alias} ${one.name} ${one.type}`.toLowerCase().includes(term)) continue;
+      for (let ancestor = /** @type {SceneObject | undefined} */ (one); ancestor && !matches.has(ancestor.handle); ancestor = this.objects.get(ancestor.parent)) matches.add(ancestor.handle);
     }
-    return shown;
+    return matches;
   }
 
   fold(handle, folded) {
@@ -87,12 +87,12 @@ export class Hierarchy {
     this.list();
   }
 
-  // Unfolds what is above the object that was selected last, and scrolls to it.
+  // Unfold the ancestors of the object that was selected last, and scroll to it.
   reveal() {
     const last = this.edit.last;
-    const hidden = this.objects.above(last).filter((one) => this.folded.has(one));
-    for (const one of hidden) this.folded.delete(one);
-    if (hidden.length) this.list();
+    const foldedAncestors = this.objects.above(last).filter((one) => this.folded.has(one));
+    for (const one of foldedAncestors) this.folded.delete(one);
+    if (foldedAncestors.length) this.list();
     const at = this.rows.findIndex(({ handle }) => handle === last);
     if (at >= 0) {
       const { scrollTop, clientHeight } = this.tree;
@@ -102,14 +102,14 @@ export class Hierarchy {
     this.draw();
   }
 
-  // ---- what is seen of them
+  // ---- elements of the rows in view
 
   draw() {
     if (this.renaming) return;
     const first = Math.max(0, Math.floor(this.tree.scrollTop / ROW) - MORE);
     const count = Math.ceil(this.tree.clientHeight / ROW) + 2 * MORE;
-    const made = this.rows.slice(first, first + count).map((row, number) => this.row(row, first + number));
-    this.body.replaceChildren(...made);
+    const elements = this.rows.slice(first, first + count).map((row, number) => this.row(row, first + number));
+    this.body.replaceChildren(...elements);
     this.tree.setAttribute("aria-activedescendant", this.edit.last === undefined ? "" : `object-${this.edit.last}`);
   }
 
@@ -126,16 +126,16 @@ export class Hierarchy {
   }
 
   folder(row, handle) {
-    const has = this.objects.children(handle).length > 0;
+    const hasChildren = this.objects.children(handle).length > 0;
     const folded = this.folded.has(handle);
-    if (has) row.setAttribute("aria-expanded", !folded);
-    const said = { className: "folder", type: "button", tabIndex: -1, "aria-label": folded ? "Unfold" : "Fold", textContent: folded ? "▸" : "▾" };
-    return has ? create("button", { ...said, onclick: () => this.fold(handle, !folded) }) : create("span", { className: "folder" });
+    if (hasChildren) row.setAttribute("aria-expanded", !folded);
+    const attributes = { className: "folder", type: "button", tabIndex: -1, "aria-label": folded ? "Unfold" : "Fold", textContent: folded ? "▸" : "▾" };
+    return hasChildren ? create("button", { ...attributes, onclick: () => this.fold(handle, !folded) }) : create("span", { className: "folder" });
   }
 
   script(one) {
-    const said = { className: "script", type: "button", tabIndex: -1, title: `Open the script of ${one.name}`, "aria-label": `Open the script of ${one.name}` };
-    return create("button", { ...said, onclick: () => this.edit.openScript(one) }, icon("script"));
+    const attributes = { className: "script", type: "button", tabIndex: -1, title: `Open the script of ${one.name}`, "aria-label": `Open the script of ${one.name}` };
+    return create("button", { ...attributes, onclick: () => this.edit.openScript(one) }, icon("script"));
   }
 
   // ---- keys
@@ -151,7 +151,7 @@ export class Hierarchy {
       Home: () => this.edit.select([this.rows[0]?.handle]),
       End: () => this.edit.select([this.rows.at(-1)?.handle]),
       F2: () => this.rename(),
-      Enter: () => this.rename(), // it would stop the flight
+      Enter: () => this.rename(), // otherwise Enter would stop the flight
     };
     if (!(event.key in acts)) return;
     acts[event.key]();
@@ -161,8 +161,8 @@ export class Hierarchy {
 
   keyOfFind(event) {
     if (event.key === "ArrowDown" || event.key === "Enter") {
-      const sought = this.find.value.trim().toLowerCase();
-      const row = this.rows.find(({ handle }) => this.objects.existing(handle).name.toLowerCase().includes(sought));
+      const term = this.find.value.trim().toLowerCase();
+      const row = this.rows.find(({ handle }) => this.objects.existing(handle).name.toLowerCase().includes(term));
       if (row) this.edit.select([row.handle]);
       this.tree.focus();
     } else if (event.key === "Escape" && this.find.value) this.find.value = "";
@@ -172,18 +172,18 @@ export class Hierarchy {
     event.stopPropagation();
   }
 
-  step(way, more) {
+  step(offset, more) {
     const at = this.rows.findIndex(({ handle }) => handle === this.edit.last);
-    const row = this.rows[Math.min(Math.max(0, at + way), this.rows.length - 1)];
+    const row = this.rows[Math.min(Math.max(0, at + offset), this.rows.length - 1)];
     if (row) this.edit.select([row.handle], more);
   }
 
-  // Selects all rows from the one that was selected last to this one.
+  // Select all rows from the one that was selected last to this one.
   range(handle) {
-    const place = (sought) => this.rows.findIndex((row) => row.handle === sought);
-    const [from, to] = [place(this.edit.last), place(handle)];
-    const between = this.rows.slice(Math.min(from, to), Math.max(from, to) + 1).map((row) => row.handle);
-    this.edit.select([...(from < 0 ? [] : between.filter((one) => one !== handle)), handle], true);
+    const indexOf = (wanted) => this.rows.findIndex((row) => row.handle === wanted);
+    const [from, to] = [indexOf(this.edit.last), indexOf(handle)];
+    const range = this.rows.slice(Math.min(from, to), Math.max(from, to) + 1).map((row) => row.handle);
+    this.edit.select([...(from < 0 ? [] : range.filter((one) => one !== handle)), handle], true);
   }
 
   // ---- a new name

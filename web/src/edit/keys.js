@@ -1,5 +1,5 @@
-// The keys of editing: none of them flies. Letters with Ctrl, digits, and few others; the help sheet lists them. A digit is
-// the key in its place: on a French keyboard, that key alone writes & or é.
+// Keys of edit mode; none of them flies the drone. The help sheet lists them. Digits are recognized by the position of the
+// key: on a French keyboard, these keys alone write & or é.
 const isWriting = (target) => target.closest?.("input:not([type=checkbox], [type=range]), textarea, select, article, [contenteditable], dialog");
 
 export const KEYS = {
@@ -8,10 +8,10 @@ export const KEYS = {
   "ctrl+c": "copy", "ctrl+d": "duplicate", "ctrl+z": "undo", "ctrl+y": "redo", "ctrl+shift+z": "redo",
   "ctrl+a": "all", "ctrl+g": "group", "ctrl+s": "save", "ctrl+o": "open", "ctrl+f": "find",
 };
-const ANYWHERE = ["save"]; // also while one writes in a field
+const ANYWHERE = ["save"]; // actions whose keys also work in text fields
 
-// `acts` by their names; `isOn()` tells whether one edits; `isAway(target)` whether the keys are somebody else's.
-// `paste(text)` gets what Ctrl+V brings, which only its own event has in every browser.
+// Listen for keys. `acts`: actions by name; `isOn()`: whether edit mode is on; `isAway(target)`: whether another part of the
+// page has the keys. `paste(text)` gets the text of Ctrl+V from the paste event, the only way that works in every browser.
 export function listen(acts, paste, isOn, isAway) {
   window.addEventListener("paste", (event) => {
     if (!isOn() || event.defaultPrevented || isAway(event.target) || isWriting(event.target)) return;
@@ -25,7 +25,7 @@ export function listen(acts, paste, isOn, isAway) {
     const [, digit] = /^Digit(\d)$/.exec(event.code) ?? [];
     const act = KEYS[`${ctrl}${shift}${digit ?? event.key.toLowerCase()}`];
     if (!act || (isWriting(event.target) && !ANYWHERE.includes(act))) return;
-    if (act === "copy" && String(window.getSelection())) return; // marked text is copied
+    if (act === "copy" && String(window.getSelection())) return; // the browser copies the selected text
     event.preventDefault();
     if (!event.repeat || act === "undo" || act === "redo") acts[act]();
   });

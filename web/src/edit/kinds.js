@@ -1,4 +1,4 @@
-// Which picture stands for an object: by the word that `shape` or `kind` has in a scene file.
+// Icons of objects, by their `shape` or `kind` in a scene file.
 const ICONS = {
   box: "cube", sphere: "ball", cylinder: "cylinder", capsule: "cylinder", cone: "cone", plane: "floor", compound: "group", mesh: "mesh", urdf: "mesh",
   vehicle: "drone", floor: "floor", dummy: "dummy", camera: "video", vehicle_camera: "video", vision_sensor: "video", proximity_sensor: "proximity",

@@ -1,9 +1,9 @@
-// The distance between two points that one clicks on, with its parts along the axes.
+// Display of the distance between two points that the user clicks on, with its components along the axes.
 import * as THREE from "three";
 import { ACCENT } from "../scene/looks.js";
 import { Words } from "../scene/text.js";
 
-const SIZE = 14; // px
+const SIZE = 14; // px, font size
 
 export class Measure {
   constructor(scene) {
@@ -26,7 +26,7 @@ export class Measure {
     this.scene.change();
   }
 
-  // A third click begins anew.
+  // Take a point that was clicked on; a third one begins a new measurement.
   take(point) {
     if (this.points.length > 1) this.points = [];
     this.points.push(point.clone());
@@ -40,9 +40,9 @@ export class Measure {
   show(to) {
     const [from, end = to] = this.points;
     this.line.geometry.setFromPoints([from, end]);
-    const way = end.clone().sub(from);
-    const [x, y, z] = way.toArray().map((one) => one.toFixed(3));
-    this.text = `${way.length().toFixed(3)} m   (x ${x}, y ${y}, z ${z})`;
+    const difference = end.clone().sub(from);
+    const [x, y, z] = difference.toArray().map((one) => one.toFixed(3));
+    this.text = `${difference.length().toFixed(3)} m   (x ${x}, y ${y}, z ${z})`;
     this.words.say(this.text);
     this.words.position.copy(from).lerp(end, 0.5);
     this.group.visible = true;

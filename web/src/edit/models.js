@@ -1,4 +1,4 @@
-// The shelf of models, with pictures: dragged into the scene one lands on what is under the mouse. So do files.
+// Shelf of models, with pictures. A model or a file that is dragged into the scene is added at the point under the mouse.
 import * as THREE from "three";
 import { create } from "../dom.js";
 import { askFor } from "./ask.js";
@@ -8,12 +8,12 @@ import { onGrid } from "./handles.js";
 import { Landing } from "./landing.js";
 import { WORLD } from "./objects.js";
 
-const FAR = 5; // px, from which on a press is a drag
-const ROOM = 1; // m, of a model whose size is not known
-const GAP = 0.5, REACH = 16; // m, between two places that are tried, and how many each way
-const SEEN = 0.85; // of the picture's half
-const UNTOLD = 2000; // ms
-const LARGEST = 5 << 20; // bytes of a file: as text it is a third longer, and a message has an end
+const FAR = 5; // px of motion that make a press a drag
+const ROOM = 1; // m, least width of the place for a model, also if its size is unknown
+const GAP = 0.5, REACH = 16; // m between two places that are tried, and their number in each direction
+const SEEN = 0.85; // of half the picture: a place farther from its center is not in view
+const UNTOLD = 2000; // ms for which the place of an added model is taken until the node sends its object
+const LARGEST = 5 << 20; // bytes of a file: base64 is a third longer, and messages are limited
 const FILES = /\.(?:ttm|obj|stl|dae|urdf|ya?ml)$/i;
 
 export class Models {
@@ -29,8 +29,8 @@ export class Models {
     /** @type {wire.Questions["models"][1]["groups"]} */
     this.groups = [];
     /** @type {Map<string | undefined, Pick<wire.Model, "op" | "title">>} */
-    this.ops = new Map(); // by the names of the models that are shown
-    this.taken = []; // boxes of what has been added without a drag, and is not told yet
+    this.ops = new Map(); // by model, of those that are shown
+    this.taken = []; // boxes of models that were added without a drag, and whose objects the node has not sent yet
     this.landing = new Landing(edit.scene);
     find.oninput = () => this.show();
     find.addEventListener("keydown", (event) => event.key === "Escape" && this.clear(event));
@@ -56,24 +56,24 @@ export class Models {
   }
 
   show() {
-    const sought = this.find.value.trim().toLowerCase();
+    const term = this.find.value.trim().toLowerCase();
     this.ops.clear();
-    const made = this.groups.flatMap(({ name, models }) => {
-      const found = models.filter(({ title }) => `${title} ${name}`.toLowerCase().includes(sought));
-      return found.length ? [create("h3", { textContent: name }), create("div", { className: "cards", role: "group", "aria-label": name }, ...found.map((one) => this.card(one)))] : [];
+    const elements = this.groups.flatMap(({ name, models }) => {
+      const matches = models.filter(({ title }) => `${title} ${name}`.toLowerCase().includes(term));
+      return matches.length ? [create("h3", { textContent: name }), create("div", { className: "cards", role: "group", "aria-label": name }, ...matches.map((one) => this.card(one)))] : [];
     });
-    this.shelf.replaceChildren(...(made.length ? made : [create("p", { textContent: "There is no such model." })]));
+    this.shelf.replaceChildren(...(elements.length ? elements : [create("p", { textContent: "There is no such model." })]));
   }
 
   card({ model, title, picture, op }) {
     this.ops.set(model, { op, title });
-    const seen = picture ? create("img", { src: picture, alt: "", draggable: false }) : create("span", { className: "blank" });
-    const card = create("button", { type: "button", className: "card", title: `${title}: drag it into the scene, or click on it` }, seen, create("span", { textContent: title }));
+    const image = picture ? create("img", { src: picture, alt: "", draggable: false }) : create("span", { className: "blank" });
+    const card = create("button", { type: "button", className: "card", title: `${title}: drag it into the scene, or click on it` }, image, create("span", { textContent: title }));
     card.dataset.model = model;
     return card;
   }
 
-  // ---- by the mouse, or a finger
+  // ---- mouse, touch and keys
 
   down(event) {
     const card = event.target.closest(".card");
@@ -108,12 +108,12 @@ export class Models {
     this.began = this.label = this.place = undefined;
   }
 
-  // Where in the world it would land; undefined beside the scene, and in the sky.
+  // Mark and return the place in the world where the model would land; undefined outside the scene and in the sky.
   aim(event) {
     const { edit } = this;
     const isScene = document.elementFromPoint(event.clientX, event.clientY) === edit.scene.canvas.dom;
-    const met = isScene && edit.hand.meet(event);
-    const place = met ? this.snapped(met.point.toArray(), isFree(event)) : undefined;
+    const hit = isScene && edit.hand.meet(event);
+    const place = hit ? this.snapped(hit.point.toArray(), isFree(event)) : undefined;
     this.landing.show(place);
     return place;
   }
@@ -128,17 +128,17 @@ export class Models {
     event.preventDefault();
     event.stopPropagation();
     if (event.repeat) return;
-    const found = this.ops.get(card.dataset.model);
-    if (found) this.putBeside(found.op, found.title);
+    const added = this.ops.get(card.dataset.model);
+    if (added) this.putBeside(added.op, added.title);
   }
 
-  // Puts a model that was not dragged beside what stands where the camera looks.
+  // Add a model that was not dragged, at a free place near the point that the camera looks at.
   putBeside(op, title) {
     const place = this.freePlace(Math.max(ROOM, ...(op.objects?.[0].size ?? [])) / 2);
     this.put(op, title, this.snapped([place.x, place.y, 0], false));
   }
 
-  // The place on the floor next to what one looks at that is in view, and has room for so much around it, m.
+  // Return the place nearest to the camera's aim that is free within `half` (m); if possible in view and on the floor.
   freePlace(half) {
     const { edit } = this;
     const { camera, view } = edit.scene;
@@ -149,16 +149,16 @@ export class Models {
     const boxes = [...others.map((one) => edit.seen.boxOf([one])), ...this.taken.map(({ box }) => box)];
     const isFree = (place) => boxes.every(({ min, max }) => ["x", "y"].some((axis) => place[axis] < min[axis] - half || place[axis] > max[axis] + half));
     const isSeen = (place) => [place.clone().project(camera)].every((at) => Math.abs(at.x) < SEEN && Math.abs(at.y) < SEEN && at.z < 1);
-    const around = [...Array(2 * REACH + 1).keys()].map((one) => (one - REACH) * GAP);
-    const places = around.flatMap((dx) => around.map((dy) => new THREE.Vector3(x + dx, y + dy, 0)));
-    const far = (place) => Math.hypot(place.x - x, place.y - y);
-    const free = places.sort((one, other) => far(one) - far(other)).filter(isFree);
+    const offsets = [...Array(2 * REACH + 1).keys()].map((one) => (one - REACH) * GAP);
+    const places = offsets.flatMap((dx) => offsets.map((dy) => new THREE.Vector3(x + dx, y + dy, 0)));
+    const distance = (place) => Math.hypot(place.x - x, place.y - y);
+    const free = places.sort((one, other) => distance(one) - distance(other)).filter(isFree);
     const end = (edit.objects.named("Floor")?.values.size ?? Infinity) / 2 - half;
     const isOnFloor = (place) => Math.max(Math.abs(place.x), Math.abs(place.y)) <= end;
-    const seen = free.filter(isSeen);
-    const found = seen.find(isOnFloor) ?? seen[0] ?? free[0] ?? places[0];
-    this.taken.push({ box: new THREE.Box3().expandByPoint(found).expandByScalar(half), until: now + UNTOLD });
-    return found;
+    const visible = free.filter(isSeen);
+    const place = visible.find(isOnFloor) ?? visible[0] ?? free[0] ?? places[0];
+    this.taken.push({ box: new THREE.Box3().expandByPoint(place).expandByScalar(half), until: now + UNTOLD });
+    return place;
   }
 
   put(op, title, position) {
@@ -204,10 +204,10 @@ export class Models {
 }
 
 function base64(file) {
-  return new Promise((done, fail) => {
+  return new Promise((resolve, reject) => {
     const reader = new FileReader();
-    reader.onload = () => done(String(reader.result).split(",")[1] ?? "");
-    reader.onerror = () => fail(new Error(`${file.name}: cannot be read`));
+    reader.onload = () => resolve(String(reader.result).split(",")[1] ?? "");
+    reader.onerror = () => reject(new Error(`${file.name}: cannot be read`));
     reader.readAsDataURL(file);
   });
 }

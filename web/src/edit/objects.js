@@ -1,9 +1,9 @@
-// The objects of the scene, as the node tells them; one is { handle, name, alias, kind, type, parent, pose, values, ... }
-// with its `matrix` in the world.
+// Objects of the scene, as the node sends them: { handle, name, alias, kind, type, parent, pose, values, ... }, with their
+// `matrix` in the world.
 import { matrixOf } from "./poses.js";
 
 export const WORLD = -1;
-const STRUCTURE = ["name", "alias", "type", "parent", "model", "script", "root"]; // what the tree shows
+const STRUCTURE = ["name", "alias", "type", "parent", "model", "script", "root"]; // keys that the object tree shows
 
 /** @typedef {wire.Row & { matrix: import("three").Matrix4 }} SceneObject */
 
@@ -12,9 +12,9 @@ export class Objects {
     /** @type {Map<number, SceneObject>} */
     this.rows = new Map(); // by handle
     /** @type {Map<number, wire.Row>} */
-    this.told = new Map(); // the rows as the node has told them, by handle
+    this.told = new Map(); // the rows as the node has sent them, by handle
     /** @type {Map<number, number[]>} */
-    this.below = new Map(); // handles, by that of their parent
+    this.below = new Map(); // handles of children, by that of their parent
     /** @type {Map<string, number>} */
     this.names = new Map(); // handles, by name
     /** @type {number | null} */
@@ -29,8 +29,8 @@ export class Objects {
     this.version = null;
   }
 
-  // Takes a change of the tree, whose rows have only the keys that have changed. Returns "missed" where something was
-  // missed before it, "tree" where names, parents or the like have changed, "" where nothing but poses and values have.
+  // Apply a change of the tree, whose rows have only the keys that have changed. Return "missed" if an earlier change is
+  // missing, "tree" if objects or their STRUCTURE have changed, "" if only poses and values have.
   /** @param {wire.TreeChange} change */
   take({ version, since, objects, gone }) {
     if (since !== null && since !== this.version) return "missed";
@@ -73,7 +73,7 @@ export class Objects {
     return this.rows.get(handle);
   }
 
-  // An object whose handle comes from the tree itself.
+  // Return an object whose handle is known to exist.
   existing(handle) {
     return /** @type {SceneObject} */ (this.rows.get(handle));
   }
@@ -86,19 +86,19 @@ export class Objects {
     return this.below.get(handle) ?? [];
   }
 
-  // The handles of all that an object hangs on, the nearest first.
+  // Return the handles of an object's ancestors, the nearest first.
   above(handle) {
-    const found = [];
-    for (let one = this.get(this.get(handle)?.parent); one; one = this.get(one.parent)) found.push(one.handle);
-    return found;
+    const ancestors = [];
+    for (let one = this.get(this.get(handle)?.parent); one; one = this.get(one.parent)) ancestors.push(one.handle);
+    return ancestors;
   }
 
-  // An object and all that hangs on it.
+  // Return the handles of an object and of all its descendants.
   withBelow(handle) {
     return [handle, ...this.children(handle).flatMap((one) => this.withBelow(one))];
   }
 
-  // Those of some handles that hang on no other of them.
+  // Return those of `handles` that are not descendants of another one.
   roots(handles) {
     const all = new Set(handles);
     return handles.filter((one) => this.rows.has(one) && !this.above(one).some((above) => all.has(above)));

@@ -1,4 +1,4 @@
-// Position and orientation in numbers, as V-REP's dialogs have them: in m and degrees, of the world or of the parent.
+// Panel for position (m) and orientation (degrees), relative to the world or to the parent, as in V-REP's dialogs.
 import { create } from "../dom.js";
 import { keep, kept } from "../storage.js";
 import { numberField } from "./number_field.js";
@@ -16,7 +16,7 @@ export class PosePanel {
   constructor(element, edit) {
     this.edit = edit;
     /** @type {number[]} */
-    this.numbers = []; // at the beginning of a drag, and what it has changed of them
+    this.numbers = []; // of the pose at the start of a drag, with the changes of the drag
     this.relative = create("select", { "aria-label": "Relative to", title: "The axes and origin of the numbers" });
     this.relative.append(...Object.entries(FRAMES_OF_NUMBERS).map(([value, words]) => new Option(words, value)));
     this.relative.value = kept("edit/relative", "world");
@@ -63,10 +63,10 @@ export class PosePanel {
     });
   }
 
-  // What is not written anew stays as it is, to the last digit; in a drag, as it was at its beginning.
+  // Change one number of the pose. The others keep all their digits; in a drag, they stay as at its start.
   take(number, value, merge) {
     const { one } = this;
-    if (!one) return; // it was removed while its number is dragged
+    if (!one) return; // the object was removed during the drag
     if (!merge || merge !== this.merge) this.numbers = numbersOf(seenFrom(this.frame, one.matrix));
     this.merge = merge;
     this.numbers[number] = value;

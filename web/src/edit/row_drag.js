@@ -1,15 +1,15 @@
-// A press on a row of the tree selects it; dragged to another row, what is selected hangs there from then on.
+// Mouse and touch input on rows of the object tree: a press selects; a drag to another row makes it the selection's parent.
 import { create } from "../dom.js";
 import { follow } from "./follow.js";
 import { WORLD } from "./objects.js";
 
-const DOUBLE = 400; // ms between two presses that are a double click
-const FAR = 5; // px, from which on a press is a drag
-const EDGE = 24; // px, at which the tree scrolls
-const PACE = 8; // px
+const DOUBLE = 400; // ms, longest time between the presses of a double click
+const FAR = 5; // px of motion that make a press a drag
+const EDGE = 24; // px from the upper and lower edge of the tree, where a drag scrolls it
+const PACE = 8; // px per event
 
 export class RowDrag {
-  // `range(handle)` selects all rows up to that one; `twice()` hears of a double click.
+  // `range(handle)` selects all rows up to that one; `twice()` is called after a double click.
   /**
    * @param {HTMLElement} tree
    * @param {import("./edit.js").Edit} edit
@@ -43,7 +43,7 @@ export class RowDrag {
     else if (event.ctrlKey || event.metaKey) this.edit.toggle(handle);
     else if (!this.edit.has(handle)) this.edit.select([handle]);
     else return;
-    this.began.isDone = true; // there is nothing left to do when it is let go
+    this.began.isDone = true; // nothing is left to do at the release
   }
 
   move(event, { x, y }) {
@@ -57,19 +57,19 @@ export class RowDrag {
     this.aim(event);
   }
 
-  // Marks the row under the mouse: there it would hang.
+  // Mark the row under the mouse, the possible new parent, and scroll near the edges.
   aim({ clientX, clientY }) {
     const box = this.tree.getBoundingClientRect();
     if (clientY < box.top + EDGE) this.tree.scrollTop -= PACE;
     if (clientY > box.bottom - EDGE) this.tree.scrollTop += PACE;
     const over = document.elementFromPoint(clientX, clientY);
     const handle = this.tree.contains(over) ? this.handleAt(over) ?? WORLD : undefined;
-    const isFine = handle !== undefined && this.edit.selected.every((one) => this.edit.objects.mayHangOn(one, handle));
-    this.to = isFine ? handle : undefined;
+    const isAllowed = handle !== undefined && this.edit.selected.every((one) => this.edit.objects.mayHangOn(one, handle));
+    this.to = isAllowed ? handle : undefined;
     for (const row of this.tree.querySelectorAll(".aimed")) row.classList.remove("aimed");
-    if (isFine && handle !== WORLD) over?.closest("[data-handle]")?.classList.add("aimed");
-    this.tree.classList.toggle("aimed", isFine && handle === WORLD);
-    this.label?.classList.toggle("wrong", !isFine);
+    if (isAllowed && handle !== WORLD) over?.closest("[data-handle]")?.classList.add("aimed");
+    this.tree.classList.toggle("aimed", isAllowed && handle === WORLD);
+    this.label?.classList.toggle("wrong", !isAllowed);
   }
 
   up(event, { handle, isDone, isSecond }) {

@@ -1,4 +1,4 @@
-// New, open, recent, save, save as; a model alone; and the draft that an earlier session has left.
+// Scene files: new, open, save, save as, save a model; and the draft of an earlier session.
 import { at, create } from "../dom.js";
 import { askFor } from "./ask.js";
 
@@ -16,7 +16,7 @@ export class SceneFiles {
     });
   }
 
-  // The name of the file, and whether it lacks something.
+  // Show the file's name, whether changes are not saved, and a question if an earlier session has left a draft.
   show() {
     const { file, modified, draft, new: isNew } = this.edit.is;
     at("scene-file").textContent = file ? nameOf(file) : isNew ? "new scene" : "as launched";
@@ -43,7 +43,7 @@ export class SceneFiles {
     }
   }
 
-  // What is not saved would be lost: that is asked first.
+  // Call `act`; if changes are not saved, ask first.
   ifSaved(act) {
     const { modified, file } = this.edit.is;
     if (!modified) return act();
@@ -57,7 +57,7 @@ export class SceneFiles {
     });
   }
 
-  // Frames a new scene's floor. Earlier trees may arrive after the request, and the new one before its answer.
+  // Show the floor of a new scene once its tree is here. Earlier trees may arrive after the request, this one before the answer.
   frame() {
     if (!(this.begun <= this.edit.is.revision)) return;
     this.begun = undefined;
@@ -70,11 +70,11 @@ export class SceneFiles {
 
   saveAs() {
     const { file } = this.edit.is;
-    const kept = { label: "Name", value: file ? nameOf(file).replace(/\.tt[tm]$/, ".yaml") : "my_scene.yaml" };
-    this.askForFile("Save the scene as", kept, "save_scene", {});
+    const field = { label: "Name", value: file ? nameOf(file).replace(/\.tt[tm]$/, ".yaml") : "my_scene.yaml" };
+    this.askForFile("Save the scene as", field, "save_scene", {});
   }
 
-  // Why what is selected cannot be saved as a model; "" if it can.
+  // Return why the selection cannot be saved as a model; "" if it can.
   whyNoModel() {
     const one = this.edit.objects.get(this.edit.last);
     if (!one) return "Nothing is selected: a model is an object with all its children";
@@ -91,7 +91,7 @@ export class SceneFiles {
     this.askForFile(`Save ${one.name} as a model`, { label: "Name", value: `${one.name}.yaml` }, "save_model", { object: one.handle });
   }
 
-  // A name that is taken is asked about once more.
+  // Ask for a file name and save. If the file exists, a second Save with the same name replaces it.
   askForFile(title, field, ask, more) {
     let taken = "";
     askFor(title, [field], "Save", async ([name]) => {
@@ -109,9 +109,9 @@ export class SceneFiles {
 
   async open() {
     try {
-      const found = await this.edit.ask("scene_files");
+      const files = await this.edit.ask("scene_files");
       const dialog = at("ask");
-      const groups = Object.entries(KINDS).flatMap(([kind, words]) => (found[kind].length ? [create("h3", { textContent: words }), ...found[kind].map((path) => this.choice(path, dialog))] : []));
+      const groups = Object.entries(KINDS).flatMap(([kind, words]) => (files[kind].length ? [create("h3", { textContent: words }), ...files[kind].map((path) => this.choice(path, dialog))] : []));
       const cancel = create("button", { type: "button", textContent: "Cancel", onclick: () => dialog.close() });
       const list = create("div", { className: "choices" }, ...(groups.length ? groups : ["There is no scene yet."]));
       dialog.replaceChildren(create("h2", { textContent: "Open a scene" }), list, create("div", { className: "buttons" }, cancel));

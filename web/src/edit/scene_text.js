@@ -1,4 +1,4 @@
-// The scene as text, beside the scene: either is edited, and the other follows. A mistake stands at its line.
+// Text editor for the scene. Changes of the text and of the scene update each other; an error is shown at its line.
 import { basicSetup } from "codemirror";
 import { indentWithTab } from "@codemirror/commands";
 import { StreamLanguage, indentUnit, syntaxHighlighting } from "@codemirror/language";
@@ -9,10 +9,10 @@ import { EditorView, keymap } from "@codemirror/view";
 import { create } from "../dom.js";
 import { colors, fillWith } from "../editor.js";
 
-const QUIET = 700; // ms without a key before it is taken; at once where one leaves it
+const QUIET = 700; // ms without a key before the text is sent to the node; when it loses the focus, it is sent at once
 
 export class SceneText {
-  // `parts`: part (the whole), text, said, title, question.
+  // `parts` are elements: part (the whole), text, said (the message), title, question.
   /** @param {import("./edit.js").Edit} edit */
   constructor(parts, edit) {
     this.parts = parts;
@@ -34,14 +34,14 @@ export class SceneText {
     if (on) this.read();
   }
 
-  // The editor, which is made when the text is shown first.
+  // The editor, created when the text is first shown.
   get view() {
     return (this.made ??= this.begin());
   }
 
   begin() {
     const changed = EditorView.updateListener.of((update) => update.docChanged && !this.filling && this.change());
-    const left = EditorView.domEventHandlers({ blur: () => void this.write() }); // before what one goes on with, as a start
+    const left = EditorView.domEventHandlers({ blur: () => void this.write() }); // before the user's next action, such as a start
     const label = EditorView.contentAttributes.of({ tabindex: "0", "aria-label": "Text of the scene; Escape and then Tab leaves it" });
     const extensions = [basicSetup, EditorView.lineWrapping, StreamLanguage.define(yaml), syntaxHighlighting(colors), keymap.of([indentWithTab]), indentUnit.of("  "), label, left, changed];
     return new EditorView({ parent: this.parts.text, state: EditorState.create({ extensions }) });
@@ -68,7 +68,7 @@ export class SceneText {
       this.parts.title.textContent = file?.split("/").pop() || "not saved yet";
       this.parts.title.title = file;
       this.filling = true;
-      fillWith(view, text ?? "", Transaction.addToHistory.of(false)); // which the scene's own undo has
+      fillWith(view, text ?? "", Transaction.addToHistory.of(false)); // undo of the scene covers this change
       this.filling = false;
       this.say("");
     } catch (error) {
@@ -77,7 +77,7 @@ export class SceneText {
     } finally {
       this.reading = false;
     }
-    if (this.edit.is.revision > this.revision) this.follow(); // it has changed meanwhile
+    if (this.edit.is.revision > this.revision) this.follow(); // the scene has changed during the request
   }
 
   // ---- to the scene
@@ -140,11 +140,11 @@ export class SceneText {
   mark(error) {
     const { doc } = this.view.state;
     /** @type {import("@codemirror/lint").Diagnostic[]} */
-    const found = [];
+    const diagnostics = [];
     if (error?.line) {
       const { from, to } = doc.line(Math.min(Math.max(1, error.line), doc.lines));
-      found.push({ from, to, severity: "error", message: error.message });
+      diagnostics.push({ from, to, severity: "error", message: error.message });
     }
-    this.view.dispatch(setDiagnostics(this.view.state, found));
+    this.view.dispatch(setDiagnostics(this.view.state, diagnostics));
   }
 }

@@ -1,10 +1,10 @@
-// What is seen in the scene of the objects: which one is under the mouse, which have an outline, how large they are.
+// Links between the edited objects and the meshes in the scene: objects of markers, outlines, bounding boxes.
 import * as THREE from "three";
 import { ACCENT, isSingleMesh } from "../scene/looks.js";
 
 const HOVERED = 0xffffff;
-const ALSO = 0xf4a261; // what was selected before the last one
-const MOST_LIT = 150; // meshes with an outline
+const ALSO = 0xf4a261; // color of selected objects except the last one
+const MOST_LIT = 150; // meshes with an outline in one color
 
 export class Seen {
   /** @param {import("./edit.js").Edit} edit */
@@ -16,7 +16,7 @@ export class Seen {
     return this.edit.objects;
   }
 
-  // The object of what is shown in the scene: a vehicle's body is its root.
+  // Return the object of a marker or glyph; for a vehicle's body, the root of the vehicle.
   objectOf({ ns, handle, layer }) {
     if (handle !== undefined) return this.objects.get(handle);
     const named = this.objects.named(ns);
@@ -24,14 +24,14 @@ export class Seen {
     return [...this.objects.all()].find((one) => one.root && one.vehicle === ns);
   }
 
-  // What is drawn by Glyphs, where it has no body; the parts of a vehicle while it is selected, or one of them.
+  // Return the objects that may have glyphs: all of the scene, and the parts of vehicles that are selected in whole or part.
   bodiless() {
     const vehicles = new Set(this.edit.selected.map((one) => this.objects.get(one)?.vehicle));
     return [...this.objects.all()].filter(({ of, vehicle }) => of === "scene" || (vehicle && vehicles.has(vehicle)));
   }
 
   /**
-   * What has an outline, as Outline takes it.
+   * Return the outlines, as Outline.show() takes them.
    * @returns {[meshes: THREE.Mesh[], color: number, pixels: number][]}
    */
   lit() {
@@ -42,7 +42,7 @@ export class Seen {
     return lit.filter(([meshes]) => meshes.length).map(([meshes, color, pixels]) => [meshes.slice(0, MOST_LIT), color, pixels]);
   }
 
-  // Of objects, and of all that hangs on them.
+  // Return the meshes of objects and of all their descendants.
   meshesOf(handles) {
     const all = new Set(handles.filter((one) => this.objects.get(one)).flatMap((one) => this.objects.withBelow(one)));
     const names = new Set([...all].flatMap((one) => this.namesOf(this.objects.existing(one))));
@@ -58,7 +58,7 @@ export class Seen {
     return root ? [name, vehicle] : [name];
   }
 
-  // The box about some objects, along the axes of the world.
+  // Return the bounding box of objects with their descendants, along the world's axes; of their origins if there is no mesh.
   boxOf(handles) {
     this.edit.scene.world.updateMatrixWorld();
     const box = new THREE.Box3();

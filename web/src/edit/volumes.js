@@ -1,4 +1,4 @@
-// Volumes (m³) of shapes, by what a scene file says of their size; 0 where that is not known.
+// Volumes (m³) of shapes, from their size in a scene file; 0 if it is not known.
 const VOLUMES = {
   box: ([x, y, z]) => x * y * z,
   sphere: ([radius]) => (4 / 3) * Math.PI * radius ** 3,

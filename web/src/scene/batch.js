@@ -1,9 +1,9 @@
-// Many objects of one shape, such as boxes, are painted at once: 2000 of them one by one would take longer than a
-// step. Each is still there by itself, unseen, for the mouse and for the line about what is selected.
+// Instanced drawing of objects of one shape, such as boxes: 2000 separate draw calls would take longer than a time step.
+// The single meshes stay in the scene, invisible, for picking and for outlines.
 import * as THREE from "three";
 import { material } from "./looks.js";
 
-const ENOUGH = 60; // objects, from which on it is worth it
+const MIN_OBJECTS = 60; // objects of one shape; fewer are drawn one by one
 const WHITE = [1, 1, 1, 1];
 
 export class Batch {
@@ -11,51 +11,51 @@ export class Batch {
     this.group = new THREE.Group();
     world.add(this.group);
     /** @type {[THREE.InstancedMesh, THREE.Object3D[]][]} */
-    this.painted = []; // [painted at once, the objects]
+    this.painted = []; // [instanced mesh, its objects]
   }
 
-  // Takes all markers anew.
+  // Rebuild the batches from all markers.
   build(markers) {
-    for (const [together, objects] of this.painted) {
+    for (const [instanced, objects] of this.painted) {
       for (const { children: [mesh] } of objects) if (mesh) mesh.visible = true;
-      together.removeFromParent();
-      together.dispose();
+      instanced.removeFromParent();
+      instanced.dispose();
     }
     this.painted = [];
-    const fit = new Map();
+    const byGeometry = new Map();
     for (const object of markers) {
       const { layer, color, lit } = object.userData.said;
       const geometry = object.children[0]?.geometry;
       if (layer !== "scene" || color[3] < 1 || lit === false || !geometry?.userData.shared || !object.parent) continue;
-      if (!fit.has(geometry)) fit.set(geometry, []);
-      fit.get(geometry).push(object);
+      if (!byGeometry.has(geometry)) byGeometry.set(geometry, []);
+      byGeometry.get(geometry).push(object);
     }
-    for (const objects of fit.values()) if (objects.length >= ENOUGH) this.add(objects);
+    for (const objects of byGeometry.values()) if (objects.length >= MIN_OBJECTS) this.add(objects);
     this.place();
   }
 
   add(objects) {
-    const together = new THREE.InstancedMesh(objects[0].children[0].geometry, material(WHITE), objects.length);
+    const instanced = new THREE.InstancedMesh(objects[0].children[0].geometry, material(WHITE), objects.length);
     const color = new THREE.Color();
-    objects.forEach((object, number) => {
+    objects.forEach((object, index) => {
       object.children[0].visible = false;
-      together.setColorAt(number, color.fromArray(object.userData.said.color));
+      instanced.setColorAt(index, color.fromArray(object.userData.said.color));
     });
-    together.castShadow = together.receiveShadow = true;
-    together.frustumCulled = false;
-    together.raycast = () => {};
-    this.group.add(together);
-    this.painted.push([together, objects]);
+    instanced.castShadow = instanced.receiveShadow = true;
+    instanced.frustumCulled = false;
+    instanced.raycast = () => {};
+    this.group.add(instanced);
+    this.painted.push([instanced, objects]);
   }
 
-  // Puts all where they are now.
+  // Copy the objects' current world matrices to the instances.
   place() {
-    for (const [together, objects] of this.painted) {
-      objects.forEach((object, number) => {
+    for (const [instanced, objects] of this.painted) {
+      objects.forEach((object, index) => {
         object.updateWorldMatrix(true, true);
-        together.setMatrixAt(number, object.children[0].matrixWorld);
+        instanced.setMatrixAt(index, object.children[0].matrixWorld);
       });
-      together.instanceMatrix.needsUpdate = true;
+      instanced.instanceMatrix.needsUpdate = true;
     }
   }
 }

@@ -1,36 +1,36 @@
-// The canvas of the scene: painted when something has changed, and at no other time.
+// Canvas of the scene. It is painted only after a change.
 import * as THREE from "three";
 
-const SLOW = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+const SOFTWARE_RENDERERS = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
-// Whether pictures are made without a GPU: then there are no shadows, and no smooth edges.
-function paintsInSoftware() {
+// Return whether WebGL runs without a GPU; shadows and antialiasing are off then.
+function isSoftwareRendered() {
   const gl = document.createElement("canvas").getContext("webgl2");
-  const names = gl?.getExtension("WEBGL_debug_renderer_info");
-  const slow = gl !== null && SLOW.test(names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : gl.getParameter(gl.RENDERER));
+  const extension = gl?.getExtension("WEBGL_debug_renderer_info");
+  const isSoftware = gl !== null && SOFTWARE_RENDERERS.test(extension ? gl.getParameter(extension.UNMASKED_RENDERER_WEBGL) : gl.getParameter(gl.RENDERER));
   gl?.getExtension("WEBGL_lose_context")?.loseContext();
-  return slow;
+  return isSoftware;
 }
 
 export class Canvas {
-  // `paint(renderer, seconds)` makes a picture, after so many s since the last one.
+  // `paint(renderer, seconds)` draws a frame; `seconds` is the time since the last one, 0.2 at most.
   constructor(element, paint) {
     this.element = element;
     this.paint = paint;
-    this.isFast = !paintsInSoftware();
+    this.isFast = !isSoftwareRendered();
     this.renderer = this.begin();
     this.dom = this.renderer?.domElement ?? document.createElement("canvas");
     this.dom.style.cssText = "display:block;width:100%;height:100%;touch-action:none;outline-offset:-3px";
     element.append(this.dom);
     this.onFit = (_width, _height) => {};
-    this.after = []; // what is done once the next picture is there
+    this.after = []; // callbacks for the end of the next frame
     this.frames = 0;
     new ResizeObserver(() => this.fit()).observe(element);
     this.dom.addEventListener("webglcontextlost", (event) => event.preventDefault());
     this.dom.addEventListener("webglcontextrestored", () => this.change());
   }
 
-  // Returns what paints, null where the browser has nothing for that: all else in the page goes on.
+  // Return the WebGL renderer, or null if the browser has no WebGL 2; the rest of the page works without it.
   begin() {
     let renderer;
     try {
@@ -52,10 +52,10 @@ export class Canvas {
     if (!width || !height) return;
     this.renderer?.setSize(width, height, false);
     this.onFit(width, height);
-    this.draw(); // at once, or it would be empty for a moment
+    this.draw(); // at once: the new size has cleared the canvas
   }
 
-  // Asks for another picture.
+  // Schedule a repaint at the next animation frame.
   change() {
     this.asked ??= requestAnimationFrame(() => this.draw());
   }

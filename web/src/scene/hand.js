@@ -1,11 +1,11 @@
-// What the mouse does to the scene: it looks about, chooses, pushes and drags; the node is told.
+// Mouse and key input in the scene in flight mode: camera, selection, pushes and drags. Pushes and drags go to the node.
 import * as THREE from "three";
 import { Drag } from "./gizmo.js";
 import { Pointer } from "./pointer.js";
 
-const STAYS = 500; // ms, that handles stay after the mouse has gone
-const SAID = 30; // ms between two words on where something is dragged
-const DOUBLE = 400; // ms between two clicks that are one double click
+const STAYS = 500; // ms for which handles stay after the mouse has left
+const MESSAGE_PERIOD = 30; // ms between two drag messages to the node
+const DOUBLE = 400; // ms, longest time between the clicks of a double click
 
 /**
  * @typedef {{ place: THREE.Vector3, heading: number }} Place
@@ -16,7 +16,7 @@ export class Hand {
   /** @param {import("./scene.js").Scene} scene */
   constructor(scene) {
     this.scene = scene;
-    this.hovered = null; // the name of what is under the mouse, or was a moment ago
+    this.hovered = null; // name of the object that the mouse is over, or left less than STAYS ago
     /** @type {Dragged | null} */
     this.dragged = null;
     this.clicked = -DOUBLE;
@@ -32,14 +32,14 @@ export class Hand {
     return this.caster;
   }
 
-  // Returns the name of what is under the mouse, and the point where it is met.
+  // Return the name of the object under the mouse and the point where the ray hits it, null for none.
   pick(event) {
-    const here = this.scene.things().filter((one) => one.visible && one.parent);
-    const [met] = this.ray(event).intersectObjects(here, true);
+    const things = this.scene.things().filter((one) => one.visible && one.parent);
+    const [hit] = this.ray(event).intersectObjects(things, true);
     /** @type {THREE.Object3D | null} */
-    let object = met?.object ?? null;
+    let object = hit?.object ?? null;
     while (object && !object.userData.said) object = object.parent;
-    return object ? { name: object.userData.said.ns, point: met.point } : null;
+    return object ? { name: object.userData.said.ns, point: hit.point } : null;
   }
 
   hover(name) {
@@ -80,7 +80,7 @@ export class Hand {
     this.looking ??= requestAnimationFrame(() => this.meet());
   }
 
-  // Looks once for a picture what is under the mouse.
+  // Update hover and cursor for the last mouse event, once per animation frame.
   meet() {
     this.looking = undefined;
     const event = this.isOver;
@@ -108,19 +108,19 @@ export class Hand {
   }
 
   lookAt(event) {
-    const met = this.pick(event);
-    if (met) this.scene.frame(met.name);
+    const hit = this.pick(event);
+    if (hit) this.scene.frame(hit.name);
   }
 
-  // Takes a part of the handles, or what is selected itself; returns which of both, null for nothing.
+  // Start a drag by a handle or by the selected object; return "part" or "thing", null for neither.
   grab(event) {
     const part = this.scene.gizmo.hit(this.ray(event));
     const name = part ? this.scene.active : this.pick(event)?.name;
     const handle = name && this.scene.handleOf(name);
     if (!handle || (!part && name !== this.scene.selected)) return null;
     const place = this.scene.place(name) ?? handle.getWorldPosition(new THREE.Vector3());
-    const does = part ? part.userData : { kind: "plane", axis: 2 }; // what is selected slides level
-    const drag = new Drag(does, place, headingOf(handle), this.ray(event).ray, this.scene.camera);
+    const action = part ? part.userData : { kind: "plane", axis: 2 }; // the selected object slides horizontally
+    const drag = new Drag(action, place, headingOf(handle), this.ray(event).ray, this.scene.camera);
     this.dragged = { name, handle: handle.userData.said, drag, isNew: true };
     this.scene.gizmo.light(part);
     return part ? "part" : "thing";
@@ -135,7 +135,7 @@ export class Hand {
     if (dragged.isNew) this.scene.view.hold();
     dragged.isNew = false;
     dragged.now = now;
-    dragged.saying ??= setTimeout(() => this.sayMove(dragged), SAID);
+    dragged.saying ??= setTimeout(() => this.sayMove(dragged), MESSAGE_PERIOD);
     this.scene.change();
   }
 
@@ -158,8 +158,8 @@ export class Hand {
   }
 
   sayDrag({ handle: { layer, ns } }, phase, { place, heading }) {
-    const turn = [0, 0, Math.sin(heading / 2), Math.cos(heading / 2)];
-    this.scene.say({ drag: phase, server: layer, name: ns, pose: [...place.toArray(), ...turn] });
+    const quaternion = [0, 0, Math.sin(heading / 2), Math.cos(heading / 2)];
+    this.scene.say({ drag: phase, server: layer, name: ns, pose: [...place.toArray(), ...quaternion] });
   }
 
   key(event) {
@@ -170,7 +170,7 @@ export class Hand {
   }
 }
 
-// Where a frame, or what hangs on it, points to, seen from above: rad.
+// Return the direction of an object's x axis in the world, seen from above: rad.
 export function headingOf(object) {
   const ahead = new THREE.Vector3().setFromMatrixColumn(object.matrixWorld, 0);
   return Math.atan2(ahead.y, ahead.x);

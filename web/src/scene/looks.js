@@ -1,18 +1,18 @@
-// Materials and shapes that many markers share. Colours are those of the screen, as in the simulated cameras: three's
-// own management of colours is off, and light adds up as it does there.
+// Materials and shapes that markers share. Colors are display values, as in the simulated cameras: three.js's color
+// management is off, and light is added up in display values, as there.
 import * as THREE from "three";
 
 THREE.ColorManagement.enabled = false;
 THREE.Object3D.DEFAULT_UP.set(0, 0, 1);
 THREE.Object3D.DEFAULT_MATRIX_AUTO_UPDATE = true;
 
-// The cameras' sun wraps a little around what it lights: 0.85 n·s + 0.15.
+// Wrapped diffuse light, as in the shaders of the simulated cameras: 0.85 n·s + 0.15.
 THREE.ShaderChunk.lights_lambert_pars_fragment = THREE.ShaderChunk.lights_lambert_pars_fragment.replace(
   "saturate( dot( geometryNormal, directLight.direction ) )",
   "saturate( 0.85 * dot( geometryNormal, directLight.direction ) + 0.15 )",
 );
 
-// How much is spent on a picture: textures that are seen from aside cost four fifths of one that is made without a GPU.
+// Rendering quality. Without a GPU, anisotropic filtering takes four fifths of a frame's time; scene.js raises it with one.
 export const quality = { anisotropy: 1 };
 
 export const INK = 0x1a1f29;
@@ -28,32 +28,32 @@ export const SHAPES = {
 };
 for (const shape of Object.values(SHAPES)) shape.userData.shared = true;
 
-// The floor is brighter than in the cameras.
+// Factors (r, g, b) that make the floor brighter than in the simulated cameras.
 export const SUNLIT = new THREE.Color(1.19, 1.17, 1.13);
 export const isFloor = ({ layer, ns }) => layer === "view/surroundings" && ns === "floor";
 
-const known = new Map();
+const materials = new Map();
 
 /**
- * A material for a colour r g b a, 0..1, which all that has this colour shares.
+ * Return the material of a color r g b a (0..1), shared by all objects of this color; `lit`: shaded by the lights.
  * @param {number[]} color
  */
 export function material([r, g, b, a], lit = true) {
   const key = `${r} ${g} ${b} ${a} ${lit}`;
-  let found = known.get(key);
-  if (!found) {
-    const look = { color: new THREE.Color(r, g, b), opacity: a, transparent: a < 1, depthWrite: a >= 1, side: THREE.DoubleSide };
-    found = lit ? new THREE.MeshLambertMaterial(look) : new THREE.MeshBasicMaterial(look);
-    found.userData.shared = true;
-    known.set(key, found);
+  let shared = materials.get(key);
+  if (!shared) {
+    const options = { color: new THREE.Color(r, g, b), opacity: a, transparent: a < 1, depthWrite: a >= 1, side: THREE.DoubleSide };
+    shared = lit ? new THREE.MeshLambertMaterial(options) : new THREE.MeshBasicMaterial(options);
+    shared.userData.shared = true;
+    materials.set(key, shared);
   }
-  return found;
+  return shared;
 }
 
 /** @type {(one: THREE.Object3D) => one is THREE.Mesh} */
 export const isSingleMesh = (one) => one instanceof THREE.Mesh && !(one instanceof THREE.InstancedMesh);
 
-// Frees what a part of the scene alone has used.
+// Free the GPU resources that only `object` and its descendants use.
 export function dispose(object) {
   object.traverse((one) => {
     if (one.geometry && !one.geometry.userData.shared) one.geometry.dispose();
@@ -65,7 +65,7 @@ export function dispose(object) {
   });
 }
 
-// The axes of a frame: x red, y green, z blue.
+// Return the axes of a frame (length and radius in m): x red, y green, z blue.
 export function axes(length = 0.1, radius = 0.0015) {
   const group = new THREE.Group();
   AXES.forEach((color, axis) => {

@@ -4,15 +4,15 @@ import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { quality } from "./looks.js";
 
 const loader = new GLTFLoader();
-const known = new Map(); // promises of scenes, by address
+const scenes = new Map(); // promises of three.js scenes, by address
 
 export function load(address) {
-  if (!known.has(address)) {
+  if (!scenes.has(address)) {
     const loading = loader.loadAsync(address).then(({ scene }) => prepare(scene));
-    loading.catch(() => known.delete(address));
-    known.set(address, loading);
+    loading.catch(() => scenes.delete(address));
+    scenes.set(address, loading);
   }
-  return known.get(address);
+  return scenes.get(address);
 }
 
 function prepare(scene) {
@@ -20,22 +20,22 @@ function prepare(scene) {
     if (!one.isMesh) return;
     one.geometry.userData.shared = true;
     if (!one.geometry.attributes.normal) one.geometry.computeVertexNormals();
-    one.material = plain(one.material);
+    one.material = lambertOf(one.material);
   });
   return scene;
 }
 
-// What a material of glTF looks like in our light.
-function plain(from) {
-  const map = from.map ?? null;
+// Return a material for the page's lights with the look of a glTF material.
+function lambertOf(material) {
+  const map = material.map ?? null;
   if (map) {
     map.colorSpace = THREE.NoColorSpace;
     map.anisotropy = quality.anisotropy;
     map.userData.shared = true;
   }
-  const { color, opacity, transparent, alphaTest, vertexColors } = from;
-  const made = new THREE.MeshLambertMaterial({ map, color, opacity, transparent, alphaTest, vertexColors, side: THREE.DoubleSide });
-  made.depthWrite = !transparent;
-  made.userData.shared = true;
-  return made;
+  const { color, opacity, transparent, alphaTest, vertexColors } = material;
+  const result = new THREE.MeshLambertMaterial({ map, color, opacity, transparent, alphaTest, vertexColors, side: THREE.DoubleSide });
+  result.depthWrite = !transparent;
+  result.userData.shared = true;
+  return result;
 }

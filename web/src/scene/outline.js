@@ -1,8 +1,8 @@
-// A line about what is selected, or under the mouse: a mask in the stencil, and about it the same shapes, moved by some
-// pixels in every direction.
+// Outlines of the selected and hovered objects. Their shapes mask the stencil buffer; around the mask, copies are drawn
+// that are shifted by some pixels in each of WAYS directions.
 import * as THREE from "three";
 
-const WAYS = 8;
+const WAYS = 8; // directions
 
 export class Outline {
   constructor() {
@@ -11,7 +11,7 @@ export class Outline {
     this.shown = [];
   }
 
-  // `lit`: [[meshes, color, pixels], ...]
+  // Replace the outlines by those of `lit`; `pixels` is the width of the line.
   /** @param {[meshes: THREE.Mesh[], color: number, pixels: number][]} lit */
   show(lit) {
     this.scene.clear();
@@ -28,7 +28,7 @@ export class Outline {
       for (const material of [mask, ...rims]) {
         const copy = new THREE.Mesh(mesh.geometry, material);
         copy.matrixAutoUpdate = copy.matrixWorldAutoUpdate = false;
-        copy.matrixWorld = mesh.matrixWorld; // the same, which moves
+        copy.matrixWorld = mesh.matrixWorld; // shared: the copy follows its mesh
         copy.renderOrder = material === mask ? 2 * reference : 2 * reference + 1;
         copy.frustumCulled = false;
         this.scene.add(copy);
@@ -51,7 +51,7 @@ export class Outline {
       depthTest: false,
       depthWrite: false,
       colorWrite: !isMask,
-      stencilWrite: true, // which is what lets it be tested, too
+      stencilWrite: true, // also enables the stencil test
       stencilRef: reference,
       stencilFunc: isMask ? THREE.AlwaysStencilFunc : THREE.NotEqualStencilFunc,
       stencilZPass: isMask ? THREE.ReplaceStencilOp : THREE.KeepStencilOp,

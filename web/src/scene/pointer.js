@@ -1,12 +1,12 @@
-// Mouse and touch on the scene: a drag orbits, the right button or two fingers pan, wheel and two fingers zoom; what is
-// taken by a handle goes where the mouse goes.
-const STILL = 4; // px, that a click may move
-const WHEEL = 0.0012;
-const LINE = 16; // px, where a wheel counts lines
+// Mouse and touch input on the scene's canvas: a drag orbits, the right button or two fingers pan, the wheel or two
+// fingers zoom. A drag that begins on a handle or on the selected object moves the object.
+const STILL = 4; // px that the pointer may move during a click
+const WHEEL = 0.0012; // exponent of the zoom per px
+const LINE = 16; // px per line, for wheels that count lines
 
 export class Pointer {
-  // `acts`: take(event) -> what is taken, "part" of a handle or a "thing", or null; drag(event), drop(), click(event),
-  // look(event), hover(event or null), and orbit, pan (right, down: px), zoom(factor)
+  // Callbacks in `acts`: take(event) begins a drag and returns "part" (of a handle), "thing" (an object) or null; drag(event),
+  // drop(), click(event), look(event) by a double click, hover(event or null), orbit and pan (right, down: px), zoom(factor)
   constructor(element, acts) {
     this.element = element;
     this.acts = acts;
@@ -38,7 +38,7 @@ export class Pointer {
     const pans = event.button !== 0 || event.shiftKey;
     const taken = pans ? null : this.acts.take(event);
     this.does = taken ? "drag" : pans ? "pan" : "orbit";
-    this.isClick = event.button === 0 && taken !== "part"; // until it has moved
+    this.isClick = event.button === 0 && taken !== "part"; // until the pointer moves by more than STILL
   }
 
   move(event) {

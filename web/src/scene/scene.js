@@ -1,4 +1,4 @@
-// The scene: what the node tells is shown, and what the mouse does to it is told to the node.
+// The 3D scene of the page. It shows the frames and markers that the node sends, and sends the user's drags and pushes.
 import * as THREE from "three";
 import { ACCENT, isFloor, isSingleMesh, quality } from "./looks.js";
 import { Batch } from "./batch.js";
@@ -13,12 +13,12 @@ import { Tree } from "./tree.js";
 import { BEHIND, FOV, FREE, View } from "./view.js";
 
 const BODIES = "view/bodies";
-const OBJECTS = "objects"; // the server of handles, and `scene`, the layer, of what stands in the scene
-const TARGETS = "markers"; // the server of the handles of vehicles and of their green spheres
+const OBJECTS = "objects"; // handle server of the scene's objects; their markers' layer is "scene"
+const TARGETS = "markers"; // handle server of vehicles and of their green target spheres, and layer of these spheres
 const BASE = "base_link", TRACK = "Track_base", EYE = "_optical";
-const STEP = 0.05; // s, of the simulation
+const STEP = 0.05; // s, time step of the simulation
 const HOVERED = 0xffffff;
-const STORE = "scene"; // the key of what the browser remembers
+const STORE = "scene"; // key in storage.js
 const LAYERS = { path: "view/path", command: "view/command", forces: "view/forces", labels: "view/state" };
 const SHOWN = { frames: false, path: true, command: true, forces: false, handles: true, labels: true, marks: true };
 
@@ -34,14 +34,14 @@ export class Scene {
     this.views = [BEHIND, FREE];
     this.selected = "";
     /** @type {Map<string, string>} */
-    this.bodies = new Map(); // name of a vehicle -> what its frames begin with
+    this.bodies = new Map(); // name of a vehicle -> prefix of its frames
     /** @type {Map<string, THREE.Object3D>} */
-    this.handles = new Map(); // [server, name] -> the place of a handle
-    this.onViews = this.onLook = this.onSelect = () => {}; // what the page shows of them follows
+    this.handles = new Map(); // key(server, name) -> the handle's marker
+    this.onViews = this.onLook = this.onSelect = () => {}; // callbacks of the View panel
     /** @type {import("../replay.js").Replay | null} */
-    this.replay = null; // the Replay, while it shows a flight
+    this.replay = null; // set while it shows a recorded flight
     /** @type {import("../edit/edit.js").Edit | null} */
-    this.editing = null; // who edits the scene: Edit, while its panel is open
+    this.editing = null; // set while the Edit panel is open
     this.world = new THREE.Scene();
     this.world.matrixWorldAutoUpdate = false;
     this.camera = new THREE.PerspectiveCamera(FOV, 1, 0.05, 4000);
@@ -62,13 +62,13 @@ export class Scene {
     this.canvas.dom.setAttribute("aria-label", "The scene");
     this.shown = { ...SHOWN, shadows: this.canvas.isFast };
     const { view, shown } = kept(STORE, {});
-    this.wanted = view ?? BEHIND; // a camera may come later
+    this.wanted = view ?? BEHIND; // a simulated camera may be added later
     this.show(shown ?? {});
-    this.isUnframed = true; // until it is known where the vehicle is
+    this.isUnframed = true; // until the first markers arrive
     this.canvas.fit();
   }
 
-  // Whom the view behind follows.
+  // The name of the vehicle that the view from behind follows.
   get vehicle() {
     return this.followedVehicle;
   }
@@ -80,7 +80,7 @@ export class Scene {
     this.change();
   }
 
-  // ---- from the node
+  // ---- messages of the node
 
   take(header, bytes) {
     try {
@@ -94,7 +94,7 @@ export class Scene {
     this.canvas.change();
   }
 
-  // Looks what there is, after frames or markers have come or gone.
+  // Update vehicles, handles, views and batches after frames or markers were added or removed.
   sort() {
     this.tree.isNew = false;
     this.bodies.clear();
@@ -111,7 +111,7 @@ export class Scene {
     this.batch.build(this.tree.markers.values());
   }
 
-  // Shows what is to be seen now, and marks what is under the mouse, or selected.
+  // Show or hide each marker, and outline the hovered and the selected objects.
   arrange() {
     this.isArranged = true;
     for (const object of this.tree.markers.values()) object.visible = this.isShown(object.userData.said);
@@ -125,7 +125,7 @@ export class Scene {
 
   isShown({ layer, ns }) {
     if (this.replay && (layer === TARGETS || (layer.startsWith("view/") && !isFloor({ layer, ns })))) return false;
-    const areLabelsShown = this.shown.labels && this.editing?.held?.of !== "vehicle"; // its handles would cover them
+    const areLabelsShown = this.shown.labels && this.editing?.held?.of !== "vehicle"; // the vehicle's handles would cover its labels
     if (layer === "view/height") return ns === "shadow" ? !this.shown.shadows : areLabelsShown;
     if (layer === LAYERS.labels) return areLabelsShown;
     if (layer === LAYERS.forces) return this.shown.forces || this.bodies.has(this.active);
@@ -135,17 +135,17 @@ export class Scene {
 
   offerViews() {
     const prefix = this.bodies.get(this.vehicle) ?? "";
-    // Frames stay, of vehicles that have gone, too: those have a prefix that the only one may lack.
+    // Frames of removed vehicles remain, with a prefix; a single vehicle may have none.
     const isOwn = (name) => name.startsWith(prefix) && !name.slice(prefix.length).includes("/");
-    const eyes = [...this.tree.byName.keys()].filter((name) => name.endsWith(EYE) && isOwn(name)).sort();
-    const views = [BEHIND, FREE, ...eyes];
+    const cameras = [...this.tree.byName.keys()].filter((name) => name.endsWith(EYE) && isOwn(name)).sort();
+    const views = [BEHIND, FREE, ...cameras];
     if (String(views) === String(this.views)) return;
     this.views = views;
     this.turn(views.includes(this.wanted) ? this.wanted : views.includes(this.view.name) ? this.view.name : BEHIND);
     this.onViews();
   }
 
-  // ---- what one sees
+  // ---- view
 
   look(view) {
     if (!this.views.includes(view)) return;
@@ -162,7 +162,7 @@ export class Scene {
     this.onLook();
   }
 
-  // A page that begins with the free view looks at the vehicle or, without one, at the middle of the floor.
+  // Point an initial free view at the vehicle or, without one, at the middle of the floor.
   beginFree() {
     if (!this.tree.markers.size) return;
     this.isUnframed = false;
@@ -173,7 +173,8 @@ export class Scene {
     this.view.stepBack();
   }
 
-  // Looks at something by its name, or at the vehicle, from near; at all there is if there is no vehicle.
+  // Move the camera near object `name`, or near all objects if there is no vehicle and no selection. While editing: near
+  // the selected objects.
   frame(name = this.selected || this.vehicle) {
     const isThere = this.bodies.has(this.vehicle);
     if (this.editing?.last !== undefined) this.lookAt(this.editing.seen.meshesOf(this.editing.selected));
@@ -182,7 +183,7 @@ export class Scene {
     this.change();
   }
 
-  // Of all that stands in the scene; of the floor where nothing does.
+  // Return the meshes of all objects in the scene, or of the floor if the scene is empty.
   meshes() {
     const names = new Set(this.things().map(({ userData }) => userData.said.ns));
     const meshes = [...names].flatMap((name) => this.meshesOf(name));
@@ -218,14 +219,14 @@ export class Scene {
     keep(STORE, { view: this.wanted, shown: this.shown });
   }
 
-  // A picture of the scene, as PNG.
+  // Return a promise of a PNG image of the scene.
   snapshot() {
     if (!this.canvas.renderer) return Promise.reject(new Error("this browser draws no scene"));
-    this.canvas.draw(); // what was painted before may have been thrown away
-    return new Promise((done, fail) => this.canvas.dom.toBlob((blob) => (blob ? done(blob) : fail(new Error("no picture"))), "image/png"));
+    this.canvas.draw(); // the browser may have discarded the last frame
+    return new Promise((resolve, reject) => this.canvas.dom.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("no picture"))), "image/png"));
   }
 
-  // What the canvas shows, as a video.
+  // Return the canvas as a video stream.
   stream() {
     const stream = this.canvas.dom.captureStream();
     this.change();
@@ -235,7 +236,7 @@ export class Scene {
   fit(width, height) {
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    this.unit = (2 * Math.tan(THREE.MathUtils.degToRad(FOV / 2))) / height; // m of a pixel, at 1 m
+    this.unit = (2 * Math.tan(THREE.MathUtils.degToRad(FOV / 2))) / height; // m per CSS pixel at a distance of 1 m
     Words.unit = this.unit;
     this.world.traverse((one) => one instanceof Words && one.fixed && one.fit());
   }
@@ -273,7 +274,7 @@ export class Scene {
     return this.tree.byName.get(`${this.bodies.get(this.vehicle) ?? ""}${TRACK}`);
   }
 
-  // Where a vehicle is in the world, undefined where that is not known.
+  // Return a vehicle's position in the world, undefined if it is not known.
   place(vehicle) {
     const frame = this.baseOf(vehicle);
     return frame && new THREE.Vector3().setFromMatrixPosition(frame.matrixWorld);
@@ -283,16 +284,16 @@ export class Scene {
     return this.bodies.has(vehicle) ? this.tree.byName.get(this.bodies.get(vehicle) + BASE) : undefined;
   }
 
-  // ---- what has handles
+  // ---- handles
 
-  // What is selected, dragged or, of vehicles and their spheres, under the mouse: this one has handles.
+  // The name of the object with the handles: the dragged one, else a hovered vehicle or target, else the selected one.
   get active() {
     if (this.hand.dragged) return this.hand.dragged.name;
     if (this.hand.hovered && this.handleOf(this.hand.hovered)?.userData.said.layer === TARGETS) return this.hand.hovered;
     return this.selected;
   }
 
-  // The handle of a vehicle, a sphere or an object. That of a vehicle alone has another name than this.
+  // Return the handle of a vehicle, target or object. A single vehicle's has another name: it is the one without a sphere.
   handleOf(name) {
     const own = this.handles.get(key(TARGETS, name)) ?? this.handles.get(key(OBJECTS, name));
     if (own || !this.bodies.has(name)) return own;
@@ -303,7 +304,7 @@ export class Scene {
     return [...this.tree.markers.values()].some(({ userData: { said } }) => said.layer === layer && said.ns === ns && said.kind !== "handle");
   }
 
-  // What the mouse may meet.
+  // Return the objects that the mouse can pick.
   things() {
     return [...this.tree.markers.values()].filter((one) => isThing(one.userData.said));
   }
@@ -335,10 +336,9 @@ export class Scene {
     if (this.hand.dragged?.now) return this.gizmo.put(this.hand.dragged.now.place, this.hand.dragged.now.heading);
     this.gizmo.put(this.place(name) ?? handle.getWorldPosition(new THREE.Vector3()), headingOf(handle));
   }
-
 }
 
 const key = (server, name) => `${server} ${name}`;
 
-// Whether the mouse meets it: bodies, objects, green spheres.
+// Return whether the mouse can pick the marker: a vehicle's body, an object or a target sphere.
 const isThing = ({ layer, kind }) => kind !== "handle" && [BODIES, "scene", TARGETS].includes(layer);

@@ -1,24 +1,24 @@
-// Sky, ground, sun and metre marks. They are friendlier than what the simulated cameras see, which they do not change.
+// Sky, ground, sun and metre marks of the page. They are brighter than in the simulated cameras, which do not see them.
 import * as THREE from "three";
 import { quality } from "./looks.js";
 
 const TO_SUN = new THREE.Vector3(-0.34, 0.3, 0.89).normalize();
-const BELOW = 0x6b6966, ABOVE = 0x858a91, SUN = 0x8a857a; // what a surface gets of each, as in scene_markers.py
-// Elevation in degrees, and the colour there.
+const BELOW = 0x6b6966, ABOVE = 0x858a91, SUN = 0x8a857a; // light on a surface from each, as in scene_markers.py
+// Colors of the sky by elevation (degrees).
 /** @type {[elevation: number, color: number[]][]} */
 const BANDS = [
   [-90, [0.72, 0.78, 0.68]], [-4, [0.8, 0.86, 0.82]], [-0.5, [0.9, 0.94, 0.95]], [1.5, [0.89, 0.945, 0.985]], [6, [0.7, 0.845, 0.975]],
   [20, [0.52, 0.73, 0.95]], [45, [0.42, 0.65, 0.92]], [90, [0.3, 0.54, 0.86]],
 ];
-const MEADOW = "0.66, 0.74, 0.6", HAZE = "0.88, 0.92, 0.92"; // of the ground: near, and far away
-const MARKED = 5; // m, each way from the origin
-const MARK = 0.3; // m, how wide the strip of an axis is
-const LINE = 0.012; // m, how wide the axis is
-const DENSE = 200; // px of a metre of it
-const AROUND = 16; // sides of the sky
-const FAR = 1500; // m, how far the ground goes
-const SHADOWED = 6; // m, each way from the drone
-const TEXELS = 2048;
+const MEADOW = "0.66, 0.74, 0.6", HAZE = "0.88, 0.92, 0.92"; // ground colors: near, and far away
+const MARKED = 5; // m, to which the axes are marked
+const MARK = 0.3; // m, width of an axis's strip
+const LINE = 0.012; // m, width of an axis's line
+const DENSE = 200; // px of a strip's texture per metre
+const AROUND = 16; // sides of the sky's sphere
+const FAR = 1500; // m, radius of the ground
+const SHADOWED = 6; // m around the drone that have shadows
+const TEXELS = 2048; // width and height of the shadow map
 
 export class Surroundings {
   constructor(scene, isFast) {
@@ -35,20 +35,20 @@ export class Surroundings {
     this.shine(new THREE.Vector3());
   }
 
-  // Lets sky and ground be about who looks, and the shadows about a place.
+  // Center sky and ground on the camera, and the shadows on `place`.
   follow(camera, place) {
     this.sky.position.copy(camera.position);
     this.ground.position.set(camera.position.x, camera.position.y, 0);
     this.shine(place);
   }
 
-  // The sun moves by whole texels of its shadows, whose edges would flicker otherwise.
+  // Center the shadows on `place`. The sun moves by whole texels of the shadow map: shadow edges would flicker otherwise.
   shine(place) {
     const texel = (2 * SHADOWED) / TEXELS;
-    const turn = new THREE.Quaternion().setFromUnitVectors(TO_SUN, new THREE.Vector3(0, 0, 1));
-    const seen = place.clone().applyQuaternion(turn);
-    seen.set(Math.round(seen.x / texel) * texel, Math.round(seen.y / texel) * texel, Math.round(seen.z / texel) * texel);
-    this.sun.target.position.copy(seen.applyQuaternion(turn.invert()));
+    const rotation = new THREE.Quaternion().setFromUnitVectors(TO_SUN, new THREE.Vector3(0, 0, 1));
+    const snapped = place.clone().applyQuaternion(rotation);
+    snapped.set(Math.round(snapped.x / texel) * texel, Math.round(snapped.y / texel) * texel, Math.round(snapped.z / texel) * texel);
+    this.sun.target.position.copy(snapped.applyQuaternion(rotation.invert()));
     this.sun.position.copy(this.sun.target.position).addScaledVector(TO_SUN, 40);
     this.sun.target.updateMatrixWorld();
   }
@@ -75,17 +75,17 @@ function sky() {
   geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
   geometry.setAttribute("color", new THREE.Float32BufferAttribute(colors, 3));
   const paint = new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide, depthWrite: false });
-  const mesh = behind(new THREE.Mesh(geometry, paint), 1);
+  const mesh = background(new THREE.Mesh(geometry, paint), 1);
   mesh.scale.setScalar(2 * FAR);
   return mesh;
 }
 
-// A disc about who looks, with lines of the world every metre and every five; far away it is lost in the haze. Like the
-// sky it is painted where nothing else is, and it is a little farther away than it seems: so it cannot fight with the floor.
+// Return a disc around the camera with grid lines every metre and every five, which fades into the haze. Like the sky it is
+// drawn after the opaque objects, where they left space; its depth offset avoids flicker against the floor.
 function ground() {
   const paint = new THREE.ShaderMaterial({
-    blending: THREE.CustomBlending, // and not `transparent`, which would be painted last
-    blendSrcAlpha: THREE.ZeroFactor, // the canvas itself stays opaque
+    blending: THREE.CustomBlending, // not `transparent`, which would be drawn over transparent objects
+    blendSrcAlpha: THREE.ZeroFactor, // the canvas stays opaque
     blendDstAlpha: THREE.OneFactor,
     depthWrite: false,
     polygonOffset: true,
@@ -116,10 +116,10 @@ function ground() {
         gl_FragColor = vec4(color, exp(-far * far / 160000.0));
       }`,
   });
-  return behind(new THREE.Mesh(new THREE.CircleGeometry(FAR, 64), paint), 2);
+  return background(new THREE.Mesh(new THREE.CircleGeometry(FAR, 64), paint), 2);
 }
 
-// The axes x and y on the floor with their metres, for who looks along x. Each is a strip that begins at its axis.
+// Return strips along the x and y axes on the floor with labels in metres, upright for a camera that looks along x.
 function marks() {
   const metres = [1, 2, 3, 4];
   const x = strip(MARK, MARKED, "#c92a2a", [0, 0, LINE, MARKED], (mark) => metres.forEach((metre) => mark(`${metre} m`, 0.17, MARKED - metre)));
@@ -129,15 +129,15 @@ function marks() {
   return new THREE.Group().add(x, y);
 }
 
-// A plate of width and height (m) on the floor, its top towards x, with a line [left, top, width, height] and words.
+// Return a plate on the floor, its top towards x. Sizes and `line` [left, top, width, height] are in m; `write` adds words.
 function strip(width, height, color, line, write) {
   const canvas = document.createElement("canvas");
   Object.assign(canvas, { width: width * DENSE, height: height * DENSE });
   const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   Object.assign(pen, { font: `500 ${0.13 * DENSE}px system-ui, "DejaVu Sans", sans-serif`, textAlign: "center", textBaseline: "middle" });
   pen.fillStyle = color;
-  const [left, top, wide, high] = line.map((metres) => metres * DENSE);
-  pen.fillRect(left, top, wide, high);
+  const [left, top, lineWidth, lineHeight] = line.map((metres) => metres * DENSE);
+  pen.fillRect(left, top, lineWidth, lineHeight);
   pen.fillStyle = "#1a1f29";
   write((words, right, down) => pen.fillText(words, right * DENSE, down * DENSE));
   const map = new THREE.CanvasTexture(canvas);
@@ -149,7 +149,7 @@ function strip(width, height, color, line, write) {
   return plate;
 }
 
-function behind(mesh, order) {
+function background(mesh, order) {
   mesh.renderOrder = order;
   mesh.frustumCulled = false;
   mesh.raycast = () => {};

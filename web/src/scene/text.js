@@ -1,16 +1,16 @@
-// Words in the scene: on a plate, turned to who looks; of a size in m, or of one on the screen.
+// Text in the scene, on a plate that faces the camera. Its size is in m, or constant on the screen.
 import * as THREE from "three";
 
-const FONT = 36; // px, in which it is painted
-const LINE = 1.25;
-const PAD = 10;
+const FONT = 36; // px, font size in the texture
+const LINE = 1.25; // line height in font sizes
+const PAD = 10; // px in the texture
 const at = new THREE.Vector3();
 
 export class Words extends THREE.Sprite {
-  static unit = 0.001; // m, how large a CSS pixel is at 1 m
+  static unit = 0.001; // m per CSS pixel at a distance of 1 m
   /** @type {THREE.Vector3 | null} */
-  static above = null; // the tip of the handles, in the world: the labels of vehicles stand above it
-  // `size`: m of a line, or with `fixed` CSS pixels, near and far.
+  static above = null; // tip of the handles in the world; vehicle labels that would cover them are raised above it
+  // `size`: font size in m or, with `fixed`, in CSS pixels at every distance.
   constructor(text, { color = "#1a1f29", plate = "rgba(255,255,255,0.78)", size = 0.05, fixed = false, isLabel = false } = {}) {
     super(new THREE.SpriteMaterial({ sizeAttenuation: !fixed, transparent: true, depthWrite: false, depthTest: !fixed }));
     this.color = color;
@@ -18,18 +18,18 @@ export class Words extends THREE.Sprite {
     this.size = size;
     this.fixed = fixed;
     this.isLabel = isLabel;
-    this.pixels = [0, 0]; // width and height of what is painted
+    this.pixels = [0, 0]; // width and height of the texture
     this.center.set(0.5, 0);
     this.renderOrder = 5;
     this.raycast = () => {};
     this.say(text);
   }
 
-  // A plate that would cover handles is raised; one that would reach over the picture's upper edge is lowered.
+  // Raise a plate that would cover the handles, and lower one that the upper edge of the picture would cut.
   onBeforeRender(_renderer, _scene, camera) {
     if (!this.fixed) return;
     const { y } = at.setFromMatrixPosition(this.matrixWorld).project(camera);
-    const height = this.scale.y * camera.projectionMatrix.elements[5]; // half pictures
+    const height = this.scale.y * camera.projectionMatrix.elements[5]; // in half heights of the picture
     const raised = this.isLabel && Words.above ? (y - at.copy(Words.above).project(camera).y) / height : 0;
     this.center.y = Math.min(1, Math.max(Math.min(0, raised), 1 - (1 - y) / height));
   }
@@ -42,9 +42,9 @@ export class Words extends THREE.Sprite {
     const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     const font = `500 ${FONT}px system-ui, "DejaVu Sans", sans-serif`;
     pen.font = font;
-    // Numbers that change do not let the plate jump: its width grows in steps.
-    const wide = Math.ceil(Math.max(...lines.map((line) => pen.measureText(line).width)) / FONT) * FONT;
-    canvas.width = Math.max(2, wide + 2 * PAD);
+    // The width is a multiple of the font size, so that changing numbers do not make the plate jump.
+    const width = Math.ceil(Math.max(...lines.map((line) => pen.measureText(line).width)) / FONT) * FONT;
+    canvas.width = Math.max(2, width + 2 * PAD);
     canvas.height = Math.ceil(lines.length * LINE * FONT) + 2 * PAD;
     pen.font = font;
     if (this.plate) {

@@ -1,15 +1,15 @@
-// The frames, and the markers that hang on them, as the node tells them.
+// Tree of the frames and of the markers in them, as sent by the node.
 import * as THREE from "three";
 import { axes } from "./looks.js";
 import { change, make, remove } from "./markers.js";
 import { Words } from "./text.js";
 
 const WORLD = "world";
-const NAME = 11; // px
-const OBJECTS = "scene"; // the layer of what stands around
-const LABELS = "view/state"; // which stand high above the drone for rviz, from whose eyes it is farther away
-const LOW = 0.5;
-const JUMP = 0.5; // m: who moves so far at once was put there
+const NAME = 11; // px, font size of frame names
+const OBJECTS = "scene"; // layer of the scene's objects
+const LABELS = "view/state"; // layer of the state texts, which are high above the drone for rviz, whose camera is farther away
+const LOW = 0.5; // factor on their height here
+const JUMP = 0.5; // m: a frame that moves farther at once was set there, and is not interpolated
 
 /** @typedef {{ position: THREE.Vector3, quaternion: THREE.Quaternion }} Place */
 
@@ -22,8 +22,8 @@ export class Tree {
     this.root = new THREE.Group();
     scene.add(this.root);
     this.changed = changed;
-    this.smooth = 0; // s, in which a frame goes to where it is told to be
-    this.isMoved = false; // whether objects have moved since somebody looked
+    this.smooth = 0; // s, duration of the interpolation to a new pose; 0 for none
+    this.isMoved = false; // objects have moved; the scene clears the flag
     /** @type {THREE.Object3D[]} */
     this.frames = []; // by index
     /** @type {Map<string, THREE.Object3D>} */
@@ -31,9 +31,9 @@ export class Tree {
     /** @type {Map<number, THREE.Object3D>} */
     this.markers = new Map(); // by id
     /** @type {Map<THREE.Object3D, { from: Place, to: Place, began: number }>} */
-    this.moving = new Map(); // frames on their way: where from, where to, since when
+    this.moving = new Map(); // frames that are interpolated; start time in ms
     /** @type {Set<THREE.Object3D>} */
-    this.waiting = new Set(); // markers whose frame is not known
+    this.waiting = new Set(); // markers whose frame the node has not sent yet
     this.clear();
   }
 
@@ -42,37 +42,37 @@ export class Tree {
     this.root.clear();
     this.frames = [];
     this.byName = new Map([[WORLD, this.root]]);
-    for (const known of [this.markers, this.moving, this.waiting]) known.clear();
-    this.isNew = true; // whether frames or markers have come or gone since somebody looked
+    for (const collection of [this.markers, this.moving, this.waiting]) collection.clear();
+    this.isNew = true; // frames or markers were added or removed; the scene clears the flag
   }
 
-  // Takes what scene_state.py tells: `said`, and the numbers (float32) that belong to it.
+  // Apply a message of scene_state.py and its numbers: poses first (7 numbers each), then the arrays of the markers.
   /**
-   * @param {wire.SceneMessage} said
+   * @param {wire.SceneMessage} message
    * @param {Float32Array} numbers
    */
-  take(said, numbers) {
-    if (said.whole) this.clear();
-    for (const id of said.gone) this.drop(id);
-    for (const [index, name, parent] of said.frames) this.hang(index, name, parent);
+  take(message, numbers) {
+    if (message.whole) this.clear();
+    for (const id of message.gone) this.drop(id);
+    for (const [index, name, parent] of message.frames) this.hang(index, name, parent);
     let at = 0;
-    for (const index of said.moved) this.move(this.frames[index], numbers, 7 * at++);
-    let after = 7 * (said.moved.length + said.placed.length);
-    for (const one of /** @type {wire.Marker[]} */ (said.markers)) {
-      for (const [name, count] of one.arrays ?? []) {
-        one[name] = numbers.slice(after, after + count);
+    for (const index of message.moved) this.move(this.frames[index], numbers, 7 * at++);
+    let after = 7 * (message.moved.length + message.placed.length);
+    for (const marker of /** @type {wire.Marker[]} */ (message.markers)) {
+      for (const [name, count] of marker.arrays ?? []) {
+        marker[name] = numbers.slice(after, after + count);
         after += count;
       }
-      this.put(one);
+      this.put(marker);
     }
-    for (const id of said.placed) {
+    for (const id of message.placed) {
       const object = this.markers.get(id);
       if (object) place(object, numbers, 7 * at);
       this.isMoved ||= object?.userData.said.layer === OBJECTS;
       if (object?.userData.said.layer === LABELS) object.position.multiplyScalar(LOW);
       at++;
     }
-    if (said.frames.length) for (const object of [...this.waiting]) this.attach(object);
+    if (message.frames.length) for (const object of [...this.waiting]) this.attach(object);
   }
 
   hang(index, name, parent) {
@@ -84,7 +84,7 @@ export class Tree {
     this.isNew = true;
   }
 
-  // A frame may be told before the one that it hangs on.
+  // Return a frame; create it if needed, since a frame may be sent before its parent.
   frameAt(index) {
     return (this.frames[index] ??= new THREE.Group());
   }
@@ -102,27 +102,27 @@ export class Tree {
     frame.quaternion.copy(from.quaternion);
   }
 
-  // Lets frames go on; tells whether there are any that have not arrived.
+  // Interpolate the moving frames at time `now` (ms); return whether any is still moving.
   advance(now) {
     for (const [frame, { from, to, began }] of this.moving) {
-      const share = Math.min(1, (now - began) / (1000 * this.smooth));
-      frame.position.lerpVectors(from.position, to.position, share);
-      frame.quaternion.slerpQuaternions(from.quaternion, to.quaternion, share);
-      if (share === 1) this.moving.delete(frame);
+      const progress = Math.min(1, (now - began) / (1000 * this.smooth));
+      frame.position.lerpVectors(from.position, to.position, progress);
+      frame.quaternion.slerpQuaternions(from.quaternion, to.quaternion, progress);
+      if (progress === 1) this.moving.delete(frame);
     }
     return this.moving.size > 0;
   }
 
-  put(said) {
-    const before = this.markers.get(said.id);
-    if (before && change(before, said)) return;
-    const object = make(said, this.changed);
+  put(marker) {
+    const before = this.markers.get(marker.id);
+    if (before && change(before, marker)) return;
+    const object = make(marker, this.changed);
     if (before) {
       object.position.copy(before.position);
       object.quaternion.copy(before.quaternion);
-      this.drop(said.id);
+      this.drop(marker.id);
     }
-    this.markers.set(said.id, object);
+    this.markers.set(marker.id, object);
     this.attach(object);
     this.isNew = true;
   }
@@ -144,7 +144,7 @@ export class Tree {
     this.isNew = true;
   }
 
-  // Shows axes and names of all frames, or none.
+  // Show or hide the axes and names of all frames.
   showFrames(shown) {
     if (shown === Boolean(this.shows)) return;
     this.shows = shown;

@@ -1,4 +1,4 @@
-// Writes the store's facts into the page: no other code writes the lines, badges and buttons that depend on them.
+// The display of the store's facts. No other code changes the lines, badges and buttons that depend on them.
 import { at } from "../dom.js";
 import { answers } from "./facts.js";
 import {
@@ -14,7 +14,7 @@ function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-// Lets keys scroll a box whose text is higher than the box.
+// Make an element focusable if its text is higher than itself, so that keys can scroll it.
 function makeScrollable(element) {
   element.tabIndex = element.scrollHeight > element.clientHeight + 1 ? 0 : -1;
 }
@@ -70,7 +70,7 @@ function showFlight(now) {
 /** @param {Facts} now */
 function showBanner(now) {
   const words = bannerWords(now);
-  // A screen reader reads the banner once, not each time its count of seconds changes.
+  // A screen reader reads the banner once, not whenever its count of seconds changes.
   const isNew = withoutNumbers(words) !== withoutNumbers(at("banner").textContent);
   at("banner").setAttribute("aria-live", isNew ? "assertive" : "off");
   write(at("banner"), words);
@@ -88,7 +88,7 @@ function showNotice({ notice }) {
 /** @param {Facts} now */
 function showButtons(now) {
   for (const [id, can] of Object.entries(abilities(now))) {
-    const button = at(/** @type {"run"} */ (id)); // or a list
+    const button = at(/** @type {"run"} */ (id)); // or a <select>
     if (button.disabled === can) button.disabled = !can;
   }
   for (const id of PARTS_OF_SIMULATOR) at(id).inert = !answers(now);

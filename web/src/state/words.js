@@ -9,7 +9,7 @@ const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 // ---- the connection
 
-// The text of the banner over the scene; "" while the scene is up to date.
+// Return the text of the banner over the scene, "" while the scene is up to date.
 /** @param {Facts} now */
 export function bannerWords(now) {
   const { connection, since, at } = now;
@@ -26,7 +26,7 @@ export function bannerWords(now) {
 
 // ---- the flight
 
-// The breakpoint at which the flight is paused, null if it is not.
+// Return the breakpoint at which the flight is paused, null if there is none.
 /** @param {Facts} now */
 export const pauseOf = (now) => (now.connection === "connected" && now.status === "paused" ? now.reached : null);
 
@@ -37,14 +37,14 @@ const isFailed = (now) => now.flight === "script failed";
 export function statusWords(now) {
   if (now.connection === "lost" || now.connection === "refused") return "No connection";
   if (hasSimulator(now) && !answers(now)) return "No answer";
-  if (answers(now) && now.status === "flying" && now.flown === "") return "Running"; // there is no vehicle that could fly
+  if (answers(now) && now.status === "flying" && now.flown === "") return "Running"; // there is no vehicle
   const says = now.status === "flying" && now.flight && !now.flight.startsWith("unknown") ? now.flight : now.status;
   return capital(now.status === "stopped" && isFailed(now) ? now.flight : says);
 }
 
 const DEAF = "This script does not listen to commands: its flight is in the script. Stage 6 of the tutorial does, and pilot.py.";
 
-// Nothing is said of a stopped script, because none listens to commands while it is stopped.
+// Return a hint if the script ignores commands. A stopped script gets no hint: none listens to commands while it is stopped.
 /** @param {Facts} now */
 export const deafWords = (now) => (answers(now) && !now.hearsCommands && now.status !== "stopped" ? DEAF : "");
 
@@ -57,7 +57,7 @@ export function diagnosisWords(now) {
   return now.warnings.length ? "" : "Nothing is wrong.";
 }
 
-// The text beside Run: what the simulator's script does, which may be another one than the open script.
+// Return the text beside Run: the state of the simulator's script, which may be another one than the open script.
 /** @param {Facts} now */
 export function flyingWords(now) {
   if (!now.flown || !answers(now)) return { text: "", is: "" };
@@ -72,7 +72,7 @@ function failureWords(failure, open) {
   return `${failure.phase}, ${place}: ${failure.said}`;
 }
 
-// The console's line about the error that kept the script from starting; its place is a link. Other errors are in the log.
+// Return the console's line about the error that kept the script from starting. Other errors are in the log.
 /** @param {Facts} now */
 export const consoleWords = ({ failure }) =>
   failure?.phase === NOT_STARTED ? `error: [load] ${failure.file}:${failure.line}: ${failure.said}` : "";
@@ -81,7 +81,7 @@ function pauseWords({ file, line, time }, open) {
   return `paused at line ${line}${file === open.file ? "" : ` of ${nameOf(file)}`}, t = ${time.toFixed(2)} s`;
 }
 
-// The line below the script: { text, bad }. The message of a failed action comes first, then the script's error.
+// Return the line below the script: { text, bad }. The message of a failed action comes first, then the script's error.
 /** @param {Facts} now */
 export function saidWords(now) {
   const { message, failure } = now;
@@ -92,7 +92,7 @@ export function saidWords(now) {
   return message ?? { text: "", bad: false };
 }
 
-// The marked lines of the open file: the line that failed, and the line of the pause; 0 if there is none.
+// Return the marked lines of the open file: the line that failed, and the line of the pause; 0 if there is none.
 /** @param {Facts} now */
 export function markedLines(now) {
   const pause = pauseOf(now);
@@ -111,7 +111,7 @@ const OF_SIMULATOR = [
 ];
 
 /**
- * Whether each button is enabled, by its id.
+ * Returns whether each button is enabled, by its id.
  * @returns {Record<string, boolean>}
  * @param {Facts} now
  */
