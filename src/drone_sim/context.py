@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from drone_sim.config.types import DatumParameters
-from drone_sim.forces.weather import Weather
 from drone_sim.mechanics.frames import Vector
-from drone_sim.render.intrinsics import Lens
 from drone_sim.scripting import load
 from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.host import ScriptContext
 from drone_sim.scripting.api.vision import NO_OBJECT
-from drone_sim.sensors.vision import TurningBlades, Vision
-from drone_sim.world import World
+
+if TYPE_CHECKING:  # slow imports, which programs that only check parameters do without
+    from drone_sim.forces.weather import Weather
+    from drone_sim.render.intrinsics import Lens
+    from drone_sim.sensors.vision import TurningBlades, Vision
+    from drone_sim.world import World
 
 NOBODY = ("", "")
 

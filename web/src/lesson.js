@@ -78,6 +78,7 @@ export class Lesson {
 
   go(name) {
     return this.show(name).catch((error) => {
+      if (this.name === name) this.name = ""; // so that the same lesson can be chosen again
       this.parts.flies.textContent = error.message;
     });
   }

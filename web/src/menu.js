@@ -31,7 +31,7 @@ export class Menu {
     const { items } = this;
     const at = items.indexOf(document.activeElement);
     const to = { ArrowDown: at + 1, ArrowUp: at - 1, Home: 0, End: -1 }[event.key];
-    if (to !== undefined) items.at(to % items.length).focus();
+    if (to !== undefined) items.at(to % items.length)?.focus();
     else if (event.key === "Escape" || event.key === "Tab") this.show(false);
     else return;
     if (event.key === "Escape") this.button.focus();

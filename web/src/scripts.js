@@ -327,7 +327,7 @@ export class Scripts {
     const { script } = this.is;
     const isGone = failure?.kind === "NoSuchScript";
     const keep = (mine) => () => this.keep(mine);
-    this.drafts.put(script, { text: this.editor.text, version: this.is.version });
+    this.draft();
     const said = isGone
       ? `${script} has been removed or renamed by another program. Its text is still here.`
       : failure?.message ?? `${script} has been changed by another program while you wrote. Both texts will be kept; which stays under this name?`;

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import IO, NamedTuple, TextIO
+from typing import IO, TYPE_CHECKING, NamedTuple, TextIO
 
 import numpy as np
 
 from drone_sim.mechanics.frames import Matrix, from_quaternion
 from drone_sim.message_text import shown
-from drone_sim.run.simulation import Simulation
+
+if TYPE_CHECKING:  # slow import, which programs that only read recordings do without
+    from drone_sim.run.simulation import Simulation
 
 COLUMNS = (
     "t [s]",

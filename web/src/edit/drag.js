@@ -18,14 +18,19 @@ export class Drag {
     this.change = { matrix: new THREE.Matrix4(), factors: null };
     this.merge = `${page}-${++drags}`;
     this.from = new Map(roots.map((one) => [one, edit.objects.existing(one).matrix.clone()]));
-    const all = roots.flatMap((one) => edit.objects.withBelow(one));
-    const names = new Set(all.map((one) => edit.objects.existing(one)).filter(({ of }) => of === "scene").map(({ name }) => name));
-    const { scene, glyphs } = edit;
-    const markers = [...scene.tree.markers.values()].filter(({ userData: { said } }) => said.layer === "scene" && names.has(said.ns));
-    this.shown = [...markers, ...all.map((one) => glyphs.get(one)).filter(Boolean)].map((one) => [one, one.matrixWorld.clone()]);
+    this.shown = roots.flatMap((root) => this.drawn(root));
   }
 
-  // Apply `change`: a motion as a matrix in the world, and scale factors along the last object's axes, null for none.
+  // Return [object of the picture, its matrix in the world, root] for the root and all its descendants.
+  drawn(root) {
+    const { objects, scene, glyphs } = this.edit;
+    const all = objects.withBelow(root);
+    const names = new Set(all.map((one) => objects.existing(one)).filter(({ of }) => of === "scene").map(({ name }) => name));
+    const markers = [...scene.tree.markers.values()].filter(({ userData: { said } }) => said.layer === "scene" && names.has(said.ns));
+    return [...markers, ...all.map((one) => glyphs.get(one)).filter(Boolean)].map((one) => [one, one.matrixWorld.clone(), root]);
+  }
+
+  // Apply `change`: a motion as a matrix in the world, and scale factors along each root's own axes, null for none.
   go(change) {
     this.change = change;
     this.edit.scene.change();
@@ -39,10 +44,10 @@ export class Drag {
 
   // Show the objects where they will be, before each frame: the node's answer comes later.
   show({ matrix, factors } = this.change) {
-    const motion = matrix.clone();
-    const own = this.from.get(this.roots[this.roots.length - 1]);
-    if (factors && own) motion.multiply(own.clone().scale(factors).multiply(own.clone().invert()));
-    for (const [object, from] of this.shown) {
+    for (const [object, from, root] of this.shown) {
+      const motion = matrix.clone();
+      const own = this.from.get(root);
+      if (factors && own) motion.multiply(own.clone().scale(factors).multiply(own.clone().invert()));
       const local = from.clone().premultiply(motion).premultiply(object.parent.matrixWorld.clone().invert());
       if (!object.matrixAutoUpdate) object.matrix.copy(local);
       local.decompose(object.position, object.quaternion, object.scale);

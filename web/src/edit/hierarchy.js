@@ -40,6 +40,10 @@ export class Hierarchy {
     return this.edit.objects;
   }
 
+  isMatch({ alias, name, type }) {
+    return `${alias} ${name} ${type}`.toLowerCase().includes(this.find.value.trim().toLowerCase());
+  }
+
   // ---- list of the rows
 
   // Show the objects that match the search, from the first one.
@@ -71,11 +75,10 @@ export class Hierarchy {
 
   // Return the handles of objects that match the search, with their ancestors; null without a search.
   found() {
-    const term = this.find.value.trim().toLowerCase();
-    if (!term) return null;
+    if (!this.find.value.trim()) return null;
     const matches = new Set();
     for (const one of this.objects.all()) {
-      if (!`${one.alias} ${one.name} ${one.type}`.toLowerCase().includes(term)) continue;
+      if (!this.isMatch(one)) continue;
       for (let ancestor = /** @type {SceneObject | undefined} */ (one); ancestor && !matches.has(ancestor.handle); ancestor = this.objects.get(ancestor.parent)) matches.add(ancestor.handle);
     }
     return matches;
@@ -147,7 +150,7 @@ export class Hierarchy {
       ArrowDown: () => this.step(1, event.shiftKey),
       ArrowUp: () => this.step(-1, event.shiftKey),
       ArrowRight: () => this.fold(last, false),
-      ArrowLeft: () => (this.folded.has(last) || !this.objects.children(last).length ? this.edit.select([this.objects.get(last)?.parent]) : this.fold(last, true)),
+      ArrowLeft: () => (this.folded.has(last) || !this.objects.children(last).length ? this.selectParent() : this.fold(last, true)),
       Home: () => this.edit.select([this.rows[0]?.handle]),
       End: () => this.edit.select([this.rows.at(-1)?.handle]),
       F2: () => this.rename(),
@@ -161,8 +164,7 @@ export class Hierarchy {
 
   keyOfFind(event) {
     if (event.key === "ArrowDown" || event.key === "Enter") {
-      const term = this.find.value.trim().toLowerCase();
-      const row = this.rows.find(({ handle }) => this.objects.existing(handle).name.toLowerCase().includes(term));
+      const row = this.rows.find(({ handle }) => this.isMatch(this.objects.existing(handle)));
       if (row) this.edit.select([row.handle]);
       this.tree.focus();
     } else if (event.key === "Escape" && this.find.value) this.find.value = "";
@@ -170,6 +172,11 @@ export class Hierarchy {
     this.list();
     event.preventDefault();
     event.stopPropagation();
+  }
+
+  selectParent() {
+    const parent = this.objects.get(this.objects.get(this.edit.last)?.parent);
+    if (parent) this.edit.select([parent.handle]);
   }
 
   step(offset, more) {

@@ -59,7 +59,8 @@ export function numberField(label, { take, wrong, undo, digits = 4, step = 0.1, 
     const direction = { ArrowUp: 1, ArrowDown: -1 }[event.key];
     if (direction && Number.isFinite(filled)) {
       event.preventDefault();
-      field.value = asText(compute(typed()) + direction * step);
+      const value = compute(typed());
+      field.value = asText((Number.isFinite(value) ? value : filled) + direction * step);
       enter();
     }
     if (event.key === "Enter") enter();

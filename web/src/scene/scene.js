@@ -175,11 +175,12 @@ export class Scene {
 
   // Move the camera near object `name`, or near all objects if there is no vehicle and no selection. While editing: near
   // the selected objects.
-  frame(name = this.selected || this.vehicle) {
+  frame(name = "") {
+    const wanted = name || this.selected || this.vehicle;
     const isThere = this.bodies.has(this.vehicle);
     if (this.editing?.last !== undefined) this.lookAt(this.editing.seen.meshesOf(this.editing.selected));
-    else if (name === this.vehicle && isThere && this.view.name === BEHIND) this.view.reset();
-    else this.lookAt(isThere || this.selected ? this.meshesOf(name) : this.meshes());
+    else if (wanted === this.vehicle && isThere && this.view.name === BEHIND) this.view.reset();
+    else this.lookAt(name || isThere || this.selected ? this.meshesOf(wanted) : this.meshes());
     this.change();
   }
 

@@ -76,7 +76,8 @@ export class View {
   // Update the camera; `frame` is Track_base or a drone's camera, if known. Return whether it is still returning to a drone.
   update(frame, seconds = 0) {
     if (this.name !== BEHIND && this.name !== FREE) return this.see(frame);
-    if (this.name === BEHIND && frame && !this.isHeld) this.approach(frame, seconds);
+    const follows = this.name === BEHIND && frame && !this.isHeld;
+    if (follows) this.approach(frame, seconds);
     const yaw = this.heading + this.yaw;
     const level = Math.cos(this.pitch);
     const ahead = new THREE.Vector3(level * Math.cos(yaw), level * Math.sin(yaw), -Math.sin(this.pitch));
@@ -84,7 +85,7 @@ export class View {
     this.camera.up.copy(up);
     this.camera.position.copy(aim).addScaledVector(ahead, -this.distance);
     this.camera.lookAt(aim);
-    return this.isLate;
+    return follows && this.isLate;
   }
 
   approach(frame, seconds) {

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import cv2
-import numpy as np
 import rospy
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
@@ -20,16 +17,12 @@ from drone_sim.message_text import shown
 from drone_sim.ros.cockpit.panel.board import Board, one_of
 from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
 from drone_sim.ros.cockpit.topics import ImageTopic, read_json
-from drone_sim.ros.core import image_messages
 
 _MAX_PICTURES = 8  # that wait for their truth; and messages of truth that wait for their picture
 _TOLERANCE = 1e-6  # s, between equal stamps
 _FLOOR = "Floor"  # its box, which is the whole picture, is not drawn
 _BUFFER = 1 << 24  # bytes; with a smaller buffer than a picture, old pictures would be shown
 _MAX_WIDTH, _MAX_DEPTH_WIDTH = 640, 320  # px; of a wider picture, only every n-th pixel is shown
-_COLORS = cv2.COLORMAP_TURBO  # near is blue, far is red
-_JPEG = (cv2.IMWRITE_JPEG_QUALITY, 80)
-_MILLIMETRES = "16UC1"  # REP-118
 _WINDOWS = ("views", "dialogs", "consoles")
 BOXES, MASK = OVERLAYS = ("boxes", "mask")
 _MAX_LENGTH = 1 << 21  # characters of a message; the simulation's are shorter
@@ -206,7 +199,11 @@ class _Camera:
 
         Also return the boxes (px) and the legend that the page itself draws.
         """
-        colors = {name: color_of(number) for number, name in self._categories.items()}
+        if not self.overlays:
+            return picture, {"overlays": [], "boxes": [], "legend": []}
+        from drone_sim.ros.cockpit.panel.image_conversion import css_color, with_mask  # slow import
+
+        colors = {name: css_color(number) for number, name in self._categories.items()}
         boxes = _nearest(self._boxes, stamp) or [] if BOXES in self.overlays else []
         shown = [
             {"name": box.get("name"), "box": box.get("visible"), "color": colors.get(str(box.get("category")), "#fff")}
@@ -216,20 +213,10 @@ class _Camera:
         legend: list[dict[str, str]] = []
         message = _nearest(self._masks, stamp) if MASK in self.overlays else None
         if message is not None:
-            mask = image_messages.pixels(message)
-            names = {number: self._categories.get(number) for number in np.unique(mask).tolist()}
-            legend = [{"name": name, "color": color_of(number)} for number, name in names.items() if name is not None]
-            image = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
-            if image is not None:
-                mask = cv2.resize(mask, image.shape[1::-1], interpolation=cv2.INTER_NEAREST)
-                masked = image_messages.draw_mask(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), mask)
-                picture = bytes(cv2.imencode(".jpg", cv2.cvtColor(masked, cv2.COLOR_RGB2BGR))[1])
+            picture, numbers = with_mask(picture, message)
+            names = {number: self._categories.get(number) for number in numbers}
+            legend = [{"name": name, "color": css_color(number)} for number, name in names.items() if name is not None]
         return picture, {"overlays": sorted(self.overlays), "boxes": shown, "legend": legend}
-
-
-def color_of(number: int) -> str:
-    """Return the CSS color of a category's number."""
-    return "#" + "".join(f"{round(255 * channel):02x}" for channel in image_messages.mask_color(number))
 
 
 def _nearest(messages: deque[tuple[float, Any]], stamp: float) -> Any:
@@ -320,29 +307,6 @@ def encode(message: CompressedImage | Image) -> tuple[bytes, str]:
     """Return a picture as JPEG (a compressed one unchanged), and a caption. Raises ValueError for other encodings."""
     if isinstance(message, CompressedImage):
         return bytes(message.data), ""
-    encoding, step = message.encoding, _step(message)
-    try:
-        image = image_messages.pixels(message)
-        if image.ndim == 2 and image.dtype != np.uint8:
-            depths = image[::step, ::step].astype(np.float32)
-            return _encode_depths(depths * (1e-3 if encoding == _MILLIMETRES else 1.0))
-        return _jpeg(image_messages.bgr(message)[::step, ::step]), ""
-    except ValueError as error:
-        raise ValueError(f"encoding '{encoding[:40]}': {error}") from None
+    from drone_sim.ros.cockpit.panel import image_conversion  # slow import, and most pictures are JPEG
 
-
-def _encode_depths(depths: np.ndarray) -> tuple[bytes, str]:
-    """Return depths (m) in colors on a logarithmic scale, black for unknown ones, and a caption with the range."""
-    is_known = np.isfinite(depths) & (depths > 0)
-    if not is_known.any():
-        return _jpeg(np.zeros((*depths.shape, 3), np.uint8)), "nothing within range"
-    near, far = float(depths[is_known].min()), float(depths[is_known].max())
-    share = np.log(np.where(is_known, depths, near) / near) / max(math.log(far / near), 1e-6)
-    scaled = (255 * share).astype(np.uint8)
-    colored = cv2.applyColorMap(scaled, _COLORS)
-    colored[~is_known] = 0
-    return _jpeg(colored), f"{near:.2f} m (blue) to {far:.2f} m (red)"
-
-
-def _jpeg(image: np.ndarray) -> bytes:
-    return bytes(cv2.imencode(".jpg", image, _JPEG)[1])
+    return image_conversion.as_jpeg(message, _step(message))

@@ -11,9 +11,6 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import numpy as np
-import trimesh
-from trimesh.exchange.gltf import export_glb
-from trimesh.visual.material import PBRMaterial
 
 from drone_sim.files.resources import resolve
 from drone_sim.ros.cockpit.server.access_control import Content
@@ -82,6 +79,10 @@ class MeshStore:
 
 def as_glb(path: Path) -> bytes:
     """Return a mesh file as glTF without metallic materials. Raises OSError, ValueError, and what trimesh raises."""
+    import trimesh  # slow import
+    from trimesh.exchange.gltf import export_glb
+    from trimesh.visual.material import PBRMaterial
+
     if path.stat().st_size > _MAX_SIZE:
         raise ValueError(f"larger than {_MAX_SIZE} bytes")
     loaded = trimesh.load(path, process=False)
