@@ -17,10 +17,10 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ["world", "forces", "scene", "scripting", "grading"]  # as many mutants of each
-FILES = 8  # of tests for a mutant
+PACKAGES = ["world", "forces", "scene", "scripting", "grading"]  # the same number of mutants of each
+FILES = 8  # test files for a mutant
 LIMIT = 180  # s for the tests of a mutant
-OTHER = {
+REPLACEMENT = {
     ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
     ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In,
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Mod: ast.Mult, ast.FloorDiv: ast.Mult,
@@ -29,11 +29,11 @@ OTHER = {
 
 
 def change(node):
-    """Change `node` into a mutant; return whether there is one of it."""
+    """Mutate `node` in place; return whether it can be mutated."""
     if isinstance(node, ast.Compare):
-        node.ops[0] = OTHER[type(node.ops[0])]()
-    elif isinstance(node, ast.BinOp | ast.BoolOp | ast.AugAssign) and type(node.op) in OTHER:
-        node.op = OTHER[type(node.op)]()
+        node.ops[0] = REPLACEMENT[type(node.ops[0])]()
+    elif isinstance(node, ast.BinOp | ast.BoolOp | ast.AugAssign) and type(node.op) in REPLACEMENT:
+        node.op = REPLACEMENT[type(node.op)]()
     elif isinstance(node, ast.Constant) and isinstance(node.value, bool | int | float):
         node.value = not node.value if isinstance(node.value, bool) else node.value + 1
     else:
@@ -43,7 +43,7 @@ def change(node):
 
 @functools.cache
 def mutants(package):
-    """List (path, index of the node, line, before, after) of each mutant of a package."""
+    """Return (path, index of the node, line, before, after) of each mutant of a package."""
     found = []
     for path in sorted((ROOT / "src/drone_sim" / package).rglob("*.py")):
         for index, node in enumerate(ast.walk(ast.parse(path.read_text()))):
@@ -54,7 +54,7 @@ def mutants(package):
 
 
 def tests_of(path):
-    """Choose the test files that import the module at `path`, are called like it, or name most of what it defines."""
+    """Return the test files that import the module at `path`, have its name, or mention most of its definitions."""
     dotted = ".".join(path.with_suffix("").parts[1:]).removesuffix(".__init__")
     package, _, module = dotted.rpartition(".")
     imported = re.compile(rf"{re.escape(dotted)}\b|from {re.escape(package)} import [^\n]*\b{module}\b")
@@ -73,36 +73,36 @@ def tests_of(path):
     return [str(test.relative_to(ROOT)) for test in best if score[test] > 0.25 or test in best[:2]]
 
 
-def run(tree, tests, left_out=()):
-    """Run tests in `tree` up to the first failure; return pytest's exit status, and the name of what failed."""
+def run(tree, tests, deselected=()):
+    """Run tests in `tree` up to the first failure; return pytest's exit status and the name of the failed test."""
     options = ["-x", "-q", "-rfE", "--show-capture=no", "-o", "addopts=", "-p", "no:randomly", "-p", "no:cacheprovider"]
-    options += [f"--deselect={one}" for one in left_out]
+    options += [f"--deselect={one}" for one in deselected]
     command = [sys.executable, "-m", "pytest", *options, *tests]
     try:
-        done = subprocess.run(command, cwd=tree, capture_output=True, text=True, timeout=LIMIT)
+        process = subprocess.run(command, cwd=tree, capture_output=True, text=True, timeout=LIMIT)
     except subprocess.TimeoutExpired:
         return None, "the time limit"
-    failed = re.findall(r"^(?:FAILED|ERROR) (test\S+\.py(?:::.*?)?)(?: - .*)?$", done.stdout, re.MULTILINE)
-    return done.returncode, failed[-1] if failed else done.stdout[-200:]
+    failed = re.findall(r"^(?:FAILED|ERROR) (test\S+\.py(?:::.*?)?)(?: - .*)?$", process.stdout, re.MULTILINE)
+    return process.returncode, failed[-1] if failed else process.stdout[-200:]
 
 
 def result(tree, path, index, tests):
-    """Say what the tests do on a mutant: they kill it, or it lives. A test that fails without it, too, is left out."""
-    original, left_out = (tree / path).read_text(), []
+    """Return whether the tests kill a mutant. A test that also fails without the mutant is deselected."""
+    original, deselected = (tree / path).read_text(), []
     module = ast.parse(original)
     change(list(ast.walk(module))[index])
-    while len(left_out) < 5:
+    while len(deselected) < 5:
         try:
             (tree / path).write_text(ast.unparse(module))
-            status, failed = run(tree, tests, left_out)
+            status, failed = run(tree, tests, deselected)
         finally:
             (tree / path).write_text(original)
         if status == 0:
             return "lives"
         if status is None or run(tree, [failed])[0] == 0:
             return f"killed by {failed}" if status else f"lives for {LIMIT} s"
-        left_out.append(failed)
-    return f"lives: {left_out} fail without it, too"
+        deselected.append(failed)
+    return f"lives: {deselected} fail without it, too"
 
 
 def main(count=40, seed=1):
@@ -114,9 +114,9 @@ def main(count=40, seed=1):
         for number in range(count):
             path, index, line, before, after = draw.choice(mutants(PACKAGES[number % len(PACKAGES)]))
             tests = tests_of(path)
-            said = result(tree, path, index, tests)
-            killed += said.startswith("killed")
-            print(f"{path}:{line}: {before} -> {after}: {said}", flush=True)
+            verdict = result(tree, path, index, tests)
+            killed += verdict.startswith("killed")
+            print(f"{path}:{line}: {before} -> {after}: {verdict}", flush=True)
     print(f"{killed} of {count} killed")
 
 

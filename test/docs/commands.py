@@ -1,4 +1,4 @@
-"""The commands of README.md and docs/*.md, as they stand there, and which of them are not run, and why."""
+"""The commands of README.md and docs/*.md, and the reasons why some of them are not run."""
 
 from __future__ import annotations
 
@@ -115,15 +115,15 @@ class Command(NamedTuple):
     shown: tuple[str, ...]
 
     @property
-    def begins_a_simulator(self) -> bool:
-        """Whether what follows on the page is for the simulator that this starts."""
+    def starts_simulator(self) -> bool:
+        """Whether this command starts a simulator, which the commands after it use."""
         return self.text.startswith(("roslaunch ", "./dev.sh run"))
 
 
 def commands(page: Path) -> list[Command]:
     """Return the commands of a page, from its code blocks with `$ `."""
     text = page.read_text(encoding="utf-8")
-    found = []
+    page_commands = []
     for block in _BLOCK.finditer(text):
         first = text.count("\n", 0, block.start(2)) + 1
         lines = block[2].splitlines() if block[1] in ("", "console") else []
@@ -133,11 +133,11 @@ def commands(page: Path) -> list[Command]:
             while lines[last].endswith("\\"):
                 last += 1
             command = "\n".join((lines[start].removeprefix(_PROMPT), *lines[start + 1 : last + 1]))
-            found.append(Command(page, first + start, _without_comment(command), tuple(lines[last + 1 : end])))
-    return found
+            page_commands.append(Command(page, first + start, _remove_comment(command), tuple(lines[last + 1 : end])))
+    return page_commands
 
 
-def _without_comment(text: str) -> str:
+def _remove_comment(text: str) -> str:
     return re.sub(r"\s+# .*$", "", text).rstrip()
 
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Run the commands of README.md and docs/*.md as they stand there: ./dev.sh docs-commands [--all] [PAGE...].
+"""Run the commands of README.md and docs/*.md as they are written: ./dev.sh docs-commands [--all] [PAGE...].
 
-Each page in a folder of its own, with a master of its own; some pages at a time. A `roslaunch` ends with the next one.
-Its commands must end well and show what the page shows after them (whatever numbers are in it); nothing may be refused.
-Without --all a simulator is started only where a command needs it, and what takes minutes is left out.
+Each page runs in its own folder with its own ROS master, a few pages at a time. Each `roslaunch` ends before the next.
+The commands must exit with 0 and print the lines of the page, apart from numbers; the simulator may refuse nothing.
+Without --all, a simulator is started only if a command needs it, and commands that take minutes are skipped.
 """
 
 from __future__ import annotations
@@ -31,36 +31,36 @@ sys.path.append(str(ROOT / "test" / "unit"))
 import vrep_encoder
 import vrep_quadricopter
 
-PATIENCE = 120.0  # s, for whatever does not end
-AT_ONCE = 4
+PATIENCE = 120.0  # s, limit for each command
+PARALLEL_PAGES = 4
 ENDLESS = (
     *("rostopic echo ", "rosrun drone_sim view", "rosrun drone_sim record_truth"),
     "python3 $(rospack find drone_sim)/docs/fleet/follow.py",
     "python3 $(rospack find drone_sim)/docs/drivers/follow_ball.py",
 )
 FROM_A_BAG = " -b "
-NEEDS_NONE = ("rosrun drone_sim ", "cat ", "source ", "rosbag info", "python3 loop.py", "python3 -m ")  # a simulator
-NEEDS_ONE = ("rosrun drone_sim view", "rosrun drone_sim record_truth", "rosrun drone_sim doctor")
+NO_SIMULATOR = ("rosrun drone_sim ", "cat ", "source ", "rosbag info", "python3 loop.py", "python3 -m ")
+NEED_SIMULATOR = ("rosrun drone_sim view", "rosrun drone_sim record_truth", "rosrun drone_sim doctor")
 WRONG = re.compile(r"Traceback|\[(?:ERROR|FATAL)\]|\bERROR:")
-REFUSED = re.compile(rf"{WRONG.pattern}|refused")  # by the simulator, whatever the command has said
-FLYING = "commands on "
-FLOWN = ("rostopic", "pub", "-1", "/drone/cmd_vel", "geometry_msgs/Twist", "{linear: {x: 0.5}}")  # into a bag
+REFUSED = re.compile(rf"{WRONG.pattern}|refused")  # in the output of the simulator
+READY = "commands on "
+PUBLISH = ("rostopic", "pub", "-1", "/drone/cmd_vel", "geometry_msgs/Twist", "{linear: {x: 0.5}}")  # recorded in a bag
 FLIGHT = ("rosrun", "drone_sim", "fly", "--duration", "1", "--csv", "flight.csv")
-USUAL = "roslaunch drone_sim drone.launch"  # where a page does not say what runs
+DEFAULT_LAUNCH = "roslaunch drone_sim drone.launch"  # if a page starts no simulator
 
 
 class Failed(Exception):
-    """A command does something else than its page says."""
+    """A command does not do what its page says."""
 
 
 class Background:
     def __init__(self, command: Command, folder: Path, environment: dict[str, str]):
         self.command = command
-        self._said: list[str] = []
+        self._lines: list[str] = []
         self._changed = threading.Condition()
         self.process = subprocess.Popen(
             ["bash", "-c", f"exec {command.text}"],
-            cwd=where(command, folder),
+            cwd=working_directory(command, folder),
             env=environment,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -68,52 +68,52 @@ class Background:
             text=True,
             errors="replace",
             start_new_session=True,
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored in what runs in the background
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # background processes ignore it
         )
         threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self) -> None:
         for line in self.process.stdout or ():
             with self._changed:
-                self._said.append(line)
+                self._lines.append(line)
                 self._changed.notify_all()
         with self._changed:
-            self._said.append("")
+            self._lines.append("")
             self._changed.notify_all()
 
     @property
-    def said(self) -> str:
-        return "".join(self._said)
+    def log(self) -> str:
+        return "".join(self._lines)
 
-    def wait_for(self, what: str) -> None:
-        """Wait until it has said something with `what` in it; raise Failed where it ends before."""
+    def wait_for(self, expected: str) -> None:
+        """Wait until the output contains `expected`; raise Failed if the command ends before."""
         with self._changed:
-            came = self._changed.wait_for(lambda: what in self.said or "" in self._said[-1:], PATIENCE)
-        if not came or what not in self.said:
+            has_come = self._changed.wait_for(lambda: expected in self.log or "" in self._lines[-1:], PATIENCE)
+        if not has_come or expected not in self.log:
             self.end()
-            raise failed(self.command, f"did not say {what!r}", self.said)
+            raise failure(self.command, f"did not say {expected!r}", self.log)
 
     def end(self) -> None:
-        """Press Ctrl-C, and wait."""
+        """Press Ctrl-C, and wait until the command has ended."""
         if self.process.poll() is None:
             os.killpg(self.process.pid, signal.SIGINT)
         try:
             self.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             os.killpg(self.process.pid, signal.SIGKILL)
-            raise failed(self.command, "does not end after Ctrl-C", self.said) from None
+            raise failure(self.command, "does not end after Ctrl-C", self.log) from None
 
 
 def needs_simulator(command: Command) -> bool:
-    return command.text.startswith(NEEDS_ONE) or not command.text.startswith(NEEDS_NONE)
+    return command.text.startswith(NEED_SIMULATOR) or not command.text.startswith(NO_SIMULATOR)
 
 
-def failed(command: Command, why: str, said: str) -> Failed:
+def failure(command: Command, cause: str, log: str) -> Failed:
     place = f"{command.page.relative_to(ROOT)}:{command.line}"
-    return Failed(f"{place}: $ {command.text}\n  {why}\n" + "".join(f"  | {one}\n" for one in said.splitlines()[-30:]))
+    return Failed(f"{place}: $ {command.text}\n  {cause}\n" + "".join(f"  | {one}\n" for one in log.splitlines()[-30:]))
 
 
-def where(command: Command, folder: Path) -> Path:
+def working_directory(command: Command, folder: Path) -> Path:
     return ROOT if command.text.startswith(("./dev.sh", "source ")) else folder
 
 
@@ -134,65 +134,65 @@ class Page:
         self.run_commands: list[Command] = []
 
     def run(self) -> None:
-        """Raise Failed for the first that does not do what it should."""
+        """Run the commands in order; raise Failed at the first one that does not do what the page says."""
         try:
             for number, command in enumerate(self._commands):
-                if command.begins_a_simulator:
-                    self._end()
+                if command.starts_simulator:
+                    self._end_simulator()
                     if self._everything or self._is_needed(number):
-                        self._begin(command)
+                        self._start_simulator(command)
                 elif self._everything or command.text not in SLOW:
                     if not number and needs_simulator(command):
-                        self._begin(Command(command.page, command.line, USUAL, ()))
+                        self._start_simulator(Command(command.page, command.line, DEFAULT_LAUNCH, ()))
                     self._run(command)
-            self._end()
+            self._end_simulator()
         finally:
             if self._simulator is not None:
                 self._simulator.end()
 
     def _is_needed(self, number: int) -> bool:
         for one in self._commands[number + 1 :]:
-            if one.begins_a_simulator:
+            if one.starts_simulator:
                 break
             if needs_simulator(one):
                 return True
         return "record_to:=." in self._commands[number].text
 
-    def _begin(self, command: Command) -> None:
+    def _start_simulator(self, command: Command) -> None:
         self.run_commands.append(command)
         self._simulator = Background(command, self._folder, self.environment)
-        self._simulator.wait_for(FLYING)
+        self._simulator.wait_for(READY)
 
-    def _end(self) -> None:
+    def _end_simulator(self) -> None:
         simulator, self._simulator = self._simulator, None
         if simulator is None:
             return
         if "record_to:=." in simulator.command.text:
-            subprocess.run(FLOWN, env=self.environment, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
+            subprocess.run(PUBLISH, env=self.environment, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
         simulator.end()
         shown = [line for one in self.run_commands for line in one.shown]
-        wrong = [
-            one for one in simulator.said.splitlines() if REFUSED.search(one) and not any(like(s, one) for s in shown)
+        complaints = [
+            one for one in simulator.log.splitlines() if REFUSED.search(one) and not any(matches(s, one) for s in shown)
         ]
-        if wrong:
-            raise failed(simulator.command, "the simulator complains", "\n".join(wrong))
+        if complaints:
+            raise failure(simulator.command, "the simulator complains", "\n".join(complaints))
         for bag in self._folder.glob("drone_sim_*.bag"):
             bag.rename(self._folder / "flight.bag")
 
     def _run(self, command: Command) -> None:
         if self._simulator is not None and "record_to:=." in self._simulator.command.text:
-            self._end()  # then the bag is whole
+            self._end_simulator()  # this completes the bag
         self.run_commands.append(command)
         if command.text.startswith(ENDLESS) and FROM_A_BAG not in command.text:
             running = Background(command, self._folder, self.environment)
             running.wait_for("\n")
             running.end()
-            said = running.said
+            log = running.log
         else:
             try:
-                done = subprocess.run(
+                completed = subprocess.run(
                     ["bash", "-c", command.text],
-                    cwd=where(command, self._folder),
+                    cwd=working_directory(command, self._folder),
                     env=self.environment,
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.PIPE,
@@ -200,31 +200,31 @@ class Page:
                     timeout=PATIENCE,
                     check=False,
                 )
-            except subprocess.TimeoutExpired as late:
-                raise failed(command, "does not end", (late.stdout or b"").decode(errors="replace")) from None
-            said = done.stdout.decode(errors="replace")
-            if done.returncode:
-                raise failed(command, f"ends with {done.returncode}", said)
-        if WRONG.search(said):
-            raise failed(command, "complains", said)
-        everywhere = said.splitlines() + (self._simulator.said.splitlines() if self._simulator else [])
+            except subprocess.TimeoutExpired as timeout_error:
+                raise failure(command, "does not end", (timeout_error.stdout or b"").decode(errors="replace")) from None
+            log = completed.stdout.decode(errors="replace")
+            if completed.returncode:
+                raise failure(command, f"ends with {completed.returncode}", log)
+        if WRONG.search(log):
+            raise failure(command, "complains", log)
+        all_lines = log.splitlines() + (self._simulator.log.splitlines() if self._simulator else [])
         for line in () if command.text in SHOWN_OTHERWISE else command.shown:
-            if line.strip() not in ("", "...") and not any(like(line, one) for one in everywhere):
-                raise failed(command, f"does not show {line!r}", said)
+            if line.strip() not in ("", "...") and not any(matches(line, one) for one in all_lines):
+                raise failure(command, f"does not show {line!r}", log)
 
 
-def like(shown: str, said: str) -> bool:
-    """Tell whether a line of a page is in what was said, whatever the numbers are."""
-    return masked(shown) in masked(said)
+def matches(shown: str, log: str) -> bool:
+    """Return whether a line of a page is in the output, apart from numbers."""
+    return mask_numbers(shown) in mask_numbers(log)
 
 
-def masked(line: str) -> str:
-    """Return a line with # for every number."""
+def mask_numbers(line: str) -> str:
+    """Return the line with every number replaced by #."""
     return re.sub(r"\d+(?:\.\d+)?", "#", line.replace("[WARN] ", "")).strip()
 
 
 def prepare(page: Path, folder: Path) -> None:
-    """Put into the folder the files that the page speaks of: its own code blocks, where it has them."""
+    """Write the files that the page mentions to the folder, from its code blocks if it has them."""
     text = page.read_text(encoding="utf-8")
     for name, content in blocks(text):
         (folder / name).write_text(content)
@@ -235,7 +235,7 @@ def prepare(page: Path, folder: Path) -> None:
     for name in ("my.py", "submissions/alice.py", "submissions/bob.py"):
         (folder / name).parent.mkdir(exist_ok=True)
         shutil.copy(built_in, folder / name)
-    if "grade hover my.py" in text:  # in which one has to hold against the wind
+    if "grade hover my.py" in text:  # the task needs a script that holds against the wind
         shutil.copy(ROOT / "tasks/hover/solution.py", folder / "my.py")
     with zipfile.ZipFile(folder / "class.zip", "w") as file:
         for number, name in enumerate(("Ada Lovelace", "Bo Ek")):
@@ -246,15 +246,15 @@ def prepare(page: Path, folder: Path) -> None:
 
 
 def blocks(text: str) -> Iterator[tuple[str, str]]:
-    """Yield the files in a page: blocks that begin with their name, or have it from where they are used."""
-    for kind, block in re.findall(r"^```(yaml|python|lua)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL):
-        named = re.match(r"(?:#|--) ([\w.]+\.(?:yaml|py|lua))\b", block)
-        if named:
-            yield named[1], block
-        elif kind == "yaml" and "gusts" in block and "faults" in block:
+    """Yield names and contents of the files in a page: blocks that begin with a file name, or have known contents."""
+    for language, block in re.findall(r"^```(yaml|python|lua)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL):
+        file_name = re.match(r"(?:#|--) ([\w.]+\.(?:yaml|py|lua))\b", block)
+        if file_name:
+            yield file_name[1], block
+        elif language == "yaml" and "gusts" in block and "faults" in block:
             yield "storm.yaml", block
-        elif kind != "yaml" and "propeller_respondable" in block and "5.33" in block:
-            yield f"climb.{'py' if kind == 'python' else 'lua'}", block
+        elif language != "yaml" and "propeller_respondable" in block and "5.33" in block:
+            yield f"climb.{'py' if language == 'python' else 'lua'}", block
 
 
 def free_port() -> int:
@@ -278,20 +278,20 @@ def run(pages: Sequence[Path], everything: bool) -> list[str]:
                 print(f"{page.relative_to(ROOT)}: {time.monotonic() - began:.1f} s", flush=True)
         return ""
 
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        return [said for said in pool.map(one, pages) if said]
+    with ThreadPoolExecutor(PARALLEL_PAGES) as pool:
+        return [log for log in pool.map(one, pages) if log]
 
 
 def main() -> int:
-    """Run what the arguments name; return 0 where all is well."""
+    """Run the pages of the arguments; return 0 if every command succeeded."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--all", action="store_true", help="start every simulator, and do what takes minutes, too")
     parser.add_argument("pages", nargs="*", type=Path, metavar="PAGE")
     options = parser.parse_args()
     pages = [one.resolve() for one in options.pages] or [one for one in PAGES if commands(one)]
-    wrong = run(pages, options.all)
-    print("\n".join(wrong) or "every command does what its page says")
-    return 1 if wrong else 0
+    complaints = run(pages, options.all)
+    print("\n".join(complaints) or "every command does what its page says")
+    return 1 if complaints else 0
 
 
 if __name__ == "__main__":

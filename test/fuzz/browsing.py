@@ -1,4 +1,4 @@
-"""The cockpit's server without a master, and browsers that say to it what nobody's page does."""
+"""The cockpit's server without a ROS master, and browsers that send it odd requests and messages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import commands  # noqa: F401 - rospy's publishers and subscribers do nothing then
+import commands  # noqa: F401 - it replaces rospy's publishers and subscribers
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
@@ -32,33 +32,32 @@ from drone_sim.ros.cockpit.teleop import CommandPublisher, HeldCommands
 from drone_sim.ros.cockpit.topics import FoundTopics, ImageTopic
 
 _PATIENCE = 60.0  # s
-_LEFT_OUT = "grade"  # which is a process of its own
-_LAST = 424242  # the number of a question that is asked after all others
+_LAST = 424242  # the id of a request that is sent after all others
 
 Data = tuple[list[bytes], list[bytes]]
 
 
 class Wrong(Exception):
-    """A browser got what it must not get, or nothing."""
+    """A browser got a wrong answer, or none."""
 
 
 class Cockpit:
-    """One server for all cases: to start it takes longer than most of them."""
+    """One server for all cases: starting it takes longer than most cases."""
 
     def __init__(self) -> None:
-        """Serve."""
+        """Start to serve."""
         self._answers: dict[str, Any] = {}
         view = SceneView(SceneState(), MeshStore(), "/drone")
-        takes = {"drag": view.drag, "push": lambda _browser, message: view.push(message)}
-        self.socket = PageSocket(HeldCommands(lambda _: None), self._answers, takes)
+        handlers = {"drag": view.drag, "push": lambda _browser, message: view.push(message)}
+        self.socket = PageSocket(HeldCommands(lambda _: None), self._answers, handlers)
         self._server = PageServer("127.0.0.1", 0)
         self._server.begin(self.socket.serve, lambda _path: None)
         self._port = self._server.port
         self._token = self._server.address.partition("?token=")[2]
 
     def hear(self, data: Data, folder: Path) -> Iterator[str]:
-        """Let browsers say all that; yield each line that they, and the user, are told. Raises Wrong."""
-        self._begin_afresh(folder)
+        """Let browsers send the requests and messages; yield the lines that they and the log get. Raises Wrong."""
+        self._reset(folder)
         lines: list[str] = []
         log = logging.Handler()
         log.emit = lambda record: lines.append(record.getMessage())  # type: ignore[method-assign]
@@ -72,8 +71,8 @@ class Cockpit:
             logging.getLogger("rosout").removeHandler(log)
         yield from lines
 
-    def _begin_afresh(self, folder: Path) -> None:
-        os.environ["HOME"] = str(folder)  # where the scenes of tasks are made
+    def _reset(self, folder: Path) -> None:
+        os.environ["HOME"] = str(folder)  # scenes of tasks are created there
         own = folder / "scripts"
         own.mkdir()
         (own / "a.py").write_text("# a script\n", encoding="utf-8")
@@ -81,32 +80,32 @@ class Cockpit:
         os.mkfifo(own / "fifo.py")
         (own / "d.py").mkdir()
         self._outside = folder / "outside.py"
-        asked = Asked(ScriptStore(own))
-        panel = Panel(asked.node, CommandPublisher(patience=0.0), SceneList(own), self.socket.tell)  # type: ignore[arg-type]
+        editor = Asked(ScriptStore(own))
+        panel = Panel(editor.node, CommandPublisher(patience=0.0), SceneList(own), self.socket.tell)  # type: ignore[arg-type]
         panel.offer(FoundTopics("/drone", ("drone", "wing"), (), {"/drone/range": "sensor_msgs/Range"}), "")
         panel.follow("drone")
         cameras = CameraSwitches(panel.board, self.socket)
         cameras.offer((ImageTopic("/drone/front"),), ("drone", "wing"))
         windows = ScriptWindows("/drone_sim", cameras, self.socket)
         windows.listen(True)
-        self._answers.update({**asked.answers, **panel.answers, **windows.answers})
+        self._answers.update({**editor.answers, **panel.answers, **windows.answers})
 
-    def _filled(self, content: bytes) -> bytes:
-        known = {b"PORT": str(self._port), b"TOKEN": self._token}
-        for word, value in known.items():
+    def _fill_in(self, content: bytes) -> bytes:
+        replacements = {b"PORT": str(self._port), b"TOKEN": self._token}
+        for word, value in replacements.items():
             content = content.replace(word, value.encode())
         return content
 
     def _request(self, content: bytes) -> None:
         with socket.create_connection(("127.0.0.1", self._port), timeout=_PATIENCE) as one:
             try:
-                one.sendall(self._filled(content))
+                one.sendall(self._fill_in(content))
                 one.shutdown(socket.SHUT_WR)
-                said = b"".join(iter(lambda: one.recv(1 << 16), b""))
+                reply = b"".join(iter(lambda: one.recv(1 << 16), b""))
             except ConnectionError:
                 return
-        if b" 500 " in said[:20] or b"Traceback" in said:
-            raise Wrong(f"a request gets {said[:200]!r}")
+        if b" 500 " in reply[:20] or b"Traceback" in reply:
+            raise Wrong(f"a request gets {reply[:200]!r}")
 
     def _open(self) -> Any:
         cookie = {"Cookie": f"drone_sim_{self._port}={self._token}"}

@@ -1,4 +1,4 @@
-"""What is tried, and what became of it: all that strategies, worker and runner share."""
+"""Types that strategies, worker and runner share: a case and its answer."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 
 class Case(NamedTuple):
-    """Files, by name, and what to do with them; `data` is of plain Python types, and its meaning is the kind's."""
+    """Files by name, and further input; `data` has plain Python types, and each kind defines its meaning."""
 
     kind: str
     files: dict[str, bytes]
@@ -14,10 +14,10 @@ class Case(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What became of a case. `fault` is empty where it was taken, or refused as it should be."""
+    """Result of a case. `fault` is empty if the case was accepted, or refused correctly."""
 
     fault: str
     refusal: str = ""
-    seconds: float = 0.0  # of the processor
+    seconds: float = 0.0  # of processor time
     resident: int = 0  # bytes, afterwards
-    busy: bool = False  # with what the case began, though it is over
+    busy: bool = False  # a thread that the case started is still busy

@@ -1,4 +1,4 @@
-"""Messages to the callbacks of the node, without a master: rospy's subscribers only remember whom they would call."""
+"""Messages to the callbacks of the node without a ROS master: rospy's subscribers only store their callbacks."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _KINDS = {
 }
 
 
-class _Deaf:
-    """Stands for a Subscriber, a Publisher and a Timer."""
+class _Stub:
+    """Stub for rospy's Subscriber, Publisher and Timer."""
 
     def __init__(self, name: Any, _kind: Any = None, callback: Any = None, **_: Any) -> None:
         if callable(callback):
@@ -36,12 +36,12 @@ class _Deaf:
         return lambda *_arguments, **_named: 0
 
 
-rospy.Subscriber = rospy.Publisher = rospy.Timer = _Deaf
+rospy.Subscriber = rospy.Publisher = rospy.Timer = _Stub
 rospy.rostime.set_rostime_initialized(True)
 
 
 def send(simulation: Simulation, messages: list[tuple[str, dict[str, Any]]]) -> None:
-    """Call what the node has subscribed, and do what that left to be done."""
+    """Call the node's callbacks with the messages, and run the jobs that they queue."""
     inbox = Inbox()
     VehicleInputs(simulation, simulation.drone.parameters, inbox)
     VehicleHandles(simulation, inbox)

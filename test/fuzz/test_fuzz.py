@@ -1,4 +1,4 @@
-"""A few odd inputs of every kind, always the same; `./dev.sh fuzz` tries as many as you like."""
+"""A few odd inputs of every kind, always the same; `./dev.sh fuzz` tries any number of them."""
 
 import importlib
 import os
@@ -13,8 +13,8 @@ KINDS = (
     *("parameters", "scenes", "meshes", "urdfs", "timelines", "lua_scripts", "python_scripts"),
 )
 CASES = 6  # of each kind
-MORE = {"archives": 30}  # none of which needs a simulation
-ASKED = int(os.environ.get("DRONE_SIM_FUZZ_CASES", "0"))  # by ./dev.sh fuzz
+MORE = {"archives": 30}  # these cases need no simulation
+COUNT = int(os.environ.get("DRONE_SIM_FUZZ_CASES", "0"))  # cases of each kind, set by ./dev.sh fuzz
 SEED = int(os.environ.get("DRONE_SIM_FUZZ_SEED", "8"))
 OPTIONS = settings(deadline=None, derandomize=False, suppress_health_check=list(HealthCheck))
 
@@ -33,7 +33,7 @@ def test_odd_input_is_taken_or_refused_in_one_line(kind, trier):
 
     @seeded(SEED)
     @settings(
-        OPTIONS, max_examples=ASKED or MORE.get(kind, CASES), database=settings.default.database if ASKED else None
+        OPTIONS, max_examples=COUNT or MORE.get(kind, CASES), database=settings.default.database if COUNT else None
     )
     @given(importlib.import_module(f"kinds.{kind}").CASES)
     def trial(case):

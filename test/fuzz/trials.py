@@ -1,6 +1,6 @@
-"""How a case of each kind is tried: by the same calls as the node and `fly` make. Raises what they raise.
+"""Trials of the cases of each kind, with the same calls as the node and `fly` make. They raise the same errors.
 
-What counts as a user's mistake is refused with one of REFUSALS, in one line; everything else is a fault.
+A user's mistake must be refused with one of REFUSALS, in one line; every other exception is a fault.
 """
 
 from __future__ import annotations
@@ -43,16 +43,16 @@ from drone_sim.sensors import camera as vision
 from drone_sim.vehicles import checks
 
 REFUSALS = (ParameterError, ScriptError, UrdfError, TimelineError, checks.Refused)
-LONGEST = 1200  # characters of a refusal, without the folder that the case lies in
+LONGEST = 1200  # characters of a refusal, without the path of the case's folder
 _SCRIPT_LIMIT = 0.2  # s
-_SMALL = {"width": 32, "height": 24}  # px: what a picture shows does not matter here
+_SMALL = {"width": 32, "height": 24}  # px: the content of images does not matter here
 
 
 _RENDERERS: dict[int, Renderer] = {}
 
 
 def _renderer(samples: int = 0) -> Renderer:
-    """Return one that is kept: to compile its shaders takes longer than most cases."""
+    """Return a cached renderer: compiling its shaders takes longer than most cases."""
     if samples not in _RENDERERS:
         renderer = _RENDERERS[samples] = Renderer(samples=samples)
         renderer.close = lambda: renderer.set_visuals(())  # type: ignore[method-assign]
@@ -63,13 +63,13 @@ vision.Renderer = _renderer  # type: ignore
 
 
 class Fault(Exception):
-    """Something that must not be; the message begins with what it is."""
+    """Wrong behaviour of the tested code; the message begins with its kind."""
 
 
 def run(case: Case, folder: Path) -> str:
-    """Write the case's files into the folder and try it; return what was refused, '' where all was taken.
+    """Write the case's files into the folder and try it; return the refusal, '' if the input was accepted.
 
-    Raises Fault, or what the code raised.
+    Raises Fault, or the exception of the tested code.
     """
     for name, content in case.files.items():
         (folder / name).write_bytes(content)
@@ -80,7 +80,7 @@ def run(case: Case, folder: Path) -> str:
 
 
 def one_line(text: str, folder: Path) -> str:
-    """Return a refusal; raises Fault where it is not one line, or longer than anybody reads."""
+    """Return a refusal without the folder; raises Fault if it is not one line, or longer than LONGEST."""
     text = text.replace(str(folder), "")
     if "\n" in text or "\r" in text or not text.strip():
         raise Fault(f"a refusal of more lines than one, or none: {text[:300]!r}")
@@ -89,11 +89,11 @@ def one_line(text: str, folder: Path) -> str:
     return text
 
 
-# ---- what stands in a scene
+# ---- content of a scene
 
 
 def _fly_a_little(simulation: Simulation, steps: int = 3) -> None:
-    """Step, look, snapshot, restore, save; the drone must be somewhere after that."""
+    """Step, snapshot, restore, and take images; raises Fault if the drone's state is not finite."""
     simulation.drone.commands.receive(Twist(Vector3(0.5, 0.0, 0.1), Vector3(0.0, 0.0, 0.3)))
     simulation.step()
     snapshot = simulation.snapshot()
@@ -108,13 +108,13 @@ def _fly_a_little(simulation: Simulation, steps: int = 3) -> None:
         raise Fault(f"the drone is at {state.position}")
 
 
-def _simulate(given: dict[str, Any], folder: Path) -> None:
-    simulation = Simulation(parameters.load(given))
+def _simulate(settings: dict[str, Any], folder: Path) -> None:
+    simulation = Simulation(parameters.load(settings))
     try:
         _fly_a_little(simulation)
         saved = folder / "saved.yaml"
         simulation.save_scene(saved)
-        if simulation.parameters.time_step < 1.0:  # in a long step things go anywhere
+        if simulation.parameters.time_step < 1.0:  # with a long step, objects may move anywhere
             _load_again(simulation, saved)
         simulation.stop()
     finally:
@@ -132,9 +132,9 @@ def _parameters(case: Case, folder: Path) -> None:
     _simulate(_with_small_pictures(case.data), folder)
 
 
-def _with_small_pictures(given: dict[str, Any]) -> dict[str, Any]:
+def _with_small_pictures(settings: dict[str, Any]) -> dict[str, Any]:
     small: dict[str, Any] = {"cameras": {name: dict(_SMALL) for name in ("front", "depth", "track", "floor")}}
-    return dict(parameters.merged(small, given))
+    return dict(parameters.merged(small, settings))
 
 
 def _scene(case: Case, folder: Path) -> None:
@@ -161,32 +161,32 @@ def _mesh(case: Case, folder: Path) -> None:
 
 def _urdf(case: Case, folder: Path) -> None:
     file = str(folder / "robot.urdf")
-    given: dict[str, Any] = {"drone": {"urdf": file}}
+    settings: dict[str, Any] = {"drone": {"urdf": file}}
     if case.data != "drone":
         mass = 1.0 if case.data == "heavy object" else 0.0
-        given = {"scene": {"objects": [{"shape": "urdf", "file": file, "position": [2, 0, 1], "mass": mass}]}}
-    _simulate(_with_small_pictures(given), folder)
+        settings = {"scene": {"objects": [{"shape": "urdf", "file": file, "position": [2, 0, 1], "mass": mass}]}}
+    _simulate(_with_small_pictures(settings), folder)
 
 
 # ---- scripts
 
 
 def _script(case: Case, folder: Path) -> str:
-    """Fly a script, start it again, and leave: each call may say that the script failed."""
+    """Fly a script, stop, start it again, and close: each call may raise ScriptError."""
     (name,) = case.files
     simulation = Simulation(
         parameters.load({"script_time_limit": _SCRIPT_LIMIT, "cameras": {"front": dict(_SMALL)}}), started=False
     )
     simulation.script = str(folder / name)
-    said: list[str] = []
+    messages: list[str] = []
 
     def attempt(action: Callable[[], None]) -> None:
         try:
             action()
         except ScriptError as error:
-            said.append(one_line(str(error), folder))
+            messages.append(one_line(str(error), folder))
 
-    def whole() -> None:
+    def fly_once() -> None:
         simulation.start()
         simulation.drone.commands.receive(Twist(Vector3(0.5, 0.0, 0.1), Vector3(0.0, 0.0, 0.3)))
         simulation.step()
@@ -195,12 +195,12 @@ def _script(case: Case, folder: Path) -> str:
         simulation.restore(snapshot)
         simulation.step()
 
-    attempt(whole)
+    attempt(fly_once)
     attempt(simulation.stop)
-    if not said:
-        attempt(whole)
+    if not messages:
+        attempt(fly_once)
     attempt(simulation.close)
-    return said[0] if said else ""
+    return messages[0] if messages else ""
 
 
 # ---- fly
@@ -215,12 +215,12 @@ def _status(arguments: list[str], folder: Path) -> str:
     with contextlib.chdir(folder), contextlib.redirect_stderr(errors), contextlib.redirect_stdout(io.StringIO()):
         try:
             status = fly.main(arguments)
-        except SystemExit as left:  # argparse's way
-            status = left.code if isinstance(left.code, int) else 1
-    said = errors.getvalue().rstrip("\n")
-    if (status == 0) != (said == ""):
-        raise Fault(f"fly: status {status}, and it said: {said[:300]!r}")
-    return one_line(said, folder) if said else ""
+        except SystemExit as ending:  # raised by argparse
+            status = ending.code if isinstance(ending.code, int) else 1
+    messages = errors.getvalue().rstrip("\n")
+    if (status == 0) != (messages == ""):
+        raise Fault(f"fly: status {status}, and it said: {messages[:300]!r}")
+    return one_line(messages, folder) if messages else ""
 
 
 def _assignments(case: Case, folder: Path) -> str:
@@ -231,37 +231,37 @@ def _assignments(case: Case, folder: Path) -> str:
 
 
 def prepare(case: Case) -> None:
-    """Import what a case needs, for that is not its own time: matplotlib takes longer than most cases."""
+    """Import a case's modules before its time is measured: matplotlib takes longer than most cases."""
     if case.kind == "bags":
         importlib.import_module(f"drone_sim.ros.tools.{case.data}")
         importlib.import_module("drone_sim.offline.plot")
 
 
 def _bags(case: Case, folder: Path) -> str:
-    """Read a bag with one of the programs for that; whatever is in it, the program ends with a line or a file."""
-    program = importlib.import_module(f"drone_sim.ros.tools.{case.data}")  # ROS is there for this alone
+    """Read a bag with one of the bag programs, which must end with either one line or an output file."""
+    program = importlib.import_module(f"drone_sim.ros.tools.{case.data}")  # only bags need ROS here
     out = folder / {"bag_commands": "out.yaml", "plot_flight": "out.png", "bag_video": "out.mp4"}[case.data]
     errors = io.StringIO()
     with contextlib.redirect_stderr(errors), contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # libraries' own, of how this machine is set up
+        warnings.simplefilter("ignore")  # warnings of libraries about this machine
         status = program.main([str(folder / "flight.bag"), str(out)])
-    said = errors.getvalue().rstrip("\n")
-    if (status == 0) != (said == "") or (status == 0) != out.exists():
-        raise Fault(f"{case.data}: status {status}, and it said: {said[:300]!r}")
-    return one_line(said, folder) if said else ""
+    messages = errors.getvalue().rstrip("\n")
+    if (status == 0) != (messages == "") or (status == 0) != out.exists():
+        raise Fault(f"{case.data}: status {status}, and it said: {messages[:300]!r}")
+    return one_line(messages, folder) if messages else ""
 
 
 # ---- zips of a class
 
 
 def _archives(case: Case, folder: Path) -> str:
-    """Find what a class has handed in; nothing may change outside `store`, and the good student's script is found."""
+    """Find a class's submissions: nothing may change outside `store`, and the good student's script must be found."""
     store, canary = folder / "results" / "store", folder / "canary"
     store.parent.mkdir()
     canary.write_text("here")
-    before = _listed(folder)
+    before = _list_files(folder)
     removed: list[Path] = []
-    with _recorded_removals(removed):
+    with _record_removals(removed):
         try:
             found = submissions_of(str(folder / "class.zip"), store)
         except ValueError as refusal:
@@ -272,9 +272,9 @@ def _archives(case: Case, folder: Path) -> str:
             outside = [one for one in removed if one == store or not one.is_relative_to(store)]
             if outside:
                 raise Fault(f"these would have been removed: {outside!r:.300}")
-            if {path: kind for path, kind in _listed(folder).items() if not path.is_relative_to(store)} != before:
+            if {path: kind for path, kind in _list_files(folder).items() if not path.is_relative_to(store)} != before:
                 raise Fault("something was written out of the store")
-            if any(kind not in (stat.S_IFREG, stat.S_IFDIR) for kind in _listed(store).values()):
+            if any(kind not in (stat.S_IFREG, stat.S_IFDIR) for kind in _list_files(store).values()):
                 raise Fault("something that is neither a file nor a folder was made")
     good = [one for one in found if one.name == "Good"]
     is_found = len(good) == 1 and not good[0].error and Path(good[0].script).is_file()
@@ -283,15 +283,15 @@ def _archives(case: Case, folder: Path) -> str:
     return next((one_line(one.error, folder) for one in found if one.error), "")
 
 
-def _listed(folder: Path) -> dict[Path, int]:
-    """Return what lies in a folder, and the kind of each."""
+def _list_files(folder: Path) -> dict[Path, int]:
+    """Return the paths in a folder, with their file types."""
     names = (os.path.join(here, name) for here, *several in os.walk(folder) for name in itertools.chain(*several))
     return {Path(name): stat.S_IFMT(os.lstat(name).st_mode) for name in names}
 
 
 @contextlib.contextmanager
-def _recorded_removals(paths: list[Path]) -> Iterator[None]:
-    """Let no tree and no file be removed, and keep which would be."""
+def _record_removals(paths: list[Path]) -> Iterator[None]:
+    """Append the paths that would be removed to `paths`, and remove nothing."""
 
     def record(path: Any, *_: Any, dir_fd: int | None = None, **__: Any) -> None:
         folder = os.getcwd() if dir_fd is None else os.readlink(f"/proc/self/fd/{dir_fd}")
@@ -308,7 +308,7 @@ def _recorded_removals(paths: list[Path]) -> Iterator[None]:
 
 
 def _messages(case: Case, folder: Path) -> str:
-    import commands  # ROS is there for this alone
+    import commands  # only messages need ROS here
 
     log = _Log()
     logging.getLogger("rosout").addHandler(log)
@@ -326,7 +326,7 @@ def _messages(case: Case, folder: Path) -> str:
 
 
 def _requests(case: Case, folder: Path) -> str:
-    """Let a client send its messages, one after the other, while the simulation steps; each must be answered."""
+    """Send a client's messages one after another while the simulation steps; return the first error."""
     simulation = Simulation(parameters.load(_with_small_pictures({"script_time_limit": _SCRIPT_LIMIT})), started=False)
     player = Player(simulation, lambda _state: None, simulated_time=False)
     server = RemoteApiServer(player, "127.0.0.1", 0)
@@ -334,15 +334,15 @@ def _requests(case: Case, folder: Path) -> str:
         client.setsockopt(zmq.LINGER, 0)
         client.connect(f"tcp://127.0.0.1:{server.port}")
         try:
-            said = [_asked(client, message, player, server) for message in case.data]
+            messages = [_answer_of(client, message, player, server) for message in case.data]
         finally:
             server.close()
             simulation.close()
-    return next((one_line(one, folder) for one in said if one), "")
+    return next((one_line(one, folder) for one in messages if one), "")
 
 
-def _asked(client: zmq.Socket[bytes], message: bytes, player: Player, server: RemoteApiServer) -> str:
-    """Return the error in the answer, '' where there is none; a step or a signal may be waited for without an end."""
+def _answer_of(client: zmq.Socket[bytes], message: bytes, player: Player, server: RemoteApiServer) -> str:
+    """Send a message; return the error in the answer, '' for none, or if no answer comes, as in an endless wait."""
     client.send_multipart([b"", message])
     for _ in range(20):
         server.wait(0.005)
@@ -357,7 +357,7 @@ def _asked(client: zmq.Socket[bytes], message: bytes, player: Player, server: Re
 
 
 def _connections(case: Case, folder: Path) -> str:
-    """Let peers send what they like; each must be let go, none may start the simulation, and a client is answered."""
+    """Let peers send bytes: each must be disconnected, none may start the simulation, a client still gets an answer."""
     simulation = Simulation(parameters.load(_with_small_pictures({})), started=False)
     player = Player(simulation, lambda _state: None, simulated_time=False)
     server = RemoteApiServer(player, "127.0.0.1", 0)
@@ -395,7 +395,7 @@ def _send_all(server: RemoteApiServer, pieces: list[bytes]) -> None:
                 with contextlib.suppress(TimeoutError):
                     if not peer.recv(65536):
                         return
-        except OSError:  # it was let go before it had said all
+        except OSError:  # it was disconnected before it had sent everything
             return
     raise Fault("a peer that has said all is not let go")
 
@@ -404,19 +404,19 @@ def _send_all(server: RemoteApiServer, pieces: list[bytes]) -> None:
 
 
 def _legacy_commands(case: Case, folder: Path) -> str:
-    """Let clients send what they like while the simulation steps; when they have gone it does, and one is heard."""
+    """Let clients send bytes: once they have left, the simulation must not wait, and a new client gets an answer."""
     simulation = Simulation(parameters.load(_with_small_pictures({"script_time_limit": _SCRIPT_LIMIT})), started=False)
     player = Player(simulation, lambda _state: None, simulated_time=False)
     server, log = LegacyServer(player, "127.0.0.1", 0), _Log()
     logging.getLogger("drone_sim.remote").addHandler(log)
     try:
         for pieces in case.data:
-            _talk(server, player, pieces)
+            _exchange(server, player, pieces)
         while server._guests:
             server.wait(0.001)
         if server.holds:
             raise Fault("nobody is there, and the simulation waits")
-        _hear_one(server)
+        _check_answer(server)
     finally:
         logging.getLogger("drone_sim.remote").removeHandler(log)
         server.close()
@@ -424,12 +424,12 @@ def _legacy_commands(case: Case, folder: Path) -> str:
     return next((one_line(line, folder) for line in log.lines), "")
 
 
-def _talk(server: LegacyServer, player: Player, pieces: list[bytes]) -> None:
-    """Send, read, and step; whatever comes of it."""
+def _exchange(server: LegacyServer, player: Player, pieces: list[bytes]) -> None:
+    """Send pieces, read, and step; the replies do not matter."""
     with socket.create_connection(("127.0.0.1", server.port), timeout=60) as peer:
         peer.setblocking(False)
         for piece in pieces:
-            with contextlib.suppress(OSError):  # it was let go before it had said all
+            with contextlib.suppress(OSError):  # it was disconnected before it had sent everything
                 peer.send(piece)
             for _ in range(5):
                 server.wait(0.001)
@@ -439,8 +439,8 @@ def _talk(server: LegacyServer, player: Player, pieces: list[bytes]) -> None:
                 peer.recv(65536)
 
 
-def _hear_one(server: LegacyServer) -> None:
-    """Raise Fault where a client that says nothing but its header is not answered."""
+def _check_answer(server: LegacyServer) -> None:
+    """Raise Fault if a client that sends only a header gets no answer."""
     with socket.create_connection(("127.0.0.1", server.port), timeout=60) as peer:
         peer.setblocking(False)
         peer.send(b"\1\0" + b"\x12\0" + b"\0\0" + bytes(18))
@@ -457,7 +457,7 @@ def _hear_one(server: LegacyServer) -> None:
 
 
 def _browsers(case: Case, folder: Path) -> str:
-    """Let browsers say what they say to the cockpit; each question gets one line, and no socket is lost."""
+    """Let browsers send requests and messages to the cockpit: each error is one line, and no socket may be lost."""
     import browsing
 
     global _COCKPIT

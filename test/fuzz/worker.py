@@ -1,6 +1,6 @@
-"""The process that a case is tried in: takes cases from a pipe until its end, within a limit of memory.
+"""Worker process that receives cases from a pipe until it is closed, and tries them within a memory limit.
 
-`python worker.py DESCRIPTOR`: of a connection of multiprocessing's.
+`python worker.py DESCRIPTOR`: the file descriptor of a multiprocessing connection.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from typing import Any
 
 from case import Answer
 
-MEMORY = 4 << 30  # bytes of address space, some 1.5 of which are Python's and Mesa's before any case
+MEMORY = 4 << 30  # bytes of address space; Python and Mesa use some 1.5 GiB before any case
 
 
 def _resident() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-def _where(error: BaseException) -> str:
-    """Name the innermost line of drone_sim, which tells faults of one message apart."""
+def _innermost_function(error: BaseException) -> str:
+    """Return the innermost function of drone_sim, which distinguishes faults with the same message."""
     frames = [f for f in traceback.extract_tb(error.__traceback__) if "drone_sim" in f.filename]
     last = frames[-1] if frames else None
     return f"{Path(last.filename).name}:{last.name}" if last else "?"
@@ -40,16 +40,16 @@ def _try(case: Any, background: list[str]) -> Answer:
 
     folder = Path(tempfile.mkdtemp(prefix="fuzz"))
     prepare(case)
-    began = time.process_time()  # of the processor: other processes may be busy, too
+    start = time.process_time()  # processor time, since other processes may be busy, too
     fault = refusal = ""
     try:
         refusal = run(case, folder)
     except Fault as error:
         fault = str(error)
-    except BaseException as error:  # whatever it is: nothing else may come through
+    except BaseException as error:  # every other exception is a fault
         trace = "".join(traceback.format_tb(error.__traceback__))
-        fault = f"{type(error).__name__} in {_where(error)}: {_said(error)}\n{trace}"
-    seconds = time.process_time() - began
+        fault = f"{type(error).__name__} in {_innermost_function(error)}: {_message_of(error)}\n{trace}"
+    seconds = time.process_time() - start
     shutil.rmtree(folder, ignore_errors=True)
     gc.collect()
     if background and not fault:
@@ -59,14 +59,14 @@ def _try(case: Any, background: list[str]) -> Answer:
 
 
 def _busy() -> bool:
-    """Tell whether a thread goes on with what the case began."""
-    began = time.process_time()
+    """Return whether a thread that the case started is still busy."""
+    start = time.process_time()
     if len(os.listdir("/proc/self/task")) > 1:
         time.sleep(0.02)
-    return time.process_time() - began > 0.01
+    return time.process_time() - start > 0.01
 
 
-def _said(error: BaseException) -> str:
+def _message_of(error: BaseException) -> str:
     try:
         return str(error)[:300]
     except Exception:
@@ -78,7 +78,7 @@ def main() -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     faulthandler.enable()
     background: list[str] = []
-    threading.excepthook = lambda hook: background.append(f"{hook.exc_type.__name__}: {_said(hook.exc_value)}")
+    threading.excepthook = lambda hook: background.append(f"{hook.exc_type.__name__}: {_message_of(hook.exc_value)}")
     connection = Connection(int(sys.argv[1]))
     while True:
         try:

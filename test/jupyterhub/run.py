@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """`./dev.sh jupyterhub`: a real JupyterHub with packaging/jupyterhub/jupyterhub_config.py, and three students.
 
-It needs root. The students are system users of namespaces of this script, with /etc and /home of their own: nothing of
-it is left on this machine. Each opens the simulator, and hands in a script. Then one of them tries to get at another's:
-through the hub, and as a system user. A teacher uses the course's page in Chromium, and grades what was handed in. Then
-hub, proxy and a simulator are killed. Exit status 1 if anything is let through or lost, or is left after the end of the
-hub. It takes one to three minutes. `./dev.sh jupyterhub --load N` measures N students instead; with `--pictures
-FOLDER`, the teachers' page is saved as a picture.
+It needs root. The students are system users in namespaces of this script, with their own /etc and /home, so it leaves
+nothing on this machine. Each student opens the simulator, two hand in a script. Then one of them attacks another's:
+through the hub, and as a system user. A teacher uses the course's page in Chromium, and grades the scripts. Then hub,
+proxy and a simulator are killed. The exit status is 1 if an attack succeeds, if data are lost, or if processes remain
+after the end of the hub. It takes one to three minutes. `./dev.sh jupyterhub --load N` measures N students instead;
+with `--pictures FOLDER`, the teachers' page is saved as a picture.
 """
 
 import argparse
@@ -29,20 +29,20 @@ from websockets.exceptions import InvalidStatus, WebSocketException
 from websockets.sync.client import connect
 
 ROOT = Path(__file__).resolve().parents[2]
-INSIDE = "DRONE_SIM_JUPYTERHUB"
+FOLDER_VARIABLE = "DRONE_SIM_JUPYTERHUB"
 NAMESPACES = ["unshare", "--mount", "--net", "--pid", "--fork", "--kill-child", "--mount-proc"]
 REAPER = ["sh", "-c", '"$@"; exit $?', "sh"]  # the first process of the namespace, which must reap orphans
 HOST = "127.0.0.1:8000"
 PATIENCE = 240  # s
-WARM_UP, MEASURED = 10, 20  # s, of the measurement of the load
+WARM_UP, MEASURED = 10, 20  # s, for the measurement of the load
 STUDENTS, TEACHER = ("ann", "ben", "cas"), "tea"
 SCENE = "wide.yaml"
 CLASSROOM = "/srv/drone_sim/classroom"
 HANDED_IN = "/srv/drone_sim/handed_in/hover"
 SOLUTION = ROOT / "tasks/hover/solution.py"
-# What must succeed against oneself, of what is below.
-NEEDED = {"socket", "home", "environ", "kill", "network", "read-handed-in", "remove-handed-in", "read-report"}
-# What a system user tries; it prints the names of what succeeds.
+# The attempts of ATTACK that must succeed if a student attacks herself.
+MUST_SUCCEED = {"socket", "home", "environ", "kill", "network", "read-handed-in", "remove-handed-in", "read-report"}
+# A script with the attempts of a system user; it prints the names of those that succeed.
 ATTACK = """
 import glob, http.client, os, pathlib, signal, socket, subprocess, sys
 victim, pids = sys.argv[1], sys.argv[2].split()
@@ -92,11 +92,11 @@ def main():
     options = parser.parse_args()
     if subprocess.run(["test", "-r", __file__], user="nobody", group="nogroup", extra_groups=[]).returncode:
         return f"jupyterhub: the students cannot read {ROOT}: move it to a folder that all users can open"
-    if INSIDE not in os.environ:
+    if FOLDER_VARIABLE not in os.environ:
         with tempfile.TemporaryDirectory(dir="/var/tmp") as folder:
             command = [*NAMESPACES, *REAPER, sys.executable, __file__, *sys.argv[1:]]
-            return subprocess.run(command, env={**os.environ, INSIDE: folder}).returncode
-    folder = Path(os.environ.pop(INSIDE))
+            return subprocess.run(command, env={**os.environ, FOLDER_VARIABLE: folder}).returncode
+    folder = Path(os.environ.pop(FOLDER_VARIABLE))
     folder.chmod(0o755)
     names = [f"student{number}" for number in range(1, options.load + 1)] if options.load else STUDENTS
     make_users(folder, names)
@@ -108,7 +108,7 @@ def main():
         failures, hub = try_course(hub, folder, options.pictures)
     hub.send_signal(signal.SIGTERM)
     hub.wait(60)
-    until(lambda: not any(processes_of(name) for name in (*names, "drone_sim")))
+    wait_until(lambda: not any(processes_of(name) for name in (*names, "drone_sim")))
     for failure in failures:
         print(f"jupyterhub: {failure}")
     if not failures and not options.load:
@@ -120,12 +120,12 @@ def start_hub(folder):
     """Start the hub, and wait until it answers."""
     configuration = str(ROOT / "packaging/jupyterhub/jupyterhub_config.py")
     hub = subprocess.Popen([sys.executable, "-m", "jupyterhub", "-f", configuration], cwd=folder)
-    until(lambda: hub.poll() is not None or answers(f"http://{HOST}/hub/login"))
+    wait_until(lambda: hub.poll() is not None or answers(f"http://{HOST}/hub/login"))
     return hub
 
 
 def try_course(hub, folder, pictures):
-    """Fly, attack, grade and kill; return what went wrong, and the hub that runs then."""
+    """Fly, attack, grade and kill; return the failures, and the hub that runs at the end."""
     students = ann, ben, cas = [Student(name) for name in STUDENTS]
     for student in students:
         student.open()
@@ -134,20 +134,20 @@ def try_course(hub, folder, pictures):
     teacher = Student(TEACHER)
     ann.hand_in(SOLUTION.read_text())
     ben.hand_in("def sysCall_actuation():\n    pass\n")
-    failures = through_the_hub(ben, ann.name)
+    failures = attack_through_hub(ben, ann.name)
     with ann.connect(ann.name) as page:
         Page(page)  # while it is open, the simulator reports
-        failures += teachers_page(teacher, ann, ben)
-        failures += in_a_browser(students, pictures)
-        failures += as_system_user(ben.name, ann.name)
+        failures += grade_on_teachers_page(teacher, ann, ben)
+        failures += use_page_in_browser(students, pictures)
+        failures += attack_as_system_user(ben.name, ann.name)
         failures += forge_and_grade(ben.name, ann.name)
-        missed = NEEDED - set(as_system_user(ann.name, ann.name))
-    failures += [f"not tried: {name}" for name in sorted(missed)]  # the attack succeeds for the student herself
-    found, hub = kill(hub, folder, cas, teacher)
+        missed = MUST_SUCCEED - set(attack_as_system_user(ann.name, ann.name))
+    failures += [f"not tried: {name}" for name in sorted(missed)]  # a student's attack on herself must succeed
+    losses, hub = kill(hub, folder, cas, teacher)
     ann.fly(ann.name)
     if not ann.stops(ann.name):
         failures.append("not tried: the end of the server")
-    return failures + found, hub
+    return failures + losses, hub
 
 
 def make_users(folder, names):
@@ -178,14 +178,14 @@ class Student:
     def open(self):
         """Log in, and open the simulator."""
         self.start_server()
-        until(lambda: self.sees(self.name))
+        wait_until(lambda: self.sees(self.name))
 
     def start_server(self):
         """Log in, and wait for the server that the hub starts."""
         self.log_in()
         self.session.get(f"http://{HOST}/hub/spawn/{self.name}")
         address = f"http://{HOST}/user/{self.name}/api"
-        until(lambda: self.session.get(address, timeout=PATIENCE).url == address)
+        wait_until(lambda: self.session.get(address, timeout=PATIENCE).url == address)
 
     def log_in(self):
         login = self.session.get(f"http://{HOST}/hub/login")
@@ -204,7 +204,7 @@ class Student:
 
     @property
     def cookies(self):
-        """All cookies, whatever their paths are."""
+        """The cookies of all paths, as a header."""
         return "; ".join(f"{one.name}={one.value}" for one in self.session.cookies)
 
     def stops(self, name):
@@ -213,20 +213,20 @@ class Student:
         return self.session.delete(f"http://{HOST}/hub/api/users/{name}/server", headers=headers).ok
 
     def fly(self, name):
-        """Wait until a student's simulator says that its drone flies. Raises InvalidStatus if it is refused."""
+        """Wait until a student's simulator reports a flying drone. Raises InvalidStatus if refused."""
         with self.connect(name) as socket:
             while '"flying"' not in str(socket.recv(timeout=PATIENCE)):
                 pass
 
     def hand_in(self, text):
-        """Write a text over the script of the task hover, and hand it in."""
+        """Replace the script of the task hover by a text, and hand it in."""
         with self.connect(self.name) as socket:
             version = ask(socket, "open", script="tasks/hover.py")["version"]
             saved = ask(socket, "save", script="tasks/hover.py", text=text, version=version)["script"]
             print(f"{self.name} hands in {saved}:", ask(socket, "hand in", script=saved, lesson="tasks/hover"))
 
     def reaches(self, name):
-        """Return whether the student's simulator flies, after something was killed."""
+        """Return whether the student's simulator can be reached and flies."""
         try:
             with self.connect(name) as socket:
                 panel = ask(socket, "panel")["panel"]
@@ -234,19 +234,19 @@ class Student:
             return False
         return panel.get("status") == "flying"
 
-    def is_told(self, *texts):
-        """Return whether the cockpit shows texts of the teacher."""
+    def shows(self, *texts):
+        """Wait until the cockpit shows all texts of the teacher; return True."""
         with self.connect(self.name) as socket:
-            until(lambda: all(text in str(ask(socket, "panel")["panel"].get("to_all")) for text in texts))
+            wait_until(lambda: all(text in str(ask(socket, "panel")["panel"].get("to_all")) for text in texts))
         return True
 
     def opens(self, scene):
-        """Return whether the simulation starts in a scene of the list."""
+        """Return whether the simulation starts in the given scene."""
         with self.connect(self.name) as socket:
             return ask(socket, "scene", scene=scene)["done"]
 
     def saved_text(self):
-        """Save a script once, and return its text as the cockpit has it."""
+        """Save a script, and return its text as the cockpit reads it."""
         with self.connect(self.name) as socket:
             opened = ask(socket, "open", script="tasks/hover.py")
             saved = ask(socket, "save", script="tasks/hover.py", text="# mine\n", version=opened["version"])
@@ -258,9 +258,9 @@ class Student:
         return connect(address, subprotocols=["drone_sim"], origin=f"http://{HOST}", additional_headers=headers)
 
 
-def ask(socket, question, **more):
-    """Return the cockpit's answer."""
-    socket.send(json.dumps({"id": 1, "ask": question, **more}))
+def ask(socket, question, **arguments):
+    """Send a request to the cockpit, and return its answer."""
+    socket.send(json.dumps({"id": 1, "ask": question, **arguments}))
     while True:
         message = socket.recv(timeout=PATIENCE)
         answer = json.loads(message) if isinstance(message, str) else {}
@@ -269,7 +269,7 @@ def ask(socket, question, **more):
 
 
 def forge_and_grade(forger, victim):
-    """Hand a script in under another's name; return what is wrong with the teacher's grades."""
+    """Hand in a script under the name of another student; return the errors in the teacher's grades."""
     forged = f"{HANDED_IN}/{victim}+2099-01-01T00.00.00Z+000000000000.py"
     run("touch", forged, user=forger, group=forger, extra_groups=[])
     report = f"/home/{TEACHER}/grades.json"
@@ -280,8 +280,8 @@ def forge_and_grade(forger, victim):
     return [] if passed == {victim: 1, forger: 0} else [f"passed flights: {passed}"]
 
 
-def teachers_page(teacher, student, other):
-    """Grade by the button of the teachers' page; return what is wrong with it, or with who may open it."""
+def grade_on_teachers_page(teacher, student, other):
+    """Grade with the button of the teachers' page; return the failures of the page and of its access control."""
     address = f"http://{HOST}/services/course/"
     failures = ["the teachers' page"] if student.session.get(address).status_code != 403 else []
     teacher.log_in()
@@ -291,7 +291,7 @@ def teachers_page(teacher, student, other):
     if student.session.post(address, data={"grade": "hover", "_xsrf": token}).status_code != 403:
         failures.append("a student can grade")
     teacher.session.post(address, data={"grade": "hover", "_xsrf": token}).raise_for_status()
-    until(lambda: "marks.csv" in teacher.session.get(address).text)
+    wait_until(lambda: "marks.csv" in teacher.session.get(address).text)
     page = teacher.session.get(address).text
     report, marks = (re.search(rf'href="([^"]+{end})"', page)[1] for end in ("index.html", "marks.csv"))
     print(teacher.session.get(f"http://{HOST}{marks}").text)
@@ -302,8 +302,8 @@ def teachers_page(teacher, student, other):
     return failures
 
 
-def in_a_browser(students, pictures):
-    """Use the teachers' page in Chromium: see the drones, watch one, and tell all; return what is wrong with it."""
+def use_page_in_browser(students, pictures):
+    """Use the teachers' page in Chromium: see the drones, watch one, send a text to all; return the failures."""
     chromium = shutil.which("chromium")
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
@@ -319,25 +319,25 @@ def in_a_browser(students, pictures):
         page.click("text=Show")
         page.get_by_text("Shown now").wait_for()
         page.evaluate("document.querySelector('main').dataset.old = true")
-        page.locator("main:not([data-old])").wait_for()  # the page renews it
+        page.locator("main:not([data-old])").wait_for()  # the page refreshes it
         if pictures:
             pictures.mkdir(parents=True, exist_ok=True)
             page.screenshot(path=pictures / "teachers_page.png")
         with page.expect_popup() as opened:
             page.locator("li", has_text=students[0].name).get_by_text("watch").click()
-        opened.value.get_by_role("button", name="Authorize").click()  # JupyterHub asks once for each student
+        opened.value.get_by_role("button", name="Authorize").click()  # JupyterHub asks once per student
         opened.value.get_by_text("watching only").wait_for()
         opened.value.locator("#scene canvas").wait_for()
         if pictures:
             opened.value.screenshot(path=pictures / "watching.png")
         browser.close()
-    told = [student.is_told("Now everybody hovers.", SCENE) for student in students]
-    failures = [] if all(told) else ["not all students are told what the teacher tells all"]
+    all_shown = [student.shows("Now everybody hovers.", SCENE) for student in students]
+    failures = [] if all(all_shown) else ["not all students are told what the teacher tells all"]
     return failures + [f"no scene: {one.name}" for one in students[1:] if not one.opens(f"course/{SCENE}")]
 
 
 def kill(hub, folder, student, teacher):
-    """Kill hub, proxy and simulator with SIGKILL; return what is lost, and the new hub."""
+    """Kill hub, proxy and simulator with SIGKILL; return the failures, and the new hub."""
     failures = []
     saved = student.saved_text()
     with student.connect(student.name) as page:
@@ -349,20 +349,20 @@ def kill(hub, folder, student, teacher):
     student.fly(student.name)
     for pid in processes_of("root", "configurable-http-proxy"):
         os.kill(pid, signal.SIGKILL)
-    until(lambda: student.reaches(student.name))
+    wait_until(lambda: student.reaches(student.name))
     killed = set(processes_of(student.name, "drone_sim/simulator"))
     for pid in killed:
         os.kill(pid, signal.SIGKILL)
-    until(lambda: set(processes_of(student.name, "drone_sim/simulator")) - killed)
-    until(lambda: student.reaches(student.name))
-    until(lambda: teacher.session.get(f"http://{HOST}/services/course/").ok)
+    wait_until(lambda: set(processes_of(student.name, "drone_sim/simulator")) - killed)
+    wait_until(lambda: student.reaches(student.name))
+    wait_until(lambda: teacher.session.get(f"http://{HOST}/services/course/").ok)
     if student.saved_text() != saved:
         failures.append("a saved script is lost")
     return failures, hub
 
 
 def still_flies(page):
-    """Return whether pulses of a flying simulator come for some seconds more."""
+    """Return whether pulses of the simulator arrive during the next 10 s."""
     end = time.monotonic() + 10
     pulses = 0
     while time.monotonic() < end:
@@ -371,8 +371,8 @@ def still_flies(page):
     return pulses > 5
 
 
-def through_the_hub(attacker, victim):
-    """Return what a student gets from another's server."""
+def attack_through_hub(attacker, victim):
+    """Return the pages and actions of another student's server that a student can reach."""
     failures = ["the page"] if attacker.sees(victim) else []
     for path in ("drone_sim/", "drone_sim/cockpit.js", "drone_sim/socket", "lab", "api/contents", "proxy/11311/"):
         address, headers = f"http://{HOST}/user/{victim}/{path}", {"Cookie": attacker.cookies}
@@ -386,48 +386,48 @@ def through_the_hub(attacker, victim):
     return failures + (["the end of the server"] if attacker.stops(victim) else [])
 
 
-def as_system_user(attacker, victim):
-    """Return what a system user reaches of another's processes, files and ports."""
+def attack_as_system_user(attacker, victim):
+    """Return the names of the attempts on another user's processes, files and ports that succeed."""
     pids = " ".join(map(str, processes_of(victim)))
     names = " ".join(name for name in os.listdir(HANDED_IN) if name.startswith(f"{victim}+"))
     attack = f"HANDED_IN, CLASSROOM = {HANDED_IN!r}, {CLASSROOM!r}\n{ATTACK}"
     reports = " ".join(path.name for path in Path(CLASSROOM, "reports").iterdir() if path.owner() == victim)
     command = [sys.executable, "-S", "-c", attack, victim, pids, names, reports]
-    tried = subprocess.run(
+    attempts = subprocess.run(
         command, user=attacker, group=attacker, extra_groups=[], cwd="/", capture_output=True, text=True
     )
-    *succeeded, last = tried.stdout.split() or [tried.stderr]
+    *succeeded, last = attempts.stdout.split() or [attempts.stderr]
     return succeeded if last == "end" else [*succeeded, last]
 
 
 def processes_of(name, command=""):
-    """Return the processes of a user whose command line contains `command`."""
-    listed = subprocess.run(["ps", "-ww", "-o", "pid=,stat=,args=", "-u", name], capture_output=True, text=True).stdout
-    rows = [line.split(maxsplit=2) for line in listed.splitlines()]
+    """Return the ids of a user's processes whose command lines contain `command`."""
+    listing = subprocess.run(["ps", "-ww", "-o", "pid=,stat=,args=", "-u", name], capture_output=True, text=True).stdout
+    rows = [line.split(maxsplit=2) for line in listing.splitlines()]
     return [int(pid) for pid, state, args in rows if not state.startswith("Z") and command in args]
 
 
 def measure_load(names):
-    """Open a simulator for each student, draw all of them for some time, and print what they need."""
+    """Open a simulator with a page for each student, and print the processor time and memory that they use."""
     pages = []
     for student in map(Student, names):
         began = time.monotonic()
         student.start_server()
         served = time.monotonic()
-        until(partial(student.sees, student.name))
+        wait_until(partial(student.sees, student.name))
         student.fly(student.name)
         flies = time.monotonic() - served
         print(f"{student.name}: server after {served - began:.1f} s, flies {flies:.1f} s later", flush=True)
         pages.append(Page(student.connect(student.name)))
     time.sleep(WARM_UP)
     drawn = [page.pictures for page in pages]
-    busy = used(names)
+    busy = measure_usage(names)
     rates = [(page.pictures - before) / MEASURED for page, before in zip(pages, drawn)]
     paces = [float(page.pace or 0) for page in pages]
     for page in pages:
         page.socket.close()
     time.sleep(WARM_UP)
-    idle = used(names)
+    idle = measure_usage(names)
     each = 1 / len(names)
     print(f"{len(names)} students fly with open pages: {busy[0] * each:.2f} cores and {busy[1] * each:.0f} MB each,")
     print(f"at {min(paces):.2f} to {max(paces):.2f} times real time; {min(rates):.0f} to {max(rates):.0f} pictures/s;")
@@ -435,7 +435,7 @@ def measure_load(names):
 
 
 class Page(threading.Thread):
-    """A page that draws the scene and one camera's pictures at once."""
+    """A simulated page, which acknowledges the scene and the pictures of one camera at once."""
 
     def __init__(self, socket):
         super().__init__(daemon=True)
@@ -453,12 +453,12 @@ class Page(threading.Thread):
                     self.socket.send(json.dumps({"shown": head.get("picture", "scene")}))
                 else:
                     self.pace = json.loads(message).get("panel", {}).get("pace", self.pace)
-        except WebSocketException:  # it is closed
+        except WebSocketException:  # the socket is closed
             pass
 
 
-def used(names):
-    """Return the cores that the students' processes use for some seconds, and their memory (PSS) in MB."""
+def measure_usage(names):
+    """Return the cores that the students' processes use, on average over MEASURED, and their memory (PSS) in MB."""
     before, began = processor_time(names), time.monotonic()
     time.sleep(MEASURED)
     cores = (processor_time(names) - before) / (time.monotonic() - began)
@@ -467,7 +467,7 @@ def used(names):
 
 
 def processor_time(names):
-    """Return the seconds that the students' processes have used."""
+    """Return the processor time of the students' processes, s."""
     total = 0
     for name in names:
         for pid in processes_of(name):
@@ -483,7 +483,7 @@ def answers(address):
         return False
 
 
-def until(condition):
+def wait_until(condition):
     end = time.monotonic() + PATIENCE
     while not condition():
         if time.monotonic() > end:

@@ -1,4 +1,4 @@
-"""Flights of the drone that CoppeliaSim recorded, flown anew by the remote API."""
+"""Flights that CoppeliaSim recorded, repeated via the remote API."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from drone_sim.importing.cache import imported_scene
 from drone_sim.remote.standalone import play
 from drone_sim.run import parameters
 
-MASS, GRAVITY, ARM = 0.52, 9.81, 0.13  # kg, m/s², m: the recorded program's
-STRONGEST = 1.5 * MASS * GRAVITY  # N
+MASS, GRAVITY, ARM = 0.52, 9.81, 0.13  # kg, m/s², m: of the recorded program
+MAX_THRUST = 1.5 * MASS * GRAVITY  # N
 HORIZON = 10  # steps
 STATE_COST = (0.3, 0.3, 3.0, 0.01, 0.01, 0.1, 0.25, 0.25, 0.1, 0.0, 0.0, 0.0)
 CONTROL_COST = (0.1, 0.4, 0.4, 0.1)
@@ -29,7 +29,7 @@ FORCES, TARGET = ("f0", "f1", "f2", "f3"), ("target_x", "target_y", "target_z")
 
 
 class Recording(NamedTuple):
-    """What CoppeliaSim wrote, a row for each step: time (s), state (m, m/s, rad, rad/s), forces (N), target (m)."""
+    """Log of CoppeliaSim, one row for each step: time (s), state (m, m/s, rad, rad/s), forces (N), target (m)."""
 
     times: np.ndarray
     states: np.ndarray
@@ -48,27 +48,27 @@ def read(path: Path) -> Recording:
 
 @contextmanager
 def simulation(scene: Path) -> Iterator[Any]:
-    """Give CoppeliaSim's own client, connected to a simulation of a scene file of CoppeliaSim's, which waits for it."""
+    """Yield `sim` of CoppeliaSim's client, connected to a waiting simulation of a CoppeliaSim scene file."""
     from coppeliasim_zmqremoteapi_client import RemoteAPIClient
 
     values = {"scene_file": str(imported_scene(scene)), "real_time_factor": 0, "remote_api": {"port": 0}}
     ports: queue.Queue[int] = queue.Queue()
-    over = threading.Event()
-    work = (parameters.load(values), over.is_set, lambda server: ports.put(server.port))
+    end_event = threading.Event()
+    work = (parameters.load(values), end_event.is_set, lambda server: ports.put(server.port))
     simulator = threading.Thread(target=play, args=work)
     simulator.start()
     try:
         yield RemoteAPIClient(port=ports.get(timeout=60)).require("sim")
     finally:
-        over.set()
+        end_event.set()
         simulator.join()
 
 
 class Controller:
-    """The recorded program's: its own model predictive controller and PID, as they are in its folder."""
+    """Controller of the recorded program: its model predictive controller and PID, imported from its folder."""
 
     def __init__(self, folder: Path, time_step: float):
-        """Take the folder with its modules, and the step (s)."""
+        """Import the modules from `folder`; `time_step` is in s."""
         sys.path.insert(0, str(folder))
         try:
             from MPC_controller import mpc_controller
@@ -82,39 +82,39 @@ class Controller:
         slope[3, 7], slope[4, 6] = GRAVITY, -GRAVITY
         effect = np.zeros((12, 4))
         effect[5, 0] = 1.0 / MASS
-        effect[[9, 10, 11], [1, 2, 3]] = 1.0  # its model takes torques for angular accelerations
+        effect[[9, 10, 11], [1, 2, 3]] = 1.0  # the program's model uses torques as angular accelerations
         self._model = np.eye(12) + slope * time_step, effect * time_step
         self._costs = np.diag(STATE_COST), np.diag(CONTROL_COST)
 
     def forces(self, state: np.ndarray, target: np.ndarray) -> np.ndarray:
-        """Return what each propeller is to pull with (N)."""
+        """Return the thrust of each propeller (N)."""
         reference = np.concatenate((target, np.zeros(9)))
         limits = np.array(LOWEST), np.array(HIGHEST)
         control, _ = self._solve(
             state, *self._model, reference, HORIZON, *self._costs, *limits, pid_controller=self._pid
         )
-        thrust = min(control[0] + MASS * GRAVITY, STRONGEST)
+        thrust = min(control[0] + MASS * GRAVITY, MAX_THRUST)
         roll, pitch, yaw = control[1] / (2 * ARM), control[2] / (2 * ARM), control[3] / 4
         return thrust / 4 + np.array((roll - pitch - yaw, roll + pitch + yaw, pitch - roll - yaw, yaw - roll - pitch))
 
 
 def closed_loop(folder: Path, recording: Recording) -> Any:
-    """Return what chooses the forces of a step by the recorded program's law, and the body's own attitude."""
+    """Return a function that gives a step's forces by the recorded program's law, along the body's current axis."""
     controller = Controller(folder, recording.times[1])
 
-    def choose(index: int, state: np.ndarray, turn: np.ndarray) -> np.ndarray:
-        return np.outer(controller.forces(state, recording.targets[index]), turn[:, 2])
+    def choose(index: int, state: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+        return np.outer(controller.forces(state, recording.targets[index]), rotation[:, 2])
 
     return choose
 
 
 def open_loop(recording: Recording) -> Any:
-    """Return what applies the recorded forces along the axis that the body has by then."""
-    return lambda index, _state, turn: np.outer(recording.forces[index], turn[:, 2])
+    """Return a function that gives the recorded forces along the body's current axis."""
+    return lambda index, _state, rotation: np.outer(recording.forces[index], rotation[:, 2])
 
 
 def recorded_attitude(recording: Recording) -> Any:
-    """Return what applies the recorded forces along the axis that the recorded body had."""
+    """Return a function that gives the recorded forces along the recorded body's axis."""
 
     def choose(index: int, _state: np.ndarray, _turn: np.ndarray) -> np.ndarray:
         return np.outer(recording.forces[index], axis(recording.states[index, 6:9]))
@@ -129,7 +129,7 @@ def axis(angles: np.ndarray) -> np.ndarray:
 
 
 def fly(sim: Any, recording: Recording, choose: Any) -> np.ndarray:
-    """Fly as long as the recording, from where it began; return the states before each step, as it has them."""
+    """Fly as long as the recording from its start; return the state before each step, in the recording's format."""
     drone = sim.getObject("/Quadcopter")
     propellers = [sim.getObject(f"/Quadcopter/propeller[{index}]/respondable") for index in range(4)]
     sim.setObjectPosition(drone, -1, recording.states[0, :3].tolist())
@@ -140,8 +140,8 @@ def fly(sim: Any, recording: Recording, choose: Any) -> np.ndarray:
         linear, angular = sim.getObjectVelocity(drone)
         place, angles = sim.getObjectPosition(drone, -1), sim.getObjectOrientation(drone, -1)
         states.append(np.array((*place, *linear, *angles, *angular)))
-        turn = np.reshape(sim.getObjectMatrix(drone, -1), (3, 4))[:, :3]
-        for propeller, force in zip(propellers, choose(index, states[-1], turn)):
+        rotation = np.reshape(sim.getObjectMatrix(drone, -1), (3, 4))[:, :3]
+        for propeller, force in zip(propellers, choose(index, states[-1], rotation)):
             sim.addForceAndTorque(propeller, force.tolist(), [0, 0, 0])
         sim.step()
     sim.stopSimulation()

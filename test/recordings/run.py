@@ -22,7 +22,7 @@ PAGE, PICTURE = ROOT / "docs" / "fidelity.md", ROOT / "docs" / "pictures" / "rec
 TABLE = re.compile(r"(<!-- recordings: begin[^\n]*-->\n).*?(<!-- recordings: end -->)", re.DOTALL)
 SCENE = "drone_scene.ttt"
 CLOSED, AXIS, OWN = "closed loop", "recorded forces along the recorded axis", "recorded forces along its own axis"
-# The commit that has scene and recording, its file, and how it is flown: of the third the controller is another.
+# Commit with scene and recording, its file, and the ways to fly it: the third was made with another controller.
 RECORDINGS = {
     "flight 1": ("a8b05b1", "simulation_logs.csv", (CLOSED, AXIS, OWN)),
     "flight 2": ("a8b05b1", "simulation_logs_25032025-173337.csv", (CLOSED, AXIS, OWN)),
@@ -32,7 +32,7 @@ SPANS = (10, 20, 50)  # s
 
 
 def main() -> int:
-    """Do what the command line says; return the exit status."""
+    """Run the comparison; return the exit status."""
     parser = argparse.ArgumentParser(prog="./dev.sh recordings", description=__doc__)
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="clone of OBulun/Coppelia-Quad")
     parser.add_argument("--docs", action="store_true", help="write table and plot into docs/")
@@ -46,24 +46,24 @@ def main() -> int:
     print("\n".join(lines))
     if options.docs:
         text = PAGE.read_text(encoding="utf-8")
-        PAGE.write_text(TABLE.sub(lambda found: found[1] + "\n".join(lines) + "\n" + found[2], text), encoding="utf-8")
+        PAGE.write_text(TABLE.sub(lambda match: match[1] + "\n".join(lines) + "\n" + match[2], text), encoding="utf-8")
         plot(compared, PICTURE)
     return 0
 
 
 def unpack(clone: Path, commit: str, folder: Path) -> None:
-    """Put the files of a commit into a folder. Raises OSError."""
-    packed = subprocess.run(["git", "-C", clone, "archive", commit], capture_output=True, check=False)
-    if packed.returncode:
+    """Extract the files of a commit into a folder. Raises OSError."""
+    archive = subprocess.run(["git", "-C", clone, "archive", commit], capture_output=True, check=False)
+    if archive.returncode:
         raise OSError(f"no clone with the commit {commit} of OBulun/Coppelia-Quad")
-    subprocess.run(["tar", "-x", "-C", folder], input=packed.stdout, check=True)
+    subprocess.run(["tar", "-x", "-C", folder], input=archive.stdout, check=True)
 
 
 def compare(clone: Path, name: str):
-    """Yield for each way of flying a recording: its name and the way, the recording, and the states flown."""
+    """Yield ((name, way), (recording, flown states)) for each way to fly a recording."""
     commit, file, ways = RECORDINGS[name]
-    with tempfile.TemporaryDirectory() as kept:
-        folder = Path(kept)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
         unpack(clone, commit, folder)
         recording = flights.read(folder / file)
         choices = {
@@ -78,27 +78,27 @@ def compare(clone: Path, name: str):
 
 
 def errors(recording: flights.Recording, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far off each step is: distance in mm, and roll, pitch, yaw in degrees."""
-    far = np.linalg.norm(states[:, :3] - recording.states[:, :3], axis=1) * 1e3
+    """Return the error of each step: distance (mm), and roll, pitch, yaw (degrees)."""
+    gap = np.linalg.norm(states[:, :3] - recording.states[:, :3], axis=1) * 1e3
     turned = (states[:, 6:9] - recording.states[:, 6:9] + np.pi) % (2 * np.pi) - np.pi
-    return far, np.degrees(np.abs(turned))
+    return gap, np.degrees(np.abs(turned))
 
 
 def table(compared) -> list[str]:
-    """Return the rows of a Markdown table: the largest errors until so many seconds."""
+    """Return the rows of a Markdown table: the largest errors within each of SPANS."""
     spans = " | ".join(f"{span} s" for span in SPANS)
     lines = [f"| | position, until {spans} | roll, pitch, yaw in all |", "|---|" + "---|" * (len(SPANS) + 1)]
     for (name, way), (recording, states) in compared.items():
-        far, turned = errors(recording, states)
-        lasts = recording.times[-1]
-        within = " | ".join(length(far[recording.times <= one].max()) if one < lasts + 0.2 else "" for one in SPANS)
+        gap, turned = errors(recording, states)
+        duration = recording.times[-1]
+        within = " | ".join(length(gap[recording.times <= one].max()) if one < duration + 0.2 else "" for one in SPANS)
         angles = ", ".join(f"{rounded(angle)}°" for angle in turned.max(axis=0))
         lines.append(f"| {name}, {way} | {within} | {angles} |")
     return lines
 
 
 def length(millimetres: float) -> str:
-    """Return a length as a person says it."""
+    """Return a length as text, in mm or m."""
     return f"{rounded(millimetres)} mm" if millimetres < 100 else f"{rounded(millimetres / 1e3)} m"
 
 
@@ -108,7 +108,7 @@ def rounded(number: float) -> str:
 
 
 def plot(compared, path: Path) -> None:
-    """Draw the flights in closed loop, recorded and flown in closed loop, and how far they are apart."""
+    """Plot the closed-loop flights, recorded and simulated, and the distance between them."""
     drawn = [name for name, way in compared if way == CLOSED]
     figure, axes = plt.subplots(3, len(drawn), figsize=(11, 8), sharex=True, layout="constrained")
     for column, name in zip(axes.T, drawn):
@@ -116,8 +116,8 @@ def plot(compared, path: Path) -> None:
         for index, axis in enumerate("xyz"):
             (line,) = column[0].plot(recording.times, recording.states[:, index], lw=3, alpha=0.35)
             column[0].plot(recording.times, states[:, index], lw=1, color=line.get_color(), label=axis)
-        far, turned = errors(recording, states)
-        column[1].plot(recording.times, far)
+        gap, turned = errors(recording, states)
+        column[1].plot(recording.times, gap)
         column[2].plot(recording.times, turned, label=["roll", "pitch", "yaw"])
         column[0].set_title(f"{name}: wide CoppeliaSim 4.9, narrow drone_sim")
         column[2].set_xlabel("time [s]")

@@ -1,4 +1,4 @@
-"""End what a test has begun: a test that waits for ever for a process that hangs says nothing."""
+"""Helper that ends the processes of a test and kills those that hang, so that the test fails with a message."""
 
 import shlex
 import signal
@@ -8,18 +8,18 @@ HANGS = 90.0  # s; nothing takes nearly as long to end unless it hangs
 
 
 def end(*processes, number=signal.SIGTERM):
-    """Send processes a signal and wait for their ends; those that hang are killed, and fail the test by their names."""
+    """Send a signal to `processes` and wait until they end; kill those that hang, and fail with their commands."""
     running = [one for one in processes if one.poll() is None]
     for process in running:
         process.send_signal(number)
     hung = [process for process in running if not _ends(process)]
-    said = "; ".join(shlex.join(map(str, process.args)) for process in hung)
-    assert not hung, f"killed, since {signal.Signals(number).name} did not end it within {HANGS:g} s: {said}"
+    commands = "; ".join(shlex.join(map(str, process.args)) for process in hung)
+    assert not hung, f"killed, since {signal.Signals(number).name} did not end them within {HANGS:g} s: {commands}"
 
 
 def _ends(process):
     try:
-        process.communicate(timeout=HANGS)  # what it prints into a pipe is read, so that it can end
+        process.communicate(timeout=HANGS)  # reads the pipe: a full pipe would block the process
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait(HANGS)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A node that does something in a flight, once: what its argument names. It prepares that before it is seen."""
+"""A node that runs the action named by its argument once in a flight. It prepares the action before the flight."""
 
 import json
 import sys
@@ -23,7 +23,7 @@ def client():
 
 
 def fly():
-    """Do what a program that flies may do, and read the scene's text."""
+    """Act as a flying program may, and read the scene's text."""
     sim, read = client(), edit({"text": True})
 
     def act():
@@ -38,7 +38,7 @@ def fly():
 
 
 def push():
-    """Push by the remote API, of which one is told."""
+    """Push the drone via the remote API, which the grader reports."""
     sim = client()
 
     def act():
@@ -73,12 +73,12 @@ def main():
     act = prepare()
     done = []
 
-    def hear(odometry):
+    def on_odometry(odometry):
         if not done and odometry.header.stamp.to_sec() >= SOON:
             done.append(True)
             act()
 
-    rospy.Subscriber("/drone/odom", Odometry, hear, queue_size=1)
+    rospy.Subscriber("/drone/odom", Odometry, on_odometry, queue_size=1)
     rospy.spin()
 
 

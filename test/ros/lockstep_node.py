@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A controller that misbehaves: `stamped N` sends N stamped answers to each odometry; `plain` flies `drone` its way."""
+"""Controller for lockstep tests: lockstep_node.py stamped|plain N DRONE sends N commands per odometry message."""
 
 import sys
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""A node that flies as teleoperation nodes of real drones do: reset, a second, takeoff, three, twists at 10 Hz, land.
+"""A node that flies like a teleoperation node of a real drone: reset, 1 s, takeoff, 3 s, twists at 10 Hz, land.
 
-It flies a square, then hands on what an outside controller sends on cmd_vel_in, as long as that goes on sending, and is
-silent before it lands.
+It flies a square, then forwards the commands of an outside controller on cmd_vel_in while that controller sends, and
+stops half a second before it lands.
 """
 
 import rospy
@@ -10,30 +10,30 @@ from geometry_msgs.msg import Twist
 from listening import connected
 from std_msgs.msg import Empty
 
-RATE = 10  # Hz, of its time
-WATCHDOG = 0.25  # s of its time, after which an outside controller counts as gone
+RATE = 10  # Hz, in the node's time
+WATCHDOG = 0.25  # s of the node's time, after which a silent outside controller counts as gone
 CORNERS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
 class SafePilot:
-    """Commands the drone in whose namespace it is."""
+    """Pilot of the drone in whose namespace the node runs."""
 
     def __init__(self, leg):
-        """Advertise and subscribe; a leg of the square takes so long (s of its time)."""
+        """Advertise and subscribe; `leg` is the duration of a leg of the square (s of the node's time)."""
         self._ticks = round(leg * RATE)
         self._reset, self._takeoff, self._land = (
             connected(rospy.Publisher(topic, Empty, queue_size=1)) for topic in ("reset", "takeoff", "land")
         )
         self._twists = connected(rospy.Publisher("cmd_vel", Twist, queue_size=1))
-        self._outside, self._came = Twist(), rospy.Time()
+        self._outside, self._received = Twist(), rospy.Time()
         rospy.Subscriber("cmd_vel_in", Twist, self._take)
 
     def _take(self, message):
-        self._outside, self._came = message, rospy.Time.now()
+        self._outside, self._received = message, rospy.Time.now()
 
-    def _handed_on(self):
-        gone = (rospy.Time.now() - self._came).to_sec() > WATCHDOG
-        return Twist() if gone else self._outside
+    def _outside_command(self):
+        is_silent = (rospy.Time.now() - self._received).to_sec() > WATCHDOG
+        return Twist() if is_silent else self._outside
 
     def fly(self):
         """Fly from the reset to the landing."""
@@ -43,7 +43,7 @@ class SafePilot:
         rospy.sleep(3)
         rate = rospy.Rate(RATE)
         for number in range(5 * self._ticks):
-            twist = self._handed_on()
+            twist = self._outside_command()
             if number < 4 * self._ticks:
                 twist = Twist()
                 twist.linear.x, twist.linear.y = (0.5 * part for part in CORNERS[number // self._ticks])

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The cameras' topics, step by step: the test steps the node itself, so that it knows what each step made."""
+"""The cameras' topics, step by step: the test steps the node itself, so that it knows what each step renders."""
 
 import math
 import sys
@@ -71,9 +71,9 @@ class Cameras(unittest.TestCase):
         self.fail("nothing such in 400 steps")
 
     def step_to_the_next_picture(self, every, odometry, *listeners):
-        """Take so many steps, each when the one before has been heard: ROS drops what comes faster than it is sent.
+        """Run `every` steps, each after the odometry of the previous one: ROS drops messages that are sent too fast.
 
-        `listeners` hear one message in these steps.
+        Return when each of `listeners` has received a message of these steps.
         """
         before = [len(one.messages) for one in listeners]
         for _ in range(every):
@@ -87,7 +87,7 @@ class Cameras(unittest.TestCase):
         self.node.step()
         return list(self.pictures)
 
-    def test_nothing_is_rendered_while_nobody_listens(self):
+    def test_nothing_is_rendered_without_a_subscriber(self):
         self.assertEqual([self.rendered_in_a_step() for _ in range(5)], [[]] * 5)
         image = self.listen("/drone/front", Image)
         self.step_until(lambda: image.messages)
@@ -98,13 +98,13 @@ class Cameras(unittest.TestCase):
         self.step_until(lambda: info.messages)
         self.assertEqual(self.rendered_in_a_step(), [])
 
-    def test_each_camera_has_its_image_its_model_and_odometry_s_stamp(self):
+    def test_each_camera_publishes_image_and_camera_info_with_the_stamp_of_odometry(self):
         odometry = self.listen("/drone/odom", Odometry)
         for name, (topic, info_topic, frame, encoding) in CAMERAS.items():
             with self.subTest(name):
                 image, info = self.listen(topic, Image), self.listen(info_topic, CameraInfo)
                 self.step_until(lambda several=(image, info, odometry): all(one.messages for one in several))
-                before = len(image.messages) + 1  # what is heard of the one is heard of the others, too, from here on
+                before = len(image.messages) + 1  # from here on, all listeners are connected
                 for _ in range(5):
                     self.step_to_the_next_picture(self.parameters.cameras[name].every, odometry, image, info)
                 expected = self.parameters.cameras[name]
@@ -122,12 +122,12 @@ class Cameras(unittest.TestCase):
                 self.assertEqual(len(stamps), 3)
                 wait_until(lambda info=info, stamps=stamps: stamps <= stamps_of(info) & stamps_of(odometry))
 
-    def test_every_third_step(self):
+    def test_every_third_step_renders_a_camera_with_every_3(self):
         image = self.listen("/drone/floor/image", Image)
         self.step_until(lambda: image.messages)
         self.assertEqual(sum(len(self.rendered_in_a_step()) for _ in range(9)), 3)
 
-    def test_the_mask_lies_over_the_picture_of_its_stamp_while_somebody_listens(self):
+    def test_the_overlay_combines_image_and_mask_of_its_stamp_if_subscribed(self):
         topics = ("", "/truth/categories", "/truth/overlay")
         with mock.patch.object(cameras, "draw_mask", wraps=cameras.draw_mask) as draw_mask:
             listeners = [self.listen(f"/drone/floor/image{one}", Image) for one in topics[:2]]
@@ -168,8 +168,8 @@ class Cameras(unittest.TestCase):
         self.assert_like_raw(compressed, raw, "rgb8; jpeg compressed bgr8", tolerance=120)
         client.close()
 
-    def test_a_slow_encoder_holds_up_no_step(self):
-        """It is stopped in the middle of a picture; the steps go on, and of what they made the last is sent."""
+    def test_a_slow_encoder_delays_no_step(self):
+        """The encoder is blocked within an image. The steps go on, and only the last of their images is sent."""
         compressed = self.listen("/drone/front/compressed", CompressedImage)
         self.step_until(lambda: compressed.messages)
         stopped, go_on, encode = threading.Event(), threading.Event(), cv2.imencode
@@ -189,7 +189,7 @@ class Cameras(unittest.TestCase):
         self.assertFalse({rospy.Time(second) for second in (1, 2, 3, 4)} & stamps_of(compressed))
 
     def assert_like_raw(self, compressed, raw, encoding, tolerance):
-        # A picture that is being encoded while the format changes still comes in the old one.
+        # An image that is being encoded while the format changes still has the old format.
         self.step_until(lambda: compressed.messages[-1].format == encoding)
         for listener in (compressed, raw):
             listener.messages.clear()

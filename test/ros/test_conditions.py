@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What changes in flight: wind that blows, a link that is slow, a gain that is tuned, and what is refused."""
+"""Changes in flight: wind, a slow link, tuned gains, and refused values."""
 
 import math
 import sys
@@ -34,7 +34,7 @@ class Conditions(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.over = threading.Event()
+        cls.end_event = threading.Event()
         cls.thread = threading.Thread(target=cls.run_node)
         cls.thread.start()
         cls.odometry, cls.log = Listener("/drone/odom", Odometry), Listener("/rosout", Log)
@@ -45,13 +45,13 @@ class Conditions(unittest.TestCase):
 
     @classmethod
     def tearDownClass(cls):
-        cls.over.set()
+        cls.end_event.set()
         cls.thread.join()
 
     @classmethod
     def run_node(cls):
         cls.node = Node(parameters.load({"sensors": WIND, "cameras": SMALL, "real_time_factor": 5.0}))
-        cls.node.run(cls.over.is_set)
+        cls.node.run(cls.end_event.is_set)
         cls.node.close()
 
     def test_wind(self):
@@ -73,7 +73,7 @@ class Conditions(unittest.TestCase):
         self.log.wait_for(lambda said: "weather refused: gust: unknown key; near names are gusts" in said.msg, after=0)
         self.assertEqual(wind.wait_for().vector.x, 2)
 
-    def test_a_slow_link(self):
+    def test_a_slow_link_delays_images_and_commands(self):
         command = Listener("/drone/command", TwistStamped)
         self.faults.publish("commands/latency", "1.0")
         image, info = Listener("/drone/front", Image), Listener("/drone/camera_info", CameraInfo)
@@ -90,15 +90,15 @@ class Conditions(unittest.TestCase):
         self.assertGreaterEqual((obeyed.header.stamp - sent).to_sec(), 1.0)
 
     def test_tuning(self):
-        """What `dynparam set`, `get` and `dump` do, by the library that they use."""
-        client, told = Client("/drone", timeout=60), Listener("/drone/parameter_updates", Config)
+        """Do what `dynparam set`, `get` and `dump` do, with the library that they use."""
+        client, feed = Client("/drone", timeout=60), Listener("/drone/parameter_updates", Config)
         self.assertEqual(client.get_configuration(timeout=60)["Kzref"], 5.0)
         self.assertEqual(client.update_configuration({"Kzref": 0.0})["Kzref"], 0.0)
         higher = PoseStamped()
         higher.pose.position.z, higher.pose.orientation.w = 1.5, 1.0
         connected(rospy.Publisher("/drone/set_pose", PoseStamped, queue_size=1)).publish(higher)
-        there = self.odometry.wait_for(lambda said: said.pose.pose.position.z > 1.45).header.stamp
-        later = self.odometry.wait_for(lambda said: (said.header.stamp - there).to_sec() > 2)
+        arrival_time = self.odometry.wait_for(lambda said: said.pose.pose.position.z > 1.45).header.stamp
+        later = self.odometry.wait_for(lambda said: (said.header.stamp - arrival_time).to_sec() > 2)
         self.assertAlmostEqual(later.pose.pose.position.z, 1.5, delta=0.1, msg="nothing holds its height")
         info = Listener("/drone/camera_info", CameraInfo)
         changes = {"Kzref": 4.0, "cameras/front/horizontal_fov": 0.5, "thrust_limits/highest": 9.0}
@@ -110,12 +110,12 @@ class Conditions(unittest.TestCase):
             ({"Kzref": math.nan}, "Kzref = nan: input should be a finite number"),
             ({"Kzref": 3.0, "thrust_limits/lowest": 9.5}, "thrust_limits = [9.5, 9.0]: must be [lowest, highest]"),
         ):
-            held = client.update_configuration(wrong)
-            self.assertEqual((held["Kzref"], held["thrust_limits/lowest"]), (4.0, 3.0))
+            result = client.update_configuration(wrong)
+            self.assertEqual((result["Kzref"], result["thrust_limits/lowest"]), (4.0, 3.0))
             line = self.log.wait_for(lambda line, said=said: said in line.msg, after=0).msg
             self.assertTrue(line.startswith("/drone refused"), line)
         self.faults.publish("propellers", "[1, 0.99, 1, 1]")
-        told.wait_for(lambda m: any(one.name.endswith("back_left") and one.value == 0.99 for one in m.doubles), after=0)
+        feed.wait_for(lambda m: any(one.name.endswith("back_left") and one.value == 0.99 for one in m.doubles), after=0)
         with tempfile.TemporaryDirectory() as folder:
             sensors, dump = Path(folder) / "sensors.yaml", Path(folder) / "dump.yaml"
             sensors.write_text(yaml.dump({"sensors": WIND}), encoding="utf-8")
@@ -125,12 +125,12 @@ class Conditions(unittest.TestCase):
         self.assertEqual(dumped.cameras["front"].horizontal_fov, 0.5)
         client.close()
 
-    def test_a_fault_that_there_is_not(self):
+    def test_a_fault_of_an_unknown_sensor_is_refused(self):
         self.faults.publish("sensors/frnt", "ok")
         said = "faults refused: faults/sensors/frnt: no such sensor or camera; near names are front"
         self.log.wait_for(lambda line: line.msg == said, after=0)
 
-    def test_what_is_refused_says_why(self):
+    def test_values_out_of_range_are_refused_with_a_reason(self):
         for key, value, said in (
             ("propellers", "[1, 2]", "propellers/1 = 2: input should be less than or equal to 1"),
             ("images/loss", "{", "value '{'"),

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Three drones behind their topics: each obeys its own, one tree of frames, and they come and go in flight."""
+"""Topics of three drones: separate commands, one tree of frames, and vehicles added and removed in flight."""
 
 import contextlib
 import os
@@ -45,7 +45,7 @@ class Fleet(unittest.TestCase):
     def place(self, name):
         return self.odometry[name].wait_for().pose.pose.position
 
-    def test_each_obeys_its_own_commands(self):
+    def test_each_vehicle_obeys_its_own_commands(self):
         before = {name: self.place(name) for name in THREE}
         self.commands["drone2"].publish(forward(0.5))
         reached = self.odometry["drone2"].wait_for(lambda o: o.pose.pose.position.x > before["drone2"].x + 1)
@@ -79,26 +79,26 @@ class Fleet(unittest.TestCase):
             (frame,) = parents[frame]
         return frame
 
-    def test_rviz_gets_every_body_on_its_own_frame(self):
+    def test_rviz_markers_of_each_body_are_in_its_own_frame(self):
         bodies = Listener("/drone_sim/view/bodies", MarkerArray)
         shown = bodies.wait_for(after=0)
         for name in THREE:
             self.assertIn(f"{name}/base_link", {one.header.frame_id for one in shown.markers if one.ns == name})
         bodies.close()
 
-    def polls(self):
-        """Return how many descriptors of the simulator watch others: rospy has one for each topic."""
+    def epoll_count(self):
+        """Return the number of epoll descriptors of the simulator: rospy has one for each topic."""
         node = rosgraph.Master(rospy.get_name()).lookupNode("/drone_sim")
         folder = Path(f"/proc/{ServerProxy(node).getPid(rospy.get_name())[2]}/fd")
-        found = 0
+        count = 0
         for one in folder.iterdir():
-            with contextlib.suppress(FileNotFoundError):  # closed meanwhile
-                found += "eventpoll" in os.readlink(one)
-        return found
+            with contextlib.suppress(FileNotFoundError):  # closed in the meantime
+                count += "eventpoll" in os.readlink(one)
+        return count
 
-    def test_they_come_and_go_in_flight(self):
-        polls = self.polls()
-        # rosparam leaves out empty entries, and lays the others over what is there.
+    def test_vehicles_are_added_and_removed_in_flight(self):
+        epoll_count = self.epoll_count()
+        # rosparam drops empty entries, and merges the others into the existing parameters.
         rosparam.set_param_raw("/drone_sim/vehicles", {**{name: {} for name in THREE}, **GUEST})
         answer = self.set_vehicles()
         self.assertTrue(answer.success, answer.message)
@@ -111,11 +111,11 @@ class Fleet(unittest.TestCase):
         connected(rospy.Publisher("/drone4/cmd_vel", Twist, queue_size=1)).unregister()
         rospy.delete_param("/drone_sim/vehicles/drone4")
         self.assertEqual(self.set_vehicles().message, "drone4 removed")
-        self.assertLess(self.polls() - polls, 8, "a vehicle has some 37")
+        self.assertLess(self.epoll_count() - epoll_count, 8, "a vehicle has some 37")
         self.assertEqual([name for name, _ in rospy.get_published_topics("/drone4")], [])
         self.assertIn("position", self.set_vehicles({"drone1": {"position": [0]}}).message)
         for name in THREE:
-            self.odometry[name].wait_for()  # they fly on
+            self.odometry[name].wait_for()  # the others still fly
         self.assertEqual(self.set_vehicles(3).message, "no vehicle was added or removed")
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The drone behind its topics: flown, moved, refused, looked through. Times are stamps."""
+"""The drone's topics: commands, poses, refused messages and camera images. Times are message stamps."""
 
 import math
 import sys
@@ -29,7 +29,7 @@ def twist(vx=0.0, vy=0.0, vz=0.0, wz=0.0):
     return message
 
 
-def at(x, y, z, yaw=0.0):
+def pose_at(x, y, z, yaw=0.0):
     pose = Pose()
     pose.position.x, pose.position.y, pose.position.z = x, y, z
     pose.orientation.z, pose.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
@@ -42,7 +42,7 @@ def speed(odometry):
 
 
 class Flight(unittest.TestCase):
-    """One running simulation, several flights."""
+    """Several flights in one running simulation."""
 
     @classmethod
     def setUpClass(cls):
@@ -53,10 +53,10 @@ class Flight(unittest.TestCase):
 
     def setUp(self):
         self.commands.publish(twist())
-        self.move(at(0, 0, 0.8))
+        self.move(pose_at(0, 0, 0.8))
 
     def test_the_drones_own_topics_are_reserved(self):
-        """A camera's topic may be none of them."""
+        """No camera may use them."""
         publishers, subscribers, _ = rosgraph.Master("/test_flight").getSystemState()
         named = {topic[len("/drone/") :] for topic, _ in publishers + subscribers if topic.startswith("/drone/")}
         cameras = parameters.load().cameras.values()
@@ -78,7 +78,7 @@ class Flight(unittest.TestCase):
         self.odometry.wait_for(lambda o: abs(o.pose.pose.position.x - place.x) < 0.02 and speed(o) < 1.0)
 
     def wait(self, seconds):
-        """Return the odometry that many simulated seconds from now."""
+        """Return the odometry `seconds` of simulated time from now."""
         start = self.odometry.wait_for().header.stamp
         return self.odometry.wait_for(lambda o: (o.header.stamp - start).to_sec() >= seconds - 0.01)
 
@@ -102,16 +102,16 @@ class Flight(unittest.TestCase):
             self.assertAlmostEqual(component(self.fly(command, 5.0)), expected, delta=0.02 * expected + 0.01)
             self.assertLess(speed(self.fly(twist(), 6.5)), 0.05)
 
-    def test_one_command_holds(self):
+    def test_one_command_stays_in_force(self):
         """As demo_teleop's key_teleop sends it: one message per key press, then silence."""
         self.commands.publish(twist(vz=0.1))
         early = self.wait(4.0).pose.pose.position.z
         self.assertAlmostEqual(self.wait(5.0).pose.pose.position.z - early, 0.5, delta=0.05)
 
-    def test_a_mad_twist_is_refused_and_the_last_good_one_kept(self):
+    def test_an_invalid_twist_is_refused_and_the_previous_twist_stays(self):
         self.fly(twist(vz=0.3), 2.0)
-        for mad in (math.nan, math.inf, 1e6):
-            self.commands.publish(twist(vz=mad))
+        for invalid in (math.nan, math.inf, 1e6):
+            self.commands.publish(twist(vz=invalid))
         moving = self.wait(1.0)
         self.assertAlmostEqual(moving.twist.twist.linear.z, 0.3, delta=0.05)
         self.log.wait_for(lambda m: "cmd_vel refused" in m.msg, after=0)
@@ -119,9 +119,9 @@ class Flight(unittest.TestCase):
         self.assertEqual(len(warned), 1, warned)
         self.assertRegex(warned[0], r"linear.z = (nan|inf|1000000.0): must lie within \+-20.0 m/s")
 
-    def test_a_mad_pose_is_refused(self):
+    def test_an_invalid_pose_is_refused(self):
         before = self.wait(0.5).pose.pose.position
-        for pose in (at(math.nan, 0, 1), at(0, 0, -5), Pose()):
+        for pose in (pose_at(math.nan, 0, 1), pose_at(0, 0, -5), Pose()):
             self.poses.publish(PoseStamped(pose=pose))
         after = self.wait(0.5).pose.pose.position
         self.assertAlmostEqual(after.z, before.z, delta=0.02)
@@ -130,7 +130,7 @@ class Flight(unittest.TestCase):
     def test_2d_pose_estimate_keeps_the_height(self):
         estimates = connected(rospy.Publisher("/drone/initialpose", PoseWithCovarianceStamped, queue_size=1))
         message = PoseWithCovarianceStamped()
-        message.header.frame_id, message.pose.pose = "world", at(1.0, -1.0, 0.0, yaw=1.0)
+        message.header.frame_id, message.pose.pose = "world", pose_at(1.0, -1.0, 0.0, yaw=1.0)
         estimates.publish(message)
         moved = self.odometry.wait_for(lambda o: abs(o.pose.pose.position.y + 1.0) < 0.01)
         self.assertAlmostEqual(moved.pose.pose.position.z, 0.8, delta=0.05)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""docs/fleet.md: two drones follow a third, wherever it is flown."""
+"""The example of docs/fleet.md: two drones follow a third one in formation."""
 
 import math
 import subprocess
@@ -17,8 +17,8 @@ FOLLOW = Path(__file__).resolve().parents[2] / "docs" / "fleet" / "follow.py"
 WINGS = {"drone2": (-1.0, 1.0), "drone3": (-1.0, -1.0)}
 
 
-def off(follower, leader, wing):
-    """Return how far (m) a follower is from its wing, and how fast (m/s) it and the leader move, in one sum."""
+def formation_error(follower, leader, wing):
+    """Return the follower's distance from its wing position (m) plus the speeds of follower and leader (m/s)."""
     (ahead, left), pose = wing, leader.pose.pose
     yaw = 2 * math.atan2(pose.orientation.z, pose.orientation.w)
     x = pose.position.x + ahead * math.cos(yaw) - left * math.sin(yaw)
@@ -41,11 +41,11 @@ class Formation(unittest.TestCase):
             commands.publish(Twist())
             for name, wing in WINGS.items():
                 odometry[name].wait_for(
-                    lambda o, wing=wing: off(o, odometry["drone1"].messages[-1], wing) < 0.05, timeout=90
+                    lambda o, wing=wing: formation_error(o, odometry["drone1"].messages[-1], wing) < 0.05, timeout=90
                 )
         finally:
-            # Not SIGTERM: rospy's own handler closes topics, and waits for ever where it interrupts `publish` (see
-            # ros/core/shutdown.py). How a user's script ends is not what this test is about.
+            # Not SIGTERM: rospy's own handler closes topics, and waits for ever if it interrupts `publish` (see
+            # ros/core/shutdown.py). How a user's script ends is not tested here.
             node.kill()
             node.wait(90)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""docs/interface.md says what the node has; /diagnostics says why a drone does not fly; the doctor repeats it."""
+"""docs/interface.md lists the node's interface; /diagnostics and the doctor report why a drone does not fly."""
 
 import fnmatch
 import itertools
@@ -42,27 +42,27 @@ def sysCall_init():
 STILL = {"contacts", "markers/update", "objects/update"}  # nothing is touched or dragged
 SUB_STEP = 5_000_000  # ns
 BROKEN = "def sysCall_actuation():\n    1 / 0\n"
-OF_ROSPY = {"/clock"}  # what this process hears since it is a node that goes by the clock
+ROSPY_TOPICS = {"/clock"}  # this process subscribes to it, since it uses simulated time
 
 
 def table(title):
-    """Return the rows of the first table with at least two columns of a section, without its head."""
+    """Return the rows of the tables in section `title` that begin with a code span."""
     section = re.search(rf"^## {title}\n(.*?)(?=^## |\Z)", PAGE, re.S | re.M).group(1)
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in section.splitlines() if line[:3] == "| `"]
     return [[row[0].strip("`"), *row[1:]] for row in rows]
 
 
-def resolved(name, namespace="/drone"):
+def expand(name, namespace="/drone"):
     return name if name.startswith("/") else f"{namespace}/{name}"
 
 
 class Interface(unittest.TestCase):
-    """A node in this process with every sensor; the tests follow one another by name."""
+    """A node in this process with every sensor; the tests run in the order of their names."""
 
     @classmethod
     def setUpClass(cls):
         diagnostics.PERIOD = 0.1
-        cls.looks, cls.ready = 0, threading.Event()
+        cls.look_count, cls.ready = 0, threading.Event()
         cls.folder = tempfile.TemporaryDirectory()
         cls.script = Path(cls.folder.name) / "script.py"
         cls.script.write_text((package_path() / "src/drone_sim/child_scripts/tutorial.py").read_text() + DRAWS)
@@ -73,7 +73,7 @@ class Interface(unittest.TestCase):
         published, subscribed, _ = master.getSystemState()[2]
         own = rospy.get_name()
         cls.published = {topic for topic, nodes in published if own in nodes}
-        cls.subscribed = {topic for topic, nodes in subscribed if own in nodes} - OF_ROSPY
+        cls.subscribed = {topic for topic, nodes in subscribed if own in nodes} - ROSPY_TOPICS
         cls.types = dict(master.getTopicTypes()[2])
         cls.services = {name: rosservice.get_service_type(name) for name in rosservice.get_service_list(node=own)}
 
@@ -85,7 +85,7 @@ class Interface(unittest.TestCase):
 
     @classmethod
     def run_node(cls):
-        """Make and run it in one thread, which OpenGL belongs to."""
+        """Create and run the node in one thread, since an OpenGL context belongs to a thread."""
         settings = {
             "config": str(package_path() / "config/sensors.yaml"),
             **{"cameras": SMALL, "real_time_factor": 4.0, "script": str(cls.script)},
@@ -95,7 +95,7 @@ class Interface(unittest.TestCase):
         look = cls.node._diagnostics._look
 
         def counted():
-            cls.looks += 1
+            cls.look_count += 1
             return look()
 
         cls.node._diagnostics._look = counted
@@ -109,19 +109,19 @@ class Interface(unittest.TestCase):
     # ---- docs/interface.md
 
     def test_1_topics_and_services_are_those_of_the_page(self):
-        said = {(resolved(row[0]).replace("/drone_sim", rospy.get_name()), row[1], row[2]) for row in table("Topics")}
-        true = {(topic, "→", self.types[topic]) for topic in self.published}
-        true |= {(topic, "←", self.types[topic]) for topic in self.subscribed}
-        self.assertEqual(said, true)
-        services = {resolved(name, rospy.get_name()): kind for name, kind, _ in table("Services")}
+        expected = {(expand(row[0]).replace("/drone_sim", rospy.get_name()), row[1], row[2]) for row in table("Topics")}
+        actual = {(topic, "→", self.types[topic]) for topic in self.published}
+        actual |= {(topic, "←", self.types[topic]) for topic in self.subscribed}
+        self.assertEqual(expected, actual)
+        services = {expand(name, rospy.get_name()): kind for name, kind, _ in table("Services")}
         self.assertEqual(services, self.services)
 
     def test_2_parameters_are_those_of_the_page(self):
-        said = {row[0] for row in table("Parameters") if row[0].startswith("/")}
-        self.assertEqual(said, {name for name in rospy.get_param_names() if name.startswith("/drone/")})
-        self.assertEqual(self.looks, 0, "nobody has listened to /diagnostics")
+        expected = {row[0] for row in table("Parameters") if row[0].startswith("/")}
+        self.assertEqual(expected, {name for name in rospy.get_param_names() if name.startswith("/drone/")})
+        self.assertEqual(self.look_count, 0, "nobody has listened to /diagnostics")
 
-    def test_3_a_look_before_any_command_says_that_none_has_come(self):
+    def test_3_diagnostics_before_any_command_report_that_none_was_received(self):
         listener = Listener("/diagnostics", DiagnosticArray)
         listener.wait_for(lambda m: any("no command has been received" in one.message for one in m.status), after=0)
         listener.close()
@@ -129,7 +129,7 @@ class Interface(unittest.TestCase):
     def test_3_rates_and_frames_are_those_of_the_page(self):
         rows = [row for row in table("Topics") if row[1] == "→" and row[0] not in ("/rosout", "/clock")]
         listeners = {
-            row[0]: Listener(resolved(row[0]), roslib.message.get_message_class(row[2]))
+            row[0]: Listener(expand(row[0]), roslib.message.get_message_class(row[2]))
             for row in rows
             if not row[0].startswith("/")
         }
@@ -149,23 +149,23 @@ class Interface(unittest.TestCase):
             for frame, parent, topic, _ in table("Frames"):
                 wanted = (frame, parent.strip("`"))
                 trees[topic.strip("`")].wait_for(lambda m, one=wanted: one in links(m), after=0)
-            true = {one for listener in trees.values() for message in listener.messages for one in links(message)}
-            self.assertEqual({(frame, parent.strip("`")) for frame, parent, *_ in table("Frames")}, true)
+            actual = {one for listener in trees.values() for message in listener.messages for one in links(message)}
+            self.assertEqual({(frame, parent.strip("`")) for frame, parent, *_ in table("Frames")}, actual)
         finally:
             commands.publish(Twist())
             commands.unregister()
             for listener in (*listeners.values(), *trees.values()):
                 listener.close()
 
-    def check_frames(self, listener, said, still):
-        """Check that there are just the frames that are said, of which some may stand for many; or none, if `still`."""
-        for name in () if still else said:
+    def check_frames(self, listener, expected, still):
+        """Check that each pattern in `expected` has a frame (unless `still`), and each frame a pattern."""
+        for name in () if still else expected:
             listener.wait_for(lambda m, one=name: fnmatch.filter(frames([m]), one), after=0)
-        true = frames(listener.messages)
-        self.assertEqual({one for one in true if not any(fnmatch.fnmatch(one, name) for name in said)}, set())
+        actual = frames(listener.messages)
+        self.assertEqual({one for one in actual if not any(fnmatch.fnmatch(one, name) for name in expected)}, set())
 
     def check_rate(self, listener, rate):
-        """Check what comes at a rate that counts in simulated time."""
+        """Check the stamps of a topic whose rate is given in simulated time."""
         seconds = {"step": 0.05}.get(rate) or (1 / float(rate.split()[0]) if rate.endswith("Hz") else None)
         if seconds is None:
             return
@@ -174,67 +174,67 @@ class Interface(unittest.TestCase):
         self.assertLessEqual({header.stamp.to_nsec() % SUB_STEP for header in headers}, {0})
         times = [header.stamp.to_sec() for header in headers]
         for before, after in itertools.pairwise(times):
-            # A busy machine may drop a message; it cannot bring one between two.
+            # A busy machine may drop a message, but it cannot add one in between.
             self.assertAlmostEqual((after - before) / seconds, max(1, round((after - before) / seconds)), delta=0.01)
 
     # ---- /diagnostics
 
-    def test_4_a_look_answers_the_complaints(self):
+    def test_4_diagnostics_explain_ignored_and_refused_commands(self):
         listener = Listener("/diagnostics", DiagnosticArray)
         own = rospy.get_name()
 
-        def told(what, level, words, command=""):
-            """Wait for a message; the level None is any: a busy machine is slow."""
+        def find_status(what, level, words, command=""):
+            """Wait for a status, and return its values. Level None matches any: a busy machine is slow."""
             name = f"{own[1:]}: {what}"
 
             def fits(status):
                 heard = {pair.key: pair.value for pair in status.values}.get("command", "")
-                said = level in (None, status.level) and words in status.message
-                return status.name == name and said and heard.startswith(command)
+                expected = level in (None, status.level) and words in status.message
+                return status.name == name and expected and heard.startswith(command)
 
             array = listener.wait_for(lambda m: any(map(fits, m.status)))
             status = next(filter(fits, array.status))
             return {pair.key: pair.value for pair in status.values}
 
-        self.assertEqual(told("simulation", None, "")["state"], "flying")
+        self.assertEqual(find_status("simulation", None, "")["state"], "flying")
         commands = connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1))
         command = Twist()
         command.linear.x = 0.5
         commands.publish(command)
-        values = told("vehicle drone", DiagnosticStatus.OK, f"as {own} commands", "0.50")  # not another test's
+        values = find_status("vehicle drone", DiagnosticStatus.OK, f"as {own} commands", "0.50")  # not another test's
         self.assertEqual(values["command"], "0.50 0.00 0.00 m/s, 0.00 0.00 0.00 rad/s")
         self.assertEqual(values["connected commanders"], own)
         command.linear.x = 50.0
         commands.publish(command)
-        values = told("vehicle drone", DiagnosticStatus.WARN, f"refused a message of {own} on cmd_vel")
+        values = find_status("vehicle drone", DiagnosticStatus.WARN, f"refused a message of {own} on cmd_vel")
         self.assertIn("linear.x = 50.0: must lie within", values["why refused"])
         command.linear.x = 0.5
         self.call("pause", True)
         commands.publish(command)
-        told("vehicle drone", DiagnosticStatus.WARN, "but the simulation is paused")
-        told("simulation", DiagnosticStatus.WARN, "/clock stands still")
+        find_status("vehicle drone", DiagnosticStatus.WARN, "but the simulation is paused")
+        find_status("simulation", DiagnosticStatus.WARN, "/clock stands still")
         upside_down = PoseStamped()
         upside_down.pose.position.z, upside_down.pose.orientation.x = 2.0, 1.0
         poses = connected(rospy.Publisher("/drone/set_pose", PoseStamped, queue_size=1))
         poses.publish(upside_down)
-        told("vehicle drone", DiagnosticStatus.WARN, "leans (180 degrees)")
+        find_status("vehicle drone", DiagnosticStatus.WARN, "leans (180 degrees)")
         self.call("restart")
         commands.publish(command)
-        told("vehicle drone", DiagnosticStatus.OK, f"as {own} commands")
+        find_status("vehicle drone", DiagnosticStatus.OK, f"as {own} commands")
         commands.unregister()
-        told("vehicle drone", DiagnosticStatus.WARN, f"still obeys the last command of {own}")
+        find_status("vehicle drone", DiagnosticStatus.WARN, f"still obeys the last command of {own}")
         camera = Listener("/drone/front", roslib.message.get_message_class("sensor_msgs/Image"))
         camera.wait_for()
-        values = told("cameras", None, "")
+        values = find_status("cameras", None, "")
         self.assertEqual(values["looked at"], "1 of 4 cameras")
         self.assertNotIn("none yet", values["renderer"])
         camera.close()
         self.script.write_text(BROKEN)
         self.call("restart")
-        told("vehicle drone", DiagnosticStatus.ERROR, f"stopped: script error: [actuation] {self.script}:2")
+        find_status("vehicle drone", DiagnosticStatus.ERROR, f"stopped: script error: [actuation] {self.script}:2")
         listener.close()
 
-    def test_6_a_simulation_that_does_not_answer_is_told(self):
+    def test_6_a_simulation_that_does_not_answer_is_reported(self):
         go_on = threading.Event()
         diagnostics.PATIENCE = 0.1
         listener = Listener("/diagnostics", DiagnosticArray)
@@ -249,7 +249,7 @@ class Interface(unittest.TestCase):
 
     # ---- the doctor
 
-    def test_5_the_doctor_repeats_what_the_node_says(self):
+    def test_5_the_doctor_reports_the_errors_of_the_node(self):
         self.script.write_text(BROKEN)
         self.call("restart")
         Listener("~state", String).wait_for(lambda m: m.data == "stopped", after=0)
@@ -266,19 +266,19 @@ class Interface(unittest.TestCase):
 
 
 def links(message):
-    """Return frames and parents of a message, as if the node had its usual name."""
+    """Return (frame, parent) of each transform, with the node's own name replaced by its usual name."""
     own = rospy.get_name()[1:]
     return {(one.child_frame_id.replace(own, "drone_sim"), one.header.frame_id) for one in message.transforms}
 
 
 def frames(messages):
-    """Return the frames of messages, and of what they hold, unless it is to be taken away."""
-    found = set()
+    """Return the frame_ids of messages and of their markers and poses, without deleted markers."""
+    frame_ids = set()
     for message in list(messages):
         held = [*getattr(message, "markers", ()), *getattr(message, "poses", ())]
         shown = [one for one in held if getattr(one, "action", Marker.ADD) == Marker.ADD]
-        found |= {one.header.frame_id for one in (message, *shown) if hasattr(one, "header")}
-    return found - {""}
+        frame_ids |= {one.header.frame_id for one in (message, *shown) if hasattr(one, "header")}
+    return frame_ids - {""}
 
 
 if __name__ == "__main__":

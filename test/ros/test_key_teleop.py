@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""key_teleop in a terminal of its own: keys too early, sequences in pieces, the read-out, and how it leaves."""
+"""key_teleop in a pseudo-terminal: keys during the start, split escape sequences, the display, and the exit."""
 
 import fcntl
 import os
@@ -28,10 +28,10 @@ UP, LEFT = b"\x1b[A", b"\x1bOD"
 
 
 class Terminal:
-    """A key_teleop whose terminal this is; a thread keeps the screen as a person sees it."""
+    """A key_teleop process in a pseudo-terminal; a thread feeds its output to an emulated screen."""
 
     def __init__(self):
-        self._own, other = pty.openpty()
+        self._terminal, other = pty.openpty()
         self._screen = pyte.Screen(100, 24)
         self._stream = pyte.ByteStream(self._screen)
         environment = {**os.environ, "TERM": "xterm"}
@@ -40,7 +40,7 @@ class Terminal:
             command, env=environment, stdin=other, stdout=other, stderr=other, start_new_session=True
         )
         os.close(other)
-        self._came = threading.Condition()
+        self._arrival = threading.Condition()
         self._closed = False
         self.resize(24, 100)
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -48,57 +48,57 @@ class Terminal:
 
     def _read(self):
         while not self._closed:
-            if not select.select([self._own], [], [], 0.05)[0]:
+            if not select.select([self._terminal], [], [], 0.05)[0]:
                 continue
             try:
-                data = os.read(self._own, 4096)
-            except OSError:  # nobody is left at the other end
+                data = os.read(self._terminal, 4096)
+            except OSError:  # the other end is closed
                 return
-            with self._came:
+            with self._arrival:
                 self._stream.feed(data)
-                self._came.notify_all()
+                self._arrival.notify_all()
 
     def type(self, keys):
-        os.write(self._own, keys)
+        os.write(self._terminal, keys)
 
     def pause(self):
-        """Wait for what is shown next, but only for a moment."""
-        with self._came:
-            self._came.wait(0.03)
+        """Wait for the next output, at most 30 ms."""
+        with self._arrival:
+            self._arrival.wait(0.03)
 
     def resize(self, rows, columns):
-        with self._came:
+        with self._arrival:
             self._screen.resize(rows, columns)
-        fcntl.ioctl(self._own, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+        fcntl.ioctl(self._terminal, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
 
     @property
     def shown(self):
-        with self._came:
+        with self._arrival:
             return "\n".join(line.rstrip() for line in self._screen.display if line.strip())
 
     def wait_for(self, *texts):
-        with self._came:
-            there = self._came.wait_for(lambda: all(text in self.shown for text in texts), PATIENCE)
-        assert there, f"{texts} is not shown, but {self.shown}"
+        with self._arrival:
+            is_shown = self._arrival.wait_for(lambda: all(text in self.shown for text in texts), PATIENCE)
+        assert is_shown, f"{texts} is not on the screen: {self.shown}"
 
     def close(self):
         self._closed = True
         self._reader.join()
-        os.close(self._own)
+        os.close(self._terminal)
 
-    def left(self):
-        """Wait for its end, and return the exit status and all that it has shown."""
+    def wait_for_exit(self):
+        """Wait until the process ends; return its exit status and the text of the screen."""
         status = self.process.wait(PATIENCE)
         self._reader.join(PATIENCE)
         return status, self.shown
 
 
 class KeyTeleop(unittest.TestCase):
-    """A person at the keys of the simulator that runs beside."""
+    """Keys typed into key_teleop, which commands the simulator of the launch file."""
 
     @classmethod
     def setUpClass(cls):
-        # Not of cmd_vel: key_teleop says "ready" once its commands have a subscriber, which is to be the simulator.
+        # Not cmd_vel: key_teleop shows "ready" once cmd_vel has a subscriber, which must be the simulator.
         cls.in_force = Listener("/drone/command", TwistStamped)
         cls.states = Listener("/drone_sim/state", String)
         rospy.wait_for_service("/drone_sim/restart", PATIENCE)
@@ -114,23 +114,23 @@ class KeyTeleop(unittest.TestCase):
         self.terminal.wait_for("ready", "state    flying", "command  vx +0.00", "height 0.")
 
     def wait_for_command(self, vx, vy=0.0):
-        """Wait until a command is in force; and shown, where the terminal is open: the next key changes it then."""
+        """Wait until a command is in force, and on the screen while key_teleop runs: the next key changes that."""
         self.in_force.wait_for(lambda m: (m.twist.linear.x, m.twist.linear.y) == (vx, vy), after=-1)
         if self.terminal.process.poll() is None:
             self.terminal.wait_for(f"command  vx {vx:+.2f}  vy {vy:+.2f}")
 
-    def assert_it_says_stop(self):
-        status, shown = self.terminal.left()
+    def assert_stop_is_sent_on_exit(self):
+        status, shown = self.terminal.wait_for_exit()
         self.assertEqual(status, 0, shown)
         self.assertIn("key_teleop: stop sent on /drone/cmd_vel", shown)
         self.assertNotIn("Traceback", shown)
         self.wait_for_command(0.0)
 
-    def test_keys_while_it_starts_do_not_end_it(self):
+    def test_keys_while_key_teleop_starts_do_not_end_it(self):
         typed, before = 0, len(self.in_force.messages)
 
         def counted():
-            """Return how many of the keys, which all mean forward or left, are in the commands."""
+            """Return the number of keys, all of them forward or left, in the commands so far."""
             heard = [message.twist.linear for message in self.in_force.messages[before:]]
             return max((round(10 * (one.x + one.y)) for one in heard), default=0)
 
@@ -141,10 +141,10 @@ class KeyTeleop(unittest.TestCase):
             self.assertIsNone(self.terminal.process.poll(), self.terminal.shown)
             typed += 2
         self.terminal.type(b"\x1b")
-        self.assert_it_says_stop()
+        self.assert_stop_is_sent_on_exit()
         self.assertLess(counted(), typed, "what was typed before it read keys is forgotten")
 
-    def test_keys_command_and_escape_leaves(self):
+    def test_keys_command_the_drone_and_escape_quits(self):
         self.ready()
         self.terminal.type(UP)
         self.wait_for_command(0.1)
@@ -158,7 +158,7 @@ class KeyTeleop(unittest.TestCase):
         self.terminal.wait_for("no such key: the drone is stopped")
         self.wait_for_command(0.0)
         self.terminal.type(b"\x1b")
-        self.assert_it_says_stop()
+        self.assert_stop_is_sent_on_exit()
 
     def test_keys_start_from_the_command_in_force(self):
         self.ready()
@@ -183,9 +183,9 @@ class KeyTeleop(unittest.TestCase):
         self.terminal.type(UP)
         self.wait_for_command(0.1)
         self.terminal.process.send_signal(signal.SIGTERM)
-        self.assert_it_says_stop()
+        self.assert_stop_is_sent_on_exit()
 
-    def test_a_terminal_of_any_size_and_its_end(self):
+    def test_any_terminal_size_works_and_a_closed_terminal_stops_the_drone(self):
         self.ready()
         self.terminal.type(UP)
         self.wait_for_command(0.1)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Steps that wait for nodes: the same flight every time, whatever becomes of the nodes."""
+"""Lockstep with nodes: every flight is identical, even if a node stops, dies or answers twice."""
 
 import contextlib
 import importlib.util
@@ -27,7 +27,7 @@ from drone_sim.ros.grading.grade_live import grade
 from drone_sim.ros.grading.simulator import GradedSimulator, Mismatch
 
 NODES = package_path() / "docs/lockstep"
-OTHER = Path(__file__).with_name("lockstep_node.py")
+CONTROLLER = Path(__file__).with_name("lockstep_node.py")
 SMALL = "cameras: {front: {width: 64, height: 48, every: 4}}\n"
 SCENE = "package://drone_sim/config/scenes/gates.yaml"
 PLAN = """
@@ -59,9 +59,9 @@ def sysCall_init():
 def sysCall_sensing():
     simROS.publish(publisher, {"data": simROS.getTime()})
 """
-FIRST = 5 * 10**7  # ns, the first stamp
+FIRST_STAMP = 5 * 10**7  # ns, the first stamp
 SECONDS = 4.0  # s of simulated time
-FREE = "_real_time_factor:=0"
+UNPACED = "_real_time_factor:=0"
 COMMANDS, STAMPED = "_lockstep/wait_for:=cmd_vel", "_lockstep/wait_for:=cmd_vel_stamped"
 
 
@@ -72,31 +72,31 @@ def state(message):
 
 
 class Flight:
-    """The odometry of one vehicle, as it comes."""
+    """Recorder of the odometry of one vehicle."""
 
     def __init__(self, drone="drone"):
-        self.rows, self._is_stopped, self._came = [], False, threading.Condition()
+        self.rows, self._is_stopped, self._event = [], False, threading.Condition()
         self._subscriber = rospy.Subscriber(f"/{drone}/odom", Odometry, self._take)
 
     def _take(self, message):
-        with self._came:
+        with self._event:
             stamp = message.header.stamp.to_nsec()
             self._is_stopped = stamp == 0
-            if stamp > FIRST:
+            if stamp > FIRST_STAMP:
                 self.rows.append(state(message))
-            self._came.notify_all()
+            self._event.notify_all()
 
-    def until(self, seconds, timeout=HANGS):
-        """Return the rows until a time (s), once they have come."""
-        with self._came:
+    def rows_until(self, seconds, timeout=HANGS):
+        """Wait for the rows up to a time (s), and return them."""
+        with self._event:
             last = round(seconds * 1e9)
-            assert self._came.wait_for(lambda: self.rows and self.rows[-1][0] >= last, timeout), self.rows[-1:]
+            assert self._event.wait_for(lambda: self.rows and self.rows[-1][0] >= last, timeout), self.rows[-1:]
             return [row for row in self.rows if row[0] <= last]
 
-    def forget(self):
-        """Wait until the flight has been stopped, and forget it."""
-        with self._came:
-            assert self._came.wait_for(lambda: self._is_stopped, HANGS), self.rows[-1:]
+    def discard(self):
+        """Wait until the flight is stopped, then discard its rows."""
+        with self._event:
+            assert self._event.wait_for(lambda: self._is_stopped, HANGS), self.rows[-1:]
             self.rows.clear()
 
     def close(self):
@@ -104,25 +104,25 @@ class Flight:
 
 
 class Simulator:
-    """A simulator as a process, with its lines of output."""
+    """A simulator process and its lines of output."""
 
     def __init__(self, *arguments):
-        program = package_path() / "scripts/simulator"  # rosrun would look for it for seconds on a busy machine
-        command = [sys.executable, program, FREE, f"_scene_file:={SCENE}", *arguments]
+        program = package_path() / "scripts/simulator"  # rosrun needs seconds to find it on a busy machine
+        command = [sys.executable, program, UNPACED, f"_scene_file:={SCENE}", *arguments]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
         self.process = subprocess.Popen(command, start_new_session=True, **pipes)
-        self.lines, self._came = [], threading.Condition()
+        self.lines, self._event = [], threading.Condition()
         threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self):
         for line in self.process.stdout:
-            with self._came:
+            with self._event:
                 self.lines.append(line)
-                self._came.notify_all()
+                self._event.notify_all()
 
     def wait_for(self, text, timeout=HANGS):
-        with self._came:
-            assert self._came.wait_for(lambda: any(text in line for line in self.lines), timeout), "".join(self.lines)
+        with self._event:
+            assert self._event.wait_for(lambda: any(text in line for line in self.lines), timeout), "".join(self.lines)
 
     def close(self):
         if self.process.poll() is None:
@@ -134,12 +134,12 @@ class Simulator:
 
 
 def start_twice(simulator, *arguments, start=GradedSimulator.start):
-    """Start as GradedSimulator does; then another client restarts, before the first step is answered."""
+    """Start like GradedSimulator; another client then restarts, before the first step is answered."""
     start(simulator, *arguments)
     assert simulator.call("restart")[0]
 
 
-def started(*command):
+def spawn(*command):
     return subprocess.Popen([sys.executable, *map(str, command)])
 
 
@@ -163,10 +163,10 @@ class Lockstep(unittest.TestCase):
 
     @contextlib.contextmanager
     def flying(self, *arguments, nodes=(), drone="drone"):
-        """Yield simulator, flight and nodes."""
+        """Yield the simulator, the recorder of its flight, and the processes of the nodes."""
         flight, simulator, processes = Flight(drone), Simulator(f"_config:={self.config}", *arguments), []
         try:
-            processes += [started(*node) for node in nodes]
+            processes += [spawn(*node) for node in nodes]
             yield simulator, flight, processes
         except AssertionError as error:
             raise AssertionError(f"{error}\n{''.join(simulator.lines)}") from error
@@ -175,19 +175,19 @@ class Lockstep(unittest.TestCase):
             end(*processes, number=signal.SIGKILL)
             simulator.close()
 
-    def flown(self, *arguments, nodes, drone="drone"):
+    def flown_rows(self, *arguments, nodes, drone="drone"):
         with self.flying(*arguments, nodes=nodes, drone=drone) as (_, flight, _):
-            return flight.until(SECONDS)
+            return flight.rows_until(SECONDS)
 
     def test_1_a_flight_is_the_same_every_time(self):
         arguments = COMMANDS, "_lockstep/trigger:=odom", "_real_time_factor:=5"
-        first, second = (self.flown(*arguments, nodes=[(NODES / "reacting.py",)]) for _ in range(2))
+        first, second = (self.flown_rows(*arguments, nodes=[(NODES / "reacting.py",)]) for _ in range(2))
         self.assertEqual(first[0][0], 10**8, "the messages of the second step are the first")
         self.assertEqual(len(first), SECONDS * 20 - 1)
         self.assertEqual(first, second)
         self.assertNotEqual(first[0][3], first[-1][3], "the commands have an effect")
 
-    def test_2_in_every_run_of_a_simulator_too_whatever_wakes_the_node(self):
+    def test_2_a_restarted_flight_is_identical_for_every_kind_of_node(self):
         flights = {}
         for node, *arguments in (
             ("reacting.py", COMMANDS),
@@ -195,55 +195,55 @@ class Lockstep(unittest.TestCase):
             ("seeing.py", STAMPED, "_lockstep/trigger:=front"),
         ):
             with self.subTest(node), self.flying(*arguments, nodes=[(NODES / node, "0.1")]) as (_, flight, _):
-                flights[node] = flight.until(SECONDS)
+                flights[node] = flight.rows_until(SECONDS)
                 self.assertTrue(rospy.ServiceProxy("/drone_sim/stop", Trigger)().success)
-                flight.forget()
+                flight.discard()
                 self.assertTrue(rospy.ServiceProxy("/drone_sim/start", Trigger)().success)
-                self.assertEqual(flight.until(SECONDS), flights[node])
+                self.assertEqual(flight.rows_until(SECONDS), flights[node])
             self.setUp()
         self.assertEqual(flights["reacting.py"], flights["sleeping.py"])
         self.assertNotEqual(flights["reacting.py"], flights["seeing.py"])
 
-    def test_3_of_stamped_answers_doubled_and_late_ones_are_told_apart(self):
-        once = self.flown(STAMPED, nodes=[(OTHER, "stamped", "1", "drone")])
-        self.assertEqual(self.flown(STAMPED, nodes=[(OTHER, "stamped", "3", "drone")]), once)
+    def test_3_repeated_answers_with_the_same_stamp_change_nothing(self):
+        once = self.flown_rows(STAMPED, nodes=[(CONTROLLER, "stamped", "1", "drone")])
+        self.assertEqual(self.flown_rows(STAMPED, nodes=[(CONTROLLER, "stamped", "3", "drone")]), once)
 
     def test_4_two_vehicles_with_a_node_each(self):
-        two = [(OTHER, "plain", "1", f"drone{number}", f"__name:=of{number}") for number in (1, 2)]
-        first, second = (self.flown(COMMANDS, "_vehicles:=2", nodes=two, drone="drone2") for _ in range(2))
+        two = [(CONTROLLER, "plain", "1", f"drone{number}", f"__name:=of{number}") for number in (1, 2)]
+        first, second = (self.flown_rows(COMMANDS, "_vehicles:=2", nodes=two, drone="drone2") for _ in range(2))
         self.assertEqual(first, second)
 
-    def test_5_a_node_that_stands_is_waited_for_and_one_that_dies_can_be_started_again(self):
-        wanted = self.flown(COMMANDS, "_lockstep/timeout:=1", nodes=[(OTHER, "plain", "1", "drone")])
-        node = (OTHER, "plain", "1", "drone")
+    def test_5_a_stopped_node_is_waited_for_and_a_dead_node_can_be_restarted(self):
+        expected = self.flown_rows(COMMANDS, "_lockstep/timeout:=1", nodes=[(CONTROLLER, "plain", "1", "drone")])
+        node = (CONTROLLER, "plain", "1", "drone")
         with self.flying(COMMANDS, "_lockstep/timeout:=1", "_real_time_factor:=4", nodes=[node]) as (
             simulator,
             flight,
             (process,),
         ):
-            found = Listener("/diagnostics", DiagnosticArray)
-            flight.until(0.5)
+            diagnostics = Listener("/diagnostics", DiagnosticArray)
+            flight.rows_until(0.5)
             process.send_signal(signal.SIGSTOP)
             simulator.wait_for("/drone/cmd_vel: /controller has not answered within 1 s")
-            late = found.wait_for(lambda m: any("has not answered the stamp" in one.message for one in m.status))
+            late = diagnostics.wait_for(lambda m: any("has not answered the stamp" in one.message for one in m.status))
             self.assertIn("/drone/cmd_vel: /controller", str(late))
             process.send_signal(signal.SIGCONT)
-            self.assertEqual(flight.until(SECONDS), wanted)
+            self.assertEqual(flight.rows_until(SECONDS), expected)
             process.kill()
             simulator.wait_for("/controller has gone")
             process.wait(HANGS)
-            stands = flight.rows[-1]
-            again = started(*node)
+            last_row = flight.rows[-1]
+            new_process = spawn(*node)
             try:
-                flight.until(stands[0] * 1e-9 + 1)
+                flight.rows_until(last_row[0] * 1e-9 + 1)
             finally:
-                end(again, number=signal.SIGKILL)
-            found.close()
+                end(new_process, number=signal.SIGKILL)
+            diagnostics.close()
 
-    def test_6_policies(self):
-        node = (OTHER, "plain", "1", "drone")
+    def test_6_timeout_policies_end_and_go_on(self):
+        node = (CONTROLLER, "plain", "1", "drone")
         with self.flying(COMMANDS, "_lockstep/on_timeout:=end", nodes=[node]) as (simulator, flight, (process,)):
-            flight.until(0.5)
+            flight.rows_until(0.5)
             process.kill()
             simulator.wait_for("/controller has gone")
             self.assertEqual(simulator.process.wait(HANGS), 1)
@@ -253,28 +253,28 @@ class Lockstep(unittest.TestCase):
             flight,
             (process,),
         ):
-            flight.until(0.5)
+            flight.rows_until(0.5)
             process.kill()
-            flight.until(flight.rows[-1][0] * 1e-9 + 2)
+            flight.rows_until(flight.rows[-1][0] * 1e-9 + 2)
 
-    def test_7_it_ends_while_it_waits(self):
-        for nodes in ([], [(OTHER, "plain", "1", "drone")]):
+    def test_7_the_simulator_ends_on_sigint_while_it_waits(self):
+        for nodes in ([], [(CONTROLLER, "plain", "1", "drone")]):
             with self.subTest(nodes), self.flying(COMMANDS, nodes=nodes) as (simulator, flight, processes):
                 if processes:
-                    flight.until(0.5)
+                    flight.rows_until(0.5)
                     processes[0].send_signal(signal.SIGSTOP)
                 simulator.wait_for("time stands at 0.05 s until there is" if not nodes else "waiting on")
                 os.killpg(simulator.process.pid, signal.SIGINT)
-                self.assertEqual(simulator.process.wait(HANGS), 0)  # the watchdog would have killed it
+                self.assertEqual(simulator.process.wait(HANGS), 0)  # not killed by the watchdog
 
-    def test_8_two_instances_are_told(self):
-        node = (OTHER, "plain", "1", "drone", "--anonymous")
+    def test_8_two_instances_of_a_node_are_reported(self):
+        node = (CONTROLLER, "plain", "1", "drone", "--anonymous")
         with self.flying(COMMANDS, "_real_time_factor:=1", nodes=[node, node]):
-            found = Listener("/diagnostics", DiagnosticArray)
-            found.wait_for(lambda m: any("the first counts" in one.message for one in m.status), after=0)
-            found.close()
+            diagnostics = Listener("/diagnostics", DiagnosticArray)
+            diagnostics.wait_for(lambda m: any("the first counts" in one.message for one in m.status), after=0)
+            diagnostics.close()
 
-    def test_9_what_is_wrong_is_told_in_one_line(self):
+    def test_9_wrong_lockstep_parameters_are_reported_in_one_line(self):
         for argument, said in (
             ("_lockstep/wait_for:=cmd_vell", "nothing listens to /drone/cmd_vell; near names are cmd_vel"),
             ("_lockstep:={wait_for: [cmd_vel], trigger: fronnt}", "no such trigger; near names are front"),
@@ -286,7 +286,7 @@ class Lockstep(unittest.TestCase):
                 self.assertNotIn("Traceback", "".join(simulator.lines))
             self.setUp()
 
-    def test_a_config_turns_simulated_time_on_until_the_end(self):
+    def test_a_config_sets_use_sim_time_until_the_simulator_ends(self):
         rospy.delete_param("/use_sim_time")
         try:
             with self.flying(COMMANDS) as (simulator, _, _):
@@ -301,7 +301,7 @@ class Lockstep(unittest.TestCase):
         script = Path(self.folder.name) / "sensing.py"
         script.write_text(SENSING)
         flights = [
-            self.flown(COMMANDS, f"_script:={script}", nodes=[(NODES / node,)])
+            self.flown_rows(COMMANDS, f"_script:={script}", nodes=[(NODES / node,)])
             for node in ("reacting.py", "sleeping.py")
         ]
         self.assertEqual(flights[0], flights[1])
@@ -331,25 +331,25 @@ class Lockstep(unittest.TestCase):
             with self.assertRaisesRegex(Mismatch, "start the simulator with lockstep:=cmd_vel"):
                 grade(plan, 1, "", "drone_sim", HANGS)
 
-    def test_steps_by_hand_in_step_with_a_node(self):
+    def test_single_steps_in_lockstep_with_a_node(self):
         with self.flying(COMMANDS, nodes=[(NODES / "reacting.py",)]) as (simulator, flight, _):
             simulator.wait_for("in step with")
-            flown = flight.until(SECONDS)
+            flown_rows = flight.rows_until(SECONDS)
             call = {name: rospy.ServiceProxy(f"/drone_sim/{name}", Trigger) for name in ("restart", "step")}
             pause = rospy.ServiceProxy("/drone_sim/pause", SetBool)
             paused = pause(True)
             self.assertTrue(paused.success)
-            # Odometry up to the pause may still be under way.
+            # Odometry from before the pause may arrive late.
             before = float(paused.message.removeprefix("paused at t = ").removesuffix(" s"))
             rospy.set_param("/drone_sim/step_count", 0)
             self.assertIn("step_count = 0: must be a whole number from 1 to 1000000", call["step"]().message)
             rospy.set_param("/drone_sim/step_count", 20)
             for number in (1, 2):
                 self.assertEqual(call["step"]().message, f"t = {before + number:.2f} s")
-                flight.until(before + number)
-            stepped = flight.until(before + 2)
-            self.assertEqual(len({row[0] for row in stepped}), round(1e9 * before / FIRST) - 1 + 40)
-            self.assertEqual(stepped[: len(flown)], flown)
+                flight.rows_until(before + number)
+            stepped = flight.rows_until(before + 2)
+            self.assertEqual(len({row[0] for row in stepped}), round(1e9 * before / FIRST_STAMP) - 1 + 40)
+            self.assertEqual(stepped[: len(flown_rows)], flown_rows)
 
     @unittest.skipUnless(importlib.util.find_spec("gymnasium"), "needs gymnasium, of requirements-dev.txt")
     def test_a_gymnasium_environment_over_ros_is_repeatable(self):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The node as a process: wrong parameters, signals, masters that go, and repeatable flights."""
+"""The node as a process: wrong parameters, signals, restarted ROS masters, and repeatable flights."""
 
 import contextlib
 import os
@@ -43,9 +43,9 @@ def stuck(*_arguments, **_options):
 Dynamics.{function} = stuck
 sys.exit(node.main(watchdog))
 """
-HOLDS_THE_LOCK, LETS_GO_OF_IT = "sum(range(10**13))", "time.sleep(1000)"
+HOLDS_THE_GIL, RELEASES_THE_GIL = "sum(range(10**13))", "time.sleep(1000)"
 
-# Another node, which a new master introduces to the simulator; then its connections break, as a network breaks them.
+# A client that a new master connects with the simulator; then it closes its connections, like a network failure does.
 CLIENT = """
 import rospy
 from geometry_msgs.msg import Twist
@@ -68,29 +68,29 @@ print(rospy.ServiceProxy("/drone_sim/stop", Trigger)().message, rospy.get_param(
 """
 
 
-def started(*command, **environment):
-    """Begin a process; what it prints goes into a pipe, which no surroundings make unbuffered."""
-    surroundings = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+def spawn(*command, **environment):
+    """Start a process with its output in a pipe; PYTHONUNBUFFERED is removed from its environment."""
+    variables = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     return subprocess.Popen(
-        command, env={**surroundings, **environment}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        command, env={**variables, **environment}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
 
 
-def program(name, *arguments, **environment):
-    """Begin one of our programs, without rosrun, which looks for it for half a second."""
-    return started(sys.executable, str(package_path() / "scripts" / name), *arguments, **environment)
+def spawn_script(name, *arguments, **environment):
+    """Start a script of this package without rosrun, which needs half a second to find it."""
+    return spawn(sys.executable, str(package_path() / "scripts" / name), *arguments, **environment)
 
 
-def simulator(*arguments, **environment):
-    return program("simulator", *arguments, **environment)
+def spawn_simulator(*arguments, **environment):
+    return spawn_script("simulator", *arguments, **environment)
 
 
-def stuck(function, call):
-    return started(sys.executable, "-c", STUCK.format(function=function, call=call))
+def spawn_stuck(function, call):
+    return spawn(sys.executable, "-c", STUCK.format(function=function, call=call))
 
 
 def launched_parameters(*arguments):
-    """Return what the simulator reads from the parameters that a roslaunch command sets."""
+    """Return the parameters that a simulator started by this roslaunch command reads."""
     config = roslaunch.config.ROSLaunchConfig()
     file = roslaunch.rlutil.resolve_launch_arguments(["drone_sim", arguments[0]])[0]
     roslaunch.xmlloader.XmlLoader().load(file, config, argv=["rviz:=false", *arguments[1:]], verbose=False)
@@ -105,7 +105,7 @@ def launched_parameters(*arguments):
 
 @contextlib.contextmanager
 def master(port):
-    """Run a master of our own; it is killed, so that it says goodbye to nobody."""
+    """Run a private ROS master. It is killed at the end, so that it notifies no node."""
     process = subprocess.Popen(["rosmaster", "--core", "-p", port], stdout=subprocess.DEVNULL)
     try:
         while process.poll() is None:
@@ -118,13 +118,13 @@ def master(port):
 
 
 class Process(unittest.TestCase):
-    """What a user sees of a node that cannot start, and of one that is told to end."""
+    """Output and exit status of a simulator process that cannot start or is asked to end."""
 
     def tearDown(self):
         if rospy.has_param("/drone_sim"):
             rospy.delete_param("/drone_sim")
 
-    def test_wrong_parameters_end_it_with_one_line(self):
+    def test_wrong_parameters_end_the_simulator_with_one_line(self):
         for argument, expected in (
             ("_time_step:=0.012", "parameter time_step = 0.012: must be a whole multiple of sub_step = 0.005"),
             ("_drone:={urdf: /no/such.urdf}", "parameter drone/urdf = '/no/such.urdf': no such file"),
@@ -134,18 +134,18 @@ class Process(unittest.TestCase):
                 for name in ("time_step", "drone", "real_time_facter"):
                     if rospy.has_param(f"/drone_sim/{name}"):
                         rospy.delete_param(f"/drone_sim/{name}")
-                node = simulator(argument)
+                node = spawn_simulator(argument)
                 output, _ = node.communicate(timeout=HANGS)
                 self.assertEqual(node.returncode, 1, output)
                 self.assertIn(expected, output)
                 self.assertNotIn("Traceback", output)
                 self.assertEqual(len([line for line in output.splitlines() if "FATAL" in line]), 1, output)
 
-    def test_it_flies_where_no_log_can_be_written(self):
+    def test_the_simulator_flies_if_no_log_can_be_written(self):
         for said in (["__log:=/dev/full"], []):
             with self.subTest(said):
-                node = simulator(*said, **({} if said else {"ROS_LOG_DIR": "/proc/nowhere"}))
-                printed = self.said_until(node, "flying")
+                node = spawn_simulator(*said, **({} if said else {"ROS_LOG_DIR": "/proc/nowhere"}))
+                printed = self.read_until(node, "flying")
                 node.send_signal(signal.SIGINT)
                 printed += node.communicate(timeout=HANGS)[0]
                 self.assertEqual(node.returncode, 0, printed)
@@ -155,22 +155,22 @@ class Process(unittest.TestCase):
     def test_a_recorder_that_cannot_write_ends_with_one_line(self):
         for folder, why in (("/proc", ""), ("/no/such", "no such folder")):
             with self.subTest(folder):
-                self.assert_refused(program("record", "--folder", folder), f"--folder {folder}: {why}")
+                self.assert_refused(spawn_script("record", "--folder", folder), f"--folder {folder}: {why}")
 
-    def test_parameters_that_are_none_end_it_with_one_line(self):
+    def test_invalid_parameters_end_the_simulator_with_one_line(self):
         for name, value, expected in (
             ("/drone_sim", 5, "parameter /drone_sim = 5: must be a namespace"),
             ("/use_sim_time", "foo", "parameter /use_sim_time = foo: must be true or false"),
-            ("/drone_sim/script", "/" + "x" * 300 + ".py", "ile"),  # too long for a file, or just not there
+            ("/drone_sim/script", "/" + "x" * 300 + ".py", "ile"),  # too long for a file name, or no such file
         ):
             with self.subTest(name):
                 rospy.set_param(name, value)
                 try:
-                    self.assert_refused(simulator(), expected)
+                    self.assert_refused(spawn_simulator(), expected)
                 finally:
                     rospy.delete_param(name)
 
-    def test_surroundings_in_which_it_cannot_be_a_node(self):
+    def test_an_unusable_ros_environment_ends_the_simulator_with_one_line(self):
         for name, value, expected in (
             ("ROS_MASTER_URI", "garbage", "ROS_MASTER_URI = 'garbage': must be like http://localhost:11311"),
             ("ROS_MASTER_URI", "http://localhost:1", "no ROS master at http://localhost:1"),
@@ -183,7 +183,7 @@ class Process(unittest.TestCase):
         ):
             with self.subTest(value), mock.patch.dict(os.environ):
                 os.environ.pop("ROS_HOSTNAME", None)
-                self.assert_refused(simulator(**{name: value}), expected)
+                self.assert_refused(spawn_simulator(**{name: value}), expected)
 
     def assert_refused(self, node, expected):
         output, _ = node.communicate(timeout=HANGS)
@@ -194,8 +194,8 @@ class Process(unittest.TestCase):
         with tempfile.NamedTemporaryFile("w", suffix=".py") as script:
             script.write("def sysCall_cleanup():\n    1 / 0\n")
             script.flush()
-            node = simulator(f"_script:={script.name}")
-            said = self.said_until(node, "flying")
+            node = spawn_simulator(f"_script:={script.name}")
+            said = self.read_until(node, "flying")
             node.send_signal(signal.SIGINT)
             said += node.communicate(timeout=HANGS)[0]
         self.assertEqual(node.returncode, 1)
@@ -205,19 +205,19 @@ class Process(unittest.TestCase):
         self.assertIn("[cleanup]", fatal[0])
         self.assertIn("ZeroDivisionError", fatal[0])
 
-    def said_until(self, node, what):
-        """Return what it says up to a line, as soon as it says it."""
+    def read_until(self, node, fragment):
+        """Return the output of `node` up to the first line that contains `fragment`."""
         said = ""
-        with self.killed_if_it_hangs(node):
+        with self.kill_on_hang(node):
             for line in node.stdout:
                 said += line
-                if what in line:
+                if fragment in line:
                     return said
-        self.fail(f"it ended, or was killed, without a line with {what!r}: {said}")
+        self.fail(f"it ended, or was killed, without a line with {fragment!r}: {said}")
 
     @contextlib.contextmanager
-    def killed_if_it_hangs(self, node):
-        """Do not wait for ever for what it says, and leave nothing to the next test where this one fails."""
+    def kill_on_hang(self, node):
+        """Kill `node` after a time limit, and if the body fails, so that it does not disturb the next test."""
         watchdog = threading.Timer(2 * HANGS, node.kill)
         watchdog.start()
         try:
@@ -228,17 +228,17 @@ class Process(unittest.TestCase):
         finally:
             watchdog.cancel()
 
-    def test_it_ends_whatever_it_does(self):
+    def test_a_signal_kills_a_stuck_simulator_that_holds_the_gil(self):
         for function, number in (("advance", signal.SIGINT), ("__init__", signal.SIGTERM)):
             with self.subTest(function):
-                node = stuck(function, HOLDS_THE_LOCK)
-                said = self.said_until(node, "flying into it")
+                node = spawn_stuck(function, HOLDS_THE_GIL)
+                said = self.read_until(node, "flying into it")
                 node.send_signal(number)
                 self.assert_killed(node, said + node.communicate(timeout=HANGS)[0])
 
-    def test_rosnode_kill_ends_it_too_unless_it_holds_the_lock(self):
-        node = stuck("advance", LETS_GO_OF_IT)
-        said = self.said_until(node, "flying into it")
+    def test_rosnode_kill_kills_a_stuck_simulator_that_releases_the_gil(self):
+        node = spawn_stuck("advance", RELEASES_THE_GIL)
+        said = self.read_until(node, "flying into it")
         rosnode.kill_nodes(["/drone_sim"])
         self.assert_killed(node, said + node.communicate(timeout=HANGS)[0])
 
@@ -247,10 +247,10 @@ class Process(unittest.TestCase):
         self.assertNotIn("Traceback", said)
         self.assertEqual(len([line for line in said.splitlines() if line.startswith("drone_sim: killed: ")]), 1, said)
 
-    def test_who_connects_and_says_nothing_keeps_nobody_out(self):
-        node = simulator()
-        with self.killed_if_it_hangs(node), contextlib.ExitStack() as silent:
-            self.said_until(node, "flying")
+    def test_silent_connections_do_not_block_other_subscribers(self):
+        node = spawn_simulator()
+        with self.kill_on_hang(node), contextlib.ExitStack() as silent:
+            self.read_until(node, "flying")
             uri = rosgraph.Master("/test").lookupNode("/drone_sim")
             _, _, (_, host, port) = ServerProxy(uri).requestTopic("/test", "/drone/odom", [["TCPROS"]])
             for _ in range(20):
@@ -263,36 +263,36 @@ class Process(unittest.TestCase):
             node.communicate(timeout=HANGS)
         self.assertEqual(node.returncode, 0)
 
-    def test_a_new_master_finds_it(self):
+    def test_the_simulator_registers_with_a_new_master(self):
         with socket.socket() as probe:
             probe.bind(("localhost", 0))
             port = str(probe.getsockname()[1])
-        surroundings = {"ROS_MASTER_URI": f"http://localhost:{port}"}
+        variables = {"ROS_MASTER_URI": f"http://localhost:{port}"}
         with master(port):
-            node = simulator("_real_time_factor:=5", **surroundings)
-            self.said_until(node, "flying")
+            node = spawn_simulator("_real_time_factor:=5", **variables)
+            self.read_until(node, "flying")
         with master(port):
-            self.assertIn("a new ROS master", self.said_until(node, "there is a new ROS master"))
-            client = started(sys.executable, "-c", CLIENT, **surroundings)
+            self.assertIn("a new ROS master", self.read_until(node, "there is a new ROS master"))
+            client = spawn(sys.executable, "-c", CLIENT, **variables)
             said, _ = client.communicate(timeout=2 * HANGS)
             self.assertEqual(said, "stopped 5\n")
             node.send_signal(signal.SIGINT)
             node.communicate(timeout=HANGS)
         self.assertEqual(node.returncode, 0)
 
-    def test_the_cockpit_waits_for_a_new_master_and_is_found_by_it(self):
+    def test_the_cockpit_waits_for_a_new_master_and_registers_with_it(self):
         with socket.socket() as probe:
             probe.bind(("localhost", 0))
             port = str(probe.getsockname()[1])
-        surroundings = {"ROS_MASTER_URI": f"http://localhost:{port}"}
+        variables = {"ROS_MASTER_URI": f"http://localhost:{port}"}
         with master(port):
-            node = program("cockpit", "_port:=0", **surroundings)
+            node = spawn_script("cockpit", "_port:=0", **variables)
             watchdog = threading.Timer(4 * HANGS, node.kill)
             watchdog.start()
-            self.assertIn("the cockpit listens at", self.said_until(node, "the cockpit is at"))
-        gone = self.said_until(node, "the ROS master does not answer")
+            self.assertIn("the cockpit listens at", self.read_until(node, "the cockpit is at"))
+        first_output = self.read_until(node, "the ROS master does not answer")
         with master(port):
-            said = gone + self.said_until(node, "there is a new ROS master")
+            said = first_output + self.read_until(node, "there is a new ROS master")
             node.send_signal(signal.SIGINT)
             said += node.communicate(timeout=HANGS)[0]
         watchdog.cancel()
@@ -300,7 +300,7 @@ class Process(unittest.TestCase):
         self.assertNotIn("Traceback", said)
         self.assertNotIn("out of sync", said)
 
-    def test_an_argument_that_the_launch_file_does_not_have_ends_it_with_one_line(self):
+    def test_an_argument_unknown_to_the_launch_file_ends_it_with_one_line(self):
         command = ["roslaunch", "drone_sim", "drone.launch", "rviz:=false", "scrpt:=mine.py"]
         launched = subprocess.run(command, capture_output=True, text=True, timeout=2 * HANGS, check=False)
         said = "scrpt:=mine.py: drone.launch has no argument scrpt; near names are script"
@@ -308,7 +308,7 @@ class Process(unittest.TestCase):
         self.assertNotIn("Traceback", launched.stderr)
         rospy.delete_param("/drone_sim")
 
-    def test_a_default_of_the_launch_does_not_override_a_scene_or_a_config(self):
+    def test_launch_defaults_do_not_override_a_scene_or_a_config(self):
         with tempfile.TemporaryDirectory() as folder:
             scene, config = Path(folder) / "scene.yaml", Path(folder) / "config.yaml"
             scene.write_text("vehicles: {drone: {position: [0, 0, 0.8], script: none}}\n")
@@ -338,17 +338,17 @@ class Process(unittest.TestCase):
                     self.assertEqual(parameters.fleet[0].position[2], where)
                     pace = (parameters.start, parameters.real_time_factor, parameters.remote_api.serve)
                     self.assertEqual(pace, ("landed", 4, True) if config_counts else ("flying", 1, False))
-            given = launched_parameters("drone.launch", f"config:={config}", "start:=flying", "real_time_factor:=2")
-            self.assertEqual((given.start, given.real_time_factor), ("flying", 2))
+            overrides = launched_parameters("drone.launch", f"config:={config}", "start:=flying", "real_time_factor:=2")
+            self.assertEqual((overrides.start, overrides.real_time_factor), ("flying", 2))
 
-    def test_a_vehicle_without_a_script_falls_if_the_launch_gives_none(self):
+    def test_a_vehicle_with_script_none_falls_if_the_launch_sets_no_script(self):
         with tempfile.TemporaryDirectory() as folder, socket.create_server(("localhost", 0)) as free:
             scene, port = Path(folder) / "scene.yaml", str(free.getsockname()[1])
             scene.write_text("vehicles: {drone: {position: [0, 0, 0.8], script: none}}\n")
             free.close()
-            node = started("roslaunch", "-p", port, "drone_sim", "drone.launch", "rviz:=false", f"scene:={scene}")
+            node = spawn("roslaunch", "-p", port, "drone_sim", "drone.launch", "rviz:=false", f"scene:={scene}")
             try:
-                self.said_until(node, "flying; commands on")
+                self.read_until(node, "flying; commands on")
                 command = ["rostopic", "echo", "-n", "1", "--filter", "m.pose.pose.position.z < 0.2", "/drone/odom"]
                 environment = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}"}
                 subprocess.run(command, env=environment, check=True, timeout=HANGS, stdout=subprocess.DEVNULL)
@@ -357,10 +357,10 @@ class Process(unittest.TestCase):
                 node.communicate(timeout=HANGS)
 
     def assert_ends_cleanly(self, end):
-        """Let it fly as fast as it can, with somebody listening, and end it by `end(process)`."""
-        node = simulator("_real_time_factor:=0")
+        """Check that a simulator with a subscriber ends without an error after `end(process)`."""
+        node = spawn_simulator("_real_time_factor:=0")
         odometry, lines = Listener("/drone/odom", Odometry), []
-        with self.killed_if_it_hangs(node):
+        with self.kill_on_hang(node):
             for line in node.stdout:
                 lines.append(line)
                 if "flying" in line:
@@ -371,12 +371,12 @@ class Process(unittest.TestCase):
         self.assertNotIn("Traceback", "".join(lines))
         self.assertNotIn("/drone_sim", rosnode.get_node_names())
 
-    def test_signals_end_it_cleanly(self):
+    def test_sigint_and_sigterm_end_the_simulator_cleanly(self):
         for number in (signal.SIGINT, signal.SIGTERM):
             with self.subTest(number):
                 self.assert_ends_cleanly(lambda node, number=number: node.send_signal(number))
 
-    def test_rosnode_kill_ends_it_cleanly(self):
+    def test_rosnode_kill_ends_the_simulator_cleanly(self):
         self.assert_ends_cleanly(lambda _: rosnode.kill_nodes(["/drone_sim"]))
 
     def assert_replaced(self, node, said=""):
@@ -386,33 +386,33 @@ class Process(unittest.TestCase):
         self.assertNotIn("Traceback", said)
         self.assertNotIn("killed", said)
 
-    def test_of_simulators_of_one_name_the_newest_flies(self):
+    def test_a_new_simulator_replaces_one_with_the_same_name(self):
         nodes = []
 
-        def more():
-            nodes.append(simulator())
+        def add_simulator():
+            nodes.append(spawn_simulator())
             return nodes[-1]
 
         watchdog = threading.Timer(4 * HANGS, lambda: [node.kill() for node in nodes])
         watchdog.start()
-        older = more()
-        said = self.said_until(older, "flying")
-        newer = more()
+        older = add_simulator()
+        said = self.read_until(older, "flying")
+        newer = add_simulator()
         self.assert_replaced(older, said)
-        self.said_until(newer, "flying")
-        newer.kill()  # of which the master does not know
+        self.read_until(newer, "flying")
+        newer.kill()  # the master does not notice it
         newer.communicate(timeout=HANGS)
-        both = more(), more()  # at once
+        both = add_simulator(), add_simulator()  # at the same time
         while all(node.poll() is None for node in both):
             rospy.rostime.wallsleep(0.05)
         first, last = sorted(both, key=lambda node: node.poll() is None)
         self.assert_replaced(first)
-        self.said_until(last, "flying")
+        self.read_until(last, "flying")
         said = "already flies in /drone_sim: give one of the two"
-        self.assert_refused(simulator("__name:=other"), said)
+        self.assert_refused(spawn_simulator("__name:=other"), said)
         last.send_signal(signal.SIGSTOP)
         try:
-            self.assert_refused(simulator(), "and does not answer")
+            self.assert_refused(spawn_simulator(), "and does not answer")
         finally:
             last.send_signal(signal.SIGCONT)
         last.send_signal(signal.SIGINT)
@@ -420,17 +420,17 @@ class Process(unittest.TestCase):
         watchdog.cancel()
         self.assertEqual(last.returncode, 0)
 
-    def test_nodes_whose_launch_runs_the_master_stay(self):
+    def test_a_node_whose_launch_runs_the_master_is_not_replaced(self):
         with socket.create_server(("localhost", 0)) as free:
             port = str(free.getsockname()[1])
-        first = started("roslaunch", "-p", port, "drone_sim", "drone.launch", "rviz:=false", "web:=true", "web_port:=0")
+        first = spawn("roslaunch", "-p", port, "drone_sim", "drone.launch", "rviz:=false", "web:=true", "web_port:=0")
         try:
-            said = self.said_until(first, "flying; commands on")
+            said = self.read_until(first, "flying; commands on")
             if "the cockpit is at" not in said:
-                self.said_until(first, "the cockpit is at")
-            there = {"ROS_MASTER_URI": f"http://localhost:{port}"}
-            self.assert_refused(simulator(**there), "its launch also runs the ROS master")
-            cockpit = program("cockpit", "__name:=cockpit", "_port:=0", **there)
+                self.read_until(first, "the cockpit is at")
+            master_variables = {"ROS_MASTER_URI": f"http://localhost:{port}"}
+            self.assert_refused(spawn_simulator(**master_variables), "its launch also runs the ROS master")
+            cockpit = spawn_script("cockpit", "__name:=cockpit", "_port:=0", **master_variables)
             self.assert_refused(cockpit, "its launch also runs the ROS master")
             self.assertIsNone(first.poll())
         finally:
@@ -438,7 +438,7 @@ class Process(unittest.TestCase):
             said = first.communicate(timeout=HANGS)[0]
         self.assertNotIn("REQUIRED process", said)
 
-    def test_two_processes_fly_alike_to_the_last_bit(self):
+    def test_two_processes_fly_bitwise_identical_flights(self):
         with tempfile.TemporaryDirectory() as folder:
             commands = Path(folder) / "commands.yaml"
             commands.write_text(
@@ -448,7 +448,7 @@ class Process(unittest.TestCase):
             )
             flights = [Path(folder) / name for name in ("one.csv", "two.csv")]
             for csv in flights:
-                fly = program("fly", "--commands", str(commands), "--csv", str(csv))
+                fly = spawn_script("fly", "--commands", str(commands), "--csv", str(csv))
                 said, _ = fly.communicate(timeout=HANGS)
                 self.assertEqual(fly.returncode, 0, said)
             one, two = (csv.read_text() for csv in flights)

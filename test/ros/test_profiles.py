@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Each driver's profile, by the driver's names: commands with its meaning, and what it publishes."""
+"""Driver profiles: commands and published topics, with each driver's names and meanings."""
 
 import contextlib
 import math
@@ -28,7 +28,7 @@ EXAMPLE = package_path() / "docs" / "drivers"
 
 
 class Sender(threading.Thread):
-    """Publishes one message again and again, as a node in its loop does."""
+    """A thread that publishes one message every 20 ms, like the loop of a node."""
 
     def __init__(self, publisher, message):
         super().__init__(daemon=True)
@@ -50,8 +50,8 @@ def pitch_of(odometry):
     return to_rpy(from_quaternion((0, 0, 0), xyzw(odometry.pose.pose.orientation)))[1]
 
 
-def near(odometry, ball):
-    """Return whether it stands still, its camera 1.5 m from the ball, at its height."""
+def is_near(odometry, ball):
+    """Return whether the drone is at rest at the ball's height, with its camera 1.5 m from the ball."""
     place, speed = xyz(odometry.pose.pose.position), math.hypot(*xyz(odometry.twist.twist.linear))
     distance = math.dist(place[:2], ball[:2])
     return abs(distance - 1.66) < 0.2 and abs(place[2] - ball[2]) < 0.2 and speed < 0.15
@@ -66,7 +66,7 @@ def command(**fields):
 
 
 class Profiles(unittest.TestCase):
-    """A simulator for each test, at its real names."""
+    """Each test starts a simulator with one profile, which uses the driver's topic names."""
 
     def setUp(self):
         self.listeners = []
@@ -97,7 +97,7 @@ class Profiles(unittest.TestCase):
         return connected(rospy.Publisher(topic, kind, queue_size=10))
 
     def fly(self, name):
-        """Take off by the topic in a namespace, until the pilot says that it flies."""
+        """Take off in namespace `name`, wait until the state is `flying`, and return the state's listener."""
         state = self.listen(f"/{name}/state", String)
         takeoff = self.publisher(f"/{name}/takeoff", Empty)
         state.wait_for(lambda message: message.data == "landed", after=0)
@@ -106,8 +106,8 @@ class Profiles(unittest.TestCase):
         return state
 
     def test_bebop(self):
-        early = rospy.Publisher("/bebop/takeoff", Empty, queue_size=1, latch=True)
-        early.publish()  # before the simulator is there
+        early_takeoff = rospy.Publisher("/bebop/takeoff", Empty, queue_size=1, latch=True)
+        early_takeoff.publish()  # before the simulator runs
         state, odometry = self.listen("/bebop/state", String), self.listen("/bebop/odom", Odometry)
         with self.simulator("bebop") as output:
             state.wait_for(lambda message: message.data == "flying")
@@ -117,13 +117,13 @@ class Profiles(unittest.TestCase):
                     lambda o: abs(pitch_of(o) - 0.5 * 0.349) < 0.02 and o.twist.twist.linear.x > 0.3
                 )
             self.assertEqual(tilted.twist.twist.angular.y, 0.0)
-            odometry.wait_for(lambda o: abs(o.twist.twist.linear.x) < 0.05)  # the time-out stops it
+            odometry.wait_for(lambda o: abs(o.twist.twist.linear.x) < 0.05)  # the command time-out stops the drone
             self.assertAlmostEqual(self.rate(odometry), 5.0, delta=0.5)
             picture = self.listen("/bebop/image_raw", Image).wait_for()
             info = self.listen("/bebop/camera_info", CameraInfo).wait_for()
             self.assertEqual((picture.width, picture.height), (640, 368))
             self.assertAlmostEqual(info.K[0], 396.2, delta=0.5)
-            self.publisher("/bebop/reset", Empty).publish()  # the emergency: it falls
+            self.publisher("/bebop/reset", Empty).publish()  # emergency: the drone falls
             state.wait_for(lambda message: message.data == "landed")
             self.publisher("/bebop/flattrim", Empty)
             self.assertIn("the package bebop_msgs is not in your workspace", output())
@@ -139,7 +139,7 @@ class Profiles(unittest.TestCase):
             odometry, imu = self.listen("/ardrone/odometry", Odometry), self.listen("/ardrone/imu", Imu)
             with Sender(self.publisher("/cmd_vel", Twist), command(angular_z=1.0)):
                 imu.wait_for(lambda message: abs(message.angular_velocity.z - 1.75) < 0.1)
-            with Sender(self.publisher("/cmd_vel", Twist), command(linear_y=7.0)):  # the driver cuts it to 1
+            with Sender(self.publisher("/cmd_vel", Twist), command(linear_y=7.0)):  # the driver clips it to 1
                 odometry.wait_for(lambda o: o.twist.twist.linear.y > 0.5)
             rospy.ServiceProxy("/ardrone/flattrim", EmptyService)()
             for topic in ("/ardrone/front/image_raw", "/ardrone/bottom/image_raw", "/ardrone/image_raw"):
@@ -164,7 +164,7 @@ class Profiles(unittest.TestCase):
         with self.simulator("sjtu"):
             state = self.fly("drone")
             pose, velocity = self.listen("/drone/gt_pose", Pose), self.listen("/drone/gt_vel", Twist)
-            with Sender(self.publisher("/cmd_vel", Twist), command(linear_x=5.0)):  # m/s, cut to 2
+            with Sender(self.publisher("/cmd_vel", Twist), command(linear_x=5.0)):  # m/s, clipped to 2
                 velocity.wait_for(lambda twist: abs(twist.linear.x - 2.0) < 0.1)
             self.assertGreater(pose.wait_for().position.x, 0.5)
             self.assertLess(max(twist.linear.x for twist in velocity.messages), 2.6)
@@ -194,22 +194,22 @@ class Profiles(unittest.TestCase):
         with self.simulator("bebop", f"_scene_file:={EXAMPLE}/ball.yaml"):
             node = subprocess.Popen([sys.executable, f"{EXAMPLE}/follow_ball.py"])
             try:
-                odometry.wait_for(lambda o: near(o, (3.0, 0.6, 1.2)))
+                odometry.wait_for(lambda o: is_near(o, (3.0, 0.6, 1.2)))
                 move = TransformStamped(child_frame_id="Ball")
                 place = move.transform.translation
                 place.x, place.y, place.z, move.transform.rotation.w = 3.0, 2.5, 1.6, 1.0
                 self.publisher("/drone_sim/set_object_pose", TransformStamped).publish(move)
-                odometry.wait_for(lambda o: near(o, (3.0, 2.5, 1.6)))
+                odometry.wait_for(lambda o: is_near(o, (3.0, 2.5, 1.6)))
             finally:
                 node.kill()
                 node.wait(60)
 
-    def test_own_file(self):
-        """A profile of one's own: other names, a service for the motors, and a number as a driver has it."""
-        with tempfile.NamedTemporaryFile("w", suffix=".yaml") as own:
-            own.write(OWN)
-            own.flush()
-            with self.simulator(own.name) as _:
+    def test_profile_from_a_user_file(self):
+        """A user's profile: own topic names, a service for the motors, and a scaled number."""
+        with tempfile.NamedTemporaryFile("w", suffix=".yaml") as profile_file:
+            profile_file.write(USER_PROFILE)
+            profile_file.flush()
+            with self.simulator(profile_file.name) as _:
                 heading = self.listen("/heading", Float32)
                 self.publisher("/go", Empty)
                 with Sender(self.publisher("/turn", Twist), command(linear_x=0.5)):
@@ -218,7 +218,7 @@ class Profiles(unittest.TestCase):
                 self.listen("/mine/state", String).wait_for(lambda message: message.data == "landed", after=0)
 
 
-OWN = """
+USER_PROFILE = """
 drone: {name: mine}
 cmd_vel_meaning: {turn: {field: linear.x}, forward: {field: angular.z}}
 topics:

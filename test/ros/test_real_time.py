@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""At real time: one stamp for everything that a step publishes, one step per 50 ms of stamps.
+"""At real time: all messages of a step have the same stamp, and several simulators share one tree of frames.
 
-Beside it two more simulators fly under the same master, in namespaces of their own.
+Two more simulators fly under the same master, each in its own namespace.
 """
 
 import subprocess
@@ -20,9 +20,9 @@ SIMULATORS = {"/tf": ("", "a/", "b/hawk/"), "/tf_static": ("drone_sim/", "a/dron
 
 
 class RealTime(unittest.TestCase):
-    """Three seconds of everything."""
+    """Messages of at least 60 steps (3 s), frames, and a refused second simulator."""
 
-    def test_a_step_has_one_stamp(self):
+    def test_all_messages_of_a_step_have_the_same_stamp(self):
         listeners = {
             "front": Listener("/drone/front", Image),
             "camera_info": Listener("/drone/camera_info", CameraInfo),
@@ -42,23 +42,23 @@ class RealTime(unittest.TestCase):
         steps = {t for t in stamps["odom"] if first <= t <= last}
         self.assertGreater(len(steps), STEPS / 4)
         for name, times in stamps.items():
-            # A busy machine may drop a message of a step; it cannot bring one that is of no step.
+            # A busy machine may drop a message of a step, but it cannot add one that belongs to no step.
             common = {t for t in times if first <= t <= last}
             self.assertLessEqual(common, steps, name)
             self.assertTrue(common, name)
 
-    def test_static_frames_come_together(self):
+    def test_static_frames_are_published_in_one_message(self):
         listener = Listener("/tf_static", TFMessage)
         static = listener.wait_for(lambda m: m._connection_header["callerid"] == "/drone_sim", after=0)
         children = {t.child_frame_id: t.header.frame_id for t in static.transforms}
         self.assertEqual(children["front_optical"], "base_link")
         self.assertEqual(children["propeller_front_left"], "base_link")
 
-    def test_simulators_in_namespaces_of_their_own_make_one_tree(self):
+    def test_simulators_in_separate_namespaces_make_one_tf_tree(self):
         parents, senders = {}, {}
-        for topic, some in (("/tf", ("blades_front_left", "base_link")), ("/tf_static", ("first",))):
+        for topic, frames in (("/tf", ("blades_front_left", "base_link")), ("/tf_static", ("first",))):
             listener = Listener(topic, TFMessage)
-            for frame in (f"{prefix}{one}" for prefix in SIMULATORS[topic] for one in some):  # each of another node
+            for frame in (f"{prefix}{one}" for prefix in SIMULATORS[topic] for one in frames):  # one for each node
                 listener.wait_for(lambda m, one=frame: one in [t.child_frame_id for t in m.transforms], after=0)
             for message in list(listener.messages):
                 for one in message.transforms:
@@ -77,10 +77,10 @@ class RealTime(unittest.TestCase):
         other = subprocess.run(
             ["rosrun", "drone_sim", "simulator", "__name:=other"], capture_output=True, text=True, timeout=90
         )
-        said = other.stdout + other.stderr
-        self.assertEqual(other.returncode, 1, said)
-        self.assertIn("already flies in /drone_sim: give one of the two a namespace", said)
-        self.assertNotIn("Traceback", said)
+        output = other.stdout + other.stderr
+        self.assertEqual(other.returncode, 1, output)
+        self.assertIn("already flies in /drone_sim: give one of the two a namespace", output)
+        self.assertNotIn("Traceback", output)
 
 
 if __name__ == "__main__":

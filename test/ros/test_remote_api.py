@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The node, driven by clients of both remote APIs, with services and topics beside them."""
+"""A node driven by clients of both remote APIs, together with its services and topics."""
 
 import struct
 import sys
@@ -45,10 +45,10 @@ class RemoteApi(unittest.TestCase):
 
     @classmethod
     def run_node(cls):
-        """Make and run it in one thread, which the simulation belongs to."""
-        served = {"serve": True, "port": 0, "legacy_port": 0}
-        given = {"script": "target", "cameras": {}, "remote_api": served, "real_time_factor": 0}
-        node = Node(parameters.load(given))
+        """Create and run the node in one thread, which owns the simulation."""
+        api_settings = {"serve": True, "port": 0, "legacy_port": 0}
+        settings = {"script": "target", "cameras": {}, "remote_api": api_settings, "real_time_factor": 0}
+        node = Node(parameters.load(settings))
         cls.port, cls.legacy_port = node._remote.zeromq.port, node._remote.legacy.port
         cls.ready.set()
         node.run()
@@ -69,7 +69,7 @@ class RemoteApi(unittest.TestCase):
         self.services["stop"]()  # answered although the client holds the simulation
         self.assertEqual(sim.getSimulationState(), sim.simulation_stopped)
 
-    def test_a_steps_are_not_waited_for_while_a_client_holds_the_simulation(self):
+    def test_a_step_is_interrupted_while_a_client_holds_the_simulation(self):
         sim = RemoteAPIClient(port=self.port).require("sim")
         sim.startSimulation()
         sim.pauseSimulation()
@@ -86,7 +86,7 @@ class RemoteApi(unittest.TestCase):
         self.assertTrue(step().success)
         sim.stopSimulation()
 
-    def test_b_topics_reach_functions_of_the_client(self):
+    def test_b_topics_call_functions_of_the_client(self):
         client = RemoteAPIClient(port=self.port)
         sim, ros = client.require("sim"), client.require("simROS")
         self.services["start"]()
@@ -102,7 +102,7 @@ class RemoteApi(unittest.TestCase):
         echo.wait_for(lambda message: message.data == "hello", after=0)
         sim.stopSimulation()
 
-    def test_c_a_client_that_goes_lets_the_flight_go_on(self):
+    def test_c_the_flight_continues_after_its_client_disconnects(self):
         client = RemoteAPIClient(port=self.port)
         sim = client.require("sim")
         sim.setStepping(True)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What rviz is shown of the flight and of what is around it."""
+"""Markers for rviz: surroundings, objects, path, command, height, forces and state."""
 
 import math
 import sys
@@ -30,7 +30,7 @@ drone: {position: [0, 0, 5], yaw: 0.5}
 
 
 def mesh(marker):
-    """Return the lines of a mesh and of its materials, by their first word, and its picture."""
+    """Return the lines of a mesh and of its material file by their first word, and its texture."""
     path = Path(marker.mesh_resource[len("file://") :])
     lines = {}
     for line in (path.read_text() + path.with_suffix(".mtl").read_text()).splitlines():
@@ -39,8 +39,8 @@ def mesh(marker):
     return lines, cv2.imread(str(path.parent / lines["map_Kd"][0][0]))
 
 
-def ahead(marker, tilt):
-    """Return the vector, in the world, from the middle of an arrow's tail to its tip; `tilt` is the drone's."""
+def arrow_vector(marker, tilt):
+    """Return the vector from the middle of an arrow's tail to its tip (world frame), given the drone's orientation."""
     left, right, *_, tip = (np.array([p.x, p.y, p.z]) for p in marker.points)
     q = marker.pose.orientation
     turn = frames.multiply_quaternions(tilt, (q.x, q.y, q.z, q.w))
@@ -54,7 +54,7 @@ def lines(message):
 
 
 class Rviz(unittest.TestCase):
-    """A node that runs in this process, five times as fast as time."""
+    """A node that runs in this process at five times real time."""
 
     @classmethod
     def setUpClass(cls):
@@ -129,10 +129,10 @@ class Rviz(unittest.TestCase):
         again = surroundings.wait_for(lambda m: len(surroundings.messages) > 1, after=0).markers[2].mesh_resource
         self.assertEqual(first, again)
 
-    def test_the_path_ends_where_the_drone_is_put_elsewhere(self):
+    def test_the_path_ends_where_set_pose_moves_the_drone(self):
         path = self.listen("view/path")
         self.command(x=1.0)
-        # Somebody who stopped listening has ended a line, too.
+        # A subscriber that disconnected has also ended a line.
         flown = lines(path.wait_for(lambda m: len(lines(m)[-1]) > 10))
         self.assertLess(np.linalg.norm(np.diff(flown[-1], axis=0), axis=1).max(), 0.5)
         pose = PoseStamped()
@@ -153,7 +153,7 @@ class Rviz(unittest.TestCase):
             self.call(service)
             path.wait_for(lambda m: sum(map(len, lines(m))) < 5, after=heard)
 
-    def test_the_arrow_is_what_is_commanded(self):
+    def test_the_arrow_shows_the_command(self):
         command = self.listen("view/command")
         self.command(x=0.6, y=-0.3, z=0.2)
         arrow = command.wait_for(lambda m: m.markers[0].action == Marker.ADD).markers[0]
@@ -161,7 +161,7 @@ class Rviz(unittest.TestCase):
         c, s = math.cos(0.5), math.sin(0.5)  # the drone's yaw: the command counts in Track_base
         expected = (0.6 * c + 0.3 * s, 0.6 * s - 0.3 * c, 0.2)
         body = self.node.simulation.drone.body
-        np.testing.assert_allclose(ahead(arrow, body.state.orientation), expected, atol=0.05)
+        np.testing.assert_allclose(arrow_vector(arrow, body.state.orientation), expected, atol=0.05)
         self.command(turn=0.5)
         turning = command.wait_for(lambda m: m.markers[0].action == Marker.DELETE and m.markers[1].points).markers
         first, last = turning[1].points[0], turning[1].points[-1]
@@ -183,13 +183,13 @@ class Rviz(unittest.TestCase):
         turn = frames.multiply_quaternions(tilt, (q.x, q.y, q.z, q.w))
         self.assertGreater(frames.turned(turn, (0, 0, 1))[2], 0.98)
 
-    def test_forces_are_drawn_on_the_drone_for_who_listens(self):
+    def test_forces_are_drawn_on_the_drone_for_subscribers(self):
         thrust, *others = self.listen("view/forces").wait_for(lambda m: m.markers[0].action == Marker.ADD).markers
         self.assertEqual((thrust.ns, thrust.header.frame_id, thrust.type), ("thrust", "base_link", Marker.LINE_LIST))
         self.assertEqual(len(thrust.points), 4 * 10)
         self.assertEqual([one.action for one in others], [Marker.DELETE] * 4)
 
-    def test_the_text_says_what_the_simulation_does(self):
+    def test_the_text_shows_the_state_of_the_simulation(self):
         state = self.listen("view/state")
         text = state.wait_for(lambda m: "flying" in m.markers[0].text, after=0).markers[0].text
         self.assertRegex(text, r"flying +\d+\.\d s\nheight \d\.\d\d m +speed \d\.\d\d m/s")

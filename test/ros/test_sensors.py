@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every sensor as ROS sees it: types, stamps, frames, and nothing twice."""
+"""Topics of every sensor: types, rates, stamps, frames, values, and no message twice."""
 
 import itertools
 import math
@@ -40,7 +40,7 @@ class Sensors(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.over = threading.Event()
+        cls.end_event = threading.Event()
         cls.thread = threading.Thread(target=cls.run_node)
         cls.thread.start()
         cls.fixed = Listener("/tf_static", TFMessage)
@@ -52,20 +52,20 @@ class Sensors(unittest.TestCase):
 
     @classmethod
     def tearDownClass(cls):
-        cls.over.set()
+        cls.end_event.set()
         cls.thread.join()
 
     @classmethod
     def run_node(cls):
         file = str(package_path() / "config" / "sensors.yaml")
         cls.node = Node(parameters.load({"config": file, "cameras": SMALL, "real_time_factor": 5.0}))
-        cls.node.run(cls.over.is_set)
+        cls.node.run(cls.end_event.is_set)
         cls.node.close()
 
     def setUp(self):
-        heard = len(self.odometry.messages)
+        count = len(self.odometry.messages)
         self.assertTrue(rospy.ServiceProxy("~restart", Trigger)().success)
-        self.odometry.wait_for(lambda o: 0 < o.header.stamp.to_sec() < 1, after=heard)
+        self.odometry.wait_for(lambda o: 0 < o.header.stamp.to_sec() < 1, after=count)
 
     def pause(self, on):
         self.assertTrue(rospy.ServiceProxy("~pause", SetBool)(on).success)
@@ -80,9 +80,9 @@ class Sensors(unittest.TestCase):
             self.assertEqual(gaps, {1.0}, topic)
             self.assertEqual({header.frame_id for header in headers}, {frame}, topic)
 
-    def test_their_frames_are_told(self):
-        told = self.fixed.wait_for(after=0)
-        sensors = {one.child_frame_id: one for one in told.transforms if one.child_frame_id.endswith("_link")}
+    def test_sensor_frames_are_published_on_tf_static(self):
+        tf_static = self.fixed.wait_for(after=0)
+        sensors = {one.child_frame_id: one for one in tf_static.transforms if one.child_frame_id.endswith("_link")}
         self.assertLessEqual({"imu_link", "range_link", "gps_link"}, set(sensors))
         self.assertEqual(
             {sensors[name].header.frame_id for name in ("imu_link", "range_link", "gps_link")}, {"base_link"}
@@ -90,7 +90,7 @@ class Sensors(unittest.TestCase):
         turn = sensors["range_link"].transform.rotation
         self.assertAlmostEqual(turn.y, math.sqrt(0.5))  # x points down
 
-    def test_what_they_say(self):
+    def test_sensor_values_are_plausible(self):
         data, raw = (self.listeners[f"imu/{name}"].wait_for() for name in ("data", "data_raw"))
         self.assertEqual(raw.orientation_covariance[0], -1)
         self.assertGreater(data.orientation_covariance[0], 0)
@@ -101,7 +101,7 @@ class Sensors(unittest.TestCase):
         self.assertLess(self.listeners["battery"].wait_for().current, -1)
         self.assertLess(self.listeners["magnetic_field"].wait_for().magnetic_field.z, -4e-5)
 
-    def test_contacts_when_it_is_on_the_floor(self):
+    def test_contacts_of_a_drone_on_the_floor(self):
         message = PoseStamped()
         message.header.frame_id = "world"
         message.pose.position.z, message.pose.orientation.w = 0.0, 1.0
@@ -110,7 +110,7 @@ class Sensors(unittest.TestCase):
         self.assertEqual({marker.ns for marker in touched.markers}, {"Floor"})
         self.assertEqual({marker.header.frame_id for marker in touched.markers}, {"world"})
 
-    def test_while_it_is_paused_nothing_comes_twice(self):
+    def test_single_steps_while_paused_publish_no_message_twice(self):
         raw = self.listeners["imu/data_raw"]
         self.pause(True)
         start = len(raw.messages)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Paused in simulated time: single steps are told of, and what is moved is seen, although the clock stands still."""
+"""Paused in simulated time: single steps and moves of the drone are published although the clock stands still."""
 
 import sys
 import tempfile
@@ -34,7 +34,7 @@ def sysCall_sensing():
 
 
 class Standing(unittest.TestCase):
-    """A node that runs in this process; this process hears its clock as any message."""
+    """A node that runs in this process, which subscribes to /clock like to any other topic."""
 
     @classmethod
     def setUpClass(cls):
@@ -55,7 +55,7 @@ class Standing(unittest.TestCase):
 
     @classmethod
     def run_node(cls):
-        """Make and run it in one thread, which OpenGL belongs to."""
+        """Create and run the node in one thread, since an OpenGL context belongs to a thread."""
         with tempfile.NamedTemporaryFile("w", suffix=".py") as script:
             script.write(SCRIPT)
             script.flush()
@@ -65,10 +65,10 @@ class Standing(unittest.TestCase):
             cls.node.close()
 
     def setUp(self):
-        heard = len(self.odometry.messages)
+        odometry_count = len(self.odometry.messages)
         self.call("start")
-        self.odometry.wait_for(lambda o: 0 < o.header.stamp.to_sec() < 1, after=heard)
-        self.scripts.wait_for()  # the script has advertised its topic anew
+        self.odometry.wait_for(lambda o: 0 < o.header.stamp.to_sec() < 1, after=odometry_count)
+        self.scripts.wait_for()  # the script has advertised its topic again
         self.assertTrue(rospy.ServiceProxy("~pause", SetBool)(True).success)
 
     def call(self, name):
@@ -84,14 +84,14 @@ class Standing(unittest.TestCase):
     def stamp(self, steps):
         return rospy.Time.from_sec((self.node.simulation.steps + steps) * 0.05)
 
-    def test_every_single_step_is_told_of(self):
+    def test_every_single_step_is_published(self):
         expected = [self.stamp(number) for number in (1, 2, 3, 4, 5)]
         listeners = (self.clock, self.odometry, self.transforms, self.front, self.scripts)
         before = {listener: len(listener.messages) for listener in listeners}
-        asking = [threading.Thread(target=self.call, args=("step",)) for _ in expected]
-        for thread in asking:
+        threads = [threading.Thread(target=self.call, args=("step",)) for _ in expected]
+        for thread in threads:
             thread.start()
-        for thread in asking:
+        for thread in threads:
             thread.join()
         for listener in (self.odometry, self.front, self.scripts):
             listener.wait_for(lambda m: m.header.stamp == expected[-1], after=before[listener])
@@ -105,10 +105,10 @@ class Standing(unittest.TestCase):
             if image.header.stamp in pictures:
                 self.assertEqual(image.data, pictures[image.header.stamp])
         first = [m.transforms[0] for m in since[self.transforms]]
-        sent = [one.header.stamp for one in first if one.child_frame_id == "base_link"]  # the blades come by themselves
+        sent = [one.header.stamp for one in first if one.child_frame_id == "base_link"]  # blades have separate messages
         self.assertEqual([stamp for stamp in sent if stamp >= expected[0]], expected)
 
-    def test_what_is_moved_is_seen_under_the_stamp_of_now(self):
+    def test_moving_the_drone_publishes_it_with_the_current_stamp(self):
         now = self.stamp(0)
         self.move_to(0.3)
         low = self.front.messages[-1]
@@ -119,7 +119,7 @@ class Standing(unittest.TestCase):
         self.assertEqual(picture.header.stamp, now)
         self.assertEqual(len(self.transforms.messages), sent, "tf2 takes but one transform of a stamp")
 
-    def test_commands_make_no_messages(self):
+    def test_commands_while_paused_cause_no_messages(self):
         self.move_to(7.0)
         before = len(self.odometry.messages)
         for _ in range(500):
@@ -128,15 +128,15 @@ class Standing(unittest.TestCase):
         heights = [o.pose.pose.position.z for o in self.odometry.messages[before:]]
         self.assertTrue(all(abs(height - 8.0) < 1e-6 for height in heights), heights)
 
-    def test_who_comes_while_the_clock_stands_is_told_what_is(self):
+    def test_subscribers_while_the_clock_stands_get_the_latest_messages(self):
         now = self.stamp(0)
         for name, topic, kind in (("clock", "/clock", Clock), ("transforms", "/tf", TFMessage)):
             getattr(self, name).close()
             setattr(type(self), name, Listener(topic, kind))
         self.assertEqual(self.clock.wait_for(after=0).clock, now)
-        told = self.transforms.wait_for(after=0).transforms
-        self.assertEqual({one.header.stamp for one in told}, {now})
-        self.assertIn("base_link", [one.child_frame_id for one in told])
+        latest_transforms = self.transforms.wait_for(after=0).transforms
+        self.assertEqual({one.header.stamp for one in latest_transforms}, {now})
+        self.assertIn("base_link", [one.child_frame_id for one in latest_transforms])
         pictures = Listener("/drone/track/image", Image)
         self.addCleanup(pictures.close)
         self.assertEqual(pictures.wait_for(after=0).header.stamp, now)

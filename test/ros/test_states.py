@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A pilot that knows the topics of real drones flies from take-off to landing, whatever time it goes by."""
+"""A pilot node for real drones flies from take-off to landing, in wall time and in simulated time."""
 
 import itertools
 import math
@@ -28,7 +28,7 @@ PILOT = Path(__file__).with_name("safe_pilot.py")
 
 
 class Flight(NamedTuple):
-    """How fast one simulator flies, by which time its pilot goes, and how long a leg of its square takes (s)."""
+    """Real-time factor, whether the pilot uses simulated time, and the duration of a leg of its square (s)."""
 
     factor: float
     simulated: bool
@@ -38,7 +38,7 @@ class Flight(NamedTuple):
 FLIGHTS = {
     "slow": Flight(1, False, 0.8),
     "real": Flight(5, False, 0.4),
-    "simulated": Flight(5, True, 4.0),  # longer: its bag is played by the clock, and a busy machine joins what is close
+    "simulated": Flight(5, True, 4.0),  # longer: a busy machine merges commands of its bag that are close in time
 }
 QUICK = ("real", "simulated")
 RECORDED = "simulated"
@@ -47,78 +47,78 @@ SPEED, STEP = 0.5, 0.05  # m/s, s
 
 
 def clock(name):
-    """Return the remapping that gives a simulator and all that goes by its time a /clock of their own."""
+    """Return the remapping that gives a simulator and its clients their own /clock topic."""
     return f"/clock:=/{name}/clock"
 
 
 def path(messages):
-    """Return where a drone was since it was first told to go, by steps, and the steps at which it was told anew."""
+    """Return {step: (x, y)} since the first change of the command, and the steps of all changes."""
     odometry, commands = messages
-    told = {}
+    twists_by_step = {}
     for message in commands:
         linear, angular = message.twist.linear, message.twist.angular
-        told[round(message.header.stamp.to_sec() / STEP)] = (linear.x, linear.y, angular.z)
-    steps = sorted(told)
-    changes = [now for before, now in itertools.pairwise(steps) if told[now] != told[before]]
+        twists_by_step[round(message.header.stamp.to_sec() / STEP)] = (linear.x, linear.y, angular.z)
+    steps = sorted(twists_by_step)
+    changes = [now for before, now in itertools.pairwise(steps) if twists_by_step[now] != twists_by_step[before]]
     places = {round(m.header.stamp.to_sec() / STEP): m.pose.pose.position for m in odometry}
     flown = {step - changes[0]: (place.x, place.y) for step, place in places.items() if step >= changes[0]}
     return flown, [step - changes[0] for step in changes]
 
 
 class States(unittest.TestCase):
-    """Three simulators with a drone each, at once; /use_sim_time counts when a node begins."""
+    """Three simulators with one drone each, in parallel; a node reads /use_sim_time when it starts."""
 
     @classmethod
     def setUpClass(cls):
         cls.processes, cls.odometry, cls.states, cls.pilots = [], {}, {}, {}
         cls.log = Listener("/rosout", Log)
         cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.end_processes)  # where this fails, too: ctest waits for whoever holds its output
+        cls.addClassCleanup(cls.end_processes)  # also if this fails: ctest waits for all processes that hold its output
         for simulated in (False, True):
             rospy.set_param("/use_sim_time", simulated)
             names = [name for name, flight in FLIGHTS.items() if flight.simulated == simulated]
             for name in names:
-                cls.begin_simulator(name)
+                cls.start_simulator(name)
             for name in names:
                 cls.odometry[name].wait_for(after=0)
             if RECORDED in names:
-                cls.begin_recorder()
-            controls = [cls.begin_pilot(name) for name in names]
+                cls.start_recorder()
+            controls = [cls.start_pilot(name) for name in names]
             for publisher in controls:
                 connected(publisher)
 
     @classmethod
-    def begin_simulator(cls, name):
+    def start_simulator(cls, name):
         cls.odometry[name] = Listener(f"/{name}/odom", Odometry)
         cls.states[name] = Listener(f"/{name}/state", String)
         settings = (f"_drone/name:={name}", f"_real_time_factor:={FLIGHTS[name].factor}", "_start:=landed")
-        cls.begin(str(package_path() / "scripts/simulator"), f"__name:=sim_{name}", clock(name), *settings)
+        cls.spawn(str(package_path() / "scripts/simulator"), f"__name:=sim_{name}", clock(name), *settings)
 
     @classmethod
-    def begin_recorder(cls):
-        """Begin a bag, and wait until it has begun."""
+    def start_recorder(cls):
+        """Start to record a bag, and wait until its file exists."""
         cls.commands = Listener(f"/{RECORDED}/command", TwistStamped)
         arguments = ("--simulator", f"sim_{RECORDED}", "--folder", cls.folder.name, clock(RECORDED))
-        cls.recorder = cls.begin(str(package_path() / "scripts/record"), *arguments)
+        cls.recorder = cls.spawn(str(package_path() / "scripts/record"), *arguments)
         while not any(Path(cls.folder.name).iterdir()):
             threading.Event().wait(0.02)
 
     @classmethod
-    def begin_pilot(cls, name):
-        """Begin a pilot, and what controls the drone from outside; return that's publisher.
+    def start_pilot(cls, name):
+        """Start a pilot and an outside controller of its drone; return the controller's publisher.
 
-        It answers every odometry with a command, whatever time goes by: the pilot decides whether it counts.
+        The controller answers every odometry message; the pilot decides whether it forwards the command.
         """
         turning = Twist()
         turning.angular.z = TURN
         publisher = rospy.Publisher(f"/{name}/cmd_vel_in", Twist, queue_size=1)
         rospy.Subscriber(f"/{name}/odom", Odometry, lambda _message: publisher.publish(turning))
         leg = str(FLIGHTS[name].leg)
-        cls.pilots[name] = cls.begin(str(PILOT), f"__name:=pilot_{name}", f"__ns:=/{name}", clock(name), leg)
+        cls.pilots[name] = cls.spawn(str(PILOT), f"__name:=pilot_{name}", f"__ns:=/{name}", clock(name), leg)
         return publisher
 
     @classmethod
-    def begin(cls, *command):
+    def spawn(cls, *command):
         cls.processes.append(subprocess.Popen([sys.executable, *command]))
         return cls.processes[-1]
 
@@ -129,7 +129,7 @@ class States(unittest.TestCase):
         finally:
             cls.folder.cleanup()
 
-    def test_1_quick(self):
+    def test_1_quick_flights(self):
         for name in QUICK:
             with self.subTest(name):
                 self.check_flight(name)
@@ -138,8 +138,8 @@ class States(unittest.TestCase):
         """Check that a pilot took off, flew a square, handed over, and landed."""
         self.assertEqual(self.pilots[name].wait(90), 0)
         self.states[name].wait_for(lambda m: len(self.states[name].messages) == 5, after=0)
-        said = [message.data for message in self.states[name].messages]
-        self.assertEqual(said, ["landed", "taking off", "flying", "landing", "landed"])
+        state_names = [message.data for message in self.states[name].messages]
+        self.assertEqual(state_names, ["landed", "taking off", "flying", "landing", "landed"])
         flown = [message.pose.pose.position for message in self.odometry[name].messages]
         for axis in "xy":
             places = [getattr(one, axis) for one in flown]
@@ -151,7 +151,7 @@ class States(unittest.TestCase):
         rest = Listener(f"/{name}/propellers", Float32MultiArray).wait_for(after=0)
         self.assertEqual(list(rest.data), [0, 0, 0, 0])
 
-    def test_2_a_twist_on_the_ground_says_why(self):
+    def test_2_a_twist_on_the_ground_logs_why_it_is_refused(self):
         twists = connected(rospy.Publisher("/real/cmd_vel", Twist, queue_size=1))
         twist = Twist()
         twist.linear.x = 0.5
@@ -160,25 +160,25 @@ class States(unittest.TestCase):
 
     def test_3_goto_home_and_reset(self):
         topics = (("takeoff", Empty), ("goto", PoseStamped), ("home", Empty), ("reset", Empty))
-        asks = {topic: connected(rospy.Publisher(f"/real/{topic}", kind, queue_size=1)) for topic, kind in topics}
-        asks["reset"].publish()
-        asks["takeoff"].publish()
+        publishers = {topic: connected(rospy.Publisher(f"/real/{topic}", kind, queue_size=1)) for topic, kind in topics}
+        publishers["reset"].publish()
+        publishers["takeoff"].publish()
         self.states["real"].wait_for(lambda m: m.data == "flying")
         goal = PoseStamped()
         goal.header.frame_id, goal.pose.position.x, goal.pose.position.z = "base_link", 1.0, 1.0
         goal.pose.orientation.w = 1.0
-        asks["goto"].publish(goal)
+        publishers["goto"].publish(goal)
         self.log.wait_for(lambda m: "goto refused: frame_id 'base_link': must be 'world'" in m.msg, after=0)
         goal.header.frame_id = "world"
-        asks["goto"].publish(goal)
+        publishers["goto"].publish(goal)
         self.odometry["real"].wait_for(lambda m: m.pose.pose.position.x > 0.9)
-        asks["home"].publish()
+        publishers["home"].publish()
         self.odometry["real"].wait_for(lambda m: m.pose.pose.position.x < 0.5)
-        asks["reset"].publish()
+        publishers["reset"].publish()
         self.states["real"].wait_for(lambda m: m.data == "landed", after=-1)
         self.odometry["real"].wait_for(lambda m: m.pose.pose.position.z < 0.02)
 
-    def test_4_a_bag_played_into_a_fresh_simulation(self):
+    def test_4_a_bag_played_into_a_restarted_simulation_repeats_the_flight(self):
         end(self.recorder, number=signal.SIGINT)
         (bag,) = Path(self.folder.name).iterdir()
         heard = (self.odometry[RECORDED], self.commands)
@@ -201,10 +201,10 @@ class States(unittest.TestCase):
         self.assertGreater(len(commanded), 100)
         self.assertGreater(len(common & commanded), 0.9 * len(commanded), "a busy machine loses few messages")
         for step in common:
-            # Each command holds a little longer or shorter. What a busy machine has not heard looks one step later.
+            # Each command lasts a little longer or shorter. A message that a busy machine drops looks one step late.
             self.assertLess(math.dist(flown[step], again[step]), SPEED * STEP * (late + 1) * len(changes))
 
-    def test_5_slow(self):
+    def test_5_slow_flights(self):
         for name in FLIGHTS.keys() - set(QUICK):
             with self.subTest(name):
                 self.check_flight(name)

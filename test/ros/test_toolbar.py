@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""V-REP's way of working through ROS: start, stop, pause, step, edit the script, save the scene, drag things."""
+"""The V-REP workflow over ROS: start, stop, pause, step, edit the script, save the scene, drag objects."""
 
 import json
 import math
@@ -48,18 +48,18 @@ def sysCall_cleanup():
     print('cleaned up')
 """
 
-LETS_GO = """
+DETACHED_TARGET_SCRIPT = """
 def sysCall_init():
     sim.setObjectParent(sim.getObjectHandle('DronePosition'), -1, True)
 """
-LISTENS = """
+SUBSCRIBING_SCRIPT = """
 def sysCall_init():
     simROS.subscribe("cmd_vel", "geometry_msgs/Twist", "on_twist")
 
 def on_twist(msg):
     pass
 """
-DRAWS = """
+DRAWING_SCRIPT = """
 def sysCall_init():
     self.path = sim.addDrawingObject(sim.drawing_linestrip, 2, 0, -1, 100, [1, 0, 0])
     self.disc = sim.addDrawingObject(sim.drawing_discpoints | sim.drawing_50percenttransparency, 0.4)
@@ -72,7 +72,7 @@ def sysCall_sensing():
     sim.addDrawingObjectItem(self.path, [self.x, 0, 1])
     sim.addDrawingObjectItem(self.ball, [self.x, 0, 1])
 """
-OPENS = """
+DIALOG_SCRIPT = """
 def sysCall_init():
     sim.adjustView(sim.floatingViewAdd(0.9, 0.9, 0.2, 0.2, 0), sim.getObject('/floorCamera'), 64)
     self.asked = sim.displayDialog('Land?', 'now?', sim.dlgstyle_yes_no, False)
@@ -85,7 +85,7 @@ def sysCall_actuation():
 
 
 class Toolbar(unittest.TestCase):
-    """A node that runs in this process, as fast as it can, called from beside."""
+    """Services and topics of a node that runs in a thread of this process at ten times real time."""
 
     @classmethod
     def setUpClass(cls):
@@ -126,7 +126,7 @@ class Toolbar(unittest.TestCase):
         return self.node.simulation
 
     def test_stop_cleans_up_and_restores_the_scene(self):
-        self.odometry.wait_for(lambda o: o.pose.pose.position.z < 899)  # this script lets it fall
+        self.odometry.wait_for(lambda o: o.pose.pose.position.z < 899)  # the vehicle falls with this script
         self.assertEqual(self.call("stop"), "stopped")
         self.assertEqual(self.simulation.time, 0.0)
         self.assertAlmostEqual(self.simulation.drone.body.state.position[2], 900)
@@ -135,24 +135,24 @@ class Toolbar(unittest.TestCase):
         self.assertEqual(self.call("start"), "started")
         self.odometry.wait_for(lambda o: o.pose.pose.position.z < 899)
 
-    def test_a_service_that_the_script_offers(self):
+    def test_a_service_that_the_script_advertises(self):
         ask = rospy.ServiceProxy("/script/steps", SetBool)
         self.assertTrue(float(ask(True).message) <= float(ask(True).message))
         self.assertFalse(ask(False).success)
-        waiting = threading.Timer(0.1, lambda: self.call("stop"))
+        stop_timer = threading.Timer(0.1, lambda: self.call("stop"))
         self.pause(True)
-        waiting.start()
+        stop_timer.start()
         with self.assertRaisesRegex(rospy.ServiceException, "the script ended before it answered"):
             ask(True)
-        waiting.join()
+        stop_timer.join()
 
-    def test_windows_of_a_script_are_told_and_a_dialog_is_answered(self):
+    def test_windows_of_a_script_are_published_and_a_dialog_is_answered(self):
         windows, answers = Listener("~windows", String), rospy.Publisher("~window_answers", String, queue_size=5)
         connected(answers)
-        self.script.write_text(OPENS)
+        self.script.write_text(DIALOG_SCRIPT)
         self.call("restart")
-        said = windows.wait_for(lambda m: '"Land?"' in m.data, after=0).data
-        state = json.loads(said)
+        result = windows.wait_for(lambda m: '"Land?"' in m.data, after=0).data
+        state = json.loads(result)
         self.assertEqual(state["views"][0]["topic"], "/drone/floor/image")
         for wrong in ("nonsense", '{"handle": 1000, "button": "no"}'):
             answers.publish(wrong)
@@ -167,25 +167,25 @@ class Toolbar(unittest.TestCase):
         variables, names = Listener("~variables", String), Listener("~names", String)
         self.call("restart")
 
-        def steps(shown):
-            rows = [row for script in json.loads(shown)["scripts"] for row in dict(script["scopes"])["self"]]
+        def steps(variables_text):
+            rows = [row for script in json.loads(variables_text)["scripts"] for row in dict(script["scopes"])["self"]]
             return [int(value) for name, _, value, _ in rows if name == "steps"]
 
         variables.wait_for(lambda m: any(count > 0 for count in steps(m.data)), after=0)
-        known = json.loads(names.wait_for(lambda m: '"objects"' in m.data, after=0).data)
-        self.assertTrue("Quadricopter_base" in known["objects"] and "Kzref" in known["parameters"])
+        known_names = json.loads(names.wait_for(lambda m: '"objects"' in m.data, after=0).data)
+        self.assertTrue("Quadricopter_base" in known_names["objects"] and "Kzref" in known_names["parameters"])
         breakpoints = rospy.Publisher("~breakpoints", String, queue_size=5, latch=True)
         connected(breakpoints)
         breakpoints.publish('{"script.py": [1]}')
         self.log.wait_for(lambda m: m.msg.startswith("breakpoints: refused: "), after=0)
         line = SCRIPT.split("\n").index("    self.steps += 1") + 1
         breakpoints.publish(json.dumps({str(self.script): [line]}))
-        said = json.loads(variables.wait_for(lambda m: '"paused"' in m.data and '"line"' in m.data, after=0).data)
-        self.assertEqual((said["reached"]["file"], said["reached"]["line"]), (str(self.script), line))
-        at_the_line = dict(said["reached"]["scopes"])["self"]
-        self.assertEqual(int(at_the_line[0][2]) + 1, steps(json.dumps(said))[0])
+        result = json.loads(variables.wait_for(lambda m: '"paused"' in m.data and '"line"' in m.data, after=0).data)
+        self.assertEqual((result["reached"]["file"], result["reached"]["line"]), (str(self.script), line))
+        scope_at_line = dict(result["reached"]["scopes"])["self"]
+        self.assertEqual(int(scope_at_line[0][2]) + 1, steps(json.dumps(result))[0])
         self.call("step")
-        variables.wait_for(lambda m: json.loads(m.data)["reached"].get("time", 0) > said["reached"]["time"], after=0)
+        variables.wait_for(lambda m: json.loads(m.data)["reached"].get("time", 0) > result["reached"]["time"], after=0)
         breakpoints.unregister()
         variables.close()
         names.close()
@@ -203,7 +203,7 @@ class Toolbar(unittest.TestCase):
         self.call("stop")
         self.pause(True, expected=False)
 
-    def test_the_state_is_told_at_once_and_to_whoever_comes_late(self):
+    def test_the_state_topic_is_latched_and_publishes_each_change(self):
         states = Listener("~state", String)
         states.wait_for(lambda m: m.data == "flying", after=0)
         expected = ["flying"]
@@ -226,11 +226,11 @@ class Toolbar(unittest.TestCase):
         self.script.write_text("def sysCall_cleanup():\n    1 / 0\n")
         self.call("start")
         self.script.write_text(SCRIPT)
-        self.call("restart")  # what cleanup gets wrong is said, and the edited script runs
+        self.call("restart")  # the error in cleanup is logged, and the edited script runs
         self.log.wait_for(lambda m: "[cleanup]" in m.msg, after=0)
         self.assertTrue(self.simulation.running)
 
-    def test_the_command_in_force(self):
+    def test_the_command_in_force_is_published(self):
         commands = Listener("/drone/command", TwistStamped)
         commander = connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1))
         twist = Twist()
@@ -238,12 +238,12 @@ class Toolbar(unittest.TestCase):
             change()
             twist.linear.x, twist.angular.z = vx, -vx
             commander.publish(twist)
-            said = commands.wait_for(lambda m, vx=vx: m.twist.linear.x == vx)
-            self.assertEqual((said.twist.angular.z, said.header.frame_id), (-vx, "Track_base"))
+            result = commands.wait_for(lambda m, vx=vx: m.twist.linear.x == vx)
+            self.assertEqual((result.twist.angular.z, result.header.frame_id), (-vx, "Track_base"))
         self.call("start")
         commands.wait_for(lambda m: m.twist == Twist())
 
-    def test_a_broken_script_stops_and_the_edited_one_starts(self):
+    def test_a_broken_script_stops_and_the_edited_script_starts(self):
         for broken, message in (
             ("def sysCall_init(:\n", "[load]"),
             ("def sysCall_init():\n    sim.getObjectPositon(1)\n", "[init]"),
@@ -253,15 +253,15 @@ class Toolbar(unittest.TestCase):
                 self.script.write_text(broken)
                 errors = len(self.log.messages)
                 rospy.ServiceProxy("~start", Trigger)()
-                said = self.log.wait_for(lambda m, message=message: message in m.msg, after=errors)
-                self.assertIn(str(self.script), said.msg)
+                result = self.log.wait_for(lambda m, message=message: message in m.msg, after=errors)
+                self.assertIn(str(self.script), result.msg)
                 self.log.wait_for(lambda m: m.msg.startswith("stopped"), after=errors)
                 self.assertFalse(self.simulation.running)
                 self.assertEqual(len([m for m in self.log.messages[errors:] if message in m.msg]), 1)
                 self.script.write_text(SCRIPT)
                 self.assertEqual(self.call("start"), "started")
 
-    def test_a_script_s_topics(self):
+    def test_a_script_publishes_and_subscribes(self):
         steps = Listener("/script/steps", Float64)
         steps.wait_for()
         connected(rospy.Publisher("/script/bump", Float64, queue_size=1)).publish(1e6)
@@ -283,19 +283,19 @@ class Toolbar(unittest.TestCase):
         self.assertLess(box["position"][2], 4.0)  # it was falling
         self.assertAlmostEqual(saved["drone"]["yaw"], 0.5, places=3)
         self.scene.write_text("object: []\n")
-        said = self.call("load_scene", expected=False)
-        self.assertIn("parameter object: unknown key; near names are objects", said)
+        result = self.call("load_scene", expected=False)
+        self.assertIn("parameter object: unknown key; near names are objects", result)
 
-    def test_the_scene_is_edited_by_two_at_once(self):
+    def test_the_scene_is_edited_by_two_clients_at_once(self):
         self.call("stop")
-        told = Listener("~scene_objects", String)
+        scene_objects = Listener("~scene_objects", String)
 
         def names(_):
             rows = {}
-            for said in (json.loads(message.data) for message in told.messages):
-                rows = {} if said["since"] is None else rows
-                rows.update((row["handle"], row["name"]) for row in said["objects"])
-                for handle in said["gone"]:
+            for result in (json.loads(message.data) for message in scene_objects.messages):
+                rows = {} if result["since"] is None else rows
+                rows.update((row["handle"], row["name"]) for row in result["objects"])
+                for handle in result["gone"]:
                     rows.pop(handle)
             return {*rows.values()} >= {"Gate", "Mark", "Goal"}
 
@@ -309,16 +309,16 @@ class Toolbar(unittest.TestCase):
             thread.start()
         for thread in threads:
             thread.join()
-        told.wait_for(names, after=0)
+        scene_objects.wait_for(names, after=0)
         refused = one(json.dumps({"edit": [{"do": "remove", "objects": ["Gat"]}]}))
         self.assertFalse(refused.success)
         self.assertIn("near names are Gate", refused.message)
         self.assertIn("not JSON", other("{").message)
         self.assertEqual(json.loads(one(json.dumps({"save": str(self.scene)})).message)["file"], str(self.scene))
         self.assertEqual(rospy.get_param("~scene_file"), str(self.scene))
-        told.close()
+        scene_objects.close()
 
-    def test_rviz_sees_the_objects_and_where_they_go(self):
+    def test_rviz_shows_objects_and_their_motion(self):
         trimesh.creation.box().export(str(self.scene.parent / "one.stl"))
         self.scene.write_text(
             "objects:\n"
@@ -340,11 +340,11 @@ class Toolbar(unittest.TestCase):
         self.assertEqual(mesh.mesh_resource, f"file://{self.scene.parent}/one.stl")
         self.assertEqual({marker.header.frame_id for marker in (box, sphere, cylinder, mesh)}, {"world"})
         scene.wait_for(lambda m: m.markers[1].pose.position.z < box.pose.position.z - 1, after=0)
-        self.call("stop")  # nothing moves, so nothing is sent, but whoever comes late is told
+        self.call("stop")  # nothing moves, so nothing is published, but the topic is latched
         Listener("/drone/scene", MarkerArray).wait_for(lambda m: len(m.markers) == 5, after=0)
 
-    def test_rviz_sees_what_a_script_draws(self):
-        self.script.write_text(DRAWS)
+    def test_rviz_shows_the_drawing_objects_of_a_script(self):
+        self.script.write_text(DRAWING_SCRIPT)
         self.call("start")
         drawing = Listener("/drone/drawing", MarkerArray)
         message = drawing.wait_for(lambda m: len(m.markers) == 4 and len(m.markers[1].points) > 5, after=0)
@@ -359,7 +359,7 @@ class Toolbar(unittest.TestCase):
         self.call("stop")
         drawing.wait_for(lambda m: len(m.markers) == 1, after=0)
 
-    def test_a_snapshot_comes_back(self):
+    def test_a_snapshot_is_restored_and_the_next_steps_are_identical(self):
         self.pause(True)
         self.call("step")
         self.call("snapshot")
@@ -371,30 +371,30 @@ class Toolbar(unittest.TestCase):
         self.assertIn("earlier run", self.call("restore", expected=False))
 
     def test_the_sphere_and_the_drone_are_dragged(self):
-        self.script.write_text(LETS_GO)
+        self.script.write_text(DETACHED_TARGET_SCRIPT)
         self.call("start")
         self.pause(True)
         handles = Listener("/drone/markers/update", InteractiveMarkerUpdate)
         handles.wait_for(lambda m: "DronePosition" in {one.name for one in (*m.markers, *m.poses)}, after=0)
         feedback = connected(rospy.Publisher("/drone/markers/feedback", InteractiveMarkerFeedback, queue_size=10))
         for name, where in (("DronePosition", (1.0, 2.0, 3.0)), ("Drone", (-1.0, 0.5, 2.0))):
-            self.assertNotEqual(self.place_of(name), where)
+            self.assertNotEqual(self.position_of(name), where)
             message = InteractiveMarkerFeedback(client_id="test", marker_name=name, control_name="slide")
             message.event_type = InteractiveMarkerFeedback.POSE_UPDATE
             message.header.frame_id = "world"
             message.pose.position.x, message.pose.position.y, message.pose.position.z = where
             message.pose.orientation.w = 1.0
-            # As rviz does while the mouse moves; the server takes none in the first second of a handle.
-            self.wait_until(lambda *, sent=message, name=name, where=where: self.dragged(feedback, sent, name) == where)
-        self.assertEqual(self.place_of("DronePosition"), (1.0, 2.0, 3.0), "the drone does not take it along")
+            # Repeat it, like rviz during a mouse move: the server ignores feedback in a marker's first second.
+            self.wait_until(lambda *, sent=message, name=name, where=where: self.drag_to(feedback, sent, name) == where)
+        self.assertEqual(self.position_of("DronePosition"), (1.0, 2.0, 3.0), "the drone does not take it along")
 
-    def test_a_drone_stands_still_while_it_is_held_and_flies_on_when_it_is_let_go(self):
+    def test_a_drone_stands_still_while_it_is_dragged_and_then_flies_on(self):
         self.call("start")
         handles = Listener("/drone/markers/update", InteractiveMarkerUpdate)
         handles.wait_for(lambda m: "Drone" in {one.name for one in (*m.markers, *m.poses)}, after=0)
         feedback = connected(rospy.Publisher("/drone/markers/feedback", InteractiveMarkerFeedback, queue_size=10))
 
-        def tell(*kinds):
+        def send(*kinds):
             for kind in kinds:
                 message = InteractiveMarkerFeedback(client_id="rviz", marker_name="Drone", event_type=kind)
                 message.pose.position.x, message.pose.position.y, message.pose.position.z = 1.0, 0.5, 2.0
@@ -403,28 +403,28 @@ class Toolbar(unittest.TestCase):
             return self.simulation.drone.body.state
 
         held = InteractiveMarkerFeedback.MOUSE_DOWN, InteractiveMarkerFeedback.POSE_UPDATE
-        self.wait_until(lambda: tell(*held).position == (1.0, 0.5, 2.0))
-        flown = self.simulation.steps + 20
-        self.wait_until(lambda: self.simulation.steps > flown or tell(InteractiveMarkerFeedback.KEEP_ALIVE) is None)
+        self.wait_until(lambda: send(*held).position == (1.0, 0.5, 2.0))
+        end_step = self.simulation.steps + 20
+        self.wait_until(lambda: self.simulation.steps > end_step or send(InteractiveMarkerFeedback.KEEP_ALIVE) is None)
         state = self.simulation.drone.body.state
         self.assertEqual((state.position, state.linear_velocity), ((1.0, 0.5, 2.0), (0.0, 0.0, 0.0)))
-        self.wait_until(lambda: tell(InteractiveMarkerFeedback.MOUSE_UP).position[2] < 0.9)
+        self.wait_until(lambda: send(InteractiveMarkerFeedback.MOUSE_UP).position[2] < 0.9)
 
-    def test_what_the_drone_does_is_told_and_whether_it_listens(self):
-        state, hears = Listener("/drone/state", String), Listener("/drone/hears_commands", Bool)
-        self.script.write_text(LISTENS)
+    def test_vehicle_state_and_hears_commands_are_published(self):
+        state, hears_commands = Listener("/drone/state", String), Listener("/drone/hears_commands", Bool)
+        self.script.write_text(SUBSCRIBING_SCRIPT)
         self.call("restart")
-        hears.wait_for(lambda m: m.data, after=0)
-        self.script.write_text(LETS_GO)
+        hears_commands.wait_for(lambda m: m.data, after=0)
+        self.script.write_text(DETACHED_TARGET_SCRIPT)
         self.call("restart")
-        hears.wait_for(lambda m: not m.data, after=0)
+        hears_commands.wait_for(lambda m: not m.data, after=0)
         state.wait_for(lambda m: m.data == "flying", after=0)
         pose = PoseStamped()
         pose.pose.position.z, pose.pose.orientation.w = 0.1, 1.0
         connected(rospy.Publisher("/drone/set_pose", PoseStamped, queue_size=10)).publish(pose)
         state.wait_for(lambda m: m.data == "on the ground", after=0)
 
-    def test_an_object_is_dragged_and_falls_when_it_is_let_go(self):
+    def test_an_object_is_dragged_and_falls_when_it_is_released(self):
         ball = "{name: Ball, shape: sphere, size: [0.1], position: [1, 0, 0.1], mass: 1}"
         self.scene.write_text(f"objects: [{ball}, {{shape: box, size: [1, 1, 1], position: [3, 0, 0.5]}}]")
         rospy.set_param("~scene_file", str(self.scene))
@@ -439,22 +439,22 @@ class Toolbar(unittest.TestCase):
                 message.pose.position.x, message.pose.position.y, message.pose.position.z = where
                 message.pose.orientation.w = 1.0
                 feedback.publish(message)
-            return self.place_of("Ball")
+            return self.position_of("Ball")
 
         self.wait_until(lambda: drag(1.0, 1.0, 2.0) == (1.0, 1.0, 2.0))
-        fallen = self.simulation.steps + 20
-        self.wait_until(lambda: self.simulation.steps > fallen or drag(1.0, 1.0, 2.0) is None)
+        last_held_step = self.simulation.steps + 20
+        self.wait_until(lambda: self.simulation.steps > last_held_step or drag(1.0, 1.0, 2.0) is None)
         self.assertEqual(drag(1e9, 1.0, 2.0), (1.0, 1.0, 2.0), "it does not fall while it is held")
         self.log.wait_for(lambda m: "'Ball' cannot be dragged there: position.x = 1000000000.0: must" in m.msg, after=0)
         feedback.publish(InteractiveMarkerFeedback(client_id="test", marker_name="Ball", event_type=5))  # MOUSE_UP
-        self.wait_until(lambda: self.place_of("Ball")[2] < 0.2)
+        self.wait_until(lambda: self.position_of("Ball")[2] < 0.2)
 
-    def dragged(self, feedback, message, name):
+    def drag_to(self, feedback, message, name):
         feedback.publish(message)
-        return self.place_of(name)
+        return self.position_of(name)
 
-    def place_of(self, name):
-        """Return where an object is: the node has been paused."""
+    def position_of(self, name):
+        """Return the position (m) of an object, rounded to 1e-9 m."""
         objects = self.simulation.context.objects
         return tuple(round(value, 9) for value in frames.position(objects.matrix(objects.handle(name))))
 
@@ -464,20 +464,20 @@ class Toolbar(unittest.TestCase):
             self.assertLess(time.monotonic(), end, "nothing such in 60 s")
             rospy.rostime.wallsleep(0.01)
 
-    def test_a_flood_of_input_makes_no_flood_of_output(self):
+    def test_a_flood_of_set_pose_messages_causes_no_flood_of_odometry(self):
         poses = connected(rospy.Publisher("/drone/set_pose", PoseStamped, queue_size=10))
         self.pause(True)
         self.odometry.wait_for()
-        before, began = len(self.odometry.messages), time.monotonic()
+        before, start_time = len(self.odometry.messages), time.monotonic()
         message = PoseStamped()
         message.pose.orientation.w = 1.0
         for number in range(1, 1001):
             message.pose.position.z = float(number)
             poses.publish(message)
         self.odometry.wait_for(lambda o: o.pose.pose.position.z == 1000.0, after=before)
-        self.assertLessEqual(len(self.odometry.messages) - before, 3 + 20 * (time.monotonic() - began))
+        self.assertLessEqual(len(self.odometry.messages) - before, 3 + 20 * (time.monotonic() - start_time))
 
-    def test_a_handle_is_free_again_once_rviz_is_dead(self):
+    def test_a_handle_is_released_after_rviz_dies(self):
         handles = Listener("/drone/markers/update", InteractiveMarkerUpdate)
         feedback = connected(rospy.Publisher("/drone/markers/feedback", InteractiveMarkerFeedback, queue_size=10))
         self.pause(True)
@@ -501,7 +501,7 @@ class Toolbar(unittest.TestCase):
         push.publish(wrench)
         connected(target)
         connected(push)
-        self.wait_until(lambda: self.place_of("DronePosition") == (1.5, 0.0, 2.0))
+        self.wait_until(lambda: self.position_of("DronePosition") == (1.5, 0.0, 2.0))
         self.wait_until(lambda: self.simulation.drone.pushes.lasting)
         for _ in range(8):
             self.call("step")

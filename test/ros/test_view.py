@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`rosrun drone_sim view` without a display: a file with the pictures of topics, and a line for each mistake."""
+"""`rosrun drone_sim view` without a display: a file with the images of topics, and one line for each mistake."""
 
 import os
 import subprocess
@@ -22,13 +22,13 @@ RED = np.full((48, 64, 3), (0, 0, 255), np.uint8)
 
 
 def publisher(topic, kind, message):
-    made = rospy.Publisher(topic, kind, queue_size=1, latch=True)
-    made.publish(message)
-    return made
+    latched_publisher = rospy.Publisher(topic, kind, queue_size=1, latch=True)
+    latched_publisher.publish(message)
+    return latched_publisher
 
 
 class View(unittest.TestCase):
-    """The pictures are this process's."""
+    """Image topics that this process publishes, in the program `view`."""
 
     @classmethod
     def setUpClass(cls):
@@ -50,26 +50,26 @@ class View(unittest.TestCase):
     def view(self, *arguments, status=0):
         environment = {key: value for key, value in os.environ.items() if key != "DISPLAY"}
         command = ["rosrun", "drone_sim", "view", *arguments]
-        ended = subprocess.run(
+        process = subprocess.run(
             command, env=environment, cwd=self.folder, timeout=HANGS, capture_output=True, text=True, check=False
         )
-        self.assertEqual(ended.returncode, status, ended.stderr)
-        self.assertNotIn("Traceback", ended.stderr)
-        return ended.stdout + ended.stderr
+        self.assertEqual(process.returncode, status, process.stderr)
+        self.assertNotIn("Traceback", process.stderr)
+        return process.stdout + process.stderr
 
     def test_the_front_camera_without_any_argument(self):
         self.assertIn("wrote view.png", self.view())
         picture = cv2.imread(str(self.folder / "view.png"))
         self.assertTrue(np.array_equal(picture[-48:], RED))
 
-    def test_several_in_one(self):
+    def test_several_topics_in_one_picture(self):
         self.view("/drone/front/compressed", "drone/depth/image", "/drone/floor/image", "--png", "all.png")
         picture = cv2.imread(str(self.folder / "all.png"))
         height, width = picture.shape[0] // 2, picture.shape[1] // 2
         self.assertTrue((abs(picture[height // 2, width // 2].astype(int) - (0, 0, 255)) < 5).all())
         self.assertEqual(picture[height // 2, width + width // 2].tolist(), [127, 127, 127])
 
-    def test_mistakes_get_a_line(self):
+    def test_mistakes_are_reported_in_one_line(self):
         for topic, line in (
             ("/drone/frnt", "/drone/frnt: no node publishes it; near names are /drone/front"),
             ("/drone/name", "/drone/name: is a std_msgs/String, not an image"),

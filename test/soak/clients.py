@@ -1,6 +1,6 @@
-"""Who bothers the node during a soak: each role is a process, `clients.py ROLE SEED FOLDER`, until it is killed.
+"""Clients that disturb the node during a soak: processes `clients.py ROLE SEED FOLDER`, until they are killed.
 
-What a role saw goes to FOLDER/ROLE-SEED.jsonl, a line each: what, how long (s), whether it went well, what was said.
+A role logs to FOLDER/ROLE-SEED.jsonl, one line for each call: name, duration (s), success, reply.
 """
 
 from __future__ import annotations
@@ -71,17 +71,17 @@ _ODD = (math.nan, math.inf, -math.inf, 1e300, -1e9, 5e-324, 1e4)
 
 
 class Diary:
-    """What a role saw."""
+    """Log file of a role."""
 
     def __init__(self, path: Path):
         self._file = path.open("a", encoding="utf-8", buffering=1)
 
-    def add(self, what: str, seconds: float, well: bool, said: str) -> None:
-        self._file.write(json.dumps([what, round(seconds, 3), well, said]) + "\n")
+    def add(self, what: str, seconds: float, succeeded: bool, reply: str) -> None:
+        self._file.write(json.dumps([what, round(seconds, 3), succeeded, reply]) + "\n")
 
 
 def within(seconds: float, action: Callable[[], Any]) -> tuple[bool, Any]:
-    """Return whether the action came to its end in that time, and its result or what it raised."""
+    """Return whether the action ended within `seconds`, and its result or exception."""
     result: list[Any] = []
 
     def run() -> None:
@@ -99,24 +99,24 @@ def within(seconds: float, action: Callable[[], Any]) -> tuple[bool, Any]:
 # ---- services
 
 
-def call_services(dice: random.Random, folder: Path, diary: Diary) -> None:
-    """Press every button, in any order, as somebody in a hurry."""
+def call_services(rng: random.Random, folder: Path, diary: Diary) -> None:
+    """Call all services in random order, like an impatient user."""
     names = ["start"] * 3 + ["pause"] * 3 + ["snapshot", "restore", "step"] * 2 + ["stop", "load_scene", "save_scene"]
     names += ["set_vehicles"] * 2
     while True:
-        name = dice.choice(names)
-        if dice.random() < 0.2:
-            _choose_script(dice, folder)
+        name = rng.choice(names)
+        if rng.random() < 0.2:
+            _choose_script(rng, folder)
         if name in ("load_scene", "save_scene"):
-            rospy.set_param("/drone_sim/scene_file", _scene(dice, folder, saving=name == "save_scene"))
+            rospy.set_param("/drone_sim/scene_file", _scene(rng, folder, saving=name == "save_scene"))
         if name == "set_vehicles":
-            rospy.set_param("/drone_sim/vehicles", dice.choice([0, 0, GUESTS]))
-        _call(name, dice.random() < 0.3, diary)
-        time.sleep(dice.choice([0.0, 0.05, 0.5, 2.0]))
+            rospy.set_param("/drone_sim/vehicles", rng.choice([0, 0, GUESTS]))
+        _call(name, rng.random() < 0.3, diary)
+        time.sleep(rng.choice([0.0, 0.05, 0.5, 2.0]))
 
 
 def _call(name: str, on: bool, diary: Diary) -> None:
-    began = time.monotonic()
+    start_time = time.monotonic()
 
     def call() -> Any:
         if name == "pause":
@@ -124,54 +124,54 @@ def _call(name: str, on: bool, diary: Diary) -> None:
         return rospy.ServiceProxy(f"/drone_sim/{name}", Trigger)()
 
     ended, answer = within(HUNG, call)
-    took = time.monotonic() - began
+    duration = time.monotonic() - start_time
     if not ended:
-        diary.add(name, took, False, "HUNG")
+        diary.add(name, duration, False, "HUNG")
     elif isinstance(answer, Exception):
-        diary.add(name, took, False, f"NO ANSWER {type(answer).__name__}: {answer}")
+        diary.add(name, duration, False, f"NO ANSWER {type(answer).__name__}: {answer}")
     else:
-        diary.add(name, took, answer.success, answer.message)
+        diary.add(name, duration, answer.success, answer.message)
 
 
-def _choose_script(dice: random.Random, folder: Path) -> None:
-    """Put another script where the node finds the one that it flies: a link, so that it may be of either language."""
-    good = dice.random() < 0.8
-    target = dice.choice(GOOD_SCRIPTS) if good else folder / dice.choice(sorted(SCRIPTS))
+def _choose_script(rng: random.Random, folder: Path) -> None:
+    """Replace the node's script by a random one: via a link, so that it may be in either language."""
+    good = rng.random() < 0.8
+    target = rng.choice(GOOD_SCRIPTS) if good else folder / rng.choice(sorted(SCRIPTS))
     link = folder / f"link-{os.getpid()}"
     link.symlink_to(target)
     link.replace(folder / "flown.py")
 
 
-def _scene(dice: random.Random, folder: Path, saving: bool) -> str:
+def _scene(rng: random.Random, folder: Path, saving: bool) -> str:
     if saving:
         return str(folder / "saved.yaml")
     own = [folder / name for name in SCENES if name.endswith(".yaml")]
     shipped = sorted((PACKAGE / "config" / "scenes").glob("*.yaml"))
-    return str(dice.choice([*own, *shipped * 4, folder / "saved.yaml", folder / "none.yaml", ""]) or "")
+    return str(rng.choice([*own, *shipped * 4, folder / "saved.yaml", folder / "none.yaml", ""]) or "")
 
 
 # ---- topics
 
 
-def send_commands(dice: random.Random, _folder: Path, _diary: Diary) -> None:
-    """Publish commands, good ones and nonsense, far more often than there are steps."""
+def send_commands(rng: random.Random, _folder: Path, _diary: Diary) -> None:
+    """Publish commands, valid ones and nonsense, far more often than there are steps."""
     kinds: dict[str, Any] = {"cmd_vel": Twist, "set_pose": PoseStamped, "target_pose": PoseStamped}
     kinds.update({"initialpose": PoseWithCovarianceStamped, "push": WrenchStamped})
     kinds["markers/feedback"] = kinds["objects/feedback"] = InteractiveMarkerFeedback
     publishers = {topic: rospy.Publisher(f"/drone/{topic}", kind, queue_size=10) for topic, kind in kinds.items()}
     while True:
-        topic = dice.choice(["cmd_vel"] * 20 + sorted(kinds))
+        topic = rng.choice(["cmd_vel"] * 20 + sorted(kinds))
         message = kinds[topic]()
-        _fill(message, dice)
+        _fill(message, rng)
         publishers[topic].publish(message)
-        time.sleep(dice.choice([0.0, 0.005, 0.005, 0.02]))
+        time.sleep(rng.choice([0.0, 0.005, 0.005, 0.02]))
 
 
-def _fill(message: Any, dice: random.Random) -> None:
-    """Give every number of a message a value, most of them sensible."""
+def _fill(message: Any, rng: random.Random) -> None:
+    """Set the numbers of a message to random values, most of them sensible."""
 
     def number() -> float:
-        return dice.choice(_ODD) if dice.random() < 0.01 else dice.uniform(-1, 1)
+        return rng.choice(_ODD) if rng.random() < 0.01 else rng.uniform(-1, 1)
 
     def fill(part: Any) -> None:
         for axis in {"x", "y", "z", "w"} & set(part.__slots__):
@@ -181,13 +181,13 @@ def _fill(message: Any, dice: random.Random) -> None:
         fill(message.linear)
         fill(message.angular)
         return
-    message.header.frame_id = dice.choice(["world"] * 9 + ["base_link"])
+    message.header.frame_id = rng.choice(["world"] * 9 + ["base_link"])
     if isinstance(message, WrenchStamped):
         fill(message.wrench.force)
         return
     if isinstance(message, InteractiveMarkerFeedback):
-        message.client_id, message.marker_name = "soak", dice.choice(["Drone", "DronePosition", "odd"])
-        message.event_type = dice.randint(0, 5)
+        message.client_id, message.marker_name = "soak", rng.choice(["Drone", "DronePosition", "odd"])
+        message.event_type = rng.randint(0, 5)
     pose = message.pose.pose if isinstance(message, PoseWithCovarianceStamped) else message.pose
     fill(pose.position)
     pose.position.z += 1.5
@@ -209,19 +209,19 @@ TOPICS: tuple[tuple[str, Any], ...] = (
 )
 
 
-def look(dice: random.Random, _folder: Path, _diary: Diary) -> None:
+def look(rng: random.Random, _folder: Path, _diary: Diary) -> None:
     subscribers: dict[str, rospy.Subscriber] = {}
     while True:
-        topic, kind = dice.choice(TOPICS)
+        topic, kind = rng.choice(TOPICS)
         if topic in subscribers:
             subscribers.pop(topic).unregister()
         elif len(subscribers) < 3:
             subscribers[topic] = rospy.Subscriber(f"/drone/{topic}", kind, lambda _message: None, queue_size=1)
-        time.sleep(dice.uniform(0.1, 2.0))
+        time.sleep(rng.uniform(0.1, 2.0))
 
 
-def listen(_dice: random.Random, _folder: Path, diary: Diary) -> None:
-    """Count the odometry; say every second how much came, and that what came were numbers."""
+def listen(_rng: random.Random, _folder: Path, diary: Diary) -> None:
+    """Log the number of odometry messages every second, and every position that is not finite."""
     count = [0]
 
     def on_odometry(message: Odometry) -> None:
@@ -237,16 +237,16 @@ def listen(_dice: random.Random, _folder: Path, diary: Diary) -> None:
         count[0] = 0
 
 
-def sleep(_dice: random.Random, _folder: Path, _diary: Diary) -> None:
-    """Listen to everything; run.py stops this process with SIGSTOP now and then, and its sockets fill up."""
+def sleep(_rng: random.Random, _folder: Path, _diary: Diary) -> None:
+    """Subscribe to many topics; run.py stops this process with SIGSTOP at times, so that its sockets fill up."""
     for topic, kind in TOPICS[:7]:
         rospy.Subscriber(f"/drone/{topic}", kind, lambda _message: None)
     while True:
         time.sleep(1.0)
 
 
-def be_silent(_dice: random.Random, _folder: Path, _diary: Diary) -> None:
-    """Connect and say nothing, as a client that is stopped just then."""
+def be_silent(_rng: random.Random, _folder: Path, _diary: Diary) -> None:
+    """Connect and send nothing, like a client that is stopped at that moment."""
     held: deque[socket.socket] = deque(maxlen=20)
     while True:
         with contextlib.suppress(OSError, rosgraph.MasterException):

@@ -1,4 +1,4 @@
-"""What is made of samples of the node's process, of its output, and of the clients' diaries."""
+"""Evaluation of samples of the node's process, of its output, and of the clients' diaries."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 MOST_MORE = 8  # threads, descriptors, registrations
-_TIDY = re.compile(r"\d[\d.e+-]*|'[^']*'|/\S+")
+_VARIABLE_PARTS = re.compile(r"\d[\d.e+-]*|'[^']*'|/\S+")
 
 
 class Sample(NamedTuple):
-    """A node at a moment (s): memory in MB, threads, open descriptors, and its registrations with the master."""
+    """State of a node at a time (s): memory in MB, threads, open descriptors, and its registrations with the master."""
 
     at: float
     memory: float
@@ -24,7 +24,7 @@ class Sample(NamedTuple):
 
 
 def slope(samples: Sequence[Sample]) -> float:
-    """Return by how many MB a minute the memory grew: the median of the slopes between any two (Theil and Sen)."""
+    """Return the growth of memory (MB/min): the median slope between two samples (Theil-Sen estimator)."""
     at, memory = np.array([[s.at, s.memory] for s in samples]).T
     first, second = np.triu_indices(len(at), 1)
     far = at[second] - at[first] > 0.2 * (at[-1] - at[0])
@@ -33,16 +33,16 @@ def slope(samples: Sequence[Sample]) -> float:
 
 
 def last_half(samples: Sequence[Sample]) -> Sequence[Sample]:
-    """Return the later half: in the first one, dozens of threads fill what the allocator keeps for each of them."""
+    """Return the later half: in the first half, the allocator's caches for dozens of threads fill."""
     return samples[len(samples) // 2 :]
 
 
 def growth(
     samples: list[Sample], most_slope: float = 1.0, least_memory: float = 15.0, judged: float = 90.0
 ) -> list[str]:
-    """Name what grew over the last half, if that had `judged` seconds.
+    """Return what grew over the last half, if that lasted `judged` seconds.
 
-    Memory grows where it does by more than `most_slope` (MB a minute) and by more than `least_memory` (MB) in all.
+    Memory counts as growing above a slope of `most_slope` (MB/min) and a total of `least_memory` (MB).
     """
     rest = last_half(samples)
     if not rest or rest[-1].at - rest[0].at < judged:
@@ -61,7 +61,7 @@ def growth(
 
 
 def late_steps(lines: list[str]) -> int:
-    """Return how many late steps the node has counted."""
+    """Return the number of late steps that the node has reported."""
     counts = [
         int(n) for line in lines for n in re.findall(r"\((\d+) so far\)|(\d+) late steps", line)[0:1] for n in n if n
     ]
@@ -69,17 +69,17 @@ def late_steps(lines: list[str]) -> int:
 
 
 def answers(diary: list[Any]) -> dict[str, Counter]:
-    """Count what the services said, with numbers and names left out."""
-    said: dict[str, Counter] = {}
-    for what, _, well, text in diary:
+    """Count the services' replies, with numbers and names replaced."""
+    replies: dict[str, Counter] = {}
+    for what, _, succeeded, text in diary:
         if what != "odom":
-            key = "well" if well else _TIDY.sub("_", text)[:110]
-            said.setdefault(what, Counter())[key] += 1
-    return said
+            key = "well" if succeeded else _VARIABLE_PARTS.sub("_", text)[:110]
+            replies.setdefault(what, Counter())[key] += 1
+    return replies
 
 
 def faults(lines: list[str], diary: list[Any], samples: list[Sample]) -> list[str]:
-    """Name what went wrong."""
+    """Return what went wrong."""
     found = [
         f"{what}: {text} after {seconds:.1f} s"
         for what, seconds, _, text in diary
@@ -91,8 +91,8 @@ def faults(lines: list[str], diary: list[Any], samples: list[Sample]) -> list[st
 
 def report(samples: list[Sample], lines: list[str], diary: list[Any], began: float) -> str:
     now, calls = samples[-1], [entry for entry in diary if entry[0] != "odom"]
-    odometry = [int(text) for what, _, well, text in diary if what == "odom" and well][-10:]
-    refused = sum(not well for _, _, well, _ in calls)
+    odometry = [int(text) for what, _, succeeded, text in diary if what == "odom" and succeeded][-10:]
+    refused = sum(not succeeded for _, _, succeeded, _ in calls)
     slowest = max((seconds for _, seconds, _, _ in calls), default=0.0)
     return (
         f"{now.at - began:6.0f} s  {now.memory:6.1f} MB {slope(last_half(samples)):+6.2f} MB/min  "

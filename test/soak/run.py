@@ -31,16 +31,16 @@ import clients
 from measure import Sample, answers, faults, report
 
 EVERY = 10.0  # s between two lines
-STARTS = 60.0  # s that the launch may take
+STARTS = 60.0  # s, time limit of the launch
 SCRIPT_LIMIT = 0.5  # s; several clients may each have to wait for another's script that hangs
-ENDS = 5.0  # s that the node may take to end: 3, and what roslaunch takes to tell it
+ENDS = 5.0  # s, time limit for the end of the node: 3, and the delay of roslaunch
 
 
 class Launch:
-    """roslaunch with a master of its own, and what it prints."""
+    """roslaunch with its own master, and its output."""
 
     def __init__(self, folder: Path, arguments: list[str]):
-        """Launch; `folder` is the home of all that the node writes."""
+        """Launch; the node writes its files into `folder`."""
         with socket.socket() as probe:
             probe.bind(("localhost", 0))
             port = probe.getsockname()[1]
@@ -69,14 +69,14 @@ class Launch:
         raise SystemExit("the node does not start:\n" + "\n".join(self.lines[-20:]))
 
     def alive(self) -> bool:
-        """Tell whether the node's process is there."""
+        """Return whether the node's process is running."""
         status = Path(f"/proc/{self.pid}/status")
         with contextlib.suppress(OSError):
             return "State:\tZ" not in status.read_text()
         return False
 
     def sample(self) -> Sample | None:
-        """Look at the node's process; None where there is none."""
+        """Return a sample of the node's process, None if it has ended."""
         folder = Path(f"/proc/{self.pid}")
         try:
             pages = int((folder / "statm").read_text().split()[1])
@@ -94,26 +94,26 @@ class Launch:
             self.end()
 
     def end(self) -> float:
-        """Send SIGINT as Ctrl-C does; return how long the node took to end (s)."""
-        began = time.monotonic()
+        """Send SIGINT like Ctrl-C; return the time until the node ended (s)."""
+        start_time = time.monotonic()
         self.process.send_signal(signal.SIGINT)
-        while self.alive() and time.monotonic() < began + 2 * ENDS:
+        while self.alive() and time.monotonic() < start_time + 2 * ENDS:
             time.sleep(0.05)
-        took = time.monotonic() - began
+        duration = time.monotonic() - start_time
         try:
             self.process.wait(30)
         except subprocess.TimeoutExpired:
             self.process.kill()
         self._reader.join(5)
-        return took
+        return duration
 
 
 class Crowd:
-    """The clients, a process each, and what they have seen."""
+    """The clients, one process for each, and their diaries."""
 
     def __init__(self, folder: Path, seed: int):
         self._folder = folder
-        self._dice = random.Random(f"crowd {seed}")
+        self._rng = random.Random(f"crowd {seed}")
         roles = ["services"] * 3 + ["commands"] * 2 + ["looker"] * 2 + ["odometry", "silent", "sleeper"]
         self._processes = [self._start(role, seed * 100 + number) for number, role in enumerate(roles)]
         self._sleeper = self._processes[-1]
@@ -130,10 +130,10 @@ class Crowd:
                 str(folder / "bag"),
                 *topics,
             ]
-            # A session of its own: rosbag starts another program, which is to end with it.
+            # In a new session: rosbag starts another program, which must end with it.
             quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
             self._processes.append(subprocess.Popen(bag, start_new_session=True, **quiet))
-        self._stopped = False
+        self._is_stopped = False
 
     def _start(self, role: str, seed: int) -> subprocess.Popen:
         program = [sys.executable, str(Path(clients.__file__)), role, str(seed), str(self._folder)]
@@ -141,13 +141,13 @@ class Crowd:
             return subprocess.Popen(program, stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
 
     def stir(self) -> None:
-        """Put the sleeper to sleep, or wake it."""
-        if self._dice.random() < 0.1:
-            self._stopped = not self._stopped
-            self._sleeper.send_signal(signal.SIGSTOP if self._stopped else signal.SIGCONT)
+        """Stop or continue the sleeper process at random times."""
+        if self._rng.random() < 0.1:
+            self._is_stopped = not self._is_stopped
+            self._sleeper.send_signal(signal.SIGSTOP if self._is_stopped else signal.SIGCONT)
 
     def dead(self) -> list[str]:
-        """Name the clients that ended by themselves, which is the harness's own fault."""
+        """Return the clients that ended by themselves, which is a fault of this program."""
         return [f"{one.args}" for one in self._processes if one.poll() is not None]
 
     def __enter__(self) -> Crowd:
@@ -161,12 +161,12 @@ class Crowd:
             one.wait()
 
     def diary(self) -> list[Any]:
-        noted: list[Any] = []
+        entries: list[Any] = []
         for path in sorted(self._folder.glob("*.jsonl")):
             for line in path.read_text(encoding="utf-8").splitlines():
-                with contextlib.suppress(ValueError):  # cut off, where the client was ended
-                    noted.append(json.loads(line))
-        return noted
+                with contextlib.suppress(ValueError):  # an incomplete line of a killed client
+                    entries.append(json.loads(line))
+        return entries
 
 
 @contextlib.contextmanager
@@ -186,25 +186,25 @@ def home(keep: bool) -> Iterator[Path]:
 
 
 def soak(launch: Launch, crowd: Crowd, minutes: float) -> list[Sample]:
-    """Let the crowd at the node for so long, and say every 10 s how it is."""
-    began = time.monotonic()
+    """Run the crowd for `minutes`, and print a report every 10 s; return the samples."""
+    start_time = time.monotonic()
     samples: list[Sample] = []
-    due = began + EVERY
-    while time.monotonic() < began + 60 * minutes:
+    next_report = start_time + EVERY
+    while time.monotonic() < start_time + 60 * minutes:
         time.sleep(1.0)
         crowd.stir()
         sample = launch.sample()
         if sample is None:
             break
         samples.append(sample)
-        if time.monotonic() > due:
-            due += EVERY
-            print(report(samples, launch.lines, crowd.diary(), began), flush=True)
+        if time.monotonic() > next_report:
+            next_report += EVERY
+            print(report(samples, launch.lines, crowd.diary(), start_time), flush=True)
     return samples
 
 
 def afterwards(folder: Path) -> list[str]:
-    """Start the tutorial's script in the empty scene, and see that it answers: the node must be what it was."""
+    """Start a good script in the empty scene, and return a failure if the node does not publish odometry."""
     program = (
         "import rospy, sys, clients; from pathlib import Path; from nav_msgs.msg import Odometry\n"
         "rospy.init_node('soak_after'); rospy.set_param('/drone_sim/scene_file', '')\n"
@@ -217,7 +217,7 @@ def afterwards(folder: Path) -> list[str]:
     link.replace(folder / "flown.py")
     environment = {**os.environ, "PYTHONPATH": f"{Path(__file__).parent}:{os.environ.get('PYTHONPATH', '')}"}
     try:
-        done = subprocess.run(
+        result = subprocess.run(
             [sys.executable, "-c", program, str(folder)],
             env=environment,
             timeout=40,
@@ -227,21 +227,21 @@ def afterwards(folder: Path) -> list[str]:
         )
     except subprocess.TimeoutExpired:
         return ["it does not answer afterwards"]
-    return [] if done.returncode == 0 else [f"it does not fly afterwards: {done.stderr[-300:]}"]
+    return [] if result.returncode == 0 else [f"it does not fly afterwards: {result.stderr[-300:]}"]
 
 
 def finish(launch: Launch, crowd: Crowd, folder: Path, samples: list[Sample]) -> list[str]:
-    """See that the node still flies, end it, say what the services answered; return what went wrong."""
+    """Check that the node still flies, end it, and print the services' replies; return the failures."""
     survived = launch.alive()
     found = afterwards(folder) if survived else ["the node died; it said last:", *launch.lines[-3:]]
-    took = launch.end()
-    if took > ENDS:
-        found.append(f"the node took {took:.1f} s to end")
+    duration = launch.end()
+    if duration > ENDS:
+        found.append(f"the node took {duration:.1f} s to end")
     diary = crowd.diary()
     for what, counts in sorted(answers(diary).items()):
         print(f"{what}: " + "; ".join(f"{count} {text}" for text, count in counts.most_common(8)))
-    flew = [line.partition("drone_sim: ")[2] for line in launch.lines if "times real time" in line]
-    print(f"ended within {took:.1f} s; {flew[-1] if flew else 'it did not say how far it flew'}")
+    flights = [line.partition("drone_sim: ")[2] for line in launch.lines if "times real time" in line]
+    print(f"ended within {duration:.1f} s; {flights[-1] if flights else 'it did not say how far it flew'}")
     return found + (faults(launch.lines, diary, samples) if survived else [])
 
 
@@ -255,10 +255,10 @@ def main() -> int:
         "--keep", action="store_true", help="keep the folder with scripts, scenes and the clients' diaries"
     )
     options, arguments = parser.parse_known_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # and tidy up
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # and clean up
     with home(options.keep) as folder:
-        ours = [f"script:={folder / 'flown.py'}", f"config:={folder / 'config.yaml'}"]
-        with Launch(folder, [*ours, *arguments]) as launch:
+        own_arguments = [f"script:={folder / 'flown.py'}", f"config:={folder / 'config.yaml'}"]
+        with Launch(folder, [*own_arguments, *arguments]) as launch:
             with Crowd(folder, options.seed) as crowd:
                 samples = soak(launch, crowd, options.minutes)
                 found = [f"a client of the soak ended: {one}" for one in crowd.dead()]

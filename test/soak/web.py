@@ -30,16 +30,16 @@ from xmlrpc.client import ServerProxy
 from measure import MOST_MORE, Sample, growth, last_half, late_steps, slope
 from run import ENDS, STARTS, Launch
 
-OFTEN, EVERY = 10.0, 60.0  # s between two samples, two lines
-LIMITS = (0.3, 6.0, 300.0)  # of growth
+OFTEN, EVERY = 10.0, 60.0  # s between two samples, and between two lines
+LIMITS = (0.3, 6.0, 300.0)  # arguments of growth()
 SETTLES = 5.0  # s until the cockpit has found the vehicle, and may command it
-QUIET = 90.0  # s after the last browser in which the cockpit becomes quiet: a deaf one is given up after 40
+QUIET = 90.0  # s after the last browser until the cockpit has unsubscribed: it drops a deaf client after 40
 HERE = Path(__file__).parent
 NODES = ("cockpit", "drone_sim")
 
 
-def look(pid: int, node: str) -> Sample:
-    """Look at a node now, whose memory is its share of what it uses. Raises OSError where it has died."""
+def take_sample(pid: int, node: str) -> Sample:
+    """Return a sample of a node; memory is its proportional set size. Raises OSError if it has died."""
     folder = Path(f"/proc/{pid}")
     share = re.search(r"^Pss:\s+(\d+)", (folder / "smaps_rollup").read_text(), re.MULTILINE)
     threads, descriptors = len(os.listdir(folder / "task")), len(os.listdir(folder / "fd"))
@@ -48,7 +48,7 @@ def look(pid: int, node: str) -> Sample:
 
 
 def registrations(node: str) -> int:
-    """Return how many topics and services a node has with the master."""
+    """Return the number of topics and services that a node has registered with the master."""
     state: Any = ServerProxy(os.environ["ROS_MASTER_URI"]).getSystemState("/soak")
     return sum(f"/{node}" in names for kind in state[2] for _, names in kind)
 
@@ -71,52 +71,52 @@ def address(launch: Launch) -> str:
 
 
 @contextlib.contextmanager
-def browsers(where: str, seed: int, folder: Path) -> Iterator[list[subprocess.Popen]]:
-    """Let browsers at the cockpit; they yield to the nodes."""
+def browsers(cockpit_address: str, seed: int, folder: Path) -> Iterator[list[subprocess.Popen]]:
+    """Run browsers at the cockpit, with lower priority than the nodes."""
     programs = ["browsers.py"]
     if shutil.which("chromium") and importlib.util.find_spec("playwright"):
         programs.append("chromium.py")
     else:
         print("no chromium, or no playwright (./dev.sh test-web installs both): the browsers are Python alone")
-    started = []
+    processes = []
     for program in programs:
-        command = ["nice", "-n", "10", sys.executable, str(HERE / program), where, str(seed), str(folder)]
+        command = ["nice", "-n", "10", sys.executable, str(HERE / program), cockpit_address, str(seed), str(folder)]
         with (folder / f"{program}.log").open("w") as log:
-            started.append(subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True))
+            processes.append(subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True))
     try:
-        yield started
+        yield processes
     finally:
-        for one in started:
+        for one in processes:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(one.pid, signal.SIGKILL)
             one.wait()
 
 
 def soak(launch: Launch, pids: dict[str, int], folder: Path, minutes: float) -> dict[str, list[Sample]]:
-    """Look for so long, and say every minute how it is; return what was seen of each node."""
-    began = time.monotonic()
-    seen: dict[str, list[Sample]] = {node: [] for node in NODES}
-    due = began + EVERY
+    """Sample the nodes for `minutes`, and print a line every minute; return the samples of each node."""
+    start_time = time.monotonic()
+    samples: dict[str, list[Sample]] = {node: [] for node in NODES}
+    next_report = start_time + EVERY
     with contextlib.suppress(OSError):
-        while time.monotonic() < began + 60 * minutes:
+        while time.monotonic() < start_time + 60 * minutes:
             time.sleep(OFTEN)
             for node, pid in pids.items():
-                seen[node].append(look(pid, node))
-            if time.monotonic() > due:
-                due += EVERY
-                print(line(seen, launch, diary(folder), time.monotonic() - began), flush=True)
-    return seen
+                samples[node].append(take_sample(pid, node))
+            if time.monotonic() > next_report:
+                next_report += EVERY
+                print(line(samples, launch, diary(folder), time.monotonic() - start_time), flush=True)
+    return samples
 
 
 def diary(folder: Path) -> list[Any]:
-    """Return all visits: what was done, s until the scene had come, what went wrong."""
+    """Return all visits: role, time until the scene was loaded (s), error."""
     lines = [one for path in folder.glob("*.jsonl") for one in path.read_text(encoding="utf-8").splitlines()]
     return [json.loads(one) for one in lines]
 
 
-def line(seen: dict[str, list[Sample]], launch: Launch, visits: list[Any], time_: float) -> str:
+def line(samples: dict[str, list[Sample]], launch: Launch, visits: list[Any], time_: float) -> str:
     parts = [f"{time_ / 60:5.1f} min"]
-    for node, states in seen.items():
+    for node, states in samples.items():
         _, memory, threads, descriptors, registered = states[-1]
         grows = slope(last_half(states))
         parts.append(
@@ -127,10 +127,10 @@ def line(seen: dict[str, list[Sample]], launch: Launch, visits: list[Any], time_
 
 
 def quiet(pid: int, before: Sample) -> list[str]:
-    """Wait until the cockpit listens to no more than before the first browser; name what it still has."""
+    """Wait until the cockpit has no more subscriptions than before the first browser; return the failure."""
     end = time.monotonic() + QUIET
     while time.monotonic() < end:
-        now = look(pid, "cockpit")
+        now = take_sample(pid, "cockpit")
         if now.registrations <= before.registrations and now.threads <= before.threads + MOST_MORE:
             return []
         time.sleep(1.0)
@@ -138,24 +138,24 @@ def quiet(pid: int, before: Sample) -> list[str]:
 
 
 def dead(pids: dict[str, int], launch: Launch) -> list[str]:
-    """Name the nodes that have died, and what was printed last."""
+    """Return the nodes that have died, and the last lines of output."""
     found = [f"{node} died" for node, pid in pids.items() if not Path(f"/proc/{pid}/exe").exists()]
     return [*found, "printed last:", *launch.lines[-10:]] if found else []
 
 
-def verdict(launch: Launch, seen: dict[str, list[Sample]], visits: list[Any]) -> list[str]:
-    """Say what there was of visits; return what went wrong."""
+def verdict(launch: Launch, samples: dict[str, list[Sample]], visits: list[Any]) -> list[str]:
+    """Print statistics of the visits; return the failures."""
     done = [one for one in visits if not one[2]]
     for role in sorted({one[0] for one in visits}):
-        came = [one[1] for one in done if one[0] == role]
-        early, late = came[: len(came) // 3 + 1], came[-(len(came) // 3 + 1) :]
-        if came:
+        load_times = [one[1] for one in done if one[0] == role]
+        early, late = load_times[: len(load_times) // 3 + 1], load_times[-(len(load_times) // 3 + 1) :]
+        if load_times:
             waits = f"{statistics.median(early):.2f} s at first, {statistics.median(late):.2f} s in the end"
-            print(f"{role}: {len(came)} visits; until the scene had come {waits}")
+            print(f"{role}: {len(load_times)} visits; until the scene had come {waits}")
     for role, _, trouble in [one for one in visits if one[2]][:10]:
         print(f"{role}: {trouble[:200]}")
     printed = [f"printed: {one[:200]}" for one in launch.lines if "Traceback" in one]
-    return [*printed[:5], *(f"{node}: {one}" for node, states in seen.items() for one in growth(states, *LIMITS))]
+    return [*printed[:5], *(f"{node}: {one}" for node, states in samples.items() for one in growth(states, *LIMITS))]
 
 
 def main() -> int:
@@ -165,21 +165,21 @@ def main() -> int:
     parser.add_argument("minutes", nargs="?", type=float, default=10.0, help="how long (default: 10)")
     parser.add_argument("--seed", type=int, default=0, help="of what the browsers do (default: 0)")
     options, arguments = parser.parse_known_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # and tidy up
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # and clean up
     folder = Path(tempfile.mkdtemp(prefix="soak"))
     try:
         with Launch(folder, ["web:=true", *arguments]) as launch:
-            where = address(launch)
+            cockpit_address = address(launch)
             time.sleep(SETTLES)
             pids = {node: pid_of(node) for node in NODES}
-            before = look(pids["cockpit"], "cockpit")
-            with browsers(where, options.seed, folder) as started:
-                seen = soak(launch, pids, folder, options.minutes)
-                found = [f"a client of the soak ended: {one.args}" for one in started if one.poll() is not None]
+            before = take_sample(pids["cockpit"], "cockpit")
+            with browsers(cockpit_address, options.seed, folder) as processes:
+                samples = soak(launch, pids, folder, options.minutes)
+                found = [f"a client of the soak ended: {one.args}" for one in processes if one.poll() is not None]
             found += dead(pids, launch) or quiet(pids["cockpit"], before)
-            found += verdict(launch, seen, diary(folder))
-            took = launch.end()
-            found += [f"the node took {took:.1f} s to end"] if took > ENDS else []
+            found += verdict(launch, samples, diary(folder))
+            duration = launch.end()
+            found += [f"the node took {duration:.1f} s to end"] if duration > ENDS else []
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     log = HERE.parents[1] / "build" / "soak_web.log"

@@ -21,16 +21,16 @@ from drone_sim.grading import plan as plans
 SCRIPTS = Path(__file__).resolve().parent / "scripts"
 NOTHING, HOVERS, BUILT_IN = str(SCRIPTS / "nothing.py"), "tutorial", ""
 SEEDS, MANY_SEEDS = 20, 100
-COMMANDED = {  # what the built-in script passes: plans by task
+COMMANDED = {  # plans that the built-in script passes, by task
     **{name: name for name in ("hover", "steps", "stability")},
     "gates": str(tasks.folder() / "gates" / "commanded.yaml"),
 }
 EXTRAS = ("broken", "starts")
-ABOUT_HOVERING = ("steps", "stability")  # and so does the tutorial's controller, which does nothing unasked
+ABOUT_HOVERING = ("steps", "stability")  # the tutorial's controller hovers without commands, and may pass these tasks
 
 
 def main():
-    """Fly, print, and return 0 where everything is as promised."""
+    """Check the tasks, print the results, and return 0 if all are as promised."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("tasks", nargs="*", help="of a task, or broken, starts (default: all of it)")
     parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
@@ -51,7 +51,7 @@ def main():
 
 
 def check_task(pool, name):
-    """Fly the solution, nothing at all, a hover and the built-in script; return what is not as promised."""
+    """Fly the solution, an idle script, a hover and the built-in script; return what is not as promised."""
     results = fly(pool, name, None, SEEDS)
     print(f"{name}: the solution passes {count(results)}")
     print_worst(results)
@@ -72,7 +72,7 @@ def check_task(pool, name):
 
 
 def check_broken(pool, folder):
-    """Fly scripts that lack something, and see that they fail what they should; return what is not as promised."""
+    """Fly the broken scripts, and check which criteria they fail; return what is not as promised."""
     wrong = []
     for case in broken.cases(folder):
         results = fly(pool, case.task, case.script, SEEDS, case.changes)
@@ -80,15 +80,15 @@ def check_broken(pool, folder):
         always = {name for name in failed if all(name in failures(one) for one in results)}
         print(f"{case.task}: {case.what} fails {', '.join(sorted(always)) or 'nothing'}")
         if not set(case.fails) <= always or set(case.passes) & failed:
-            told = f"should fail {', '.join(case.fails)} and pass {', '.join(case.passes) or 'whatever'}"
-            wrong.append(f"{case.task}: {case.what} {told}; it failed {', '.join(sorted(failed))}")
+            expectation = f"should fail {', '.join(case.fails)} and pass {', '.join(case.passes) or 'whatever'}"
+            wrong.append(f"{case.task}: {case.what} {expectation}; it failed {', '.join(sorted(failed))}")
     return wrong
 
 
 def check_starts(pool):
-    """Displace the drone in many ways; return what is not as the tutorial's law is known to do it.
+    """Start from many displacements; return deviations from the known behaviour of the tutorial's law.
 
-    Measured for the bare law: 134 of 180 displacements return, depending on the last digits; with the guards, all.
+    Measured: the bare law returns from 134 of 180, depending on rounding errors; with the guards, from all.
     """
     wrong = []
     for what, changes, least, most in (("bare", broken.BARE, 129, 139), ("built-in", {}, 180, 180)):
@@ -103,16 +103,16 @@ def check_starts(pool):
 
 
 def fly(pool, task, script, seeds, changes=None):
-    return pool.starmap(one_flight, [(task, script, seed, changes) for seed in range(seeds)], chunksize=5)
+    return pool.starmap(grade_flight, [(task, script, seed, changes) for seed in range(seeds)], chunksize=5)
 
 
-def one_flight(task, script, seed, changes):
+def grade_flight(task, script, seed, changes):
     logging.disable(logging.WARNING)
     return flight.grade(read(task), script, seed, changes)
 
 
-def read(task, known={}):  # noqa: B006 -- a process reads a plan once
-    """Return the plan of a task, or in a file."""
+def read(task, known={}):  # noqa: B006 -- the default caches the plans of a process
+    """Return the plan of a task or file."""
     if task not in known:
         known[task] = plans.read(tasks.find(task))
     return known[task]
@@ -133,7 +133,7 @@ def count(results):
 
 
 def print_worst(results):
-    """Print for each criterion what its figures were."""
+    """Print the range of figures for each criterion."""
     figures = defaultdict(list)
     for result in results:
         for one in result.outcomes:

@@ -1,4 +1,4 @@
-"""The displacements from which the tutorial's bare law is known to return, or not."""
+"""Displacements of the drone, and whether the built-in script returns to rest from them."""
 
 import itertools
 import logging
@@ -20,7 +20,7 @@ ALL = list(
 
 
 def returns(start, changes):
-    """Tell whether the built-in script, with such `changes`, brings the drone to rest."""
+    """Return whether the built-in script brings the drone to rest; `changes` are parameters."""
     logging.disable(logging.WARNING)
     above, tilt, azimuth = start
     half = math.sin(tilt / 2)

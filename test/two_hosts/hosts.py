@@ -1,4 +1,4 @@
-"""The two hosts: this process is on the simulator's; the student's is a process in another network namespace."""
+"""The two hosts: this process runs on the simulator's, the student's node in another network namespace."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from nav_msgs.msg import Odometry
 from wire import Wire
 
 HERE, THERE = "10.77.0.1", "10.77.0.2"
-STARTS = 60.0  # s that the launch, or the student's first picture, may take
+STARTS = 60.0  # s, time limit of the launch and of the student's first image
 _PORT = 11311
 
 
 def settle(folder: Path) -> None:
-    """Make this process one of the simulator's host; `folder` is the home of all that nodes write."""
+    """Configure this process for the simulator's host; nodes write their files into `folder`."""
     os.environ.pop("ROS_HOSTNAME", None)
     os.environ.update(ROS_MASTER_URI=f"http://{HERE}:{_PORT}", ROS_IP=HERE, PYTHONUNBUFFERED="1")
     os.environ.update(HOME=str(folder), ROS_HOME=str(folder / "ros"))
 
 
 class Student:
-    """The student's host, and the wire to it."""
+    """The student's host, and the network connection to it."""
 
     def __init__(self) -> None:
-        """Start its node. Raises OSError."""
+        """Start the student's node. Raises OSError."""
         command = ["unshare", "--net", sys.executable, str(Path(__file__).with_name("student.py"))]
         environment = {**os.environ, "ROS_IP": THERE}
         pipe = subprocess.PIPE
@@ -53,14 +53,14 @@ class Student:
             time.sleep(0.01)
 
     def ask(self, word: str = "") -> Any:
-        """Return what it saw since it was last asked: see student.py."""
+        """Return the student's report since the previous request: see student.py."""
         assert self._process.stdin and self._process.stdout
         self._process.stdin.write(f"{word}\n")
         self._process.stdin.flush()
-        return json.loads(self._process.stdout.readline(), object_hook=lambda found: SimpleNamespace(**found))
+        return json.loads(self._process.stdout.readline(), object_hook=lambda fields: SimpleNamespace(**fields))
 
     def begin(self) -> None:
-        """Fly, and wait for pictures. Raises OSError where none come."""
+        """Start the flight, and wait for fresh images. Raises OSError if none arrive."""
         assert self._process.stdin
         self._process.stdin.write("\n")
         end = time.monotonic() + STARTS
@@ -71,7 +71,7 @@ class Student:
 
 
 class Simulator:
-    """The simulator's host: drone.launch, with a node that looks from near by."""
+    """The simulator's host: drone.launch, and a local node that subscribes to the drone's topics."""
 
     def __init__(self, folder: Path, timeout: float):
         """Launch; `timeout` is cmd_vel_timeout (s)."""
@@ -87,8 +87,8 @@ class Simulator:
         rospy.init_node("near_by", disable_signals=True)
         self.steps: list[Odometry] = []
         self.command = TwistStamped()
-        rospy.Subscriber("/drone/odom", Odometry, self._see_step, queue_size=100)
-        rospy.Subscriber("/drone/command", TwistStamped, self._see_command, queue_size=100)
+        rospy.Subscriber("/drone/odom", Odometry, self._on_odometry, queue_size=100)
+        rospy.Subscriber("/drone/command", TwistStamped, self._on_command, queue_size=100)
 
     def _read(self) -> None:
         for line in self._process.stdout or ():
@@ -102,34 +102,34 @@ class Simulator:
                 raise OSError("\n".join(["the simulator does not start", *self.lines[-5:]]))
             time.sleep(0.1)
 
-    def _see_step(self, message: Odometry) -> None:
+    def _on_odometry(self, message: Odometry) -> None:
         self.steps.append(message)
 
-    def _see_command(self, message: TwistStamped) -> None:
+    def _on_command(self, message: TwistStamped) -> None:
         self.command = message
 
     @property
     def stopped(self) -> bool:
-        """Whether the command in force is to hover."""
+        """Whether the command in force has no forward speed."""
         return self.command.twist.linear.x == 0.0
 
     @property
     def speed(self) -> float:
-        """How fast the drone flies, m/s."""
+        """Speed of the drone (m/s)."""
         velocity = self.steps[-1].twist.twist.linear
         return math.hypot(velocity.x, velocity.y, velocity.z)
 
     def worst_gap(self, first: int) -> float:
-        """Return the longest time between two steps (s), from the one of that number on."""
+        """Return the longest time between the stamps of two successive steps (s), from index `first` on."""
         stamps = [message.header.stamp.to_sec() for message in self.steps[first:]]
         return max(later - sooner for sooner, later in itertools.pairwise(stamps))
 
     def end(self) -> float:
-        """Send SIGINT as Ctrl-C does; return how long it took to end (s)."""
-        began = time.monotonic()
+        """Send SIGINT like Ctrl-C; return the time until the launch ended (s)."""
+        start_time = time.monotonic()
         self._process.send_signal(signal.SIGINT)
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(STARTS)
         self._process.kill()
         self._reader.join(5)
-        return time.monotonic() - began
+        return time.monotonic() - start_time

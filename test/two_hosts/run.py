@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """`./dev.sh two-hosts [--cut SECONDS]`: the simulator on one host, a student's node on another, a bad network between.
 
-The hosts are network namespaces of this machine; whoever is not root makes them in a namespace of users, where the
-kernel allows that. They, their interfaces and all processes go with this one. Commands go one way, compressed pictures
-the other; then the wire is cut, comes back, gets slow and bad, and is cut for good. Exit status 1 where the drone did
-not do what cmd_vel_timeout says, something hung or died, commands and pictures did not come back, or nothing could be
-tried. It takes a minute.
+The hosts are network namespaces of this machine; without root they are created in a user namespace, if the kernel
+allows that. Namespaces, interfaces and processes end with this process. Commands go one way, compressed images the
+other; then the connection is cut, restored, made slow and lossy, and cut for good. The exit status is 1 if the drone
+did not obey cmd_vel_timeout, something hung or died, commands and images did not come back, or the test could not run.
+It takes a minute.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CUT, SHORTEST, LONGEST = 10.0, 5.0, 3600.0  # s
 
 
 def main() -> int:
-    """Go into namespaces of its own, and run there."""
+    """Run the test in new namespaces; return the exit status."""
     parser = argparse.ArgumentParser(prog="./dev.sh two-hosts", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--cut", type=_seconds, default=CUT, help="s for which the wire is cut (default: %(default)s)")
     options = parser.parse_args()
@@ -37,9 +37,9 @@ def main() -> int:
     if missing:
         print(f"two-hosts: {missing}")
         return 1
-    for asked in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(asked, lambda number, _frame: sys.exit(128 + number))
-    return _inside(sys.argv[1:])
+    for signal_number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(signal_number, lambda number, _frame: sys.exit(128 + number))
+    return _run_in_namespaces(sys.argv[1:])
 
 
 def _seconds(text: str) -> float:
@@ -52,25 +52,25 @@ def _seconds(text: str) -> float:
 
 
 def _missing() -> str:
-    """Return what is not here, or not allowed; nothing where all is."""
+    """Return what is missing or not permitted on this machine, '' for nothing."""
     try:
         interface = ["ip", "tuntap", "add", "wire0", "mode", "tun"]
-        tried = subprocess.run([*_NAMESPACES, *interface], capture_output=True, text=True)
+        attempt = subprocess.run([*_NAMESPACES, *interface], capture_output=True, text=True)
     except FileNotFoundError:
         return "there is no unshare (Debian: util-linux)"
-    said = " ".join(tried.stderr.split())
-    return f"no network namespaces with TUN interfaces can be made here ({said})" if tried.returncode else ""
+    reason = " ".join(attempt.stderr.split())
+    return f"no network namespaces with TUN interfaces can be made here ({reason})" if attempt.returncode else ""
 
 
-def _inside(arguments: list[str]) -> int:
-    """Run this file in namespaces of its own, out of reach of the terminal's Ctrl-C; with it, all in there ends."""
+def _run_in_namespaces(arguments: list[str]) -> int:
+    """Run this file in new namespaces, out of reach of the terminal's Ctrl-C; kill their processes at the end."""
     with tempfile.TemporaryDirectory(prefix="drone_sim_two_hosts_", ignore_cleanup_errors=True) as folder:
         command = [*_NAMESPACES, sys.executable, __file__, *arguments]
-        inside = subprocess.Popen(command, env={**os.environ, _INSIDE: folder}, start_new_session=True)
+        child = subprocess.Popen(command, env={**os.environ, _INSIDE: folder}, start_new_session=True)
         try:
-            return inside.wait()
+            return child.wait()
         finally:
-            inside.kill()
+            child.kill()
 
 
 def _run(folder: Path, cut: float) -> int:
@@ -86,7 +86,7 @@ def _run(folder: Path, cut: float) -> int:
         print(f"two-hosts: {error}")
         return 1
     wrong = list(told(simulator, student, TIMEOUT, cut))
-    print(*[f"WRONG: {said}" for said in wrong] or ["two-hosts: all as it should be"], sep="\n")
+    print(*[f"WRONG: {reason}" for reason in wrong] or ["two-hosts: all as it should be"], sep="\n")
     return 1 if wrong else 0
 
 

@@ -1,6 +1,6 @@
-"""The student's host: flies a circle, watches the pictures, and for each line on stdin prints what it saw since.
+"""Node on the student's host: flies a circle, receives images, and prints a report for each line on stdin.
 
-That is a line of JSON: see `_Seen`. It ends with stdin.
+A report is a line of JSON about the time since the previous one: see `_Statistics`. The node ends with stdin.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from sensor_msgs.msg import CompressedImage, Image
 
 _RATE = 20.0  # Hz, of commands
 _FORWARD, _TURN = 0.3, 0.5  # m/s, rad/s
-_STEP = 1e-6  # rad/s, by which commands differ: so each is known when it comes back
-_FRESH = 1.0  # s, the age at which a picture is called old
-_BUFFER = 2**24  # bytes; rospy's own, 64 KiB, lets pictures get old in the socket
+_STEP = 1e-6  # rad/s, difference between two commands, which identifies their echoes
+_FRESH = 1.0  # s, age from which an image counts as old
+_BUFFER = 2**24  # bytes; with rospy's default, 64 KiB, images get old in the socket
 
 
-class _Seen:
-    """Counts from one report to the next."""
+class _Statistics:
+    """Statistics since the previous report."""
 
     def __init__(self) -> None:
-        self.ages: list[float] = []  # s, of pictures when they came
+        self.ages: list[float] = []  # s, of images on arrival
         self.round_trips: list[float] = []  # s, from a command to the topic `command` that shows it
-        self.fresh = 0.0  # s since the epoch, when a picture that was not old came first; 0 for never
-        self.echo = 0.0  # the same, of a command
+        self.fresh = 0.0  # s since the epoch, arrival of the first image that was not old; 0 for none
+        self.echo = 0.0  # the same for commands
 
     def report(self) -> dict[str, Any]:
         return {
@@ -45,18 +45,18 @@ class _Seen:
 
 class Student:
     def __init__(self) -> None:
-        """Begin to fly and to watch."""
-        self._seen = _Seen()
-        self._sent: dict[float, float] = {}  # when, by the commanded turn
+        """Start to fly and to receive images."""
+        self._statistics = _Statistics()
+        self._sent: dict[float, float] = {}  # time of publication by commanded turn rate
         self._commands = rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
-        rospy.Subscriber("/drone/command", TwistStamped, self._see_command, queue_size=100, tcp_nodelay=True)
-        self._watch(CompressedImage)
+        rospy.Subscriber("/drone/command", TwistStamped, self._on_command, queue_size=100, tcp_nodelay=True)
+        self._subscribe(CompressedImage)
         threading.Thread(target=self._fly, daemon=True).start()
 
-    def _watch(self, kind: type) -> None:
+    def _subscribe(self, kind: type) -> None:
         topic = "/drone/front/compressed" if kind is CompressedImage else "/drone/front"
         self._pictures = rospy.Subscriber(
-            topic, kind, self._see_picture, queue_size=1, buff_size=_BUFFER, tcp_nodelay=True
+            topic, kind, self._on_image, queue_size=1, buff_size=_BUFFER, tcp_nodelay=True
         )
 
     def _fly(self) -> None:
@@ -69,27 +69,27 @@ class Student:
             self._commands.publish(command)
             time.sleep(1 / _RATE)
 
-    def _see_command(self, message: TwistStamped) -> None:
+    def _on_command(self, message: TwistStamped) -> None:
         sent = self._sent.pop(message.twist.angular.z, None)
         if sent is not None:
-            took = time.time() - sent
-            self._seen.round_trips.append(took)
-            if took < _FRESH:
-                self._seen.echo = self._seen.echo or time.time()
+            delay = time.time() - sent
+            self._statistics.round_trips.append(delay)
+            if delay < _FRESH:
+                self._statistics.echo = self._statistics.echo or time.time()
 
-    def _see_picture(self, message: Any) -> None:
+    def _on_image(self, message: Any) -> None:
         age = time.time() - message.header.stamp.to_sec()
-        self._seen.ages.append(age)
+        self._statistics.ages.append(age)
         if age < _FRESH:
-            self._seen.fresh = self._seen.fresh or time.time()
+            self._statistics.fresh = self._statistics.fresh or time.time()
 
     def answer(self, word: str) -> None:
-        """Report, and begin anew; `raw` or `compressed` is what is watched from now on."""
+        """Print a report and start the next one; `raw` or `compressed` selects the kind of images from now on."""
         if word in ("raw", "compressed"):
             self._pictures.unregister()
-            self._watch(Image if word == "raw" else CompressedImage)
-        seen, self._seen = self._seen, _Seen()
-        print(json.dumps(seen.report()), flush=True)
+            self._subscribe(Image if word == "raw" else CompressedImage)
+        finished, self._statistics = self._statistics, _Statistics()
+        print(json.dumps(finished.report()), flush=True)
 
 
 def _median_and_worst(values: list[float]) -> tuple[float, float]:
@@ -97,7 +97,7 @@ def _median_and_worst(values: list[float]) -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    sys.stdin.readline()  # the network is there
+    sys.stdin.readline()  # the network is ready
     rospy.init_node("student", disable_signals=True)
     student = Student()
     for line in sys.stdin:

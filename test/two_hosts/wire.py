@@ -1,6 +1,6 @@
-"""A network between two hosts, made of two TUN interfaces; what goes in at one comes out at the other, or does not.
+"""A network between two hosts, made of two TUN interfaces, with adjustable delay and loss of packets.
 
-All of it goes with the process: no interface is left behind. See Documentation/networking/tuntap.rst of Linux.
+The interfaces are removed when the process ends. See Documentation/networking/tuntap.rst of Linux.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ _PACKET = 2048  # bytes; more than an interface's MTU, 1500
 
 
 class Wire:
-    """A wire that may be cut, slow or bad. It drops packets without a word, as a lost WiFi does."""
+    """A network link that may be cut, slow or lossy. It drops packets silently, like a lost WiFi connection."""
 
     def __init__(self, here: str, there: str, process: int):
-        """Lead from the address `here` to `there`, in the network namespace of a process. Raises OSError."""
+        """Connect the address `here` with `there`, in the network namespace of a process. Raises OSError."""
         self.cut = False
         self.delay = 0.0  # s, each way
         self.loss = 0.0  # share of the packets, 0..1
@@ -36,23 +36,23 @@ class Wire:
         _address("wire0", here)
         _address("wire1", there, "nsenter", "--net", "--target", str(process))
         for source, target in (ends, ends[::-1]):
-            threading.Thread(target=self._carry, args=(source, target), daemon=True).start()
+            threading.Thread(target=self._forward_until_closed, args=(source, target), daemon=True).start()
 
-    def _carry(self, source: int, target: int) -> None:
-        """Carry one way, until one of the ends has gone."""
+    def _forward_until_closed(self, source: int, target: int) -> None:
+        """Forward packets in one direction until one of the interfaces is closed."""
         with contextlib.suppress(OSError):
-            self._carry_on(source, target)
+            self._forward(source, target)
 
-    def _carry_on(self, source: int, target: int) -> None:
-        under_way: deque[tuple[float, bytes]] = deque()  # with when they arrive
+    def _forward(self, source: int, target: int) -> None:
+        in_transit: deque[tuple[float, bytes]] = deque()  # with their arrival times
         while True:
-            left = max(under_way[0][0] - time.monotonic(), 0.0) if under_way else None
-            if select.select([source], [], [], left)[0]:
+            timeout = max(in_transit[0][0] - time.monotonic(), 0.0) if in_transit else None
+            if select.select([source], [], [], timeout)[0]:
                 packet = os.read(source, _PACKET)
                 if not self.cut and self._dice.random() >= self.loss:
-                    under_way.append((time.monotonic() + self.delay, packet))
-            while under_way and under_way[0][0] <= time.monotonic():
-                self._deliver(target, under_way.popleft()[1])
+                    in_transit.append((time.monotonic() + self.delay, packet))
+            while in_transit and in_transit[0][0] <= time.monotonic():
+                self._deliver(target, in_transit.popleft()[1])
 
     def _deliver(self, target: int, packet: bytes) -> None:
         if not self.cut:
@@ -60,7 +60,7 @@ class Wire:
 
 
 def _end(name: str) -> int:
-    """Make an interface, and return the file of what comes in and goes out there."""
+    """Create an interface; return the file descriptor that reads and writes its packets."""
     file = os.open("/dev/net/tun", os.O_RDWR)
     fcntl.ioctl(file, _TUNSETIFF, struct.pack("16sH22x", name.encode(), _IFF_TUN | _IFF_NO_PI))
     return file

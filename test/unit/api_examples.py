@@ -1,7 +1,7 @@
-"""An example of every function of the script API: a call, written as Lua writes it, and what it returns.
+"""Examples of every function of the script API: a call in Lua's syntax and its return values.
 
-`NAME` stands for each of the function's names, one after the other. Tables are lists in Python; a call that Python
-writes in another way has its text beside it. What a call returns is a list: of one value, of several, or of none.
+`NAME` stands for each of the function's names in turn. Tables become lists in Python; a call that needs another syntax
+in Python has its own Python text. The return values are a list of zero, one or several values.
 """
 
 import math
@@ -17,13 +17,13 @@ POSE_BACK = [-2, 1, -3, 0, 0, -HALF, HALF]
 STRING = "'\\1\\0\\0\\0\\2\\0\\0\\0'"
 NO_THREAD = "in sysCall_thread, sysCall_threadmain, or a coroutine"
 NO_FUNCTION = "no function 'nothing' for this callback"
-ANY = object()  # whatever comes
+ANY = object()  # any value
 STEP_STAYS = "`time_step` in the scene file sets it"
 NO_SCENE_FILE = "a model must be in the folder of the scene file, but the simulation has no scene file"
 
 
 class Example(NamedTuple):
-    """A call, what it returns, and the call in Python where that is not what Lua's becomes."""
+    """A call, its return values, and the call in Python if it is not the translation of the call in Lua."""
 
     call: str
     returns: list[Any]
@@ -31,7 +31,7 @@ class Example(NamedTuple):
 
 
 def near(*values: float) -> Any:
-    """Return a list of numbers that is compared within rounding."""
+    """Return a list of numbers that is compared with a tolerance for rounding errors."""
     return approx(list(values), abs=1e-9)
 
 
@@ -39,13 +39,13 @@ ALONG_X = near(8e-6, 0, 0, 0, 9.04e-4, 0, 0, 0, 9.04e-4)  # kg m², of a drone w
 
 
 # Intensity, red, green and blue of the two pixels (3, 4, 5) and (0, 1, 2).
-DARKEST, LIGHTEST, MEAN = ([one / 255 for one in (g, g - 1, g, g + 1)] for g in (1, 4, 2.5))
+DARKEST, LIGHTEST, MEAN = ([level / 255 for level in (g, g - 1, g, g + 1)] for g in (1, 4, 2.5))
 STATISTICS = approx([*DARKEST, 0.25, *LIGHTEST, 0.75, *MEAN, 0.5])
 BOX = [near(1, 1, 1), near(0.5, 0.5, 0.5, 0, 0, 0, 1)]
 
 
 def _packed(count: int, size: int, name: str) -> list[Example]:
-    """Return examples of the functions that pack numbers of so many bytes each."""
+    """Return examples of the functions that pack and unpack numbers of `size` bytes each."""
     return [
         Example(f"sim.pack{name}({{1,2,3}}, 1, 1)", [ANY]),
         Example(f"sim.unpack{name}(sim.pack{name}({{1,2,3}}))", [[1, 2, 3]]),
@@ -110,7 +110,7 @@ SIM: dict[str, list[Example]] = {
     "emptyCollection": [Example("NAME(sim.createCollection(0))", [])],
     "destroyCollection": [Example("NAME(sim.createCollection(0))", [])],
     "getObjectUid": [Example("NAME(BASE) == BASE", [True])],
-    # ---- where objects are
+    # ---- poses of objects
     "setObjectPosition": [Example("NAME(TARGET, -1, {1,2,3})", []), Example("NAME(TARGET, {4,5,6}, -1)", [])],
     "getObjectPosition": [Example("NAME(TARGET, -1)", [near(4, 5, 6)])],
     "setObjectOrientation": [Example("NAME(TARGET, -1, {0,0,0.5})", [])],
@@ -123,7 +123,7 @@ SIM: dict[str, list[Example]] = {
     "getObjectMatrix": [Example("NAME(TARGET, -1)", [near(0, -1, 0, 1, 1, 0, 0, 2, 0, 0, 1, 3)])],
     "getObjectSizeFactor": [Example("NAME(BASE)", [1])],
     "getObjectSizeValues": [Example("NAME(BASE)", [[1, 1, 1]])],
-    # ---- how they move
+    # ---- velocities and forces
     "getObjectVelocity": [Example("NAME(DRONE + sim.handleflag_axis)", [near(0, 0, 0), near(0, 0, 0)])],
     "getVelocity": [Example("NAME(DRONE)", [near(0, 0, 0), near(0, 0, 0)])],
     "addForce": [Example("NAME(DRONE, {0,0,0}, {0,0,0})", [])],
@@ -265,7 +265,7 @@ SIM: dict[str, list[Example]] = {
     "callScriptFunction": [Example("REFUSED(NAME, 'nothing', sim.handle_self)", [NO_FUNCTION])],
     "executeScriptString": [Example("NAME('1 + 1', sim.handle_self)", [0, 2])],
     "getScriptFunctions": [Example("NAME(sim.handle_self) ~= nil", [True], "NAME(sim.handle_self) is not None")],
-    # ---- threads, of a script that has none
+    # ---- threads, in a script without a thread
     "switchThread": [Example("REFUSED(NAME)", [NO_THREAD])],
     "step": [Example("REFUSED(NAME)", [NO_THREAD])],
     "wait": [Example("NAME(0)", [0]), Example("REFUSED(NAME, 1)", [NO_THREAD])],
@@ -280,7 +280,7 @@ SIM: dict[str, list[Example]] = {
     "getThreadExitRequest": [Example("NAME()", [False])],
     "setThreadResumeLocation": [Example("NAME(0, 0)", [1])],
     "delegateChildScriptExecution": [Example("NAME()", [1])],
-    # ---- motions, which wait for steps; and trajectories, which a script follows by itself
+    # ---- motions, which wait for steps, and trajectories, which do not
     "moveToConfig": [Example("REFUSED(NAME, {pos={0}, targetPos={1}})", [NO_THREAD], "REFUSED(NAME, PARAMETERS)")],
     "moveToPose": [
         Example("REFUSED(NAME, {pos={0}})", ["`object` or `pose` must be given"], "REFUSED(NAME, PARAMETERS)")
@@ -353,7 +353,7 @@ SIM: dict[str, list[Example]] = {
     "setStringSignal": [Example("NAME('n', 2.5)", []), Example("NAME('s', 'text')", [])],
     "getStringSignal": [Example("NAME('n')", ["2.5"]), Example("NAME('s')", ["text"])],
     "clearStringSignal": [Example("NAME('s')", []), Example("sim.getStringSignal('s')", [])],
-    "extRemoteApiStart": [Example("NAME(19999)", [-1])],  # nobody serves it here
+    "extRemoteApiStart": [Example("NAME(19999)", [-1])],  # no server runs here
     "extRemoteApiStop": [Example("NAME(19999)", [-1])],
     "extRemoteApiReset": [Example("NAME(19999)", [-1])],
     "extRemoteApiStatus": [Example("NAME(19999)", [-1])],
@@ -382,7 +382,7 @@ SIM: dict[str, list[Example]] = {
     "setProperty": [Example("NAME(DRONE, 'customData.x', 3)", [])],
     "getProperty": [Example("NAME(DRONE, 'customData.x')", [3]), Example("NAME(DRONE, 'signal.y', NOERROR)", [])],
     "removeProperty": [Example("NAME(DRONE, 'customData.x')", [])],
-    # ---- what one sees
+    # ---- drawings, dialogs and sensors
     "addDrawingObject": [Example("NAME(sim.drawing_spherepts, 0.1, 0, BASE, 10) > 0", [True])],
     "addDrawingObjectItem": [Example("NAME(DRAWN, {1,2,3})", [])],
     "removeDrawingObject": [Example("NAME(DRAWN)", [])],
@@ -426,7 +426,7 @@ SIM: dict[str, list[Example]] = {
     "resetProximitySensor": [Example("NAME(FEELER)", [])],
     "readForceSensor": [Example("NAME(GAUGE)", [1, [0, 0, 0], [0, 0, 0]])],
     "readSensor": [Example("NAME(RANGE)", [])],
-    # ---- objects that are made; last, for they stand at the origin
+    # ---- created objects; last, since they stand at the origin
     "createPureShape": [Example("sim.getShapeMass(NAME(0, 8, {0.1,0.1,0.1}, 2))", [2])],
     "createPrimitiveShape": [Example("sim.getShapeMass(NAME(sim.primitiveshape_cuboid, {1,1,1}))", [approx(1000)])],
     "createMeshShape": [
@@ -469,7 +469,7 @@ SIM: dict[str, list[Example]] = {
     "ungroupShape": [Example("REFUSED(NAME, FLOOR)", ["only objects of the scene can be changed"])],
 }
 
-REMOTE_API = {name: [Example("NAME(19999)", [-1])] for name in ("start", "stop", "reset", "status")}  # nobody serves it
+REMOTE_API = {name: [Example("NAME(19999)", [-1])] for name in ("start", "stop", "reset", "status")}  # no server
 
 # TASK has SPACE, from (0, 0) to (1, 0) with RRTConnect.
 _STRAIGHT = near(0, 0, 0.5, 0, 1, 0)

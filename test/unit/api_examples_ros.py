@@ -1,4 +1,4 @@
-"""An example of every function of simROS: see api_examples.py."""
+"""Examples of every function of simROS, in the form of api_examples.py."""
 
 from api_examples import Example
 

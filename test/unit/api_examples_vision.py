@@ -1,4 +1,4 @@
-"""Examples of simVision, as api_examples.py has those of sim; the camera sees two pixels, one above the other."""
+"""Examples of simVision, in the form of api_examples.py; the camera has two pixels, one above the other."""
 
 from api_examples import ANY, Example, approx
 
@@ -6,7 +6,7 @@ WORK = "simVision.sensorImgToWorkImg(CAMERA)"
 
 
 def _grey(at_least: float) -> Example:
-    """Return how much of the work image is at least so bright."""
+    """Return an example whose value is the share of the work image's pixels with at least this brightness."""
     share = 1.0 if at_least < 0.5 else 0.0
     call = f"sim.unpackFloatTable(SECOND(simVision.binaryWorkImg(CAMERA, {at_least}, 0, 0)))"
     return Example(f"{call} [FIRST]", [share])

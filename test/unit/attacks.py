@@ -1,6 +1,6 @@
-"""Flies scripts that attack the process, each in a process of its own: forked from one that has imported everything.
+"""Flights of scripts that attack the process, each in a fork of a server process that has imported all modules.
 
-Run as a program, it reads a request in each line of its input and answers with a line: of JSON, both.
+Run as a program, it is this server: it reads one JSON request per line and writes one JSON reply per line.
 """
 
 import gc
@@ -18,11 +18,11 @@ from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 EVERYTHING = ("drone_sim.run.simulation", "drone_sim.scripting.lua.script")
-HANGS = 100  # s, on a busy machine; most take less than one
+HANGS = 100  # s, long enough for a busy machine; most flights take less than 1 s
 
 
 class Attacker:
-    """A process that flies scripts."""
+    """A server process that flies scripts in its forks."""
 
     def __init__(self):
         self._process = subprocess.Popen(
@@ -34,7 +34,7 @@ class Attacker:
         )
 
     def fly(self, path, limit, where="main"):
-        """Return what was said in the first flight and in the one after it, and how much was logged."""
+        """Return the errors of a flight with the script and of a flight after it, and how much was logged."""
         print(json.dumps([str(path), limit, where]), file=self._process.stdin, flush=True)
         status, text = json.loads(self._process.stdout.readline())
         assert status == 0, f"the process ended with {status}"
@@ -46,13 +46,13 @@ class Attacker:
 
 
 def flight(path, limit, snapshots=3):
-    """Fly a script for a step and so many more with a snapshot in each, with a command; return what was said."""
+    """Fly a script with a command for one step, and for `snapshots` steps after a snapshot each; return the errors."""
     from drone_sim.mechanics.state import Twist
     from drone_sim.run import parameters
     from drone_sim.run.simulation import Simulation
     from drone_sim.scripting.errors import ScriptError
 
-    said = []
+    messages = []
     simulation = None
     try:
         simulation = Simulation(parameters.load({"script_time_limit": limit}), script=path)
@@ -62,13 +62,13 @@ def flight(path, limit, snapshots=3):
             simulation.restore(simulation.snapshot())
             simulation.step()
     except ScriptError as error:
-        said.append(str(error))
+        messages.append(str(error))
     try:
         if simulation is not None:
             simulation.close()
     except ScriptError as error:
-        said.append(str(error))
-    return said
+        messages.append(str(error))
+    return messages
 
 
 def _attack(path, limit, where, answer):
@@ -78,10 +78,10 @@ def _attack(path, limit, where, answer):
     logging.getLogger("drone_sim.script").addHandler(handler)
 
     def attack():
-        found = {"first": flight(path, limit)}
+        report = {"first": flight(path, limit)}
         Path(path).write_text("", encoding="utf-8")
-        found.update(second=flight(path, 20, snapshots=0), lines=len(lines), bytes=sum(map(len, lines)))
-        os.write(answer, json.dumps(found).encode())
+        report.update(second=flight(path, 20, snapshots=0), lines=len(lines), bytes=sum(map(len, lines)))
+        os.write(answer, json.dumps(report).encode())
 
     if where == "main":
         attack()
@@ -98,8 +98,8 @@ def _serve():
         for name in ("empty.py", "empty.lua"):
             path = Path(folder, name)
             path.write_text("", encoding="utf-8")
-            flight(str(path), 20)  # forks inherit what this reads and compiles
-    gc.freeze()  # a fork need not look through all of that when it ends, which takes longer than most flights
+            flight(str(path), 20)  # forks inherit the files that this reads and compiles
+    gc.freeze()  # else each fork would scan these objects at its exit, which takes longer than most flights
     for line in sys.stdin:
         read, write = os.pipe()
         child = os.fork()

@@ -1,4 +1,4 @@
-"""Markers as the simulation makes them, and what a browser is told of them."""
+"""Markers as the simulation publishes them, and the scene that a browser builds from the messages it gets."""
 
 import json
 
@@ -10,15 +10,15 @@ from drone_sim.ros.cockpit.scene.scene_state import SceneState
 
 
 def marker(number, kind=Marker.CUBE, ns="a", **values):
-    made = Marker(ns=ns, id=number, type=kind, **values)
-    made.header.frame_id = "world"
-    made.scale.x = made.scale.y = made.scale.z = 1.0
-    made.color = ColorRGBA(1, 0, 0, 1)
-    return made
+    new_marker = Marker(ns=ns, id=number, type=kind, **values)
+    new_marker.header.frame_id = "world"
+    new_marker.scale.x = new_marker.scale.y = new_marker.scale.z = 1.0
+    new_marker.color = ColorRGBA(1, 0, 0, 1)
+    return new_marker
 
 
 class Browser:
-    """What one browser knows: it reads messages as the page does."""
+    """The scene as one browser knows it; messages are read as in the page."""
 
     def __init__(self, state=None):
         self.state = SceneState() if state is None else state
@@ -26,32 +26,32 @@ class Browser:
         self.frames, self.markers, self.poses = {}, {}, {}
 
     def hear(self):
-        """Take what has changed; return what is said of it, None for nothing."""
+        """Apply the changes since the last call; return their JSON part, or None if there are none."""
         self.version, message = self.state.since(self.version)
         if not message:
             return None
         line, _, rest = message.partition(b"\n")
-        said = json.loads(line)
-        self._take(said, np.frombuffer(rest, "<f4").tolist())
-        return said
+        changes = json.loads(line)
+        self._take(changes, np.frombuffer(rest, "<f4").tolist())
+        return changes
 
-    def _take(self, said, numbers):
-        if said["whole"]:
+    def _take(self, changes, numbers):
+        if changes["whole"]:
             self.frames, self.markers, self.poses = {}, {}, {}
-        for number in said["gone"]:
+        for number in changes["gone"]:
             del self.markers[number]
-        self.frames.update({index: (name, parent) for index, name, parent in said["frames"]})
-        moved = said["moved"] + said["placed"]
+        self.frames.update({index: (name, parent) for index, name, parent in changes["frames"]})
+        moved = changes["moved"] + changes["placed"]
         poses = [tuple(numbers[at : at + 7]) for at in range(0, 7 * len(moved), 7)]
         numbers = numbers[7 * len(moved) :]
-        self.poses.update({self.frames[index][0]: pose for index, pose in zip(said["moved"], poses)})
-        for one in said["markers"]:
-            for name, count in one.pop("arrays", []):
-                one[name], numbers = numbers[:count], numbers[count:]
-            self.markers[one["id"]] = one
-        for number, pose in zip(said["placed"], poses[len(said["moved"]) :]):
+        self.poses.update({self.frames[index][0]: pose for index, pose in zip(changes["moved"], poses)})
+        for entry in changes["markers"]:
+            for name, count in entry.pop("arrays", []):
+                entry[name], numbers = numbers[:count], numbers[count:]
+            self.markers[entry["id"]] = entry
+        for number, pose in zip(changes["placed"], poses[len(changes["moved"]) :]):
             self.markers[number]["pose"] = pose
         assert not numbers
 
     def named(self, ns):
-        return [one for one in self.markers.values() if one["ns"] == ns]
+        return [entry for entry in self.markers.values() if entry["ns"] == ns]

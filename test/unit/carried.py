@@ -1,4 +1,4 @@
-"""What carries the sensors of the tests: a drone in a world of its own, and a body that moves as it is told."""
+"""Carriers of sensors for tests: a body with a given state, a body on a circle, and a drone in its own world."""
 
 import math
 import weakref
@@ -22,7 +22,7 @@ FIELD = (1.334e-6, 21.523e-6, -43.290e-6)
 
 
 class Carried:
-    """Something with sensors; `state` is what a test makes of it."""
+    """A body with sensors, whose `state` the test sets."""
 
     mass, gravity, teleports = BODY.mass, GRAVITY, 0
     datum, magnetic_field = ZURICH, FIELD
@@ -55,14 +55,14 @@ class Carried:
             sensor.look(self.count)
 
     def values(self, sensor):
-        """Return what a sensor has measured since the last time, and clear it."""
-        found = [reading.value for reading in sensor.readings]
+        """Return the readings of a sensor since the last call, and clear them."""
+        values_read = [reading.value for reading in sensor.readings]
         sensor.readings.clear()
-        return found
+        return values_read
 
 
 class Circling(Carried):
-    """Something on a circle (m, rad/s) about the z axis, its x axis ahead."""
+    """A body on a circle (m, rad/s) about the z axis; its x axis points along the motion."""
 
     def __init__(self, radius, rate):
         self._radius, self._rate = radius, rate
@@ -80,7 +80,7 @@ class Circling(Carried):
 
 
 class Flown(Carried):
-    """The drone in a world."""
+    """The drone in a physics world."""
 
     def __init__(self, pose=ABOVE, gravity=GRAVITY, floor=True):
         self.world = World(SUB_STEP, gravity)
@@ -100,7 +100,7 @@ class Flown(Carried):
         return hit and Hit(hit.distance, self.names[hit.body], hit.normal)
 
     def contacts(self):
-        return [Contact(self.names[one.body], *one[1:]) for one in self.world.queries.contacts(self.body)]
+        return [Contact(self.names[contact.body], *contact[1:]) for contact in self.world.queries.contacts(self.body)]
 
     def move(self, pose):
         self.teleports += 1
@@ -108,7 +108,7 @@ class Flown(Carried):
         self.state = self.world.state(self.body)
 
     def step(self, sub_steps=1, force=(0, 0, 0), torque=(0, 0, 0)):
-        """Let a force (N) at the centre of mass and a torque (N m) act, both in the world."""
+        """Apply a force (N) at the centre of mass and a torque (N m), both in the world frame, in each sub-step."""
         wrench = Wrench()
         wrench.add(force, torque, (0, 0, 0))
         for _ in range(sub_steps):

@@ -1,4 +1,4 @@
-"""What the tests of the cockpit's scripts ask, and the simulator that they ask it of."""
+"""Stand-ins for the simulator, its scene and the timeline player in tests of the cockpit's scripts."""
 
 from drone_sim.ros.cockpit.editor.backend import EditorBackend
 from drone_sim.ros.cockpit.editor.lessons import Lessons
@@ -7,7 +7,7 @@ LESSONS = Lessons()
 
 
 class Node:
-    """A simulator that remembers what it was asked, and fails as it is told."""
+    """A simulator that records its service calls; `fails` has the error messages of services that fail."""
 
     node = "/drone_sim"
 
@@ -26,7 +26,7 @@ class Node:
 
 
 class TimelinePlayer:
-    """Remembers whose timeline was sent."""
+    """A timeline player that records the prepared plan."""
 
     def __init__(self):
         self.prepared = self.begun = None

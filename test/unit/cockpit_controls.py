@@ -1,7 +1,7 @@
-"""The controls and keys that the tutorial names to who reads it in the browser: the one list of them.
+"""The controls and keys that the tutorial names for readers who use the browser.
 
-Each has the accessible name by which the page has it as a button, a tab or in a menu: a regular expression, in any
-case.
+The value of a control is the accessible name of its button, tab or menu entry in the page: a regular expression that
+ignores case.
 """
 
 CONTROLS = {

@@ -1,4 +1,4 @@
-"""Fixtures of several test files, and the options of all."""
+"""Fixtures that several test files share, and settings for all tests."""
 
 import contextlib
 import gc
@@ -12,20 +12,20 @@ from drone_sim.render.renderer import Renderer
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
-# The same examples every time, however slow the machine.
+# The same examples in every run, without a deadline, since some machines are slow.
 settings.register_profile("same", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("same")
 
-# A shell's background job ignores Ctrl-C, what nohup starts ignores SIGHUP, and so would every process that a test
-# starts to interrupt it.
+# A background job of a shell ignores SIGINT, and a job under nohup ignores SIGHUP. Child processes would inherit that,
+# and tests could not interrupt them.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
-    signal.signal(signal.SIGHUP, lambda *_: None)  # which no other program inherits
+    signal.signal(signal.SIGHUP, lambda *_: None)  # programs inherit SIG_IGN, but no handler
 
 
 @pytest.fixture(name="shared_renderer", scope="session")
 def _shared_renderer():
-    """Return one renderer for all tests that draw: compiling its shaders takes longer than most of them."""
+    """Yield one renderer for all tests that draw, since compiling its shaders takes longer than most of the tests."""
     renderer = Renderer()
     yield renderer
     renderer.close()
@@ -51,11 +51,11 @@ def clock():
 
 
 def simulations(folder):
-    """Yield a function that builds a simulation from parameters, and advances it by some steps; close all in the end.
+    """Yield a function that builds a simulation from parameters and advances it; close all simulations at the end.
 
-    The drone's script may be given as text, `lua` or `python`, and so may the scene's file.
+    The drone's script may be given as a text, `lua` or `python`, and the scene file as the text `scene`.
     """
-    with contextlib.ExitStack() as in_the_end:
+    with contextlib.ExitStack() as exit_stack:
 
         def build(values=None, steps=0, *, lua=None, python=None, scene=None, **options):
             values = dict(values or {})
@@ -67,7 +67,7 @@ def simulations(folder):
             if lua is not None or python is not None:
                 options["script"] = str(folder / ("script.py" if lua is None else "script.lua"))
             simulation = Simulation(parameters.load(values), **options)
-            in_the_end.callback(simulation.close)
+            exit_stack.callback(simulation.close)
             for _ in range(steps):
                 simulation.step()
             return simulation
@@ -82,7 +82,7 @@ def new_simulation(tmp_path):
 
 @pytest.fixture(scope="module")
 def new_shared_simulation(tmp_path_factory):
-    """Do what new_simulation does, for a simulation that the tests of a file share."""
+    """Do the same as new_simulation, for a simulation that all tests of a file share."""
     yield from simulations(tmp_path_factory.mktemp("shared"))
 
 
@@ -95,11 +95,11 @@ def pytest_collection_modifyitems(items):
 
 def pytest_collection_finish():
     gc.collect()
-    gc.freeze()  # so that no collection, here or in a fork, looks through all the tests again
+    gc.freeze()  # garbage collections, here and in forks, need not scan all tests again
 
 
 def pytest_sessionfinish():
-    gc.unfreeze()  # for nanobind, which tells of what is left at the end
+    gc.unfreeze()  # otherwise nanobind would report the frozen objects as leaks at exit
 
 
 def pytest_terminal_summary(terminalreporter, config):
@@ -109,5 +109,5 @@ def pytest_terminal_summary(terminalreporter, config):
 
 
 def pytest_make_parametrize_id(val):
-    """Name a long value by its length: pytest would make it a part of the test's name, over and over."""
+    """Return the length as the id of a long value, since pytest would put the whole value into the test's name."""
     return f"{len(val)} long" if isinstance(val, (str, bytes)) and len(val) > 200 else None

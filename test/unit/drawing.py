@@ -1,4 +1,4 @@
-"""What the tests of the renderer draw, and from where they look at it."""
+"""Visuals and camera poses for tests of the renderer, and functions that find objects in its pictures."""
 
 import numpy as np
 
@@ -13,14 +13,14 @@ FLOOR = Visual("floor", Plane(), GREY, floor=True)
 
 
 def at(x, y, z):
-    """World from a frame that stands upright there."""
+    """Return the pose of an upright frame at a position in the world, as a 4 x 4 matrix."""
     pose = np.eye(4)
     pose[:3, 3] = x, y, z
     return pose
 
 
 def looking(eye, target):
-    """World-from-optical of a camera at `eye` that looks at `target`, upright."""
+    """Return the world-from-optical matrix of an upright camera at `eye` that looks at `target`."""
     forward = np.subtract(target, eye).astype(float)
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, (0, 0, 1))
@@ -43,13 +43,13 @@ def draw(renderer, visuals, poses, camera_pose=AHEAD, intrinsics=CAMERA):
 
 
 def pixel(camera, point):
-    """Pixel (u, v) of a point in front of the camera, in its optical frame (m)."""
+    """Return the pixel (u, v) of a point in front of the camera, in its optical frame (m)."""
     x, y, z = point
     return camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
 
 
 def seen(renderer, visuals, poses, camera_pose=AHEAD, intrinsics=CAMERA):
-    """Index of the visual seen at each pixel, -1 for none: the nearest of them, each drawn alone."""
+    """Return the index of the nearest visual at each pixel, -1 for none; each visual is drawn alone."""
     depths = []
     for visual, pose in zip(visuals, poses):
         renderer.set_visuals([visual])
@@ -59,5 +59,5 @@ def seen(renderer, visuals, poses, camera_pose=AHEAD, intrinsics=CAMERA):
 
 
 def reddish(picture):
-    """Where a picture shows RED."""
+    """Return the mask of pixels where a picture shows RED."""
     return (picture[:, :, 0] > 100) & (picture[:, :, 1] < 40)

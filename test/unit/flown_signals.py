@@ -1,4 +1,4 @@
-"""Flights that are formulas: tables as a flight leaves them, of which some columns are given functions of time."""
+"""Flight records made from formulas: some columns of the table are given as functions of time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def times(seconds: float = 10.0, step: float = 0.01) -> np.ndarray:
 
 
 def flown(at: np.ndarray, is_whole: bool = True, more: dict[str, Any] | None = None, **columns: Any) -> FlightRecord:
-    """Return a level flight with these columns of the table; `vx` is that of the world."""
+    """Return the record of a level flight with the given columns; `vx` is in the world frame."""
     rows = np.zeros((len(at), len(COLUMNS)))
     rows[:, 0], rows[:, INDEX["qw"]] = at, 1.0
     for name, values in columns.items():
@@ -29,7 +29,7 @@ def flown(at: np.ndarray, is_whole: bool = True, more: dict[str, Any] | None = N
 
 
 def criterion(kind: str, **values: Any) -> Criterion:
-    (model,) = (one for one in KINDS if one.model_fields["kind"].annotation.__args__ == (kind,))
+    (model,) = (kind_model for kind_model in KINDS if kind_model.model_fields["kind"].annotation.__args__ == (kind,))
     return model.model_validate({"kind": kind, **values})
 
 

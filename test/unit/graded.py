@@ -1,4 +1,4 @@
-"""Results of flights that nobody has flown, for the tests of what is made of results."""
+"""Plans, results and tables made without a flight, for tests of the outputs of grading."""
 
 import math
 
@@ -36,13 +36,13 @@ def outcome(name, passed, value=0.5, at=1.5, of=1.0, said="it rose in 0.5 s"):
 
 def result(script="my.py", seed=0, passed=(True, True), error=None, changes=None, names=("forward", "no_contact")):
     outcomes = tuple(outcome(name, good, of=2.0 - at) for at, (name, good) in enumerate(zip(names, passed)))
-    points, possible = (sum(getattr(one, key) for one in outcomes) for key in ("points", "of"))
-    has_passed = error is None and all(one.passed for one in outcomes)
+    points, possible = (sum(getattr(entry, key) for entry in outcomes) for key in ("points", "of"))
+    has_passed = error is None and all(entry.passed for entry in outcomes)
     return Result("steps", script, seed, changes or {}, has_passed, points, possible, 4.0, error, outcomes)
 
 
 def write_table(path, seconds=4.0):
-    """Write a table of a circle (m): radius 1 about (1, 0), and from 0.8 up."""
+    """Write the table of a flight (m) on a circle of radius 1 about (1, 0) that climbs from 0.8."""
     with open(path, "w") as file:
         recording = Recording(file)
         for step in range(round(seconds / 0.05) + 1):

@@ -1,4 +1,4 @@
-"""A client of V-REP's legacy remote API that says on the wire what a test says, and nothing by itself."""
+"""A client of V-REP's legacy remote API that sends the messages of a test and nothing else."""
 
 import contextlib
 import itertools
@@ -9,7 +9,7 @@ HEADER = struct.Struct("<HBiiiHB")
 COMMAND = struct.Struct("<iiHiiHiBB")
 PACKET = struct.Struct("<hhh")
 ONESHOT, BLOCKING, STREAMING, SPLIT, STREAMING_SPLIT, DISCONTINUE = (mode << 16 for mode in range(6))
-OK, NO_VALUE, FAILED = 0, 1, 8  # what a client's functions return
+OK, NO_VALUE, FAILED = 0, 1, 8  # return codes of the official client's functions
 
 
 def ints(*values):
@@ -25,7 +25,7 @@ def text(value):
 
 
 def command(code, key=b"", data=b"", shift=0, whole=None):
-    """Return a command, whose code has its mode, and perhaps a delay in ms."""
+    """Return an encoded command. `code` includes the mode, or is a pair of such a code and a delay in ms."""
     size = COMMAND.size + len(key) + len(data)
     full = size if whole is None else COMMAND.size + len(key) + whole
     number, delay = code if isinstance(code, tuple) else (code, 0)
@@ -38,11 +38,11 @@ def message(number, *commands, version=11):
 
 def packets(content, piece=1294):
     pieces = [content[start : start + piece] for start in range(0, len(content), piece)]
-    return b"".join(PACKET.pack(1, len(one), len(pieces) - 1 - count) + one for count, one in enumerate(pieces))
+    return b"".join(PACKET.pack(1, len(chunk), len(pieces) - 1 - count) + chunk for count, chunk in enumerate(pieces))
 
 
 class Reply:
-    """A message of the server's: its header, and the commands that came back, by code (with the mode) and key."""
+    """A message of the server: its header, and the replies to commands by code (with the mode) and key."""
 
     def __init__(self, content):
         fields = HEADER.unpack_from(content)
@@ -59,7 +59,7 @@ class Reply:
 
 
 class Client:
-    """`serve(seconds)` is called while an answer is awaited."""
+    """A client that calls `serve(seconds)` while it waits for a reply."""
 
     def __init__(self, port, serve):
         self.peer = socket.create_connection(("127.0.0.1", port), timeout=60)
@@ -80,13 +80,13 @@ class Client:
                 self._serve(0.001)
 
     def received(self, looks=2000):
-        """Serve until a whole message is there, or for so many looks; return it, or None."""
+        """Serve until a whole message has arrived and return it, or None after `looks` attempts."""
         for _ in range(looks):
             with contextlib.suppress(BlockingIOError):
                 self._bytes += self.peer.recv(1 << 20)
-            found = self._take()
-            if found is not None:
-                return Reply(found)
+            message_bytes = self._take()
+            if message_bytes is not None:
+                return Reply(message_bytes)
             self._serve(0.001)
         return None
 
@@ -105,18 +105,18 @@ class Client:
         return None
 
     def ask(self, *commands):
-        """Return the reply to a message of these commands."""
+        """Return the reply to a message with these commands."""
         self.send(*commands)
         reply = self.received()
         assert reply is not None
         return reply
 
     def call(self, code, key=b"", data=b""):
-        """Return what a command brings in the blocking mode: bytes, or FAILED."""
+        """Return the data of the reply to a command in blocking mode, or FAILED."""
         return self.ask(command(code | BLOCKING, key, data)).answers[code | BLOCKING, key]
 
     def numbers(self, layout, code, key=b"", data=b""):
-        """Return the numbers that a command brings."""
+        """Return the numbers in the reply to a command."""
         answer = self.call(code, key, data)
         assert answer != FAILED, self.errors()
         return struct.unpack(f"<{layout}", answer)
@@ -125,7 +125,7 @@ class Client:
         return self.numbers("i", 0x3001, text(name))[0]
 
     def errors(self):
-        """Return what was refused since the last time."""
+        """Return the error messages since the last call."""
         answer = self.call(0x0004)
         (count,) = struct.unpack_from("<i", answer)
         lines = answer[4:].decode().split("\0")
@@ -133,7 +133,7 @@ class Client:
         return lines[:-1]
 
     def is_let_go(self, looks=2000):
-        """Serve until the server has ended the connection; return whether it has."""
+        """Serve until the server has closed the connection, at most `looks` times; return whether it has."""
         for _ in range(looks):
             try:
                 if not self.peer.recv(1 << 20):

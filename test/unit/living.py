@@ -1,4 +1,4 @@
-"""A scene that is changed while it lives, and how to see what it is like and what there is of everything."""
+"""Helpers for tests that edit a scene in memory: editors, comparisons of scenes, and counts of all objects."""
 
 import numpy as np
 import pybullet
@@ -9,9 +9,9 @@ from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 
 
-def editor_of(given=None, drafts=None):
-    """Return the editor of a scene that is stopped."""
-    simulation = Simulation(parameters.load(given), started=False)
+def editor_of(parameter_values=None, drafts=None):
+    """Return the editor of a stopped scene."""
+    simulation = Simulation(parameters.load(parameter_values), started=False)
     return SceneEditor(Player(simulation, lambda state: None, False), drafts)
 
 
@@ -24,12 +24,12 @@ def text_of(editor):
 
 
 def state(simulation):
-    """Return what `picture` does, what is seen in any order."""
-    objects, looks, poses, seen = picture(simulation)
+    """Return the same as `picture`, rounded, with the visuals in an order that does not depend on their creation."""
+    objects, looks, poses, visual_poses = picture(simulation)
     return (
         objects,
         np.round(poses, 6) + 0.0,
-        sorted((str(look), (np.round(pose, 5) + 0.0).tolist()) for look, pose in zip(looks, seen)),
+        sorted((str(look), (np.round(pose, 5) + 0.0).tolist()) for look, pose in zip(looks, visual_poses)),
     )
 
 
@@ -73,7 +73,7 @@ KINDS = {
 
 
 def sizes(simulation):
-    """Return how much of everything there is, as far as one may count it."""
+    """Return the sizes of all collections that must not grow when objects are added and removed again."""
     world, scene, tree = simulation.world, simulation.scene, simulation.context.objects
     counted = (tree, list(tree.names), scene.entries, scene.objects, scene.visuals()[0], simulation.context.names)
     inside = (scene._built, scene._holders, scene.records, scene._carried_bases, world._inertial_frames)
@@ -83,7 +83,7 @@ def sizes(simulation):
 
 
 def picture(simulation):
-    """Return what the tree and the world are like: names, parents, places, looks, masses."""
+    """Return names, parents and masses of the objects, looks of the visuals, and the poses of both."""
     tree, scene = simulation.context.objects, simulation.scene
     objects = {
         handle: (one.names, one.alias, one.kind, getattr(one.parent, "name", ""), getattr(one, "mass", 0.0))

@@ -1,4 +1,4 @@
-"""A backend that keeps what scripts publish, for tests that look at it."""
+"""A backend that records the messages that scripts publish."""
 
 from typing import Any, NamedTuple
 

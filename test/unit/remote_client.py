@@ -1,4 +1,4 @@
-"""Clients of the remote API: CoppeliaSim's own, and one that does what the test says, message by message."""
+"""Clients of the ZeroMQ remote API: CoppeliaSim's own client, and a client that a test controls by message."""
 
 import itertools
 
@@ -6,12 +6,12 @@ import cbor2
 import pytest
 import zmq
 
-PATIENCE = 60_000  # ms, after which a test fails whose server has ended
+PATIENCE = 60_000  # ms until a test fails if its server has ended
 _numbers = itertools.count(1)
 
 
 def official_client(port):
-    """Return CoppeliaSim's own client, which by itself would wait for ever for a server that has ended."""
+    """Return CoppeliaSim's own client with a timeout, since it waits for ever if the server has ended."""
     client = pytest.importorskip("coppeliasim_zmqremoteapi_client").RemoteAPIClient(port=port)
     client.socket.setsockopt(zmq.RCVTIMEO, PATIENCE)
     client.socket.setsockopt(zmq.LINGER, 0)
@@ -23,7 +23,7 @@ class Refusal(Exception):
 
 
 class Client:
-    """Speaks version 2 of the protocol; `server` is served while an answer is awaited."""
+    """A client for version 2 of the protocol that serves `server` while it waits for a reply."""
 
     def __init__(self, server, kind=zmq.REQ, **fields):
         self.fields = {"uuid": f"client {next(_numbers)}", **fields}
@@ -41,7 +41,7 @@ class Client:
         self._socket.send(payload)
 
     def answered(self, looks=5000):
-        """Serve until there is an answer, or for so many looks; return whether there is."""
+        """Serve until a reply has arrived, at most `looks` times; return whether it has."""
         for _ in range(looks):
             if self._socket.poll(0):
                 return True
@@ -57,7 +57,7 @@ class Client:
         return self.reply()
 
     def call(self, function, *arguments):
-        """Return what the official client's functions return; raises Refusal."""
+        """Return the same value as the official client's functions, or raise Refusal."""
         reply = self.ask(function, *arguments)
         if "err" in reply:
             raise Refusal(reply["err"])

@@ -1,4 +1,4 @@
-"""What rviz shows of a scene: its markers, applied as rviz applies them; and what the tree says it should show."""
+"""The markers of a scene, applied as rviz applies them, and the markers that are expected from the object tree."""
 
 import contextlib
 
@@ -12,11 +12,11 @@ from drone_sim.ros.rviz.scene_markers import RvizMeshes, SceneMarkers
 from drone_sim.scene.kinds.dummy import Dummy
 from drone_sim.scene.kinds.paths import PathParameters
 
-FAR = 1e-5  # m
+TOLERANCE = 1e-5  # m
 
 
 class Rviz:
-    """Somebody who listens to a topic of markers, and keeps by namespace and id what is to be seen."""
+    """A subscriber to a marker topic that stores the shown markers by namespace and id."""
 
     def __init__(self):
         self.shown = {}
@@ -25,8 +25,8 @@ class Rviz:
         return 1
 
     def publish(self, message):
-        told = [(one.ns, one.id) for one in message.markers]
-        assert len(set(told)) == len(told), "rviz takes one of each namespace and id in a message"
+        marker_ids = [(one.ns, one.id) for one in message.markers]
+        assert len(set(marker_ids)) == len(marker_ids), "namespace and id must be unique within a message"
         for one in message.markers:
             if one.action == Marker.DELETEALL:
                 self.shown.clear()
@@ -36,23 +36,23 @@ class Rviz:
                 self.shown[one.ns, one.id] = one
 
     def assert_agrees(self, simulation):
-        """See that it shows the objects of the tree, where and as large as those are, and nothing else."""
-        seen = {}
+        """Assert that exactly the objects of the tree are shown, with their positions, sizes and colors."""
+        shown_by_name = {}
         for (name, _), one in sorted(self.shown.items()):
-            seen.setdefault(name, []).append(one)
-        wanted = {one.name: looks for one in _now(simulation) if (looks := _looks(simulation, one))}
-        assert seen.keys() == wanted.keys()
-        for name, looks in wanted.items():
-            assert len(seen[name]) == len(looks), name
-            for marker, (place, size, color) in zip(seen[name], looks):
-                assert np.allclose(_place(marker), place, atol=FAR), name
+            shown_by_name.setdefault(name, []).append(one)
+        expected = {one.name: looks for one in _entries(simulation) if (looks := _expected_markers(simulation, one))}
+        assert shown_by_name.keys() == expected.keys()
+        for name, looks in expected.items():
+            assert len(shown_by_name[name]) == len(looks), name
+            for marker, (place, size, color) in zip(shown_by_name[name], looks):
+                assert np.allclose(_position_of(marker), place, atol=TOLERANCE), name
                 assert np.allclose(_xyz(marker.scale), size), name
                 assert color is None or np.allclose([marker.color.r, marker.color.g, marker.color.b], color[:3]), name
 
 
 @contextlib.contextmanager
 def rviz_of(simulation):
-    """Give what rviz shows of a simulation's scene, and what lets it hear the news at once."""
+    """Yield an Rviz for a simulation's scene, and a function that publishes changes to it without throttling."""
     rviz = Rviz()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(marker_topics.rospy, "Publisher", lambda *_, **__: rviz)
@@ -66,13 +66,13 @@ class _Always:
         return True
 
 
-def _now(simulation):
+def _entries(simulation):
     scene = simulation.scene
     return [record.present for record in scene.records.values()]
 
 
-def _looks(simulation, entry):
-    """Return the places (of lines: of their points), sizes and colors of the markers of one entry."""
+def _expected_markers(simulation, entry):
+    """Return position (of a line: its points), size and color of each marker that is expected for an entry."""
     tree = simulation.context.objects
     one = tree[tree.handle(entry.name)]
     matrix = one.matrix()
@@ -85,14 +85,14 @@ def _looks(simulation, entry):
     return [(frames.position(matrix), _box(entry), entry.color)] if hasattr(entry, "shape") else []
 
 
-def _box(said):
+def _box(shape_parameters):
     """Return the size of the box around a shape."""
-    first, *others = said.size
-    known = {"box": [first, *others], "sphere": [2 * first] * 3, "cylinder": [2 * first, 2 * first, *others]}
-    return known[said.shape]
+    first, *others = shape_parameters.size
+    sizes_by_shape = {"box": [first, *others], "sphere": [2 * first] * 3, "cylinder": [2 * first, 2 * first, *others]}
+    return sizes_by_shape[shape_parameters.shape]
 
 
-def _place(marker):
+def _position_of(marker):
     is_line = marker.type == Marker.LINE_STRIP
     return [_xyz(one) for one in marker.points] if is_line else _xyz(marker.pose.position)
 

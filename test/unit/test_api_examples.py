@@ -1,4 +1,4 @@
-"""Every function of docs/api.md, called in Lua and in Python under each of its names, and what it returns."""
+"""Calls of every function of docs/api.md under each of its names, in Lua and in Python, and their return values."""
 
 import logging
 import re
@@ -116,7 +116,7 @@ def _simulation(new_shared_simulation):
 @pytest.fixture(name="modules")
 def _modules(simulation):
     own, drone, shared = simulation.child_scripts["drone"], simulation.drone.propulsion, simulation.context
-    shared.gravity = -9.81  # as scripts see it
+    shared.gravity = -9.81  # the gravity that scripts read
     for one in (shared.control, shared.data, shared.tubes, shared.collections):
         one.clear()
     weights = {"masses": drone.masses, "inertias": drone.inertias, "nearest": Distances(shared).nearest}
@@ -132,7 +132,7 @@ def _modules(simulation):
 
 
 def names_of(modules):
-    """Return the names of each function that does something, by module and by the name that its example has."""
+    """Return the names of each function that is not ignored, by module and by the name that its example has."""
     found = {}
     for module, examples in EXAMPLES.items():
         for declaration, function in make_api.declared(modules[module]):
@@ -143,7 +143,7 @@ def names_of(modules):
 
 
 def calls(modules, flat):
-    """Return every call of the examples, with what it returns: under its module's names, or under 3.x's."""
+    """Return every call of the examples with its return values, with module names or flat names as in V-REP 3.x."""
     found = []
     all_names = names_of(modules)
     for module, known in ((module, known) for module, examples in EXAMPLES.items() for known in examples):
@@ -163,14 +163,14 @@ def in_python(call, python):
 
 
 def run(path, text, modules):
-    """Run a script; return what it handed to `check`, by number."""
-    taken = {}
-    modules = {**modules, "out": Api("out", {"take": lambda number, values: taken.update({number: values})}, {})}
+    """Run a script and return the values that it passed to `check`, by number."""
+    results = {}
+    modules = {**modules, "out": Api("out", {"take": lambda number, values: results.update({number: values})}, {})}
     path.write_text(text, encoding="utf-8")
     script = load.load(str(path), modules, TimeLimit(0.0))
     script.call("init")
     script.close()
-    return taken
+    return results
 
 
 def plain(value):
@@ -179,24 +179,24 @@ def plain(value):
     return [plain(one) for one in value] if isinstance(value, (list, tuple)) else value
 
 
-def is_as(value, expected):
+def matches(value, expected):
     if expected is ANY:
         return True
     if isinstance(expected, list) and isinstance(value, list):
-        return len(value) == len(expected) and all(map(is_as, value, expected))
+        return len(value) == len(expected) and all(map(matches, value, expected))
     return value == expected
 
 
-def assert_all(taken, expected):
-    assert len(taken) == len(expected)
-    wrong = []
+def assert_all(results, expected):
+    assert len(results) == len(expected)
+    mismatches = []
     for number, (call, returns, _) in enumerate(expected):
-        value = plain(taken[number])
+        value = plain(results[number])
         while value and value[-1] is None:
             value.pop()
-        if not is_as(value, returns):
-            wrong.append(f"{call}: {value}, not {returns}")
-    assert not wrong
+        if not matches(value, returns):
+            mismatches.append(f"{call}: {value}, not {returns}")
+    assert not mismatches
 
 
 def test_every_function_has_an_example(modules):
@@ -205,24 +205,24 @@ def test_every_function_has_an_example(modules):
 
 
 @pytest.mark.parametrize("flat", [False, True], ids=["sim.", "sim"])
-def test_in_lua(tmp_path, modules, flat):
+def test_every_example_returns_its_values_in_lua(tmp_path, modules, flat):
     expected = calls(modules, flat)
     finding = [f"local {name} = sim.getObject('{path}')\n" for name, path in OBJECTS.items()]
     body = [f"check({number}, {call})\n" for number, (call, _, _) in enumerate(expected)]
-    taken = run(tmp_path / "all.lua", LUA + "".join([*finding, *body, "end"]), modules)
-    assert_all(taken, expected)
+    results = run(tmp_path / "all.lua", LUA + "".join([*finding, *body, "end"]), modules)
+    assert_all(results, expected)
 
 
-def test_in_python(tmp_path, modules):
+def test_every_example_returns_its_values_in_python(tmp_path, modules):
     expected = calls(modules, flat=False)
     finding = [f"{name} = sim.getObject('{path}')\n" for name, path in OBJECTS.items()]
     body = [f"check({i}, {in_python(call, python)})\n" for i, (call, _, python) in enumerate(expected)]
-    taken = run(tmp_path / "all.py", PYTHON + "".join(finding) + "".join(body), modules)
-    assert_all(taken, expected)
+    results = run(tmp_path / "all.py", PYTHON + "".join(finding) + "".join(body), modules)
+    assert_all(results, expected)
 
 
 @pytest.mark.parametrize("suffix", [".lua", ".py"])
-def test_what_is_ignored_says_so_once(tmp_path, modules, caplog, suffix):
+def test_an_ignored_function_is_logged_once(tmp_path, modules, caplog, suffix):
     does_nothing = [
         (f"{module}.{name}", gives)
         for module, groups in ignored.MODULES.items()
@@ -232,16 +232,16 @@ def test_what_is_ignored_says_so_once(tmp_path, modules, caplog, suffix):
     check, end = (LUA, "end") if suffix == ".lua" else (PYTHON, "")
     body = [f"check({number}, {name}(1, 'x'))\n" for number, (name, _) in enumerate([*does_nothing, *does_nothing])]
     with caplog.at_level(logging.INFO):
-        taken = run(tmp_path / f"ignored{suffix}", check + "".join(body) + end, modules)
+        results = run(tmp_path / f"ignored{suffix}", check + "".join(body) + end, modules)
     for number, (name, gives) in enumerate(does_nothing):
-        values = plain(taken[number])
+        values = plain(results[number])
         expected = [gives] if not isinstance(gives, tuple) else plain(gives)
         if gives is ignored.HANDLE:
             assert values[0] > 0, name
         else:
             assert values == expected or (gives is None and not values), name
-        said = [one for one in caplog.messages if one.startswith(f"{name}: ")]
-        assert len(said) == 1 and said[0].endswith("accepted and ignored (in the script of Drone)"), name
+        log_lines = [one for one in caplog.messages if one.startswith(f"{name}: ")]
+        assert len(log_lines) == 1 and log_lines[0].endswith("accepted and ignored (in the script of Drone)"), name
 
 
 # Functions that return several values in CoppeliaSim 4.9's Python synopses, and how many.
@@ -259,7 +259,7 @@ DOCUMENTED = {
 
 def test_python_unpacks_every_call_as_coppeliasim_documents_it(modules, tmp_path):
     finding = "".join(f"{name} = sim.getObject('{path}')\n" for name, path in OBJECTS.items())
-    wrong = []
+    mismatches = []
     for name, count in DOCUMENTED.items():
         examples = EXAMPLES["sim"].get(name) or [Example("NAME()", [])]
         for example in (one for one in examples if one.call.startswith("NAME(")):
@@ -269,11 +269,11 @@ def test_python_unpacks_every_call_as_coppeliasim_documents_it(modules, tmp_path
             try:
                 run(tmp_path / "unpack.py", f"{PYTHON}{finding}{values} = {call}\n", modules)
             except ScriptError as error:
-                wrong.append(f"{call}: {error.reason}")
-    assert not wrong
+                mismatches.append(f"{call}: {error.reason}")
+    assert not mismatches
 
 
-def test_in_lua_a_packet_that_is_not_there_is_nil(modules, tmp_path):
+def test_a_missing_packet_of_a_vision_sensor_is_omitted_in_lua(modules, tmp_path):
     camera = f"sim.getObject('{OBJECTS['DEPTH']}')"
     text = f"function sysCall_init() out.take(1, {{select('#', sim.readVisionSensor({camera}))}}) end"
     assert plain(run(tmp_path / "packets.lua", text, modules)[1]) == [2]
@@ -282,16 +282,14 @@ def test_in_lua_a_packet_that_is_not_there_is_nil(modules, tmp_path):
 @pytest.mark.parametrize(
     ("graph", "draw"), [("simHandleGraph", "simAddDrawingObject"), ("sim.handleGraph", "sim.addDrawingObject")]
 )
-def test_what_is_ignored_is_told_as_the_script_writes_it_and_drawings_at_debug_level(
-    new_simulation, caplog, graph, draw
-):
+def test_ignored_functions_are_logged_by_their_name_and_drawings_at_debug_level(new_simulation, caplog, graph, draw):
     with caplog.at_level(logging.DEBUG), caplog.at_level(logging.DEBUG, "drone_sim.script"):
         new_simulation(lua=f"function sysCall_init()\n{graph}(1, 2)\n{draw}(0, 1)\n{draw}(0, 1)\nend")
-    told = [
+    log_entries = [
         (one.getMessage().partition(":")[0], one.levelno) for one in caplog.records if "accepted and" in one.message
     ]
-    assert told == [(graph, logging.INFO), (draw, logging.DEBUG)]
+    assert log_entries == [(graph, logging.INFO), (draw, logging.DEBUG)]
 
 
-def test_the_page_is_made_from_the_code():
+def test_the_page_of_the_api_is_up_to_date():
     assert make_api.PAGE.read_text(encoding="utf-8") == make_api.text(), "PYTHONPATH=src python docs/make_api.py"

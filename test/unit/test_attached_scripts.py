@@ -1,4 +1,4 @@
-"""Scripts on any object: each with its own state and API, called in the order of the tree."""
+"""Child scripts on any object: each has its own state and API, and they are called in the order of the tree."""
 
 import math
 import re
@@ -37,7 +37,7 @@ def sysCall_sensing(): tell("sensing")
 
 @pytest.fixture(name="build")
 def _build(tmp_path, new_simulation):
-    """Give a function that builds a simulation with scripts, a text for each object's name."""
+    """Return a function that builds a simulation with scripts, given as a text for each object's name."""
 
     def build(scripts, own="", values=None, **overrides):
         entries = []
@@ -49,8 +49,8 @@ def _build(tmp_path, new_simulation):
         script = tmp_path / "own.lua"
         if own:
             script.write_text(own, encoding="utf-8")
-        given = {**overrides, "scene": {**overrides.get("scene", {}), "scripts": entries}}
-        return new_simulation(given, script=str(script) if own else "")
+        settings = {**overrides, "scene": {**overrides.get("scene", {}), "scripts": entries}}
+        return new_simulation(settings, script=str(script) if own else "")
 
     return build
 
@@ -58,7 +58,7 @@ def _build(tmp_path, new_simulation):
 @pytest.fixture
 def fails_in_one_line(build):
     def check(call, answers, words):
-        """Let the drone's script call what is attached to the target, in vain."""
+        """Let the drone's script call a script that is attached to the target; the call must fail."""
         own = f"function ask() end function sysCall_actuation() {call} end"
         limit = 0.5 if words.startswith("stopped after") else 60.0
         scripts = {"Floor": "function sysCall_init() end", "DronePosition": answers}
@@ -76,10 +76,10 @@ def order(simulation):
     return found
 
 
-# ---- order, and what each of them is
+# ---- order, state and errors
 
 
-def test_they_are_called_from_the_root_to_the_leaves(build):
+def test_attached_scripts_are_called_from_the_root_to_the_leaves(build):
     target, first, last = "DronePosition", PROPELLERS[0], "Box"
     scripts = {last: TELL_PYTHON, target: TELL_LUA, first: TELL_LUA}
     box = {"shape": "box", "size": [1, 1, 1], "position": [3, 0, 0.5], "name": "Box"}
@@ -94,7 +94,7 @@ def test_they_are_called_from_the_root_to_the_leaves(build):
     assert order(simulation)[:4] == [f"{name}:actuation" for name in (target, "Drone", first, last)]
 
 
-def test_each_has_parameters_names_and_a_state_of_its_own(build):
+def test_each_script_has_its_own_parameters_names_and_state(build):
     text = """
     count = 0
     function sysCall_actuation()
@@ -116,7 +116,7 @@ def test_each_has_parameters_names_and_a_state_of_its_own(build):
     assert handle.parameters == {"step": 2.0}
 
 
-def test_each_requires_what_lies_beside_it(build, tmp_path):
+def test_a_script_can_load_modules_from_its_folder(build, tmp_path):
     (tmp_path / "gains.lua").write_text("return {kp = 3}", encoding="utf-8")
     (tmp_path / "more.py").write_text("kd = 4", encoding="utf-8")
     lua = "sim = require'sim' function sysCall_init() sim.setFloatSignal('kp', require('gains').kp) end"
@@ -126,7 +126,7 @@ def test_each_requires_what_lies_beside_it(build, tmp_path):
     assert [simulation.context.signals.get(float, name) for name in ("kp", "kd")] == [3, 4]
 
 
-def test_a_script_that_fails_is_told_once_with_file_line_and_phase_and_the_others_go_on(build, tmp_path, caplog):
+def test_a_failed_script_is_logged_once_with_its_line_and_the_others_continue(build, tmp_path, caplog):
     count = "n = 0 function sysCall_actuation() n = n + 1 sim.setFloatSignal('n', n) end"
     fails = "function sysCall_sensing()\n  sim.getObject('/Nobody')\nend function f() end"
     simulation = build({"Floor": fails, "DronePosition": count})
@@ -144,14 +144,14 @@ def test_a_script_that_fails_is_told_once_with_file_line_and_phase_and_the_other
 
 
 @pytest.mark.parametrize("source", ["error('x')", "function sysCall_init() error('x') end"])
-def test_one_that_fails_while_it_is_loaded_leaves_the_flight_as_it_is(build, caplog, source):
+def test_a_script_that_fails_while_it_is_loaded_does_not_end_the_flight(build, caplog, source):
     simulation = build({"Floor": source})
     simulation.step()
     simulation.close()
     assert [one.levelname for one in caplog.records].count("ERROR") == 1
 
 
-def test_nobody_calls_a_script_that_has_failed(build):
+def test_calling_a_failed_script_raises_an_error(build):
     fails = "function f() end function sysCall_init() error('x') end"
     own = "function ask() end function sysCall_actuation() sim.callScriptFunction('f@Floor', 1) end"
     with pytest.raises(ScriptError, match="the script has failed"):
@@ -165,12 +165,12 @@ def test_nobody_calls_a_script_that_has_failed(build):
         ("DronePositon", "no object named 'DronePositon'; near names are DronePosition"),
     ],
 )
-def test_a_wrong_object_gets_one_line(build, name, words):
+def test_an_invalid_object_of_a_script_gets_one_line(build, name, words):
     with pytest.raises(ParameterError, match=f"^scene: scripts/0/object: {words}"):
         build({name: TELL_LUA})
 
 
-def test_an_object_has_one_script(tmp_path):
+def test_an_object_has_at_most_one_child_script(tmp_path):
     scene = tmp_path / "scene.yaml"
     scene.write_text("scripts:\n- {object: Floor, script: a.lua}\n- {object: Floor, script: b.lua}\n")
     with pytest.raises(
@@ -179,10 +179,10 @@ def test_an_object_has_one_script(tmp_path):
         parameters.load({"scene_file": str(scene)})
 
 
-# ---- start, stop, snapshots, vehicles that come and go, files
+# ---- start, snapshots, changes of the fleet, files
 
 
-def test_they_take_part_in_restarts_snapshots_and_saving(build, tmp_path):
+def test_attached_scripts_are_restarted_restored_and_saved_with_the_simulation(build, tmp_path):
     own = "n = 0 function sysCall_actuation() n = n + 1 sim.setFloatSignal('n', n) end"
     simulation = build(
         {
@@ -205,25 +205,25 @@ def test_they_take_part_in_restarts_snapshots_and_saving(build, tmp_path):
     simulation.step()
     assert signals() == [1, 1]
     simulation.save_scene(tmp_path / "saved.yaml")
-    again = parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.scripts
-    assert [(one.object, Path(one.script).name) for one in again] == [("Floor", "0.lua"), ("DronePosition", "1.py")]
+    attached = parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.scripts
+    assert [(one.object, Path(one.script).name) for one in attached] == [("Floor", "0.lua"), ("DronePosition", "1.py")]
 
 
-def test_a_vehicles_scripts_come_and_go_with_it(build):
+def test_the_scripts_of_a_vehicle_are_added_and_removed_with_it(build):
     simulation = build({"DronePosition#0": TELL_LUA}, vehicles={"a": {}})
     simulation.step()
-    there = {"a": {}, "b": {"position": [0, 2, 1]}}
-    simulation.set_vehicles(there)
+    two_vehicles = {"a": {}, "b": {"position": [0, 2, 1]}}
+    simulation.set_vehicles(two_vehicles)
     simulation.step()
     assert order(simulation) == [f"DronePosition#0:{phase}" for phase in ("init", "actuation", "sensing")]
     simulation.set_vehicles({"a": {}})
     simulation.step()
     assert order(simulation) == ["DronePosition#0:cleanup"]
-    simulation.set_vehicles(there)
+    simulation.set_vehicles(two_vehicles)
     assert order(simulation) == ["DronePosition#0:init"]
 
 
-def test_a_command_reaches_the_scripts_on_a_vehicles_parts(build):
+def test_a_command_reaches_the_scripts_on_the_parts_of_a_vehicle(build):
     text = """
     function sysCall_init() simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'heard') end
     function heard(m) sim.setFloatSignal('x', m.linear.x) end
@@ -234,7 +234,7 @@ def test_a_command_reaches_the_scripts_on_a_vehicles_parts(build):
     assert simulation.context.signals.get(float, "x") == 0.5
 
 
-# ---- from one script to another
+# ---- calls between scripts
 
 
 CALLED = """
@@ -337,11 +337,11 @@ def sysCall_actuation():
 def test_a_script_calls_its_own_functions(build, language):
     simulation = build({"Floor": OWN[language]})
     simulation.step()
-    *told, _ = simulation.context.signals.get(str, "told").split(";")
-    failed, nothing, deep, customization, *_ = told
+    *messages, _ = simulation.context.signals.get(str, "told").split(";")
+    failed, nothing, deep, customization, *_ = messages
     assert failed.endswith("no")
     assert "no function 'nothing'" in nothing
-    assert "deep" in deep, "and it ends"
+    assert "deep" in deep, "endless recursion is stopped"
     assert customization.endswith("no customization script is attached to 'Floor'")
 
 
@@ -391,11 +391,11 @@ def sysCall_actuation():
 
 
 @pytest.mark.parametrize("asks, answers", [(RUNS_IN_LUA, LUA_RUNS), (RUNS_IN_PYTHON, PYTHON_RUNS)])
-def test_a_text_is_run_in_another_script(build, asks, answers):
+def test_a_string_is_executed_in_another_script(build, asks, answers):
     simulation = build({"Floor": asks, "DronePosition": answers})
     simulation.step()
     why = simulation.context.signals.get(str, "why")
-    assert "[executeScriptString]" in why and "/1." in why and "nothing" in why, "it is the other one's error"
+    assert "[executeScriptString]" in why and "/1." in why and "nothing" in why, "the error is that of the other script"
 
 
 @pytest.mark.parametrize(
@@ -411,11 +411,11 @@ def test_a_text_is_run_in_another_script(build, asks, answers):
         ("1, 2", LUA_RUNS, "expected a string and the handle of a script"),
     ],
 )
-def test_a_text_that_is_not_run_gets_one_line(fails_in_one_line, text, answers, words):
+def test_a_string_that_cannot_be_executed_gets_one_line(fails_in_one_line, text, answers, words):
     fails_in_one_line(f"sim.executeScriptString({text})", answers, words)
 
 
-def test_a_call_of_ones_own_is_on_ones_own_time(build):
+def test_a_call_of_an_own_function_counts_for_the_time_limit(build):
     own = """
     function hangs() while true do end end
     function sysCall_init() end
@@ -425,7 +425,7 @@ def test_a_call_of_ones_own_is_on_ones_own_time(build):
         build({}, own, script_time_limit=0.2).step()
 
 
-def test_special_handles_stand_for_several_scripts(build):
+def test_special_handles_address_several_scripts(build):
     own = """
     function sysCall_init()
         sim.setScriptSimulationParameter(sim.handle_all, 'everybody', 1)
@@ -453,7 +453,7 @@ def test_special_handles_stand_for_several_scripts(build):
 # ---- propellers
 
 
-def flown(simulation, steps=200):
+def fly_path(simulation, steps=200):
     path = []
     for step in range(steps):
         if step == 5:
@@ -463,24 +463,24 @@ def flown(simulation, steps=200):
     return path
 
 
-def test_propellers_with_v_reps_script_fly_as_the_law_does(build):
-    expected = flown(build({}))
-    found = flown(build({name: SCRIPTS / "propeller_v3.lua" for name in PROPELLERS}))
+def test_v_reps_propeller_script_flies_like_the_built_in_propeller_law(build):
+    expected = fly_path(build({}))
+    found = fly_path(build({name: SCRIPTS / "propeller_v3.lua" for name in PROPELLERS}))
     assert max(math.dist(one, other) for one, other in zip(expected, found)) < 1e-9
 
 
-def test_a_propellers_script_takes_the_laws_place(build):
-    still = "function sysCall_actuation() end"
-    simulation = build(dict.fromkeys(PROPELLERS, still))
+def test_a_script_on_a_propeller_replaces_the_built_in_propeller_law(build):
+    idle_script = "function sysCall_actuation() end"
+    simulation = build(dict.fromkeys(PROPELLERS, idle_script))
     for _ in range(10):
         simulation.step()
     assert simulation.drone.body.state.position[2] < 0.1
-    assert min(simulation.drone.propulsion.particle_velocities) > 3, "the drone's script wants to fly"
+    assert min(simulation.drone.propulsion.particle_velocities) > 3, "the drone's script still commands the propellers"
 
 
-def test_without_scripts_nothing_is_otherwise(build):
-    assert struct.pack("600d", *sum(flown(build({})), ())) == struct.pack(
-        "600d", *sum(flown(build({"Floor": TELL_LUA})), ())
+def test_an_attached_script_that_changes_nothing_leaves_the_flight_bitwise_equal(build):
+    assert struct.pack("600d", *sum(fly_path(build({})), ())) == struct.pack(
+        "600d", *sum(fly_path(build({"Floor": TELL_LUA})), ())
     )
 
 
@@ -494,5 +494,5 @@ def test_the_example_leads_the_drone_along_a_circle(tmp_path, new_simulation):
     (tmp_path / "circle.lua").write_text(circle, encoding="utf-8")
     (tmp_path / "gate.py").write_text("def sysCall_init(): pass", encoding="utf-8")
     simulation = new_simulation({"scene_file": str(tmp_path / "scene.yaml")}, script="target")
-    path = flown(simulation, 240)
+    path = fly_path(simulation, 240)
     assert max(x for x, _, _ in path) > 0.4 and path[-1][1] > 0.5

@@ -1,4 +1,4 @@
-"""What was commanded in a bag flies again as a timeline, to the bit, although the recorder heard of it late."""
+"""The commands of a bag, as a timeline, repeat its flight bit by bit, although the recorder received them late."""
 
 import pytest
 
@@ -44,7 +44,7 @@ def twist(vx, wz=0.0):
     return message
 
 
-TOLD = {  # by step: topic, message, and how many steps late the recorder heard of it
+COMMANDS = {  # by step: topic, message, and the delay of the recorder in steps
     4: ("takeoff", Empty(), 1),
     70: ("cmd_vel", twist(0.5), 4),
     90: ("cmd_vel", twist(float("nan")), 0),
@@ -53,14 +53,14 @@ TOLD = {  # by step: topic, message, and how many steps late the recorder heard 
     130: ("goto", goto(1.0, 1.2), 0),
     131: ("goto", goto(5.0, 5.0, "map"), 0),
     170: ("push", WrenchStamped(), 0),
-    180: ("cmd_vel", twist(0.1, 0.3), 0),  # the same once more ends the goto
+    180: ("cmd_vel", twist(0.1, 0.3), 0),  # the same twist again ends the goto
     190: ("faults", KeyValue("propellers", "[1, 0.97, 1, 1]"), 0),
     200: ("weather", KeyValue("a/" * 10_000, "1"), 0),
     220: ("land", Empty(), -1),
 }
 
 
-def obey(simulation, topic, message):
+def apply_command(simulation, topic, message):
     drone = simulation.drone
     if topic == "cmd_vel" and message.linear.x == message.linear.x:
         drone.commands.receive(Twist(Vector3(message.linear.x, 0, 0), Vector3(0, 0, message.angular.z)))
@@ -75,14 +75,14 @@ def obey(simulation, topic, message):
 
 
 def record(path, began):
-    """Fly, and write what a recorder would hear; return the states."""
+    """Fly, write the messages that a recorder would receive, and return the states."""
     simulation, states, state = Simulation(parameters.load(SETTINGS)), [], ""
     with rosbag.Bag(str(path), "w") as bag:
         for step in range(STEPS):
-            if step in TOLD:
-                topic, message, late = TOLD[step]
+            if step in COMMANDS:
+                topic, message, late = COMMANDS[step]
                 bag.write(f"/drone/{topic}", message, rospy.Time.from_sec(began + 0.05 * (step + late) + 0.01))
-                obey(simulation, topic, message)
+                apply_command(simulation, topic, message)
             simulation.step()
             at = rospy.Time.from_sec(began + simulation.time)
             drone = simulation.drone
@@ -96,29 +96,29 @@ def record(path, began):
     return states
 
 
-def test_twists_are_obeyed_in_their_order_however_late_they_were_heard_of():
-    """The recorder was 4 steps late, more than half of what lay between two commands; two came within one step."""
+def test_twists_are_applied_in_order_although_they_were_recorded_late():
+    """The recorder was 4 steps late, more than half the time between two commands; one step has two commands."""
     commands = np.zeros((60, 4))
     for row in range(10, 46, 6):
         commands[row : row + 3, 0] = 1.0
     commands[40:, 1] = 0.5
     steps = BagSteps(np.arange(1, 61) * 0.05, commands)
-    told = [(row, (float(row % 6 == 4), 0.0)) for row in range(10, 40, 3)]
-    told += [(40, (1.0, 0.2)), (40, (1.0, 0.5)), (43, (0.0, 0.5))]
-    heard = [
-        RecordedMessage((row + 4) * 0.05 + 0.01 + 1e-4 * index, twist(x)) for index, (row, (x, _)) in enumerate(told)
+    twists = [(row, (float(row % 6 == 4), 0.0)) for row in range(10, 40, 3)]
+    twists += [(40, (1.0, 0.2)), (40, (1.0, 0.5)), (43, (0.0, 0.5))]
+    recorded_messages = [
+        RecordedMessage((row + 4) * 0.05 + 0.01 + 1e-4 * index, twist(x)) for index, (row, (x, _)) in enumerate(twists)
     ]
-    for one, (_, (_, y)) in zip(heard, told):
+    for one, (_, (_, y)) in zip(recorded_messages, twists):
         one.message.linear.y = y
-    found = list(bag_commands._twists(iter(heard), steps))
-    truth = [round(row * 0.05, 9) for row, _ in told]
-    assert [one["at"] for one, (_, (_, y)) in zip(found, told) if y != 0.2] == [
-        at for at, (_, (_, y)) in zip(truth, told) if y != 0.2
+    found = list(bag_commands._twists(iter(recorded_messages), steps))
+    truth = [round(row * 0.05, 9) for row, _ in twists]
+    assert [one["at"] for one, (_, (_, y)) in zip(found, twists) if y != 0.2] == [
+        at for at, (_, (_, y)) in zip(truth, twists) if y != 0.2
     ]
 
 
 @pytest.mark.parametrize("began", [0.0, 1.7e9])
-def test_the_same_flight_to_the_bit(tmp_path, capsys, began, new_simulation):
+def test_the_timeline_of_a_bag_repeats_the_flight_bit_by_bit(tmp_path, capsys, began, new_simulation):
     states = record(tmp_path / "flight.bag", began)
     out = tmp_path / "flight.yaml"
     assert bag_commands.main([str(tmp_path / "flight.bag"), str(out)]) == 0

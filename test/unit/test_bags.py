@@ -1,4 +1,4 @@
-"""Flights out of bags: what was flown comes back to the last digit, and a file that is none gets one line."""
+"""Flights read from bags: states, sensors, plots and videos, and one line for each file that is not a valid bag."""
 
 import io
 import zlib
@@ -36,7 +36,7 @@ RED = np.full((240, 320, 3), (0, 0, 200), np.uint8)
 
 @pytest.fixture(name="flown", scope="module")
 def _flown(tmp_path_factory):
-    """A bag as `drone.launch record:=true` would write it, and the flight that is in it."""
+    """A bag as `drone.launch record:=true` writes it, and the recording of the same flight."""
     path = tmp_path_factory.mktemp("bags") / "flight.bag"
     simulation, recording = Simulation(parameters.load()), Recording()
     jpeg = CompressedImage(format="jpeg", data=cv2.imencode(".jpg", RED)[1].tobytes())
@@ -82,7 +82,7 @@ def _drawn(monkeypatch):
     return drawn
 
 
-def test_what_was_flown_comes_back(flown, bag):
+def test_the_recorded_states_are_read_back(flown, bag):
     rows = np.array(BagFlight(bag).recording().rows)
     expected = np.array(flown[1].rows)
     expected[:, 0] -= expected[0, 0]
@@ -91,7 +91,7 @@ def test_what_was_flown_comes_back(flown, bag):
     assert np.abs(rows[:, 18:] - expected[:, 18:]).max() < 1e-6  # propellers are 32 bit floats
 
 
-def test_pushes_jumps_and_sensors_come_back(bag):
+def test_pushes_teleports_and_sensors_are_read_back(bag):
     flight = BagFlight(bag, "drone")
     assert [(type(one.action), one.at) for one in flight.timeline().entries] == [
         (Pose, pytest.approx(1.95)),
@@ -106,7 +106,7 @@ def test_pushes_jumps_and_sensors_come_back(bag):
     assert series[-1].values[:, 0].tolist() == list(range(STEPS))
 
 
-def test_what_was_not_recorded_is_not_known(tmp_path, drawn):
+def test_values_without_a_topic_are_nan_and_plotted_as_not_recorded(tmp_path, drawn):
     path = str(tmp_path / "odom.bag")
     with rosbag.Bag(path, "w") as bag:
         for second in (1, 2, 2, 3, 4):
@@ -125,7 +125,7 @@ def test_what_was_not_recorded_is_not_known(tmp_path, drawn):
     assert [text.get_text() for ax in drawn[0].axes for text in ax.texts] == ["not recorded"]
 
 
-def test_a_bag_is_drawn_with_its_sensors(flown, tmp_path, monkeypatch, drawn):
+def test_the_plot_of_a_bag_contains_its_sensors(flown, tmp_path, monkeypatch, drawn):
     monkeypatch.chdir(tmp_path)
     assert plot_flight.main([flown[0]]) == 0
     labels = {ax.get_ylabel(): ax for ax in drawn[0].axes}
@@ -135,7 +135,7 @@ def test_a_bag_is_drawn_with_its_sensors(flown, tmp_path, monkeypatch, drawn):
     assert [path.name for path in tmp_path.iterdir()] == ["flight.png"]
 
 
-def test_a_bag_becomes_a_video(flown, tmp_path, capsys):
+def test_the_pictures_of_a_bag_become_a_video(flown, tmp_path, capsys):
     out = tmp_path / "out.mp4"
     assert bag_video.main([flown[0], str(out)]) == 0
     assert f"of /drone/front/compressed: 320 x 240, {STEPS} pictures, 2.00 s" in capsys.readouterr().out
@@ -148,7 +148,7 @@ def test_a_bag_becomes_a_video(flown, tmp_path, capsys):
     assert abs(first[:14].astype(int) - RED[0, 0]).mean() > 30  # the display
 
 
-def test_a_video_waits_where_no_picture_came(tmp_path):
+def test_a_video_repeats_the_last_picture_during_a_gap(tmp_path):
     path, out = str(tmp_path / "gap.bag"), tmp_path / "out.mp4"
     with rosbag.Bag(path, "w") as bag:
         for at in (1.0, 1.1, 1.2, 2.2, 2.3, 100.0):
@@ -156,10 +156,10 @@ def test_a_video_waits_where_no_picture_came(tmp_path):
             message.header.stamp = rospy.Time.from_sec(at)
             bag.write("/camera/image", message, message.header.stamp)
     assert bag_video.main([path, str(out)]) == 0
-    assert cv2.VideoCapture(str(out)).get(cv2.CAP_PROP_FRAME_COUNT) == 13 + 100 + 1  # a still of 10 s at most
+    assert cv2.VideoCapture(str(out)).get(cv2.CAP_PROP_FRAME_COUNT) == 13 + 100 + 1  # gaps are filled for at most 10 s
 
 
-def test_a_picture_that_is_none_is_told(tmp_path, capsys):
+def test_a_bag_with_invalid_pictures_only_is_reported(tmp_path, capsys):
     path, out = str(tmp_path / "wrong.bag"), tmp_path / "out.mp4"
     with rosbag.Bag(path, "w") as bag:
         bag.write("/camera/image/compressed", CompressedImage(format="jpeg", data=b"none"), rospy.Time(1))
@@ -168,7 +168,7 @@ def test_a_picture_that_is_none_is_told(tmp_path, capsys):
     assert not out.exists()
 
 
-def test_a_damaged_picture_among_others_is_left_out(tmp_path, capsys):
+def test_a_damaged_picture_is_skipped(tmp_path, capsys):
     path, out = str(tmp_path / "damaged.bag"), tmp_path / "out.mp4"
     with rosbag.Bag(path, "w") as bag:
         for at in range(5):
@@ -178,7 +178,7 @@ def test_a_damaged_picture_among_others_is_left_out(tmp_path, capsys):
             bag.write("/camera/image/compressed", message, message.header.stamp)
     assert bag_video.main([path, str(out)]) == 0
     assert "1 are left out: not a picture: format 'jpeg'" in capsys.readouterr().out
-    assert cv2.VideoCapture(str(out)).get(cv2.CAP_PROP_FRAME_COUNT) == 5, "the one before is seen longer"
+    assert cv2.VideoCapture(str(out)).get(cv2.CAP_PROP_FRAME_COUNT) == 5, "the picture before it is shown longer"
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,7 @@ def test_a_damaged_picture_among_others_is_left_out(tmp_path, capsys):
         (0.999, "was cut off"),
     ],
 )
-def test_what_is_no_whole_bag_gets_one_line(flown, tmp_path, capsys, content, said):
+def test_a_truncated_or_invalid_bag_gets_one_line(flown, tmp_path, capsys, content, said):
     path = tmp_path / "wrong.bag"
     if not isinstance(content, bytes):
         with open(flown[0], "rb") as file:
@@ -220,7 +220,7 @@ def test_what_is_no_whole_bag_gets_one_line(flown, tmp_path, capsys, content, sa
         (bag_video, [".", "out.mp4"], ".: is not a regular file"),
     ],
 )
-def test_a_mistake_gets_one_line(flown, tmp_path, monkeypatch, capsys, program, arguments, said):
+def test_a_wrong_argument_gives_one_line_and_status_1(flown, tmp_path, monkeypatch, capsys, program, arguments, said):
     monkeypatch.chdir(tmp_path)
     assert program.main([flown[0] if one == "BAG" else one for one in arguments]) == 1
     (line,) = capsys.readouterr().err.splitlines()
@@ -228,16 +228,16 @@ def test_a_mistake_gets_one_line(flown, tmp_path, monkeypatch, capsys, program, 
     assert not list(tmp_path.iterdir())
 
 
-def test_no_class_is_made_from_what_a_bag_says(tmp_path):
+def test_a_message_with_another_definition_is_not_read(tmp_path):
     path = str(tmp_path / "other.bag")
-    other = genpy.dynamic.generate_dynamic("nav_msgs/Odometry", "string data\n")["nav_msgs/Odometry"]
+    other_class = genpy.dynamic.generate_dynamic("nav_msgs/Odometry", "string data\n")["nav_msgs/Odometry"]
     with rosbag.Bag(path, "w") as bag:
-        bag.write("/drone/odom", other(data="x"), rospy.Time(1))
+        bag.write("/drone/odom", other_class(data="x"), rospy.Time(1))
     with pytest.raises(BagError, match="no readable message on /drone/odom"):
         BagFlight(Bag(path))
 
 
-def test_a_name_that_is_no_text_is_not_told_besides(tmp_path, caplog, monkeypatch):
+def test_an_invalid_utf8_name_logs_no_warning(tmp_path, caplog, monkeypatch):
     monkeypatch.setattr(genpy.message, "_warned_decoding_error", set())
     path, odometry = str(tmp_path / "flight.bag"), io.BytesIO()
     Odometry(child_frame_id="base_link").serialize(odometry)
@@ -250,7 +250,7 @@ def test_a_name_that_is_no_text_is_not_told_besides(tmp_path, caplog, monkeypatc
 
 
 @pytest.mark.parametrize(("program", "out"), [(plot_flight, "o.png"), (bag_commands, "o.yaml"), (bag_video, "o.mp4")])
-def test_topics_of_another_kind_are_left_out(tmp_path, capsys, program, out):
+def test_topics_of_another_message_type_are_ignored(tmp_path, capsys, program, out):
     path = str(tmp_path / "other.bag")
     kinds = (
         "cmd_vel",
@@ -282,7 +282,7 @@ def test_topics_of_another_kind_are_left_out(tmp_path, capsys, program, out):
     assert said.partition(".bag: ")[2].startswith(refusal)
 
 
-def test_what_unpacks_to_too_much_is_refused(flown, tmp_path, monkeypatch, capsys):
+def test_an_oversized_chunk_or_picture_is_refused(flown, tmp_path, monkeypatch, capsys):
     path, out = str(tmp_path / "large.bag"), str(tmp_path / "out.mp4")
     monkeypatch.setattr(bags, "MAX_CHUNK", 1000)
     assert plot_flight.main([flown[0], str(tmp_path / "out.png")]) == 1
@@ -297,7 +297,7 @@ def test_what_unpacks_to_too_much_is_refused(flown, tmp_path, monkeypatch, capsy
     assert "/camera/image/compressed: 5000 x 5000 px: at most 4096 x 4096 px are allowed" in capsys.readouterr().err
 
 
-def test_pictures_are_recorded_by_choice_and_never_raw():
+def test_pictures_are_recorded_on_request_and_only_compressed():
     kinds = {
         "/drone/odom": "nav_msgs/Odometry",
         "/drone/cmd_vel": "geometry_msgs/Twist",
@@ -315,16 +315,16 @@ def test_pictures_are_recorded_by_choice_and_never_raw():
     assert topics_to_record(kinds, images=True) == sorted([*small, "/drone/camera_info", "/drone/front/compressed"])
 
 
-def test_record_says_once_what_it_waits_for(monkeypatch, capsys):
+def test_record_reports_that_it_waits_for_the_simulator(monkeypatch, capsys):
     class Master:
-        asked = 0
+        call_count = 0
 
         def __init__(self, _name):
             pass
 
         def lookupService(self, _name):
-            Master.asked += 1
-            if Master.asked < 200:
+            Master.call_count += 1
+            if Master.call_count < 200:
                 raise record.rosgraph.MasterError("not yet")
 
         def getTopicTypes(self):
@@ -332,6 +332,6 @@ def test_record_says_once_what_it_waits_for(monkeypatch, capsys):
 
     monkeypatch.setattr(record.rosgraph, "Master", Master)
     monkeypatch.setattr(record.time, "sleep", lambda _: None)
-    monkeypatch.setattr(record.time, "monotonic", lambda: 0.1 * Master.asked)
+    monkeypatch.setattr(record.time, "monotonic", lambda: 0.1 * Master.call_count)
     assert record._wait_for_topics("/drone_sim") == {}
     assert capsys.readouterr().err.startswith("record: waiting for /drone_sim")

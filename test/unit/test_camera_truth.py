@@ -1,4 +1,4 @@
-"""What a drone's camera knows to be true of its picture: names, categories, boxes, flow; and nothing for nobody."""
+"""Ground truth of a drone's camera: names, categories, boxes and flow, rendered only on request."""
 
 import json
 
@@ -35,7 +35,7 @@ def by_name(truth):
     return {one.identity.name: one for one in truth.seen()}
 
 
-def test_masks_and_boxes_have_the_names_of_the_scene(simulation):
+def test_masks_and_boxes_have_the_names_and_categories_of_the_scene(simulation):
     truth = simulation.drone.cameras["front"].truth()
     seen = by_name(truth)
     assert {"Wall", "Post7", "Aside", "Floor"} <= set(seen)
@@ -52,7 +52,7 @@ def test_masks_and_boxes_have_the_names_of_the_scene(simulation):
         assert one.visible[2:] == (columns.max() + 0.5, rows.max() + 0.5)
 
 
-def test_boxes_in_space_are_where_the_objects_are(simulation):
+def test_3d_boxes_match_the_poses_and_sizes_of_the_objects(simulation):
     camera = simulation.drone.cameras["front"]
     eye = np.reshape((*camera.pose(), 0, 0, 0, 1), (4, 4))
     for entry in SCENE["objects"]:
@@ -62,7 +62,7 @@ def test_boxes_in_space_are_where_the_objects_are(simulation):
         np.testing.assert_allclose(one.size, entry["size"], atol=1e-6)
 
 
-def test_what_hides_and_what_leaves_the_picture_is_counted(simulation):
+def test_occlusion_and_truncation_are_measured(simulation):
     camera = simulation.drone.cameras["front"]
     seen = by_name(camera.truth())
     assert seen["Post7"].occlusion == 0 and seen["Post7"].truncation == 0
@@ -70,11 +70,11 @@ def test_what_hides_and_what_leaves_the_picture_is_counted(simulation):
     assert 0.2 < seen["Aside"].truncation < 0.9
     assert seen["Aside"].full.right > camera.intrinsics.width
     alone = np.count_nonzero(camera.truth().output("instance") == seen["Wall"].number)
-    assert alone / (1 - seen["Wall"].occlusion) == pytest.approx(alone + hidden(camera, seen), rel=0.01)
+    assert alone / (1 - seen["Wall"].occlusion) == pytest.approx(alone + count_hidden_pixels(camera, seen), rel=0.01)
 
 
-def hidden(camera, seen):
-    """Count the pixels of the post that the wall is behind."""
+def count_hidden_pixels(camera, seen):
+    """Return the number of pixels of the post that lie in front of the wall."""
     truth = camera.truth()
     rays = camera.intrinsics.rays[truth.output("instance") == seen["Post7"].number]
     pose, size = seen["Wall"].pose, seen["Wall"].size
@@ -85,7 +85,7 @@ def hidden(camera, seen):
 
 @pytest.fixture(name="picture_of")
 def _picture_of(tmp_path, new_simulation):
-    """Return what takes a picture of objects with the front camera, 1 m above the floor; as its objects, and it."""
+    """Return a function that takes a picture with the front camera, 1 m above the floor: seen objects and camera."""
 
     def take(objects, **camera):
         scene = yaml.safe_dump({"objects": objects, "drone": {"position": [0, 0, 1]}})
@@ -95,30 +95,30 @@ def _picture_of(tmp_path, new_simulation):
     return take
 
 
-def test_nothing_is_hidden_of_a_compound_whose_parts_overlap(picture_of):
+def test_overlapping_parts_of_a_compound_are_not_occlusion(picture_of):
     parts = [{"shape": "box", "size": [0.2, 0.4, 0.4], "position": [0, y, 0]} for y in (-0.1, 0.1)]
     seen, _ = picture_of([{"name": "Pair", "shape": "compound", "parts": parts, "position": [2, 0, 1]}])
     assert seen["Pair"].occlusion == 0 and seen["Pair"].pixels > 10_000
 
 
-def test_what_reaches_behind_the_camera_ends_at_its_near_plane(picture_of):
+def test_an_object_that_extends_behind_the_camera_ends_at_the_near_plane(picture_of):
     beam = {"name": "Beam", "shape": "box", "size": [6.0, 0.4, 0.2], "position": [0, 0.8, 1.0]}
     seen, camera = picture_of([beam], near=0.05)
     lens, eye = camera.intrinsics, camera.pose()
     far, left, right = 3.0 - eye[3], 1.0 - eye[7], 0.6 - eye[7]  # of the beam, from the camera, m
     top, bottom = 1.1 - eye[11], 0.9 - eye[11]
-    wanted = (
+    expected = (
         lens.cx - lens.fx * left / lens.near, lens.cy - lens.fx * top / lens.near,
         lens.cx - lens.fx * right / far, lens.cy - lens.fx * bottom / lens.near,
     )  # fmt: skip
-    np.testing.assert_allclose(seen["Beam"].full, wanted, rtol=1e-4, atol=0.5)
-    wide, high = wanted[2] - wanted[0], wanted[3] - wanted[1]
-    inside = (wanted[2] + 0.5) * lens.height  # the part that the picture shows is as high as the picture
+    np.testing.assert_allclose(seen["Beam"].full, expected, rtol=1e-4, atol=0.5)
+    wide, high = expected[2] - expected[0], expected[3] - expected[1]
+    inside = (expected[2] + 0.5) * lens.height  # the part that the picture shows is as high as the picture
     assert seen["Beam"].truncation == pytest.approx(1 - inside / (wide * high), rel=1e-3)
     assert seen["Floor"].truncation > 0.99, "the floor reaches behind the camera, too"
 
 
-def test_flow_is_that_of_reprojected_points(simulation):
+def test_flow_equals_that_of_reprojected_points(simulation):
     camera = simulation.drone.cameras["front"]
     first = camera.truth()
     depth, before = first.output("depth"), first.moment
@@ -126,29 +126,29 @@ def test_flow_is_that_of_reprojected_points(simulation):
     truth = camera.truth()
     flow, known = truth.flow(depth)
     world = truth.points @ truth.moment.camera_pose[:3, :3].T + truth.moment.camera_pose[:3, 3]
-    then = camera.intrinsics.project((world - before.camera_pose[:3, 3]) @ before.camera_pose[:3, :3])
+    previous_pixels = camera.intrinsics.project((world - before.camera_pose[:3, 3]) @ before.camera_pose[:3, :3])
     assert known.mean() > 0.3
-    missed = np.abs(flow - (camera.intrinsics.pixels - then)).max(axis=-1)
-    assert missed[known & inner(truth.output("instance"))].max() < 0.1, "apart from edges, between two things"
+    missed = np.abs(flow - (camera.intrinsics.pixels - previous_pixels)).max(axis=-1)
+    assert missed[known & inner(truth.output("instance"))].max() < 0.1, "except at edges between two objects"
     assert np.linalg.norm(flow[known], axis=1).max() > 5
     assert (flow[~known] == 0).all()
 
 
-def test_a_flight_becomes_a_dataset_as_coco_has_it(tmp_path):
+def test_a_flight_is_written_as_a_coco_dataset(tmp_path):
     scene = tmp_path / "scene.yaml"
     scene.write_text(yaml.safe_dump(SCENE))
     folder, small = tmp_path / "seen", ["cameras.front.width=64", "cameras.front.height=48"]
     assert fly(["--scene", str(scene), "--duration", "0.15", "--truth", str(folder), "--set", *small]) == 0
-    said, read = json.loads((folder / "annotations.json").read_text()), COCO(folder / "annotations.json")
-    assert [one["file_name"] for one in said["images"]] == [f"color/{number:06}.png" for number in range(3)]
-    categories = {one["id"]: one["name"] for one in said["categories"]}
-    assert len({one["id"] for one in said["annotations"]}) == len(said["annotations"]) > 6
-    for one in said["annotations"]:
+    annotations, dataset = json.loads((folder / "annotations.json").read_text()), COCO(folder / "annotations.json")
+    assert [one["file_name"] for one in annotations["images"]] == [f"color/{number:06}.png" for number in range(3)]
+    categories = {one["id"]: one["name"] for one in annotations["categories"]}
+    assert len({one["id"] for one in annotations["annotations"]}) == len(annotations["annotations"]) > 6
+    for one in annotations["annotations"]:
         file = f"{one['image_id']:06}.png"
         mask = cv2.imread(str(folder / "instances" / file), cv2.IMREAD_UNCHANGED) == one["number"]
-        np.testing.assert_array_equal(read.annToMask(one), mask)  # as COCO's own reader has it
-        assert one["bbox"] == toBbox(read.annToRLE(one)).tolist() and one["area"] == area(read.annToRLE(one))
-    assert {one["name"]: categories[one["category_id"]] for one in said["annotations"]}["Wall"] == "obstacle"
+        np.testing.assert_array_equal(dataset.annToMask(one), mask)  # as COCO's own reader decodes it
+        assert one["bbox"] == toBbox(dataset.annToRLE(one)).tolist() and one["area"] == area(dataset.annToRLE(one))
+    assert {one["name"]: categories[one["category_id"]] for one in annotations["annotations"]}["Wall"] == "obstacle"
     arrays = np.load(folder / "truth" / "000001.npz")
     assert {name: one.shape for name, one in arrays.items()} == {
         "depth": (48, 64), "normals": (48, 64, 3), "flow": (48, 64, 2), "flow_known": (48, 64),
@@ -157,7 +157,7 @@ def test_a_flight_becomes_a_dataset_as_coco_has_it(tmp_path):
     assert fly(["--duration", "0", "--truth", str(folder)]) == 1 == fly(["--duration", "0", "--truth", str(scene)])
 
 
-def test_messages_of_one_stamp_become_a_picture_of_the_dataset(tmp_path):
+def test_messages_of_one_stamp_become_one_picture_of_the_dataset(tmp_path):
     pytest.importorskip("rospy", reason="needs ROS")
     from drone_sim.ros.tools import record_truth
 
@@ -170,38 +170,38 @@ def test_messages_of_one_stamp_become_a_picture_of_the_dataset(tmp_path):
     for number in range(3):
         for name in names:
             groups.add(name, 2.0 + number, name)
-    assert groups.lost == 1, "two wait at a time"
+    assert groups.lost == 1, "at most two groups wait at a time"
     for number in range(record_truth._MAX_INCOMPLETE):
         groups.add("color", 10.0 + number, "alone")
-    assert groups.lost == 2, "the oldest, whose flow has never come, makes room"
+    assert groups.lost == 2, "the oldest group, whose flow is missing, is dropped"
 
 
-def test_nothing_is_drawn_for_a_truth_that_nobody_asks(simulation, monkeypatch):
+def test_ground_truth_is_not_rendered_without_a_request(simulation, monkeypatch):
     camera = simulation.drone.cameras["front"]
     picture = camera.take()
-    drawn = []
+    renderings = []
     renderer = simulation.vision._renderer
-    monkeypatch.setattr(renderer, "render_outputs", lambda *_, **__: drawn.append(1))
+    monkeypatch.setattr(renderer, "render_outputs", lambda *_, **__: renderings.append(1))
     simulation.step()
     camera.look()
-    assert drawn == []
+    assert renderings == []
     assert picture.shape == (480, 640, 3)
 
 
-def test_what_was_asked_of_the_last_picture_is_drawn_with_the_next(simulation, monkeypatch):
+def test_outputs_requested_for_one_picture_are_rendered_with_the_next(simulation, monkeypatch):
     camera = simulation.drone.cameras["front"]
     camera.take()
     camera.truth().want(("depth", "instance"))
     simulation.step()
-    taken = simulation.vision.pictures
+    picture_count = simulation.vision.pictures
     picture = camera.look()
-    assert simulation.vision.pictures == taken + 1
-    renderer, drawn = simulation.vision._renderer, []
+    assert simulation.vision.pictures == picture_count + 1
+    renderer, renderings = simulation.vision._renderer, []
     with monkeypatch.context() as patched:
-        patched.setattr(renderer, "render_outputs", lambda *_, **__: drawn.append(1))
-        found = camera.truth()
-        depth, mask = found.output("depth"), found.output("instance")
-    assert drawn == []
+        patched.setattr(renderer, "render_outputs", lambda *_, **__: renderings.append(1))
+        cached_truth = camera.truth()
+        depth, mask = cached_truth.output("depth"), cached_truth.output("instance")
+    assert renderings == []
     np.testing.assert_array_equal(picture, camera.take())
     fresh = camera.truth()
     np.testing.assert_array_equal(depth, fresh.output("depth"))

@@ -1,4 +1,4 @@
-"""Commands from outside: what is refused, and with which words."""
+"""Checks of twists and poses that arrive from outside: the refused values and their messages."""
 
 import math
 
@@ -12,14 +12,14 @@ PARAMETERS = parameters.load()
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 21.0])
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_twists_that_no_drone_could_fly(value, axis):
+def test_a_twist_out_of_range_is_refused(value, axis):
     linear = [0.0, 0.0, 0.0]
     linear[axis] = value
     with pytest.raises(checks.Refused, match=f"linear.{'xyz'[axis]} = {value}: must lie within \\+-20.0 m/s"):
         checks.twist(linear, (0, 0, 0), PARAMETERS)
 
 
-def test_a_good_twist_passes_unchanged():
+def test_a_valid_twist_passes_unchanged():
     assert checks.twist((1, -2, 3), (0.1, 0.2, -0.3), PARAMETERS) == ((1, -2, 3), (0.1, 0.2, -0.3))
 
 
@@ -33,11 +33,11 @@ def test_a_good_twist_passes_unchanged():
         ((0, 0, 1), (0, 0, math.nan, 1), "must be a unit quaternion, its length is nan"),
     ],
 )
-def test_poses_where_nothing_could_stand(position, orientation, message):
+def test_an_invalid_pose_is_refused(position, orientation, message):
     with pytest.raises(checks.Refused, match=message):
         checks.pose(position, orientation, PARAMETERS)
 
 
-def test_a_nearly_unit_quaternion_is_made_unit():
+def test_a_nearly_unit_quaternion_is_normalised():
     orientation = checks.pose((0, 0, 1), (0, 0, 0.7072, 0.7072), PARAMETERS).orientation
     assert math.hypot(*orientation) == pytest.approx(1, abs=1e-15)

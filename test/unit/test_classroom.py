@@ -1,4 +1,4 @@
-"""Simulators of a course report to a folder in which students can put whatever they like."""
+"""The shared folder of a course: simulators write reports to it, and students may put any file into it."""
 
 import json
 import os
@@ -26,7 +26,7 @@ def _reports(room):
     return room / "reports"
 
 
-def test_the_last_report_of_a_user_counts(room):
+def test_only_the_last_report_of_a_user_counts(room):
     first, second = classroom.report_path(room), classroom.report_path(room)
     classroom.report(first, {"status": "paused"}, "")
     os.utime(first, (os.stat(first).st_mtime - 5,) * 2)
@@ -41,18 +41,18 @@ def test_a_report_of_an_ended_simulator_does_not_count(room, reports):
     assert classroom.reports(room) == {}
 
 
-def test_texts_and_pictures_of_strangers_are_limited(room, reports):
+def test_texts_and_pictures_of_a_report_are_sanitised(room, reports):
     strange = {"status": ["x"], "script": "s" * 1000, "scene": "\ud800", "picture": '" onerror="alert(1)', "more": 1}
     (reports / "a.json").write_text(json.dumps(strange))
-    (found,) = classroom.reports(room).values()
-    assert found == {"status": "['x']", "script": "s" * 200, "scene": "?", "grades": "", "picture": ""}
+    (user_report,) = classroom.reports(room).values()
+    assert user_report == {"status": "['x']", "script": "s" * 200, "scene": "?", "grades": "", "picture": ""}
 
 
 TOO_LARGE = b'{"status": "' + b"x" * (1 << 18) + b'"}'
 
 
 @pytest.mark.parametrize("content", [b"", b"[]", b"{", b"\xff", b"[" * 200_000, TOO_LARGE])
-def test_what_is_no_report_is_ignored(room, reports, content):
+def test_an_invalid_report_is_ignored(room, reports, content):
     (reports / "a.json").write_bytes(content)
     assert classroom.reports(room) == {}
 
@@ -66,7 +66,7 @@ def test_links_and_special_files_are_not_read(room, reports, tmp_path):
     assert classroom.reports(room) == {}
 
 
-def test_a_message_reaches_all_and_ends(room):
+def test_a_message_to_all_can_be_sent_and_cleared(room):
     classroom.tell_all(room, "Now hover.", "hover")
     message = classroom.message_to_all(room)
     assert (message.text, message.task) == ("Now hover.", "hover")
@@ -78,7 +78,7 @@ def test_a_message_reaches_all_and_ends(room):
 SCENE = b"floor: {size: 7}\nobjects:\n- {shape: box, size: [1, 1, 1], position: [2, 0, 0.5]}\n"
 
 
-def test_a_scene_reaches_all(room):
+def test_a_scene_can_be_sent_to_all(room):
     classroom.keep_scene(room, "my gates.yaml", SCENE)
     classroom.tell_all(room, "", "", "my gates.yaml")
     message = classroom.message_to_all(room)
@@ -90,7 +90,7 @@ def test_a_scene_reaches_all(room):
 @pytest.mark.parametrize(
     "name", ["", "a", "a.ttt", "../a.yaml", "/etc/a.yaml", ".a.yaml", "a\n.yaml", "x" * 99 + ".yaml", "a\0.yaml"]
 )
-def test_a_scene_with_another_name_is_refused(room, name):
+def test_an_invalid_name_of_a_scene_is_refused(room, name):
     with pytest.raises(ValueError, match="ends in"):
         classroom.keep_scene(room, name, SCENE)
     assert not classroom.scenes_folder(room).exists()
@@ -110,16 +110,16 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("words", HOSTILE)
-def test_a_scene_that_the_simulator_refuses_is_not_sent(room, words):
+def test_an_invalid_scene_is_refused_and_the_last_one_is_kept(room, words):
     classroom.keep_scene(room, "gates.yaml", SCENE)
     with pytest.raises(ValueError, match=words):
         classroom.keep_scene(room, "gates.yaml", HOSTILE[words])
-    (kept,) = classroom.scenes_folder(room).iterdir()
-    assert kept.read_bytes() == SCENE
+    (stored_file,) = classroom.scenes_folder(room).iterdir()
+    assert stored_file.read_bytes() == SCENE
 
 
 @pytest.mark.parametrize("content", ["", "[1]", '{"text": "x"}'])
-def test_a_broken_message_is_none(room, content):
+def test_a_malformed_message_is_ignored(room, content):
     (room / "to_all.json").write_text(content)
     assert classroom.message_to_all(room) is None
 

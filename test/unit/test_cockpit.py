@@ -1,4 +1,4 @@
-"""The parts of the cockpit that need no browser: who comes in, who flies, which files may be written, what is shown."""
+"""The cockpit without a browser: access control, held keys, the scene that is shown, meshes, and served files."""
 
 import asyncio
 import errno
@@ -9,6 +9,8 @@ import json
 import os
 import runpy
 import socket
+import subprocess
+import sys
 import threading
 from pathlib import Path
 from types import SimpleNamespace
@@ -42,10 +44,10 @@ from drone_sim.ros.tools.commands import Command
 TOKEN = "secret-token"
 
 
-# ---- who comes in
+# ---- access control
 
 
-class Served:
+class CockpitServer:
     def __init__(self):
         self.sent = []
         self.may_answer = threading.Event()
@@ -87,7 +89,7 @@ class Served:
 
 @pytest.fixture(name="served", scope="module")
 def _served():
-    served = Served()
+    served = CockpitServer()
     yield served
     served.stop()
 
@@ -101,7 +103,7 @@ def test_without_the_token_nothing_is_served(served, path):
     assert served.get(path, Cookie="drone_sim_1=x; =;;")[0] == 403
 
 
-def test_the_token_lets_in_and_leaves_the_address(served):
+def test_the_token_sets_a_cookie_and_is_removed_from_the_address(served):
     status, answer, _ = served.get(f"/?token={TOKEN}")
     assert status == 303 and answer.headers["Location"] == "./"
     cookie = answer.headers["Set-Cookie"]
@@ -114,7 +116,7 @@ def test_the_token_lets_in_and_leaves_the_address(served):
 
 
 @pytest.mark.parametrize("path", ["/", "/cockpit.js", "/nothing", "/?token=wrong", "/manual/search.html"])
-def test_every_answer_says_what_a_browser_may_do_with_it(served, path):
+def test_every_response_has_the_security_headers(served, path):
     cookie = {} if "wrong" in path else {"Cookie": served.cookie}
     _, answer, _ = served.get(path, **cookie)
     assert answer.headers.get_all("X-Frame-Options") == ["SAMEORIGIN"]
@@ -126,10 +128,10 @@ def test_every_answer_says_what_a_browser_may_do_with_it(served, path):
     assert policy["frame-ancestors"] == "'self'"
     here = ("'self'", "blob:", f"ws://{served.host}", f"wss://{served.host}")
     assert set(policy.get("connect-src", "").split()) <= set(here)
-    assert policy["script-src"] == "'self'", "no script in the page, and none made of text"
+    assert policy["script-src"] == "'self'", "inline scripts and eval are not allowed"
 
 
-def test_a_browser_that_takes_it_gets_the_page_compressed(served):
+def test_the_page_is_compressed_for_browsers_that_accept_gzip(served):
     plain = served.get("/cockpit.js", Cookie=served.cookie)[2]
     for accepts in ("gzip, deflate", "br;q=1.0, gzip;q=0.8"):
         _, answer, body = served.get("/cockpit.js", **{"Cookie": served.cookie, "Accept-Encoding": accepts})
@@ -138,12 +140,12 @@ def test_a_browser_that_takes_it_gets_the_page_compressed(served):
     assert "Content-Encoding" not in served.get("/cockpit.js", Cookie=served.cookie)[1].headers
 
 
-def raw(served, *lines):
-    """Return the status and the text that such lines get for an answer."""
+def send_raw(served, *lines):
+    """Return the status and the body of the response to a request of these raw lines."""
     with socket.create_connection(("127.0.0.1", served.port), timeout=60) as one:
         one.sendall(b"\r\n".join((*lines, b"", b"")))
-        said = b"".join(iter(lambda: one.recv(4096), b""))
-    head, _, body = said.partition(b"\r\n\r\n")
+        payload = b"".join(iter(lambda: one.recv(4096), b""))
+    head, _, body = payload.partition(b"\r\n\r\n")
     return int(head.split()[1]), body.decode()
 
 
@@ -166,9 +168,9 @@ def raw(served, *lines):
         ("/", [], 403, "?token="),
     ],
 )
-def test_odd_headers_get_an_answer_and_leave_no_traceback(served, caplog, path, headers, status, words):
+def test_malformed_headers_get_a_response_and_log_no_traceback(served, caplog, path, headers, status, words):
     lines = [f"GET {path} HTTP/1.1", *headers, "Connection: close"]
-    answer, body = raw(served, *(one.encode("latin-1") for one in lines))
+    answer, body = send_raw(served, *(one.encode("latin-1") for one in lines))
     assert answer == status and words in body and "\n" not in body
     assert not caplog.records
 
@@ -176,20 +178,20 @@ def test_odd_headers_get_an_answer_and_leave_no_traceback(served, caplog, path, 
 @pytest.mark.parametrize(
     "junk", [b"\x01\x00\x02\x00x", b"POST / HTTP/1.1", b"GET / HTTP/1.1\r\nno header", b"\x16\x03\x01"]
 )
-def test_what_is_no_browser_is_hung_up_on(served, caplog, junk):
+def test_a_connection_with_an_invalid_request_is_closed(served, caplog, junk):
     with socket.create_connection(("127.0.0.1", served.port), timeout=60) as one:
         one.sendall(junk + b"\r\n\r\n")
-        said = b"".join(iter(lambda: one.recv(4096), b""))
-    assert b"Traceback" not in said and b"200 OK" not in said and not caplog.records
+        payload = b"".join(iter(lambda: one.recv(4096), b""))
+    assert b"Traceback" not in payload and b"200 OK" not in payload and not caplog.records
 
 
-def test_the_page_that_is_served_is_the_one_in_the_source():
+def test_the_served_page_equals_its_source():
     source = Path(__file__).parents[2] / "web" / "src"
     for name in ("index.html", *(file.name for file in source.glob("*.css"))):  # `npm run build` copies these
         assert page_files().get(f"/{name}")[1] == (source / name).read_bytes(), "cd web && npm ci && npm run build"
 
 
-def test_the_script_that_is_served_was_built_from_the_source():
+def test_the_served_script_was_built_from_the_current_source():
     """`web/build.mjs` writes a digest of all sources into the first line of the script."""
     web = Path(__file__).parents[2] / "web"
     digest = hashlib.sha256()
@@ -200,40 +202,40 @@ def test_the_script_that_is_served_was_built_from_the_source():
     assert first_line.endswith(digest.hexdigest()), "cd web && npm ci && npm run build"
 
 
-def test_the_types_of_the_page_are_those_of_the_records_and_of_its_elements():
+def test_the_generated_types_of_the_page_are_up_to_date():
     generator = runpy.run_path(str(Path(__file__).parents[2] / "web" / "make_types.py"))
     assert generator["FILE"].read_text() == generator["text"](), "PYTHONPATH=src python web/make_types.py"
 
 
 @pytest.mark.parametrize("path", ["/socket", "/anything"])
-def test_sockets_want_the_token_and_our_origin(served, path):
+def test_a_websocket_needs_the_token_and_the_same_origin(served, path):
     for cookie, origin in (("", None), ("drone_sim=1", None), (None, "http://evil.example"), (None, "null")):
         with pytest.raises(InvalidStatus, match="403"):
             served.connect(cookie, origin, path)
     served.connect(origin=f"http://{served.host}").close()
 
 
-def test_a_browser_that_vanishes_leaves_a_stopped_drone(served):
+def test_the_drone_stops_when_a_browser_disconnects_while_a_key_is_held(served):
     served.sent.clear()
     with served.connect() as socket:
         socket.send(json.dumps({"hold": {"vx": 1.5}}))
         socket.send(json.dumps({"id": 7, "ask": "double", "number": 21}))
         assert json.loads(socket.recv(timeout=60)) == {"id": 7, "twice": 42}
         assert served.sent == [Command(vx=1.5)]
-    gone = threading.Event()
+    pause = threading.Event()
     while len(served.sent) < 2:
-        gone.wait(0.01)
+        pause.wait(0.01)
     assert served.sent[-1] == Command()
 
 
-def test_what_a_browser_asks_is_done_in_turn(served):
+def test_requests_of_a_browser_are_answered_in_order(served):
     with served.connect() as socket:
         for number, seconds in enumerate((0.2, 0.1, 0)):
             socket.send(json.dumps({"id": number, "ask": "double", "number": number, "seconds": seconds}))
         assert [json.loads(socket.recv(timeout=60))["id"] for _ in range(3)] == [0, 1, 2]
 
 
-def test_keys_do_not_wait_for_an_answer_that_takes_long(served):
+def test_held_keys_are_sent_while_a_slow_request_is_answered(served):
     served.sent.clear()
     served.may_answer.clear()
     try:
@@ -249,10 +251,10 @@ def test_keys_do_not_wait_for_an_answer_that_takes_long(served):
         served.may_answer.set()
 
 
-def test_changes_of_the_tree_reach_only_browsers_that_follow_it(served):
+def test_tree_changes_are_sent_only_to_browsers_that_follow_the_tree(served):
     def told(socket, number):
         socket.send(json.dumps({"id": 1, "ask": "double", "number": 1}))
-        assert json.loads(socket.recv(timeout=60))["twice"] == 2, "what was said before is processed"
+        assert json.loads(socket.recv(timeout=60))["twice"] == 2, "earlier messages are processed"
         served.socket.tell_tree({"tree": number})
         served.socket.tell({"end": number})
         return json.loads(socket.recv(timeout=60))
@@ -288,7 +290,7 @@ def test_changes_of_the_tree_reach_only_browsers_that_follow_it(served):
         ("[" * 100_000, ""),
     ],
 )
-def test_what_a_browser_says_is_checked(served, text, words):
+def test_an_invalid_message_gets_an_error_and_the_socket_stays_open(served, text, words):
     with served.connect() as socket:
         socket.send(text)
         answer = json.loads(socket.recv(timeout=60))
@@ -297,7 +299,7 @@ def test_what_a_browser_says_is_checked(served, text, words):
         assert json.loads(socket.recv(timeout=60))["twice"] == 2
 
 
-def test_a_question_that_fails_in_any_way_is_answered_and_the_socket_stays_open(served, tmp_path, monkeypatch, caplog):
+def test_a_request_that_raises_gets_an_error_and_the_socket_stays_open(served, tmp_path, monkeypatch, caplog):
     def exists(message):
         return {"there": (tmp_path / message["name"]).exists() and 1 // 0}
 
@@ -310,10 +312,10 @@ def test_a_question_that_fails_in_any_way_is_answered_and_the_socket_stays_open(
     assert [one.exc_info[0] for one in caplog.records if one.exc_info] == [ZeroDivisionError]
 
 
-# ---- who flies
+# ---- teleoperation
 
 
-def test_held_keys_fly_while_they_are_held_and_said():
+def test_a_held_command_is_repeated_until_it_is_released_or_times_out():
     sent, now = [], [0.0]
     flying = HeldCommands(sent.append, lambda: now[0])
     ahead, left = Command(vx=1.0), Command(vy=1.0)
@@ -322,31 +324,31 @@ def test_held_keys_fly_while_they_are_held_and_said():
     assert sent == [ahead, ahead], "repeated"
     flying.hold(2, left)
     flying.hold(1, ahead)
-    assert sent[2:] == [left], "the one that changed last counts, and is not thrown over by a repetition"
+    assert sent[2:] == [left], "the command that changed last counts, although another one is repeated"
     flying.release(2)
     assert sent[-1] == ahead
     now[0] = 10.0
     flying.repeat()
-    assert sent[-1] == Command(), "silence"
+    assert sent[-1] == Command(), "the command has timed out"
     count = len(sent)
     flying.repeat()
     flying.release(1)
-    assert len(sent) == count, "nobody flies, and nobody is disturbed"
+    assert len(sent) == count, "nothing is sent while no key is held"
 
 
-def test_nan_is_no_speed():
+def test_a_nan_speed_is_refused():
     with pytest.raises(ValueError, match="hold/wz"):
         read_command({"wz": float("nan")})
     assert read_command({"vz": -2}) == Command(vz=-2.0)
 
 
-def test_a_failure_is_read_from_a_line():
+def test_a_script_failure_is_parsed_from_a_log_line():
     failure = script_failure("script error: [actuation] /home/a b/x.py:12: NameError: y: z")
     assert failure == ("actuation", "/home/a b/x.py", 12, "NameError: y: z")
     assert script_failure("started") is None
 
 
-def test_what_the_master_knows():
+def test_the_topics_of_the_simulator_are_found_in_the_masters_list():
     topics = [
         ("/drone/view/bodies", "visualization_msgs/MarkerArray"),
         ("/drone/odom", "nav_msgs/Odometry"),
@@ -362,14 +364,14 @@ def test_what_the_master_knows():
     assert find_topics(topics[1:]) == FoundTopics()
 
 
-# ---- what is shown
+# ---- frames and markers
 
 
 LINE = [Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)]
 
 
 class Topic(MarkerListener):
-    """A topic whose markers one browser sees."""
+    """A marker topic that is shown in one browser."""
 
     def __init__(self, layer="drawing", **options):
         super().__init__(layer, **options)
@@ -385,34 +387,34 @@ class Topic(MarkerListener):
         return list(self.browser.markers.values())
 
 
-def test_markers_come_move_and_go():
+def test_markers_are_added_moved_and_deleted():
     topic = Topic()
     topic.show(marker(0), marker(1))
     assert len(topic.shown) == 2 and topic.shown[0]["kind"] == "cube" and topic.shown[0]["color"] == [1, 0, 0, 1]
     moved = marker(0)
     moved.pose.position.x = 3.0
-    said = topic.show(moved, Marker(ns="a", id=1, action=Marker.DELETE))
-    assert not said["markers"] and len(said["placed"]) == len(said["gone"]) == 1, "moved, not told anew"
+    payload = topic.show(moved, Marker(ns="a", id=1, action=Marker.DELETE))
+    assert not payload["markers"] and len(payload["placed"]) == len(payload["gone"]) == 1, "only the pose is sent"
     assert [one["pose"] for one in topic.shown] == [(3, 0, 0, 0, 0, 0, 1)]
-    assert topic.show(moved) is None, "nothing new"
+    assert topic.show(moved) is None, "nothing has changed"
     topic.show(Marker(action=Marker.DELETEALL))
     assert not topic.shown
 
 
-def test_what_is_told_anew_as_a_whole_is_sent_where_it_differs():
-    """The simulation numbers the objects of its scene; one that goes changes the numbers of all that follow."""
+def test_only_the_differences_of_a_complete_marker_list_are_sent():
+    """Marker ids number the objects of the scene: removing an object changes the ids of all later objects."""
     topic, everything = Topic(), Marker(action=Marker.DELETEALL)
     made = [marker(number, ns=name) for number, name in enumerate(["Crate", "Pole", "Pole", "Wall"], 1)]
     topic.show(everything, *made)
     assert len(topic.shown) == 4
     for number, one in enumerate(made[1:], 1):
         one.id = number
-    said = topic.show(everything, *made[1:])
-    assert (len(said["gone"]), said["markers"], said["placed"]) == (1, [], [])
+    payload = topic.show(everything, *made[1:])
+    assert (len(payload["gone"]), payload["markers"], payload["placed"]) == (1, [], [])
     assert [one["ns"] for one in topic.shown] == ["Pole", "Pole", "Wall"]
 
 
-def test_a_browser_that_comes_late_gets_the_whole_and_one_that_is_slow_what_it_lacks():
+def test_a_late_browser_gets_the_whole_scene_and_a_slow_browser_the_changes():
     topic = Topic()
     for x in range(3):
         moved = marker(0)
@@ -436,7 +438,7 @@ def test_a_browser_that_comes_late_gets_the_whole_and_one_that_is_slow_what_it_l
         ({"type": Marker.LINE_LIST, "points": LINE[:2]}, {"points": LINE[1:]}, lambda told: told["points"][0] == 1),
     ],
 )
-def test_words_and_lines_change(before, after, seen):
+def test_texts_and_lines_of_a_marker_are_updated(before, after, seen):
     topic = Topic()
     for number, values in enumerate((before, {**before, **after})):
         message = Marker(ns="a", **values)
@@ -445,7 +447,7 @@ def test_words_and_lines_change(before, after, seen):
     (told,) = topic.shown
     assert seen(told) and told["pose"][0] == 1.0
     topic.show(Marker(ns="a", type=before["type"], header=message.header))
-    assert len(topic.shown) == (before["type"] == Marker.TEXT_VIEW_FACING), "lines of no points are nothing"
+    assert len(topic.shown) == (before["type"] == Marker.TEXT_VIEW_FACING), "lines without points are removed"
 
 
 def transform(parent, child, x=0.0):
@@ -454,7 +456,7 @@ def transform(parent, child, x=0.0):
     return made
 
 
-def test_a_frame_waits_for_its_parents():
+def test_a_frame_is_sent_once_its_parents_are_known():
     browser, frames = Browser(), FrameTree()
     loop = [transform("a", "b"), transform("b", "a"), transform("c", "c")]
     for message, shown in (
@@ -468,18 +470,18 @@ def test_a_frame_waits_for_its_parents():
         assert list(browser.frames.values()) == shown
     frames.on_transforms(TFMessage([transform("world", "body", 2.0), transform("body", "blades", 1.0)]))
     browser.state.change(frames.take(), {})
-    said = browser.hear()
-    assert said["moved"] == [0, 2] and browser.poses["body"][0] == 2.0
-    assert said["frames"] == [[2, "blades", 0]], "hung on another one"
+    payload = browser.hear()
+    assert payload["moved"] == [0, 2] and browser.poses["body"][0] == 2.0
+    assert payload["frames"] == [[2, "blades", 0]], "its parent has changed"
 
 
-def test_what_happens_in_one_step_is_one_message():
+def test_frames_and_markers_of_one_step_are_one_message():
     browser, frames, topic = Browser(), FrameTree(), MarkerListener("view/path")
     frames.on_transforms(TFMessage([transform("world", "a"), transform("world", "b")]))
     topic.on_markers(MarkerArray([marker(0)]))
     assert browser.state.change(frames.take(), topic.take())
-    said = browser.hear()
-    assert said["moved"] == [0, 1] and len(said["markers"]) == 1 and browser.hear() is None
+    payload = browser.hear()
+    assert payload["moved"] == [0, 1] and len(payload["markers"]) == 1 and browser.hear() is None
 
 
 @pytest.mark.parametrize(
@@ -498,22 +500,22 @@ def test_what_happens_in_one_step_is_one_message():
         (Marker.TRIANGLE_LIST, "triangles"),
     ],
 )
-def test_every_kind_of_marker_is_told(kind, name):
+def test_every_marker_type_is_sent(kind, name):
     topic = Topic()
     topic.show(marker(0, kind, points=[] if kind == Marker.ARROW else LINE, text="<b>words</b>"))
     (told,) = topic.shown
-    assert told["kind"] == name and told["pose"] == (0, 0, 0, 0, 0, 0, 1), "no orientation is upright"
+    assert told["kind"] == name and told["pose"] == (0, 0, 0, 0, 0, 0, 1), "a zero quaternion means no rotation"
     assert told.get("text", "<b>words</b>") == "<b>words</b>"
 
 
 @pytest.mark.parametrize("kind", [Marker.LINE_STRIP, Marker.LINE_LIST, Marker.POINTS, Marker.TRIANGLE_LIST, 99])
-def test_markers_of_nothing_are_nothing(kind):
+def test_markers_without_points_or_of_unknown_type_are_not_sent(kind):
     topic = Topic()
     topic.show(marker(0, kind))
     assert not topic.shown
 
 
-def test_light_that_is_painted_on_for_rviz_is_left_out_where_there_is_a_sun():
+def test_shading_painted_for_rviz_is_left_out_of_a_shaded_layer():
     painted = marker(0, Marker.TRIANGLE_LIST, points=LINE)
     painted.colors = [ColorRGBA(0, 0, 0.5, 0.25)] * 3
     for is_shaded in (True, False):
@@ -523,7 +525,7 @@ def test_light_that_is_painted_on_for_rviz_is_left_out_where_there_is_a_sun():
         assert ("colors" in told, "lit" in told) == (not is_shaded, not is_shaded)
 
 
-def test_a_sky_is_hidden_and_an_object_called_sky_is_shown():
+def test_the_sky_is_hidden_but_an_object_named_sky_is_shown():
     for layer, hidden in (("view/surroundings", ("sky",)), ("scene", ())):
         topic = Topic(layer, hidden=hidden)
         topic.show(marker(0, ns="sky"))
@@ -533,7 +535,7 @@ def test_a_sky_is_hidden_and_an_object_called_sky_is_shown():
 # ---- meshes
 
 
-def test_a_mesh_is_served_once_by_what_is_in_it(tmp_path):
+def test_a_mesh_is_served_under_a_url_made_from_its_content(tmp_path):
     meshes, file = MeshStore(), tmp_path / "a box.stl"
     trimesh.creation.box().export(file)
     topic = Topic(mesh_url=meshes.url)
@@ -543,21 +545,28 @@ def test_a_mesh_is_served_once_by_what_is_in_it(tmp_path):
     assert kind == "model/gltf-binary" and content == as_glb(file)
     assert meshes.find("/mesh/../a.glb") is None and meshes.find("/") is None
     trimesh.creation.icosphere().export(file)
-    again = meshes.url(file.as_uri())
-    assert again != told["mesh"] and meshes.find(again)[1] == as_glb(file), "the file has changed"
+    new_url = meshes.url(file.as_uri())
+    assert new_url != told["mesh"] and meshes.find(new_url)[1] == as_glb(file), "the file has changed"
 
 
-def test_a_mesh_that_cannot_be_read_is_told_once_and_left_out(tmp_path, caplog):
+def test_an_unreadable_mesh_is_logged_and_not_shown(tmp_path, caplog):
     file = tmp_path / "broken.stl"
     file.write_text("solid nothing", encoding="utf-8")
     topic = Topic(mesh_url=MeshStore().url)
     for missing in (file, file, tmp_path / "none.stl"):
         topic.show(marker(0, Marker.MESH_RESOURCE, mesh_resource=f"file://{missing}"))
         assert not topic.shown
-    assert "broken.stl" in caplog.text and "none.stl" in caplog.text
+    assert "broken.stl" in caplog.messages[0] and "none.stl" in caplog.messages[1]
+    assert len(caplog.messages) == 2, "each file is reported once"
 
 
-def test_a_mesh_has_no_metal(tmp_path):
+def test_slow_imports_wait_until_a_page_needs_them():
+    code = "import sys, drone_sim.ros.cockpit.cockpit; print({'cv_bridge', 'scipy', 'trimesh'} & set(sys.modules))"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout == "set()\n"
+
+
+def test_a_mesh_has_a_metallic_factor_of_zero(tmp_path):
     file = tmp_path / "box.stl"
     trimesh.creation.box().export(file)
     content = as_glb(file)
@@ -566,7 +575,7 @@ def test_a_mesh_has_no_metal(tmp_path):
     assert [one["pbrMetallicRoughness"]["metallicFactor"] for one in tree["materials"]] == [0.0]
 
 
-def test_the_manual_is_served_where_it_was_built_and_nothing_beside_it(tmp_path):
+def test_only_files_of_the_built_manual_are_served(tmp_path):
     (tmp_path / "html/_static").mkdir(parents=True)
     (tmp_path / "html/_static/furo.css").write_text("p {}")
     (tmp_path / "secret.css").write_text("p {}")
@@ -585,7 +594,7 @@ def test_the_manual_is_served_where_it_was_built_and_nothing_beside_it(tmp_path)
     assert kind.startswith("text/plain") and b"./dev.sh docs" in content
 
 
-def test_of_a_grade_only_the_report_is_served(tmp_path, monkeypatch):
+def test_only_the_report_of_a_grading_is_served(tmp_path, monkeypatch):
     grader = Grader()
     monkeypatch.setattr(grader, "_folder", SimpleNamespace(name=str(tmp_path)))
     (tmp_path / "report").mkdir()
@@ -597,7 +606,7 @@ def test_of_a_grade_only_the_report_is_served(tmp_path, monkeypatch):
         assert grader.report_file(path) is None
 
 
-def test_a_page_that_is_opened_early_is_answered_when_all_is_there():
+def test_a_page_opened_before_the_server_begins_is_answered_later():
     serving = PageServer("127.0.0.1", 0)
     host, token = serving.address.removeprefix("http://").split("/?token=")
     cookie = {"Cookie": f"drone_sim_{host.rpartition(':')[2]}={token}"}
@@ -617,8 +626,8 @@ def test_a_page_that_is_opened_early_is_answered_when_all_is_there():
     serving.stop()
 
 
-def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
-    """Whoever ends and starts a launch anew keeps the page, and what stands in the editor."""
+def test_the_cockpit_reconnects_after_a_restart_of_the_master(monkeypatch, tmp_path):
+    """The page and the text in its editor survive a restart of the launch file."""
 
     def refuse(*_):
         raise ConnectionRefusedError(111, "Connection refused")
@@ -627,7 +636,7 @@ def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
         return [["/drone/view/bodies", "visualization_msgs/MarkerArray"]]
 
     shown = Cockpit(PageServer("127.0.0.1", 0), "drone_sim", tmp_path)
-    monkeypatch.setattr(rospy, "get_param", lambda _name, otherwise: otherwise)
+    monkeypatch.setattr(rospy, "get_param", lambda _name, default: default)
     for master, namespace in ((answer, "/drone"), (refuse, ""), (refuse, ""), (answer, "/drone")):
         monkeypatch.setattr(rospy, "get_published_topics", master)
         shown._ask_master()
@@ -637,14 +646,14 @@ def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
     shown._server.stop()
 
 
-def test_another_scene_is_looked_for_at_once(tmp_path, monkeypatch):
-    shown, asked = Cockpit(PageServer("127.0.0.1", 0), "drone_sim", tmp_path), []
-    monkeypatch.setattr(shown, "_ask_master", lambda: asked.append(scene))
+def test_the_master_is_queried_at_once_after_a_change_of_the_scene(tmp_path, monkeypatch):
+    shown, queries = Cockpit(PageServer("127.0.0.1", 0), "drone_sim", tmp_path), []
+    monkeypatch.setattr(shown, "_ask_master", lambda: queries.append(scene))
     monkeypatch.setattr(type(shown._editing), "scene", property(lambda _: scene))
     for one in (("", "drone"), ("", "drone"), ("a.yaml", "drone"), ("a.yaml", "drone"), ("a.yaml", "")):
         scene = one
         shown._update(10.0)
-    assert asked == [("", "drone"), ("a.yaml", "drone"), ("a.yaml", "")]
+    assert queries == [("", "drone"), ("a.yaml", "drone"), ("a.yaml", "")]
     shown._server.stop()
 
 
@@ -652,16 +661,16 @@ def test_another_scene_is_looked_for_at_once(tmp_path, monkeypatch):
     ("browsers", "namespace", "period"),
     [({1}, "", 0.3), ({1}, "/drone", 2.0), (set(), "", 10.0), (set(), "/drone", 10.0)],
 )
-def test_the_master_is_asked_often_while_a_page_waits_for_the_simulator(
+def test_the_master_is_queried_often_while_a_page_waits_for_the_simulator(
     tmp_path, monkeypatch, browsers, namespace, period
 ):
-    shown, asked = Cockpit(PageServer("127.0.0.1", 0), "drone_sim", tmp_path), []
-    monkeypatch.setattr(shown, "_ask_master", lambda: asked.append(now))
+    shown, queries = Cockpit(PageServer("127.0.0.1", 0), "drone_sim", tmp_path), []
+    monkeypatch.setattr(shown, "_ask_master", lambda: queries.append(now))
     monkeypatch.setattr(shown, "_open", lambda _namespace: None)
     monkeypatch.setattr(type(shown._socket), "browsers", property(lambda _: browsers))
     shown._topics = FoundTopics(namespace)
     for tenth in range(1000, 1300):  # 30 s
         now = tenth / 10
         shown._update(now)
-    assert 30.0 / (period + 0.2) <= len(asked) <= 30.0 / period + 1
+    assert 30.0 / (period + 0.2) <= len(queries) <= 30.0 / period + 1
     shown._server.stop()

@@ -1,4 +1,4 @@
-"""Where the cockpit listens, the addresses that it prints, which can be opened, and what else may be set."""
+"""Host, port and other parameters of the cockpit, the URLs that it prints, and where its token is written."""
 
 import logging
 import os
@@ -21,41 +21,41 @@ from drone_sim.ros.cockpit.server.address import address_file, print_to_terminal
 
 @pytest.fixture
 def taken():
-    """A port that somebody else listens on."""
-    with socket.create_server(("127.0.0.1", 0)) as one:
-        yield one.getsockname()[1]
+    """A port on which another socket listens."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        yield listener.getsockname()[1]
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "0.0.0.0"])
-def test_a_port_that_is_taken_is_left_out(taken, host):
-    found, port = address.free_place(host, taken)
-    assert found == ("0.0.0.0" if host == "0.0.0.0" else "127.0.0.1")
+def test_a_port_in_use_is_skipped(taken, host):
+    bound_host, port = address.free_place(host, taken)
+    assert bound_host == ("0.0.0.0" if host == "0.0.0.0" else "127.0.0.1")
     assert taken < port < taken + 100
 
 
-def test_a_port_that_has_just_been_left_is_free():
-    """As when the cockpit is started again: connections that are closing there do not count."""
+def test_a_port_with_closing_connections_counts_as_free():
+    """As after a restart of the cockpit: connections in TIME_WAIT do not count."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         with socket.create_connection(("127.0.0.1", port)):
-            server.accept()[0].close()  # which was the first to go
+            server.accept()[0].close()  # the server closes first, so that its side is left in TIME_WAIT
     assert address.free_place("127.0.0.1", port) == ("127.0.0.1", port)
 
 
 @pytest.mark.parametrize("port", [-1, 65536, 99999, "abc", 80.5, True, None])
-def test_what_is_no_port_is_told(port):
+def test_an_invalid_port_is_refused(port):
     with pytest.raises(address.AddressError, match=rf"^port = {port}: must be a whole number from 0 to 65535"):
         address.free_place("127.0.0.1", port)
 
 
 @pytest.mark.parametrize("given", ["192.0.2.77", "", "8080", 5, None, "\0", "x" * 300])
-def test_what_is_no_address_of_this_machine_is_told(given):
+def test_an_address_of_another_machine_is_refused(given):
     with pytest.raises(address.AddressError, match=r"^address = .*: is not an address of this machine; ") as raised:
         address.free_place(given, 8080)
     assert len(str(raised.value)) < 250
 
 
-def test_ports_for_root_are_told(monkeypatch):
+def test_a_privileged_port_is_refused(monkeypatch):
     def refuse(*_):
         raise PermissionError(13, "Permission denied")
 
@@ -64,7 +64,7 @@ def test_ports_for_root_are_told(monkeypatch):
         address._is_free(socket.AF_INET, "127.0.0.1", 80)
 
 
-def test_where_no_port_is_free_it_is_told(monkeypatch):
+def test_an_error_is_raised_if_no_port_is_free(monkeypatch):
     monkeypatch.setattr(address, "_is_free", lambda family, host, port: port == 0)
     with pytest.raises(address.AddressError, match=r"^port = 65500: all ports from 65500 to 65535"):
         address.free_place("127.0.0.1", 65500)
@@ -78,7 +78,7 @@ def test_printed_addresses_can_be_opened():
     assert elsewhere.endswith(":8080/?token=T") and "0.0.0.0" not in elsewhere
 
 
-def test_without_a_network_the_machine_goes_by_its_name(monkeypatch):
+def test_without_a_network_the_url_contains_the_host_name(monkeypatch):
     def refuse(*_):
         raise OSError(101, "Network is unreachable")
 
@@ -109,13 +109,13 @@ def test_scripts_are_relative_to_the_shell(monkeypatch):
         (5, "the node's parameters: must be a mapping, not 5"),
     ],
 )
-def test_wrong_settings_are_told_in_a_line(given, words):
+def test_a_wrong_setting_gets_one_line(given, words):
     with pytest.raises((ValueError, OSError)) as raised:
         read_parameters(given)
     assert str(raised.value) == words
 
 
-# ---- who hears of the token
+# ---- where the token is written
 
 
 ADDRESS = "http://127.0.0.1:8080/?token=secret"
@@ -130,36 +130,36 @@ def _home(tmp_path, monkeypatch):
 
 @pytest.fixture(name="logged")
 def _logged(caplog):
-    """What rospy sends to its log, to the terminal and to /rosout."""
+    """The lines that rospy sends to its log, to the terminal and to /rosout."""
     lines = []
-    heard = logging.Handler()
-    heard.emit = lambda record: lines.append(record.getMessage())
+    handler = logging.Handler()
+    handler.emit = lambda record: lines.append(record.getMessage())
     caplog.set_level(logging.DEBUG, "rosout")
-    logging.getLogger("rosout").addHandler(heard)
+    logging.getLogger("rosout").addHandler(handler)
     yield lines
-    logging.getLogger("rosout").removeHandler(heard)
+    logging.getLogger("rosout").removeHandler(handler)
 
 
-def test_the_token_is_on_the_terminal_and_in_a_file_and_in_no_log(home, logged, monkeypatch, capfd):
-    seen = []
+def test_the_token_is_printed_and_written_to_a_private_file_but_never_logged(home, logged, monkeypatch, capfd):
+    records = []
 
-    class Looked:
+    class CockpitStub:
         def __init__(self, served, *_):
             self.served = served
 
         def run(self):
             file = home / "drone_sim" / f"cockpit_{self.served.port}.txt"
-            seen.append((file, file.read_text(), stat.S_IMODE(file.stat().st_mode)))
+            records.append((file, file.read_text(), stat.S_IMODE(file.stat().st_mode)))
             self.served.stop()
 
-    monkeypatch.setattr(cockpit, "Cockpit", Looked)
+    monkeypatch.setattr(cockpit, "Cockpit", CockpitStub)
     monkeypatch.setattr(rospy, "get_param", lambda *_: {"port": 0})
     before = os.umask(0)
     try:
         main._serve()
     finally:
         os.umask(before)
-    ((file, address, mode),) = seen
+    ((file, address, mode),) = records
     printed = re.search(r"the cockpit is at (\S+)", capfd.readouterr().out)[1]
     assert address == f"{printed}\n" and mode == 0o600 and not file.exists()
     base, _, token = printed.partition("?token=")
@@ -167,7 +167,7 @@ def test_the_token_is_on_the_terminal_and_in_a_file_and_in_no_log(home, logged, 
     assert not [line for line in logged if token in line]
 
 
-def test_the_file_of_one_that_was_killed_is_made_anew_and_another_ones_is_left(home):
+def test_a_leftover_address_file_is_replaced_and_a_foreign_file_is_kept(home):
     file = home / "drone_sim" / "cockpit_8080.txt"
     with address_file(ADDRESS, 8080):
         file.unlink()
@@ -178,14 +178,14 @@ def test_the_file_of_one_that_was_killed_is_made_anew_and_another_ones_is_left(h
     assert file.read_text() == "of another one" and not (home / "elsewhere").exists()
 
 
-def test_a_home_that_holds_no_file_is_told_in_one_line(home):
+def test_a_home_that_is_not_a_folder_gets_one_line(home):
     home.write_text("no folder")
-    with address_file(ADDRESS, 8080) as where:
-        assert re.fullmatch(r"the address with the token is only in the terminal, .*cockpit_8080.txt .+", where)
+    with address_file(ADDRESS, 8080) as message:
+        assert re.fullmatch(r"the address with the token is only in the terminal, .*cockpit_8080.txt .+", message)
 
 
 @pytest.mark.parametrize("inside", [True, False])
-def test_the_log_that_roslaunch_makes_of_a_node_is_left_without(home, monkeypatch, inside):
+def test_the_token_is_not_printed_into_a_log_file_of_roslaunch(home, monkeypatch, inside):
     log = (home / "log" / "run" if inside else home / "mine") / "cockpit-3-stdout.log"
     log.parent.mkdir(parents=True)
     with log.open("w") as stdout:
@@ -194,11 +194,11 @@ def test_the_log_that_roslaunch_makes_of_a_node_is_left_without(home, monkeypatc
     assert ("secret" in log.read_text()) is not inside
 
 
-def test_a_terminal_that_is_gone_ends_nothing(home, monkeypatch):
+def test_printing_to_a_closed_terminal_raises_no_error(home, monkeypatch):
     reading, writing = os.pipe()
     os.close(reading)
     with os.fdopen(writing, "w", closefd=False) as stdout:
         monkeypatch.setattr("sys.stdout", stdout)
         print_to_terminal("a line")
-        os.dup2(os.open(os.devnull, os.O_WRONLY), writing)  # or to close it would fail, too
+        os.dup2(os.open(os.devnull, os.O_WRONLY), writing)  # otherwise closing it would fail, too
     os.close(writing)

@@ -1,4 +1,4 @@
-"""The cockpit's handles without a browser: what is told of them, who holds one, what the simulation hears."""
+"""The cockpit's handles without a browser: markers shown, the browser that holds a handle, feedback published."""
 
 import json
 
@@ -25,12 +25,12 @@ from drone_sim.ros.cockpit.scene.scene_view import read_push
 HERE, THERE = (1.0, 0, 0, 0, 0, 0, 1), (2.0, 0, 0, 0, 0, 0, 1)
 
 
-class Dragged:
-    """Handles whose feedback is kept, with one marker at (1, 0, 0), turned by 90 degrees, of a green sphere."""
+class RecordedHandles:
+    """Handles whose feedback is recorded: one marker at (1, 0, 0), turned by 90 degrees, with one visible sphere."""
 
     def __init__(self):
-        self.said, self.now, self.browser = [], 0.0, Browser()
-        self.handles = DragControls("markers", self.said.append, clock=lambda: self.now)
+        self.feedback, self.now, self.browser = [], 0.0, Browser()
+        self.handles = DragControls("markers", self.feedback.append, clock=lambda: self.now)
         ball, unseen = marker(0, Marker.SPHERE), marker(1, Marker.SPHERE)
         unseen.color = ColorRGBA(0, 0, 0, 0.01)
         looks = InteractiveMarkerControl(always_visible=True, markers=[ball, unseen])
@@ -52,74 +52,74 @@ class Dragged:
 
     @property
     def kinds(self):
-        return [one.event_type for one in self.said]
+        return [one.event_type for one in self.feedback]
 
 
 @pytest.fixture(name="dragged")
 def _dragged():
-    return Dragged()
+    return RecordedHandles()
 
 
-def test_a_handle_is_a_place_and_what_is_always_seen_of_it(dragged):
-    told = {one["kind"]: one for one in dragged.browser.named("a")}
-    assert set(told) == {"handle", "sphere"} and told["handle"]["layer"] == "markers"
-    for one in told.values():
+def test_a_handle_is_shown_with_its_pose_and_its_visible_markers(dragged):
+    data = {one["kind"]: one for one in dragged.browser.named("a")}
+    assert set(data) == {"handle", "sphere"} and data["handle"]["layer"] == "markers"
+    for one in data.values():
         assert one["pose"] == pytest.approx((1, 0, 0, 0, 0, 0.5**0.5, 0.5**0.5)) and one["frame"] == "world"
-    said = dragged.hear(x=1.5)
-    assert len(said["placed"]) == 2 and not said["markers"]
+    feedback = dragged.hear(x=1.5)
+    assert len(feedback["placed"]) == 2 and not feedback["markers"]
     assert {one["pose"][0] for one in dragged.browser.named("a")} == {1.5}
     dragged.handles.on_update(InteractiveMarkerUpdate(erases=["a"]))
     dragged.show()
     assert not dragged.browser.markers
 
 
-def test_the_simulation_hears_what_is_dragged(dragged):
+def test_a_drag_is_published_as_marker_feedback(dragged):
     for phase, pose in (("start", HERE), ("move", THERE), ("end", THERE)):
         dragged.drag(phase, pose)
     assert dragged.kinds == [Feedback.MOUSE_DOWN, Feedback.POSE_UPDATE, Feedback.MOUSE_UP]
-    told = dragged.said[1]
-    assert (told.marker_name, told.header.frame_id, told.pose.position.x) == ("a", "world", 2.0)
-    assert told.client_id == "cockpit/1"
+    data = dragged.feedback[1]
+    assert (data.marker_name, data.header.frame_id, data.pose.position.x) == ("a", "world", 2.0)
+    assert data.client_id == "cockpit/1"
 
 
-def test_a_handle_that_is_held_still_is_told_again(dragged):
+def test_a_handle_held_still_publishes_keep_alive(dragged):
     dragged.drag("start")
     for dragged.now in (0.1, 0.3, 0.4):
         dragged.handles.keep((1,))
     assert dragged.kinds == [Feedback.MOUSE_DOWN, Feedback.KEEP_ALIVE]
 
 
-def test_a_browser_that_is_gone_lets_go(dragged):
+def test_a_disconnected_browser_releases_its_handle(dragged):
     dragged.drag("start")
     dragged.handles.keep((2,))
     assert dragged.kinds == [Feedback.MOUSE_DOWN, Feedback.MOUSE_UP]
     dragged.drag("move", THERE)
-    assert len(dragged.said) == 2, "what comes late is nothing"
+    assert len(dragged.feedback) == 2, "a late move is ignored"
 
 
-def test_whoever_comes_second_waits_until_the_first_lets_go(dragged):
+def test_a_second_browser_cannot_drag_until_the_first_releases_the_handle(dragged):
     dragged.drag("start", browser=1)
     for phase in ("start", "move", "end"):
         dragged.drag(phase, THERE, browser=2)
     assert dragged.kinds == [Feedback.MOUSE_DOWN]
     dragged.drag("end", browser=1)
     dragged.drag("start", browser=2)
-    assert [one.client_id for one in dragged.said] == ["cockpit/1"] * 2 + ["cockpit/2"]
+    assert [one.client_id for one in dragged.feedback] == ["cockpit/1"] * 2 + ["cockpit/2"]
 
 
-def test_a_handle_that_goes_while_it_is_held_is_let_go_of(dragged):
+def test_a_handle_erased_during_a_drag_is_released(dragged):
     dragged.drag("start")
     dragged.handles.on_update(InteractiveMarkerUpdate(erases=["a"]))
     dragged.handles.keep((1,))
     assert dragged.kinds == [Feedback.MOUSE_DOWN, Feedback.MOUSE_UP]
     dragged.drag("start")
-    assert len(dragged.said) == 2, "there is none"
+    assert len(dragged.feedback) == 2, "an erased handle cannot be dragged"
 
 
 GOOD = {"drag": "move", "server": "markers", "name": "a", "pose": [1, 2, 3, 0, 0, 0, 2]}
 
 
-def test_what_a_browser_says_of_a_drag_is_read():
+def test_a_drag_message_is_parsed():
     assert read_drag(GOOD) == Drag("markers", "a", "move", (1, 2, 3, 0, 0, 0, 1))
 
 
@@ -136,7 +136,7 @@ def test_what_a_browser_says_of_a_drag_is_read():
         ),
     ],
 )
-def test_what_is_wrong_with_a_drag_is_said(wrong, words):
+def test_an_invalid_drag_message_is_refused(wrong, words):
     with pytest.raises(ValueError, match=words):
         read_drag({**GOOD, **wrong})
 
@@ -152,7 +152,7 @@ def test_what_is_wrong_with_a_drag_is_said(wrong, words):
         ({"newtons": True}, "newtons = True: must be"),
     ],
 )
-def test_what_is_wrong_with_a_push_is_said(wrong, words):
+def test_an_invalid_push_message_is_refused(wrong, words):
     good = {"push": "drone", "ray": [1, 0, 0], "newtons": 0.5}
     assert read_push(good) == ("drone", [1, 0, 0], 0.5)
     with pytest.raises(ValueError, match=words):

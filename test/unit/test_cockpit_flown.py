@@ -1,4 +1,4 @@
-"""Where a script of the cockpit flies, what happens to it there, and how it is graded, without a browser."""
+"""The scene in which the cockpit runs a script, the timeline of a task, and grading, without a browser."""
 
 import shutil
 import threading
@@ -30,30 +30,30 @@ def _ask(tmp_path, monkeypatch):
     return Asked(ScriptStore(tmp_path / "mine"))
 
 
-# ---- where they fly
+# ---- the scene of a run
 
 
 @pytest.mark.parametrize("name", tasks.names())
-def test_a_tasks_scene_is_what_its_plan_says(name, tmp_path):
+def test_the_scene_of_a_task_has_the_parameters_of_its_plan(name, tmp_path):
     plan = plans.read(tasks.find(name))
-    wanted, file = plan.parameters(), lesson_scenes.scene_of(plan, tmp_path)
-    found = parameters.load({"scene_file": file})
-    assert found.model_dump(exclude={"vehicles", "scene_file"} | _carried(found)) == wanted.model_dump(
-        exclude={"vehicles", "scene_file"} | _carried(found)
+    expected, file = plan.parameters(), lesson_scenes.scene_of(plan, tmp_path)
+    settings = parameters.load({"scene_file": file})
+    assert settings.model_dump(exclude={"vehicles", "scene_file"} | keys_of_vehicles(settings)) == expected.model_dump(
+        exclude={"vehicles", "scene_file"} | keys_of_vehicles(settings)
     )
-    assert [one.model_dump() for one in found.fleet] == [one.model_dump() for one in wanted.fleet]
-    said = lesson_scenes.describe_scene_of(plan)
-    assert "/" not in said.replace("m/s", "") and ("The wind blows" in said) == any(wanted.weather.wind)
-    assert plan.name in said and not any(one.startswith("=") for one in said.split(", "))
+    assert [one.model_dump() for one in settings.fleet] == [one.model_dump() for one in expected.fleet]
+    reply = lesson_scenes.describe_scene_of(plan)
+    assert "/" not in reply.replace("m/s", "") and ("The wind blows" in reply) == any(expected.weather.wind)
+    assert plan.name in reply and not any(one.startswith("=") for one in reply.split(", "))
 
 
-def _carried(found):
-    """What the vehicles carry themselves; the keys at the top are of none then."""
-    return set(type(found.fleet[0]).model_fields) & set(type(found).model_fields) if found.vehicles else set()
+def keys_of_vehicles(settings):
+    """Return the keys that each vehicle has itself; the same keys at the top level then apply to no vehicle."""
+    return set(type(settings.fleet[0]).model_fields) & set(type(settings).model_fields) if settings.vehicles else set()
 
 
 @pytest.mark.parametrize("name", tasks.names())
-def test_what_a_task_begins_with_flies(name, tmp_path):
+def test_the_start_script_of_every_task_flies(name, tmp_path):
     plan = plans.read(tasks.find(name))
     start = ScriptStore(tmp_path).find(f"tasks/{name}.py")
     simulation = Simulation(plan.parameters(changes={"script": str(start.path)}))
@@ -62,7 +62,7 @@ def test_what_a_task_begins_with_flies(name, tmp_path):
     simulation.close()
 
 
-def test_run_writes_the_script_into_a_scene_that_names_one_and_stops_first(ask):
+def test_run_stops_and_sets_the_script_of_a_scene_that_has_a_script(ask):
     assert ask("scripts")["flown"] == "built-in/pilot.py"
     ask.scene.own_script = "target"
     assert ask("scripts")["flown"] == "built-in/target.py"
@@ -70,14 +70,14 @@ def test_run_writes_the_script_into_a_scene_that_names_one_and_stops_first(ask):
     assert ask.node.asked == ["stop", "restart"]
     assert ask("scripts")["flown"] == "tutorial/2_elevation.py"
     ask.scene.own_script, ask.scene.has_no_vehicle = "", True
-    assert ask("scripts")["flown"] == "", "nothing flies"
+    assert ask("scripts")["flown"] == "", "the scene has no vehicle"
 
 
-def test_a_task_brings_its_scene_and_leaving_it_brings_back_the_users(ask, tmp_path):
+def test_a_task_loads_its_scene_and_leaving_the_task_restores_the_users(ask, tmp_path):
     node = ask.node
     node.parameters["scene_file"] = "mine.yaml"
-    said = ask("run", script="tasks/hover.py", lesson="tasks/hover")
-    assert said["done"] and said["said"] == "started in the scene of the task hover"
+    reply = ask("run", script="tasks/hover.py", lesson="tasks/hover")
+    assert reply["done"] and reply["said"] == "started in the scene of the task hover"
     assert "The wind blows with 2.7 m/s" in ask("lesson", lesson="tasks/hover")["flies"]
     assert node.parameters == {
         "scene_file": str(tmp_path / ".ros/drone_sim/tasks/hover.yaml"),
@@ -86,8 +86,8 @@ def test_a_task_brings_its_scene_and_leaving_it_brings_back_the_users(ask, tmp_p
     ask("run", script="tutorial/4_pitch.py", lesson="stage-4-pitch")
     assert node.parameters["scene_file"] == str(package_path() / "config/scenes/empty.yaml")
     assert ask("lesson", lesson="stage-1-constant-thrust")["flies"] == "again in mine.yaml"
-    said = ask("run", script="tutorial/1_thrust.py", lesson="stage-1-constant-thrust")["said"]
-    assert said == "started again in mine.yaml"
+    reply = ask("run", script="tutorial/1_thrust.py", lesson="stage-1-constant-thrust")["said"]
+    assert reply == "started again in mine.yaml"
     assert node.parameters["scene_file"] == "mine.yaml"
     node.asked.clear()
     assert ask("run", script="tutorial/2_elevation.py", lesson="")["said"] == "restart"
@@ -95,7 +95,7 @@ def test_a_task_brings_its_scene_and_leaving_it_brings_back_the_users(ask, tmp_p
 
 
 @pytest.mark.parametrize(("file", "is_modified"), [("", True), ("mine.yaml", True), ("mine.yaml", False)])
-def test_run_goes_back_to_changes_that_are_not_saved_and_to_a_scene_that_names_a_script(ask, file, is_modified):
+def test_run_restores_the_users_scene_with_unsaved_changes_and_its_script(ask, file, is_modified):
     node, scene = ask.node, ask.scene
     node.parameters["scene_file"] = file
     scene.own_script, scene.is_modified = "pilot", is_modified
@@ -112,7 +112,7 @@ def test_run_goes_back_to_changes_that_are_not_saved_and_to_a_scene_that_names_a
     assert node.asked == ["stop", "stop", "restart"]
 
 
-def test_a_page_that_can_ask_is_told_when_run_would_leave_the_users_scene(ask):
+def test_run_asks_for_confirmation_before_it_leaves_the_users_scene(ask):
     assert ask("run", script="tutorial/4_pitch.py", lesson="stage-4-pitch", may_ask=True)["done"]
     ask.node.parameters["scene_file"], ask.scene.is_own = "mine.yaml", True
     assert ask("run", script="tutorial/1_thrust.py", lesson="stage-1-constant-thrust", may_ask=True)["done"]
@@ -123,17 +123,17 @@ def test_a_page_that_can_ask_is_told_when_run_would_leave_the_users_scene(ask):
         "leaves": "the scene of the task hover"
     }
     assert ask("run", script="tasks/hover.py", lesson="tasks/hover", may_ask=False)["done"]
-    assert ask("run", script="tasks/hover.py", lesson="tasks/hover", may_ask=True)["done"], "it is there already"
+    assert ask("run", script="tasks/hover.py", lesson="tasks/hover", may_ask=True)["done"], "this scene is loaded"
 
 
-def test_a_scene_that_the_user_has_chosen_meanwhile_stays(ask):
+def test_a_scene_chosen_by_the_user_during_a_task_stays(ask):
     ask("run", script="tasks/gates.py", lesson="tasks/gates")
     ask.node.parameters["scene_file"] = "other.yaml"
     assert ask("run", script="tutorial/2_elevation.py", lesson="")["said"] == "restart"
     assert ask.node.parameters["scene_file"] == "other.yaml"
 
 
-def test_a_script_that_fails_in_a_tasks_scene_is_shown_at_its_line_and_one_that_has_no_scene_leaves_all_as_it_was(ask):
+def test_run_shows_a_script_error_and_keeps_the_scene_if_loading_fails(ask):
     ask.node.fails = {"load_scene": f"[init] {_start('gates')}:7: NameError: x"}
     failed = ask("run", script="tasks/gates.py", lesson="tasks/gates")
     assert not failed["done"] and failed["failure"]["line"] == 7 and "gates.yaml" in ask.node.parameters["scene_file"]
@@ -143,42 +143,42 @@ def test_a_script_that_fails_in_a_tasks_scene_is_shown_at_its_line_and_one_that_
     assert ask.node.parameters["scene_file"] == "mine.yaml"
 
 
-def test_the_easiest_task_is_the_first_and_each_says_how_hard_it_is(ask):
-    listed = [lesson for lesson in ask("scripts")["lessons"] if lesson["task"]]
-    assert {lesson["task"] for lesson in listed} == set(tasks.names()) and listed[0]["task"] == "hover"
-    hardness = [("easy", "medium", "hard").index(lesson["difficulty"]) for lesson in listed]
-    assert hardness[0] == 0 and all(lesson["summary"] and lesson["time"].endswith(("min", "h")) for lesson in listed)
+def test_the_easiest_task_is_first_and_every_task_has_a_difficulty(ask):
+    lessons = [lesson for lesson in ask("scripts")["lessons"] if lesson["task"]]
+    assert {lesson["task"] for lesson in lessons} == set(tasks.names()) and lessons[0]["task"] == "hover"
+    hardness = [("easy", "medium", "hard").index(lesson["difficulty"]) for lesson in lessons]
+    assert hardness[0] == 0 and all(lesson["summary"] and lesson["time"].endswith(("min", "h")) for lesson in lessons)
 
 
-def test_a_task_of_the_course_is_listed_with_text_script_and_picture(ask, tmp_path, monkeypatch):
+def test_a_task_of_the_course_is_listed_with_its_text_script_and_picture(ask, tmp_path, monkeypatch):
     monkeypatch.setenv("DRONE_SIM_TASKS", str(tmp_path))
     shutil.copytree(tasks.folder() / "hover", tmp_path / "waltz")
     (tmp_path / "waltz" / "README.md").write_text("# Waltz\n\n![a picture](picture.png)\n")
-    listed = {lesson["task"]: lesson["title"] for lesson in ask("scripts")["lessons"]}
-    assert listed["waltz"] == "Waltz"
+    lessons = {lesson["task"]: lesson["title"] for lesson in ask("scripts")["lessons"]}
+    assert lessons["waltz"] == "Waltz"
     lesson = ask("lesson", lesson="tasks/waltz")
     assert lesson["script"] == "tasks/waltz.py" and lesson["flies"]
     assert ask("open", script="tasks/waltz.py")["text"] == Path(_start("hover")).read_text()
     assert LESSONS.picture("/tasks/waltz/picture.png")[1] == (tmp_path / "waltz" / "picture.png").read_bytes()
 
 
-def test_a_task_with_a_folder_of_the_course_is_handed_in(ask, tmp_path, monkeypatch):
+def test_a_task_is_handed_in_if_the_course_has_a_folder_for_it(ask, tmp_path, monkeypatch):
     monkeypatch.setenv("DRONE_SIM_HAND_IN", str(tmp_path))
     (tmp_path / "hover").mkdir()
     assert [lesson["task"] for lesson in ask("scripts")["lessons"] if lesson["hands_in"]] == ["hover"]
-    said = ask("hand in", script="tasks/hover.py", lesson="tasks/hover")
+    reply = ask("hand in", script="tasks/hover.py", lesson="tasks/hover")
     (copy,) = (tmp_path / "hover").iterdir()
-    assert copy.read_text() == Path(_start("hover")).read_text() and said["digest"] in copy.name
+    assert copy.read_text() == Path(_start("hover")).read_text() and reply["digest"] in copy.name
     for lesson, words in (("tasks/gates", "cannot be handed in now"), ("stage-2-elevation", "needs a task")):
         with pytest.raises(ValueError, match=words):
             ask("hand in", script="tasks/hover.py", lesson=lesson)
 
 
-def test_a_script_is_graded_in_a_process_of_its_own(ask):
-    begun = ask("grade", script="tasks/hover.py", lesson="tasks/hover")
+def test_a_script_is_graded_while_the_page_polls_for_the_result(ask):
+    started = ask("grade", script="tasks/hover.py", lesson="tasks/hover")
     with pytest.raises(ScriptStoreError, match="another script is being graded"):
         ask("grade", script="tasks/hover.py", lesson="tasks/hover")
-    while "problem" not in (result := ask("graded", number=begun["number"])):
+    while "problem" not in (result := ask("graded", number=started["number"])):
         assert result["seeds"] == 3 and 0 <= result["flights"] <= 3
         time.sleep(0.02)
     assert (result["problem"], result["points"], result["of"]) == ("", 3.0, 6.0)
@@ -194,7 +194,7 @@ def test_a_script_is_graded_in_a_process_of_its_own(ask):
         ask("graded", number=-1)
 
 
-def test_a_grading_that_does_not_end_is_ended(monkeypatch, tmp_path):
+def test_a_grading_that_exceeds_the_timeout_is_ended(monkeypatch, tmp_path):
     monkeypatch.setattr(task_flights, "_TIMEOUT", 0.0)
     one = task_flights.Grader()
     number = one.start("hover", tmp_path / "x.py")
@@ -203,11 +203,11 @@ def test_a_grading_that_does_not_end_is_ended(monkeypatch, tmp_path):
     assert result == {"problem": "it took more than 0 s"}
 
 
-def test_a_master_that_has_gone_is_one_line(ask, monkeypatch):
-    def gone(*_):
+def test_a_master_that_is_down_is_reported_as_an_error(ask, monkeypatch):
+    def refuse(*_):
         raise rospy.ROSException("no master")
 
-    monkeypatch.setattr(ask.node, "parameter", gone)
+    monkeypatch.setattr(ask.node, "parameter", refuse)
     with pytest.raises(ValueError, match="no master"):
         ask("scripts")
 
@@ -216,11 +216,11 @@ def _start(name):
     return str(Path(tasks.folder()) / name / "start.py")
 
 
-# ---- what a task's plan says happens
+# ---- the timeline of a task
 
 
 class Topics:
-    """The subscribers and publishers that were made, and what was published."""
+    """The subscribers and publishers that were created, and the published messages."""
 
     def __init__(self):
         self.hears, self.sent = {}, []
@@ -249,12 +249,12 @@ def _topics(monkeypatch):
     return topics
 
 
-def test_what_happens_in_a_task_is_sent_by_the_count_of_steps(topics):
+def test_the_timeline_of_a_task_is_sent_at_its_steps(topics):
     player = TimelinePlayer("/drone_sim")
     player.prepare(plans.read(tasks.find("steps")))
-    assert not topics.hears, "nothing is listened to before it flies"
+    assert not topics.hears, "no topic is subscribed before the flight"
     player.begin()
-    stamps = [100 + 0.06 * step for step in range(25) for _ in range(2)]  # twice each: it stood still in between
+    stamps = [100 + 0.06 * step for step in range(25) for _ in range(2)]  # each stamp comes twice, as after a pause
     for stamp in stamps:
         topics.hears["/drone/odom"](Odometry(header=Header(stamp=rospy.Time.from_sec(stamp))))
         if len(topics.sent) == 1:
@@ -270,14 +270,14 @@ def test_what_happens_in_a_task_is_sent_by_the_count_of_steps(topics):
         player.end()
     player.prepare(plans.read(tasks.find("gates")))
     player.begin()
-    assert not topics.hears, "nothing happens in this one"
+    assert not topics.hears, "this task has no timeline"
 
 
-def test_a_state_from_before_the_flight_ends_nothing(topics):
+def test_a_latched_state_from_before_the_flight_does_not_end_the_timeline(topics):
     topics.latched["/drone_sim/state"] = String("stopped")
     player = TimelinePlayer("/drone_sim")
     player.prepare(plans.read(tasks.find("steps")))
-    beginning = threading.Thread(target=player.begin, daemon=True)  # which could wait for itself for ever
+    beginning = threading.Thread(target=player.begin, daemon=True)  # `begin` could deadlock
     beginning.start()
     beginning.join(10)
     assert not beginning.is_alive() and set(topics.hears) == {"/drone/odom", "/drone_sim/state"}

@@ -1,4 +1,4 @@
-"""Variables and breakpoints between the simulation and the browsers, without either of them."""
+"""ScriptInspector, which passes variables and breakpoints between simulation and browsers, without either of them."""
 
 import json
 
@@ -14,7 +14,7 @@ from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 
 
 class Topic:
-    """A publisher or subscriber of nobody's, which remembers."""
+    """A publisher or subscriber without ROS that records what is published."""
 
     there = None
 
@@ -35,7 +35,7 @@ class Topic:
 
 @pytest.fixture(name="now")
 def _now(monkeypatch):
-    """The monotonic clock, in a list; topics are nobody's."""
+    """The time of the monotonic clock, in a list; topics need no ROS."""
     now = [100.0]
     monkeypatch.setattr(inspection.time, "monotonic", lambda: now[0])
     monkeypatch.setattr(Topic, "there", {})
@@ -63,13 +63,13 @@ def listens(topic):
     return f"/sim/{topic}" in Topic.there
 
 
-def test_breakpoints_of_all_pages_are_published_and_go_with_them(inspector, now, tmp_path):
+def test_breakpoints_of_all_pages_are_published_and_removed_with_their_page(inspector, now, tmp_path):
     ask(inspector, breakpoints={"mine/a.py": [3, 1], "mine/gone.py": [1]})
     ask(inspector, page="two", breakpoints={"mine/a.py": [2, 3]})
     inspector.update(True)
     published = Topic.there["/sim/breakpoints"].published
     file = str(tmp_path / "a.py")
-    assert published == [{file: [1, 3]}, {file: [1, 2, 3]}] and listens("variables") and listens("names"), "at once"
+    assert published == [{file: [1, 3]}, {file: [1, 2, 3]}] and listens("variables") and listens("names"), "immediately"
     ask(inspector, page="two", breakpoints={})
     assert published[2:] == [{file: [1, 3]}]
     now[0] += 100.0
@@ -77,7 +77,7 @@ def test_breakpoints_of_all_pages_are_published_and_go_with_them(inspector, now,
     assert published[3:] == [{}] and not listens("variables") and not listens("names")
 
 
-def test_nobody_listens_where_nobody_looks(inspector, now, told):
+def test_topics_are_subscribed_only_while_a_page_needs_them(inspector, now, told):
     ask(inspector, looks=False)
     inspector.update(True)
     assert not listens("variables") and listens("names") and not listens("breakpoints")
@@ -86,31 +86,31 @@ def test_nobody_listens_where_nobody_looks(inspector, now, told):
     take = Topic.there["/sim/variables"].callback
     now[0] += 5.0
     inspector.update(True)
-    take(String(json.dumps({"state": "paused"})))  # rospy's thread had it already
+    take(String(json.dumps({"state": "paused"})))  # rospy's thread had already fetched the callback
     assert not listens("variables") and told == [{"variables": None}]
     inspector.update(False)
     assert not listens("names")
 
 
-def test_what_flies_is_told_only_where_somebody_follows_it(inspector, told):
+def test_variables_in_flight_are_sent_only_to_pages_that_follow_them_live(inspector, told):
     ask(inspector, looks=True)
     inspector.update(True)
 
-    def say(state):
+    def publish_state(state):
         Topic.there["/sim/variables"].callback(String(data=json.dumps({"state": state})))
-        return [one["variables"]["state"] for one in told]
+        return [sent_message["variables"]["state"] for sent_message in told]
 
     for state in ("flying", "paused", "flying", "flying", "flying"):
-        said = say(state)
-    assert said[1:] == ["paused", "flying"], "and that it goes on"
+        said = publish_state(state)
+    assert said[1:] == ["paused", "flying"], "changes of the state are sent"
     ask(inspector, looks=True, live=True)
-    assert say("flying")[3:] == ["flying"]
+    assert publish_state("flying")[3:] == ["flying"]
     for nonsense in ("[1]", "{", "[" * 100_000, "x" * (1 << 21)):
         Topic.there["/sim/variables"].callback(String(data=nonsense))
     assert len(told) == 4
 
 
-def test_names_reach_the_page(inspector):
+def test_names_of_objects_and_parameters_reach_the_page(inspector):
     assert ask(inspector) == {"objects": [], "parameters": []}
     inspector.update(True)
     for names in ({"objects": ["Floor"], "parameters": ["Kz"]}, {"objects": [1]}, []):
@@ -128,6 +128,6 @@ def test_names_reach_the_page(inspector):
         ({"breakpoints": {"mine/a.py": list(range(501))}}, "at most 500"),
     ],
 )
-def test_what_a_browser_must_not_ask(inspector, message, said):
+def test_an_invalid_request_is_refused(inspector, message, said):
     with pytest.raises(ValueError, match=said):
         ask(inspector, **message)

@@ -1,4 +1,4 @@
-"""What the page's panels show, and what their buttons ask for, without a browser."""
+"""The contents of the page's panels and the requests of their buttons, without a browser."""
 
 import re
 
@@ -23,7 +23,7 @@ from drone_sim.run import parameters
 HOSTILE = "<script>alert(1)</script>"
 
 
-def test_a_board_tells_what_changes_once_and_a_new_browser_everything():
+def test_a_board_sends_each_change_once_and_its_whole_content_on_request():
     told = []
     board = Board(told.append)
     for status in ("flying", "flying", "paused"):
@@ -44,9 +44,9 @@ def _board():
 
 @pytest.fixture(name="server")
 def _server(monkeypatch):
-    """A vehicle's server, which takes what it is asked for, but a wind."""
-    known = tunables(parameters.load().fleet[0], {"speed": 1.0})
-    values = {name: one.kind(one.choices[0] if one.choices else one.low or 0) for name, one in known.items()}
+    """A dynamic_reconfigure server of a vehicle that accepts all changes except of the weather."""
+    descriptions = tunables(parameters.load().fleet[0], {"speed": 1.0})
+    values = {name: one.kind(one.choices[0] if one.choices else one.low or 0) for name, one in descriptions.items()}
     values = {name: 0.0 if value == float("-inf") else value for name, value in values.items()}
 
     def reconfigure(_server, name, value):
@@ -55,7 +55,7 @@ def _server(monkeypatch):
         return encode_config(values)
 
     monkeypatch.setattr(tuning_module, "reconfigure", reconfigure)
-    return encode_description(described(known, values, "limits")), values
+    return encode_description(described(descriptions, values, "limits")), values
 
 
 @pytest.fixture(name="tuning")
@@ -66,7 +66,7 @@ def _tuning(board, server):
     return tuning
 
 
-def test_parameters_are_offered_in_groups_with_unit_and_ends(tuning, board):
+def test_parameters_are_offered_in_groups_with_unit_and_limits(tuning, board):
     groups = {one["group"]: one["fields"] for one in board.get("tuning")}
     field = next(one for one in groups["Gains"] if one["name"] == "Kzref")
     assert field["unit"] == "(m/s) per m" and (field["low"], field["high"]) == (0, 10000)
@@ -92,14 +92,14 @@ def test_a_wrong_value_gets_one_line(tuning, name, value, said):
         tuning.set({"name": name, "value": value})
 
 
-def test_numbers_are_taken_as_they_are(tuning, board):
+def test_numbers_are_set_without_rounding(tuning, board):
     for value in (2.5, 3, 0.123456789):
         assert tuning.set({"name": "Kzref", "value": value})["value"] == value
         assert board.get("values")["Kzref"] == value
     assert tuning.set({"name": "cameras/front/every", "value": 2.0}) == {"said": "cameras/front/every = 2", "value": 2}
 
 
-def test_the_speed_follows_what_others_set(board, monkeypatch):
+def test_the_speed_follows_changes_by_other_clients(board, monkeypatch):
     speed = SpeedControl(board, "/drone_sim")
     speed.on_set(encode_config({"real_time_factor": 3.7}))
     assert board.get("speed") == 3.7
@@ -113,7 +113,7 @@ def test_the_speed_follows_what_others_set(board, monkeypatch):
     assert decode_config(encode_config({"real_time_factor": 2.0}))["real_time_factor"] == 2.0
 
 
-# ---- buttons, and what the simulation says
+# ---- buttons, logs and diagnostics
 
 
 class Simulator:
@@ -152,7 +152,7 @@ def _panel(tmp_path, told):
     return panel
 
 
-def test_buttons_call_services_and_tell_what_they_say(panel):
+def test_buttons_call_services_and_return_their_messages(panel):
     ask = panel.answers
     assert ask["call"]({"call": "pause"}) == {"done": True, "said": "pause said"}
     assert ask["call"]({"call": "resume"})["done"] and ask["call"]({"call": "step"})["done"] is False
@@ -176,30 +176,30 @@ def test_buttons_call_services_and_tell_what_they_say(panel):
         ("scene", {"scene": {}}),
     ],
 )
-def test_what_there_is_not_is_refused_in_one_line(panel, ask, message):
+def test_a_request_for_an_unknown_name_gets_one_line(panel, ask, message):
     with pytest.raises(ValueError, match=rf"^{ask} = [^\n]*: does not exist; "):
         panel.answers[ask](message)
     assert not panel._simulator.asked
 
 
-def test_what_the_simulation_says_is_shown_as_text(panel, told, monkeypatch):
+def test_logs_and_diagnostics_of_the_simulation_are_shown_as_text(panel, told, monkeypatch):
     monkeypatch.setattr("rospy.Subscriber", lambda *_, **__: None)
-    heard = []
-    monkeypatch.setattr(panel.pulse, "hear", lambda: heard.append(True))
+    pulses = []
+    monkeypatch.setattr(panel.pulse, "hear", lambda: pulses.append(True))
     panel.listen(True)
     panel._on_log(Log(name="/other", msg="not ours"))
     panel._on_log(Log(name="/drone_sim", msg=HOSTILE, level=Log.WARN))
     assert panel.board.whole({})["lines"] == [f"warning: {HOSTILE}"]
     panel._on_log(Log(name="/drone_sim", msg="[actuation] /a.py:3: ZeroDivisionError", level=Log.ERROR))
     assert told[-1]["failure"]["line"] == 3
-    found = [
+    statuses = [
         DiagnosticStatus(0, "drone_sim: simulation", "flying", "", [KeyValue("real-time factor", "0.98")]),
         DiagnosticStatus(1, "drone_sim: vehicle drone", "upside down", "", []),
         DiagnosticStatus(2, "another: node", "broken", "", []),
     ]
-    panel._on_diagnostics(DiagnosticArray(status=found))
+    panel._on_diagnostics(DiagnosticArray(status=statuses))
     assert panel.board.get("pace") == "0.98"
-    assert len(heard) == 3, "what other nodes say is no sign of life"
+    assert len(pulses) == 3, "messages of other nodes are no sign of life"
     assert panel.board.get("diagnosis") == [
         {"of": "vehicle drone", "said": "upside down", "wrong": True},
         {"of": "simulation", "said": "flying", "wrong": False},

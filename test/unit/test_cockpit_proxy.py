@@ -1,4 +1,4 @@
-"""The cockpit behind a proxy of the same user: a UNIX socket, which needs no token but that user."""
+"""The cockpit behind a proxy of the same user, on a UNIX socket that checks the user instead of a token."""
 
 import http.client
 import os
@@ -37,7 +37,7 @@ async def serve(page):
 
 @pytest.fixture(name="path", scope="module")
 def _path():
-    """The socket of a cockpit whose starter is a proxy; everybody may write to it."""
+    """The path of a cockpit's UNIX socket; its file permissions let every user write to it."""
     folder = tempfile.mkdtemp()
     os.chmod(folder, 0o755)
     path = f"{folder}/socket"
@@ -52,7 +52,7 @@ def _path():
 
 @pytest.fixture(name="direct", scope="module")
 def _direct():
-    """Two cockpits for browsers, each with its own token, as of neighbours on a machine."""
+    """Two cockpits on TCP ports, each with its own token, as of two users of one machine."""
     servers = [PageServer("127.0.0.1", 0) for _ in range(2)]
     for server in servers:
         server.begin(serve, lambda _: None)
@@ -67,51 +67,51 @@ def answer_of(connection, path="/", **headers):
     return answer, answer.read()
 
 
-def through(path):
+def connect_to_socket(path):
     connection = http.client.HTTPConnection(HUB, timeout=60)
     connection.sock = socket.socket(socket.AF_UNIX)
     connection.sock.connect(path)
     return connection
 
 
-def opens(path, origin, host=HUB):
+def can_open_socket(path, origin, host=HUB):
     try:
-        with unix_connect(path, f"ws://{host}/socket", subprotocols=[SUBPROTOCOL], origin=origin) as one:
-            return one.recv(timeout=60) == "{}"
+        with unix_connect(path, f"ws://{host}/socket", subprotocols=[SUBPROTOCOL], origin=origin) as websocket:
+            return websocket.recv(timeout=60) == "{}"
     except InvalidStatus as refused:
         assert refused.response.status_code == 403
         return False
 
 
 def test_the_proxy_of_the_same_user_needs_no_token(path):
-    answer, page = answer_of(through(path))
+    answer, page = answer_of(connect_to_socket(path))
     assert answer.status == 200 and b"cockpit.js" in page and "Set-Cookie" not in answer.headers
     policy = answer.headers["Content-Security-Policy"]
     assert f"wss://{HUB}" in policy and "frame-ancestors 'self'" in policy
-    assert answer_of(through(path), "/return")[0].status == 404, "there are no other ways in"
+    assert answer_of(connect_to_socket(path), "/return")[0].status == 404, "a UNIX socket has no return pass"
 
 
 @pytest.mark.parametrize("origin", [f"http://{HUB}", f"https://{HUB}"])
 def test_the_page_opens_its_socket_through_the_proxy(path, origin):
-    assert opens(path, origin)
+    assert can_open_socket(path, origin)
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", f"http://{HUB}.evil.example", f"http://{HUB}:81"])
 def test_a_page_of_another_origin_opens_no_socket_through_the_proxy(path, origin):
-    assert not opens(path, origin)
+    assert not can_open_socket(path, origin)
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can be another user")
-def test_another_user_is_refused_though_the_file_system_lets_it(path, direct):
-    """Its own cookie, and headers of a proxy, do not help."""
-    neighbour = f"drone_sim_{direct[0].port}={direct[0].address.partition('=')[2]}"
-    for cookie in ("", neighbour):
-        asked = ["/usr/bin/python3", "-S", "-c", STATUS_FOR, path, "/", cookie]  # which others may run, too
-        seen = subprocess.run(asked, user="nobody", cwd="/", capture_output=True, text=True, check=False, timeout=60)
-        assert seen.stdout.strip() == "403", seen.stderr
+def test_another_user_is_refused_although_the_socket_file_is_writable(path, direct):
+    """Neither the cookie of its own cockpit nor the headers of a proxy give access."""
+    neighbours_cookie = f"drone_sim_{direct[0].port}={direct[0].address.partition('=')[2]}"
+    for cookie in ("", neighbours_cookie):
+        command = ["/usr/bin/python3", "-S", "-c", STATUS_FOR, path, "/", cookie]  # every user may run it
+        child = subprocess.run(command, user="nobody", cwd="/", capture_output=True, text=True, check=False, timeout=60)
+        assert child.stdout.strip() == "403", child.stderr
 
 
-def test_a_neighbours_cookie_and_a_proxys_headers_open_nothing_without_the_proxy(direct):
+def test_another_users_cookie_and_proxy_headers_are_refused_on_the_tcp_port(direct):
     ours, neighbours = direct
     token = neighbours.address.partition("=")[2]
     for port in (ours.port, neighbours.port):
@@ -125,7 +125,7 @@ def test_a_neighbours_cookie_and_a_proxys_headers_open_nothing_without_the_proxy
         assert answer.status == 403 and b"token" in body
 
 
-def test_a_forwarded_host_does_not_make_another_origin_ours(direct):
+def test_a_forwarded_host_does_not_allow_another_origin(direct):
     server = direct[0]
     cookie = f"drone_sim_{server.port}={server.address.partition('=')[2]}"
     headers = {"Cookie": cookie, "X-Forwarded-Host": "evil.example", "Forwarded": "host=evil.example"}
@@ -134,18 +134,18 @@ def test_a_forwarded_host_does_not_make_another_origin_ours(direct):
         connect(address, subprotocols=[SUBPROTOCOL], additional_headers=headers, origin="http://evil.example")
 
 
-def test_the_token_is_kept_for_the_folder_of_the_page(direct):
-    """Behind a prefix that the server does not know, it is not sent to the prefixes of others."""
+def test_the_cookie_is_limited_to_the_folder_of_the_page(direct):
+    """Behind a URL prefix, which the server does not know, browsers do not send it to the prefixes of other users."""
     server = direct[0]
     query = server.address.partition("/?")[2]
     answer, _ = answer_of(http.client.HTTPConnection(f"127.0.0.1:{server.port}", timeout=60), f"/?{query}")
     assert answer.status == 303 and answer.headers["Location"] == "./"
     assert "path" not in answer.headers["Set-Cookie"].lower()
     answer, _ = answer_of(http.client.HTTPConnection(f"127.0.0.1:{server.port}", timeout=60), f"/mesh/a?{query}")
-    assert answer.status == 403 and "Set-Cookie" not in answer.headers, "it would be kept for another folder"
+    assert answer.status == 403 and "Set-Cookie" not in answer.headers, "the cookie would belong to another folder"
 
 
-def test_a_socket_that_cannot_be_made_is_told():
+def test_a_socket_that_cannot_be_created_is_reported():
     with pytest.raises(AddressError, match=r"^socket = /nowhere/socket: No such file"):
         PageServer("127.0.0.1", 8080, "/nowhere/socket")
     with pytest.raises(ValueError, match=r"^socket = 5: must be the name of a UNIX socket"):

@@ -1,4 +1,4 @@
-"""The scene's editor between the node and the browsers, without either of them."""
+"""SceneBackend, which passes the scene editor's messages between node and browsers, without either of them."""
 
 import base64
 import json
@@ -26,7 +26,7 @@ class Answer:
 
 @pytest.fixture(name="asked")
 def _asked(monkeypatch):
-    """What the node is asked; it agrees to all but texts with a mistake."""
+    """The requests that the node receives; it accepts all of them except the text 'wrong'."""
     asked = []
 
     def ask(text):
@@ -48,33 +48,33 @@ def _told():
 
 @pytest.fixture(name="editing")
 def _editing(asked, told, tmp_path):
-    made = SceneBackend("/sim", tmp_path, told.append)
-    made.subscribe(True)
-    return made
+    backend = SceneBackend("/sim", tmp_path, told.append)
+    backend.subscribe(True)
+    return backend
 
 
-def say(version, since, objects=(), gone=(), **more):
-    said = {"version": version, "since": since, "revision": version, "objects": [*objects], "gone": [*gone], **more}
-    Topic.there["/sim/scene_objects"].callback(String(json.dumps(said)))
+def publish_objects(version, since, objects=(), gone=(), **more):
+    payload = {"version": version, "since": since, "revision": version, "objects": [*objects], "gone": [*gone], **more}
+    Topic.there["/sim/scene_objects"].callback(String(json.dumps(payload)))
 
 
 def tree(editing):
     return editing.answers["tree"]({})["tree"]
 
 
-def test_a_browser_that_comes_late_gets_the_whole_tree(editing, told):
-    say(1, None, [ROW, {"handle": 4, "name": "Post"}])
-    say(2, 1, [{**ROW, "name": "Door"}], gone=[4])
+def test_a_new_browser_gets_the_whole_tree(editing, told):
+    publish_objects(1, None, [ROW, {"handle": 4, "name": "Post"}])
+    publish_objects(2, 1, [{**ROW, "name": "Door"}], gone=[4])
     assert tree(editing)["objects"] == [{**ROW, "name": "Door"}]
     assert tree(editing)["version"] == 2
     assert [one["tree"]["version"] for one in told] == [1, 2]
 
 
-def test_browsers_get_only_what_has_changed_of_a_row(editing, told):
-    say(1, None, [{**ROW, "pose": [0], "root": True, "vehicle": "drone"}])
+def test_browsers_get_only_the_changed_keys_of_a_row(editing, told):
+    publish_objects(1, None, [{**ROW, "pose": [0], "root": True, "vehicle": "drone"}])
     assert editing.scene[-1] == {"drone"}
-    say(2, 1, [{**ROW, "pose": [1], "root": True, "vehicle": "drone"}])
-    say(3, 2, [{**ROW, "pose": [1], "vehicle": ""}, {"handle": 4, "name": "Post"}])
+    publish_objects(2, 1, [{**ROW, "pose": [1], "root": True, "vehicle": "drone"}])
+    publish_objects(3, 2, [{**ROW, "pose": [1], "vehicle": ""}, {"handle": 4, "name": "Post"}])
     assert [one["tree"]["objects"] for one in told[1:]] == [
         [{"handle": 3, "pose": [1]}],
         [{"handle": 3, "root": None, "vehicle": ""}, {"handle": 4, "name": "Post"}],
@@ -82,18 +82,18 @@ def test_browsers_get_only_what_has_changed_of_a_row(editing, told):
     assert tree(editing)["objects"][0] == {**ROW, "pose": [1], "vehicle": ""} and editing.scene[-1] == set()
 
 
-def test_after_a_lost_message_the_whole_is_heard_anew(editing, told):
-    say(1, None, [ROW])
+def test_after_a_lost_message_the_whole_tree_is_requested_again(editing, told):
+    publish_objects(1, None, [ROW])
     before = Topic.there["/sim/scene_objects"]
-    say(3, 2, [], gone=[3])
+    publish_objects(3, 2, [], gone=[3])
     editing.subscribe(True)
     assert Topic.there["/sim/scene_objects"] is not before
-    say(4, None, [ROW])
+    publish_objects(4, None, [ROW])
     assert tree(editing)["version"] == 4
     assert [one["tree"]["version"] for one in told] == [1, 4]
 
 
-def test_edits_go_to_the_node_and_mistakes_come_back_with_their_line(editing, asked):
+def test_edits_are_sent_to_the_node_and_errors_are_returned_with_their_line(editing, asked):
     operation = {"do": "remove", "objects": [3]}
     assert editing.answers["edit"]({"edit": [operation], "name": "Remove", "id": 5})["revision"] == 1
     assert asked == [{"edit": [operation], "name": "Remove"}]
@@ -105,7 +105,7 @@ def test_edits_go_to_the_node_and_mistakes_come_back_with_their_line(editing, as
         editing.answers["open_scene"]({"file": 3})
 
 
-def test_a_scene_is_not_saved_over_another_one_unasked(editing, asked, tmp_path):
+def test_a_scene_overwrites_a_file_only_on_request(editing, asked, tmp_path):
     (tmp_path / "mine.yaml").write_text("objects: []\n")
     with pytest.raises(ValueError, match=r"mine is there already"):
         editing.answers["save_scene"]({"file": "mine"})
@@ -117,40 +117,40 @@ def test_a_scene_is_not_saved_over_another_one_unasked(editing, asked, tmp_path)
 DRONE = {"handle": 5, "name": "Drone", "root": True, "vehicle": "drone", "own_script": ""}
 
 
-def test_run_writes_the_script_into_a_scene_that_names_one(editing, asked):
+def test_run_sets_the_script_of_a_scene_that_has_a_script(editing, asked):
     assert not editing.has_no_vehicle and editing.own_script == ""
-    say(1, None, [ROW])
+    publish_objects(1, None, [ROW])
     assert editing.has_no_vehicle
-    say(2, 1, [{**DRONE, "own_script": "pilot"}])
+    publish_objects(2, 1, [{**DRONE, "own_script": "pilot"}])
     assert not editing.has_no_vehicle and editing.own_script == "pilot"
     editing.set_script(str(BUILT_IN / "pilot.py"))
-    assert asked == [], "the scene names it already"
+    assert asked == [], "the scene has this script already"
     editing.set_script(str(package_path() / "docs/tutorial/2_elevation.py"))
     values = {"script": "package://drone_sim/docs/tutorial/2_elevation.py"}
     assert asked == [{"edit": [{"do": "set", "object": 5, "values": values}], "name": "Fly 2_elevation.py"}]
 
 
-def test_a_saved_scene_keeps_the_script_that_was_run(editing, asked, monkeypatch, tmp_path):
+def test_saving_a_stopped_scene_stores_the_script_that_was_run(editing, asked, monkeypatch, tmp_path):
     monkeypatch.setattr(scene_backend.rospy, "get_param", lambda name, default: str(tmp_path / "mine.py"))
-    say(1, None, [DRONE], state="stopped")
+    publish_objects(1, None, [DRONE], state="stopped")
     editing.answers["save_scene"]({"file": "scene"})
     assert [next(iter(one)) for one in asked] == ["edit", "save"]
     assert asked[0]["edit"][0]["values"] == {"script": str(tmp_path / "mine.py")}
-    say(2, 1, [], state="flying")
+    publish_objects(2, 1, [], state="flying")
     editing.answers["save_scene"]({"file": "scene", "over": True})
     assert [next(iter(one)) for one in asked] == ["edit", "save", "save"], "stop would undo the edit"
 
 
-def test_models_have_pictures_and_own_ones_are_uploaded(editing, tmp_path):
+def test_models_have_pictures_and_a_model_can_be_uploaded(editing, tmp_path):
     groups = {one["name"]: one["models"] for one in editing.answers["models"]({})["groups"]}
     for one in [model for name in ("Shapes", "Arena", "Vehicles", "Sensors") for model in groups[name]]:
         kind, content = editing.models.picture(f"/{one['picture']}")
         assert (kind, content[:4]) == ("image/png", b"\x89PNG"), one
         assert len(content) < 8000
     content = base64.b64encode(b"solid").decode()
-    said = editing.answers["upload_model"]({"name": "chair.stl", "content": content})["model"]
-    assert said == {"do": "add_model", "model": str(tmp_path / "models/chair.stl")}
-    assert [one["op"] for one in editing.answers["models"]({})["groups"][-1]["models"]] == [said]
+    payload = editing.answers["upload_model"]({"name": "chair.stl", "content": content})["model"]
+    assert payload == {"do": "add_model", "model": str(tmp_path / "models/chair.stl")}
+    assert [one["op"] for one in editing.answers["models"]({})["groups"][-1]["models"]] == [payload]
     for name in ("../chair.stl", "chair.exe", "chair.stl"):
         with pytest.raises(ValueError, match=r"name: must|already"):
             editing.answers["upload_model"]({"name": name, "content": content})
@@ -164,7 +164,7 @@ GATES = "package://drone_sim/config/scenes/gates.yaml"
 
 
 @pytest.mark.parametrize("flown", [GATES, str(package_path() / "config/scenes/gates.yaml")])
-def test_a_shipped_scene_has_its_short_name_however_it_was_named(tmp_path, flown):
+def test_a_shipped_scene_is_listed_under_its_short_name(tmp_path, flown):
     scenes = SceneList(tmp_path)
     names, name = scenes.names(flown)
     assert name == "gates" and {"none", "empty", "gates", "room"} <= set(names)
@@ -172,17 +172,17 @@ def test_a_shipped_scene_has_its_short_name_however_it_was_named(tmp_path, flown
 
 
 @pytest.mark.parametrize("flown", ["", "none"])
-def test_no_scene_is_offered_first(tmp_path, flown):
+def test_the_first_entry_of_the_scene_list_is_none(tmp_path, flown):
     names, name = SceneList(tmp_path).names(flown)
     assert names[0] == name == SceneList(tmp_path).file(name) == "none"
 
 
-def test_a_scene_without_a_file_has_a_name_of_its_own(tmp_path):
+def test_a_new_scene_without_a_file_is_the_last_entry(tmp_path):
     names, name = SceneList(tmp_path).names(NEW_SCENE)
     assert names[-1] == name == NEW_SCENE and names[0] == "none"
 
 
-def test_scenes_of_the_folder_are_offered_as_ones_own_and_nothing_else_of_it(tmp_path):
+def test_only_scene_files_of_the_users_folder_are_listed(tmp_path):
     for file in ("yard.yaml", "Old.TTT", "pilot.py"):
         (tmp_path / file).touch()
     (tmp_path / "folder.yaml").mkdir()
@@ -193,7 +193,7 @@ def test_scenes_of_the_folder_are_offered_as_ones_own_and_nothing_else_of_it(tmp
 
 
 @pytest.mark.parametrize("flown", ["/elsewhere/hall.yaml", "\0", "package://nobody/x.yaml"])
-def test_a_scene_from_elsewhere_is_called_as_it_is(tmp_path, flown):
+def test_a_scene_outside_the_known_folders_is_listed_under_its_path(tmp_path, flown):
     scenes = SceneList(tmp_path / "not there")
     names, name = scenes.names(flown)
     assert names[-1] == name == flown == scenes.file(name)

@@ -1,4 +1,4 @@
-"""The cockpit's scripts and texts without a browser: what may be read and written, and what stands beside it."""
+"""The cockpit's scripts and lessons without a browser: reading, writing, and the lesson shown beside a script."""
 
 import json
 import os
@@ -23,7 +23,7 @@ STAGES = [
 
 @pytest.fixture(name="own")
 def _own(tmp_path):
-    """The user's folder, which is not there yet."""
+    """The user's folder, which does not exist yet."""
     return tmp_path / "mine"
 
 
@@ -40,22 +40,22 @@ def _ask(own, tmp_path, monkeypatch):
     return Asked(ScriptStore(own))
 
 
-# ---- which files
+# ---- reading and writing
 
 
-def test_a_script_of_the_package_becomes_a_copy(store, own):
+def test_saving_a_script_of_the_package_creates_a_copy(store, own):
     pilot = store.find("built-in/pilot.py")
     copy, version = store.save(pilot, "changed", "")
     assert copy.name == "mine/pilot.py" and (own / "pilot.py").read_text() == "changed"
     assert store.read(pilot)[0] == "shipped"
     again, _ = store.save(copy, "changed again", version)
     assert again == copy and store.original(copy) == "shipped"
-    assert store.save(pilot, "other", "")[0].name == "mine/pilot_2.py", "nothing is lost"
+    assert store.save(pilot, "other", "")[0].name == "mine/pilot_2.py", "the earlier copy is kept"
 
 
-def test_a_draft_of_a_page_that_was_left_goes_into_its_copy(store, own):
+def test_a_page_that_resends_its_draft_writes_into_the_same_copy(store, own):
     pilot = store.find("built-in/pilot.py")
-    for text in ("# mi", "# mine"):  # the page was left before it had the answer, and comes back with all of it
+    for text in ("# mi", "# mine"):  # the page was closed before the reply, and resends all when it is reopened
         copy, _ = store.save(pilot, text, "", "draft")
         assert copy.name == "mine/pilot.py" and (own / "pilot.py").read_text() == text
     (own / "pilot.py").write_text("by another program")
@@ -64,7 +64,7 @@ def test_a_draft_of_a_page_that_was_left_goes_into_its_copy(store, own):
     assert (own / "pilot.py").read_text() == "by another program"
 
 
-def test_what_another_has_changed_is_not_overwritten_and_both_texts_can_be_kept(store, own):
+def test_a_file_changed_elsewhere_is_not_overwritten_and_both_texts_are_kept(store, own):
     script, version = store.save_as("x.py", "first")
     assert store.version("mine/x.py") == version
     (own / "x.py").write_text("theirs", encoding="utf-8")
@@ -81,20 +81,20 @@ def test_what_another_has_changed_is_not_overwritten_and_both_texts_can_be_kept(
     )
 
 
-def test_a_file_that_is_gone_is_told_and_written_again(ask, own):
+def test_a_deleted_file_is_reported_and_can_be_written_again(ask, own):
     saved = ask("save_as", name="x.py", text="a")
     digest = ask("look", script="mine/x.py")["digest"]
     (own / "x.py").unlink()
     assert ask("look", script="mine/x.py")["version"] == "" and ask("look", script="mine/x.py")["digest"] != digest
     assert ask("save", script="mine/x.py", text="b", version=saved["version"]) == {"changed": True}
-    kept = ask("keep", script="mine/x.py", text="b", mine=False)
-    assert kept["text"] == "b" and kept["other"] == "" and (own / "x.py").read_text() == "b"
+    reply = ask("keep", script="mine/x.py", text="b", mine=False)
+    assert reply["text"] == "b" and reply["other"] == "" and (own / "x.py").read_text() == "b"
 
 
 @pytest.mark.parametrize(
     "name", ["/etc/passwd", "mine/../../x.py", "built-in/../x", "tasks/hover/solution.py", "", None, 3, ["a"]]
 )
-def test_only_what_is_listed_is_read(ask, name):
+def test_only_listed_scripts_can_be_opened(ask, name):
     with pytest.raises(ScriptStoreError, match="no such script"):
         ask("open", script=name)
 
@@ -118,7 +118,7 @@ def test_a_new_name_is_checked(store, own, name, words):
     assert "\n" not in str(error.value) and not own.exists()
 
 
-def test_a_name_that_is_taken_stays_as_it_is(store, own):
+def test_an_existing_script_is_not_overwritten_by_save_as(store, own):
     store.save_as("ü b.py", "first")
     with pytest.raises(ScriptStoreError, match="is there already"):
         store.save_as("ü b.py", "second")
@@ -136,7 +136,7 @@ def test_a_name_that_is_taken_stays_as_it_is(store, own):
         (lambda file: file.symlink_to("nowhere.py"), "No such file"),
     ],
 )
-def test_a_file_that_is_no_script_gets_one_line(ask, own, make, words):
+def test_an_unreadable_script_gets_one_line(ask, own, make, words):
     own.mkdir()
     make(own / "odd.py")
     with pytest.raises(ScriptStoreError, match=words) as error:
@@ -144,7 +144,7 @@ def test_a_file_that_is_no_script_gets_one_line(ask, own, make, words):
     assert "mine/odd.py" in str(error.value) and "\n" not in str(error.value)
 
 
-def test_a_name_that_is_no_utf8_is_opened_but_not_flown(ask, own):
+def test_a_script_whose_name_is_not_utf8_can_be_opened_but_not_run(ask, own):
     own.mkdir()
     Path(os.fsdecode(os.fsencode(own) + b"/\xff.py")).write_text("text")
     name = ask("scripts")["groups"][-1]["scripts"][0]
@@ -153,7 +153,7 @@ def test_a_name_that_is_no_utf8_is_opened_but_not_flown(ask, own):
         ask("run", script=name, lesson="")
 
 
-def test_lines_end_as_they_did(store, own):
+def test_saving_keeps_the_line_endings(store, own):
     own.mkdir()
     (own / "dos.py").write_bytes(b"a\r\nb\r\n")
     script = store.find("mine/dos.py")
@@ -163,7 +163,7 @@ def test_lines_end_as_they_did(store, own):
     assert (own / "dos.py").read_bytes() == b"a\r\nc\r\nb\r\n"
 
 
-def test_what_cannot_be_written_is_told(store, own, monkeypatch):
+def test_a_failed_write_is_reported_and_leaves_the_file_unchanged(store, own, monkeypatch):
     script, version = store.save_as("x.py", "kept")
     with pytest.raises(ScriptStoreError, match="at most"):
         store.save(script, "x" * (LARGEST + 1), version)
@@ -181,7 +181,7 @@ def test_what_cannot_be_written_is_told(store, own, monkeypatch):
         ScriptStore(own / "x.py", {}).save_as("y.py", "text")
 
 
-# ---- what is in the way
+# ---- links and special files
 
 
 def _link(place, outside):
@@ -197,7 +197,7 @@ def _folder(place, _outside):
 
 
 @pytest.mark.parametrize("put", [_link, _fifo, _folder])
-def test_whatever_has_the_name_nothing_is_written_through_it(store, own, tmp_path, put):
+def test_nothing_is_written_through_a_link_fifo_or_folder_of_the_same_name(store, own, tmp_path, put):
     own.mkdir()
     outside = tmp_path / "outside.py"
     put(own / "pilot.py", outside)  # the link dangles
@@ -218,8 +218,8 @@ def test_whatever_has_the_name_nothing_is_written_through_it(store, own, tmp_pat
 
 @pytest.mark.parametrize("put", [_link, _fifo, _folder])
 @pytest.mark.parametrize("how", ["save", "save as", "copy", "keep mine", "keep theirs"])
-def test_what_comes_between_look_and_write_leads_nowhere(store, own, tmp_path, monkeypatch, how, put):
-    """As when an archive is unpacked meanwhile: the last look is over, and the name is taken then."""
+def test_a_link_created_between_check_and_write_is_not_followed(store, own, tmp_path, monkeypatch, how, put):
+    """As when an archive is unpacked at the same time: the name is taken after the check and before the write."""
     script, version = store.save_as("x.py", "first")
     outside = tmp_path / "outside.py"
     outside.write_text("theirs", encoding="utf-8")
@@ -232,17 +232,17 @@ def test_what_comes_between_look_and_write_leads_nowhere(store, own, tmp_path, m
     }
     name, act = acts[how]
 
-    def before(function):
-        def meanwhile(*given, **options):
+    def with_replacement(function):
+        def replace_and_call(*arguments, **options):
             if not (own / name).is_symlink() and (not (own / name).exists() or name == "x.py"):
                 (own / name).unlink(missing_ok=True)
                 put(own / name, outside)
-            return function(*given, **options)
+            return function(*arguments, **options)
 
-        return meanwhile
+        return replace_and_call
 
     for function in ("write", "write_new"):
-        monkeypatch.setattr(writing, function, before(getattr(writing, function)))
+        monkeypatch.setattr(writing, function, with_replacement(getattr(writing, function)))
     try:
         act()
     except ScriptStoreError as error:
@@ -251,7 +251,7 @@ def test_what_comes_between_look_and_write_leads_nowhere(store, own, tmp_path, m
     assert not [one for one in own.iterdir() if one.name.startswith(".")], "no temporary file is left"
 
 
-def test_a_link_to_another_script_of_the_folder_stays_one(store, own):
+def test_saving_through_a_link_within_the_folder_keeps_the_link(store, own):
     script, _ = store.save_as("real.py", "first")
     (own / "again.py").symlink_to("real.py")
     again = store.find("mine/again.py")
@@ -259,7 +259,7 @@ def test_a_link_to_another_script_of_the_folder_stays_one(store, own):
     assert (own / "again.py").is_symlink() and script.path.read_text() == "second"
 
 
-def test_a_folder_that_is_a_link_is_the_users_choice(tmp_path):
+def test_the_users_folder_may_be_a_link(tmp_path):
     (tmp_path / "real").mkdir()
     (tmp_path / "link").symlink_to("real")
     store = ScriptStore(tmp_path / "link", {})
@@ -267,10 +267,10 @@ def test_a_folder_that_is_a_link_is_the_users_choice(tmp_path):
     assert store.save(script, "b", version) and (tmp_path / "real" / "x.py").read_text() == "b"
 
 
-# ---- texts beside them
+# ---- lessons
 
 
-def test_every_stage_and_every_task_has_a_text_and_a_script(ask):
+def test_every_stage_and_every_task_has_a_lesson_and_a_script(ask):
     lists = ask("scripts")
     groups = {one["name"]: one["scripts"] for one in lists["groups"]}
     assert list(groups) == ["built-in", "tutorial", "solutions", "tasks", "mine"]
@@ -287,7 +287,7 @@ def test_every_stage_and_every_task_has_a_text_and_a_script(ask):
     assert ask("open", script="built-in/pilot.py")["lesson"] == ""
 
 
-def test_ones_own_script_belongs_to_a_text_by_its_name(ask):
+def test_a_users_script_belongs_to_a_lesson_by_its_name(ask):
     ask("save_as", name="2_elevation_of_mine.py", text="")
     ask("save_as", name="hoverfly.py", text="")
     assert ask("open", script="mine/2_elevation_of_mine.py")["lesson"] == "stage-2-elevation"
@@ -295,21 +295,21 @@ def test_ones_own_script_belongs_to_a_text_by_its_name(ask):
     assert ask("open", script="mine/hoverfly.py")["lesson"] == ""
 
 
-def test_a_solution_and_a_copy_of_one_belong_to_the_stage_of_their_number(ask):
+def test_a_solution_and_its_copy_belong_to_the_stage_of_their_number(ask):
     assert ask("open", script="solutions/5_square.py")["lesson"] == "stage-5-roll"
     ask("save_as", name="5_square.py", text="")
     assert ask("open", script="mine/5_square.py")["lesson"] == "stage-5-roll"
     assert ask("lesson", lesson="stage-5-roll")["script"] == "tutorial/5_roll.py"
 
 
-def test_a_section_ends_where_the_next_begins_and_code_is_no_heading(tmp_path):
+def test_a_lesson_ends_at_the_next_heading_outside_of_code_blocks(tmp_path):
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs" / "tutorial.md").write_text("# T\n## One\na\n```\n## no\n```\n## Two: b\n", encoding="utf-8")
-    found = [one for one in Lessons(tmp_path).all() if not one.task]
-    assert [(one.name, one.text) for one in found] == [("one", "## One\na\n```\n## no\n```"), ("two-b", "## Two: b")]
+    sections = [one for one in Lessons(tmp_path).all() if not one.task]
+    assert [(one.name, one.text) for one in sections] == [("one", "## One\na\n```\n## no\n```"), ("two-b", "## Two: b")]
 
 
-def test_only_the_pictures_of_the_texts_are_served():
+def test_only_the_pictures_of_lessons_are_served():
     kind, content = LESSONS.picture("/docs/pictures/tutorial_loops.png")
     assert kind == "image/png" and content.startswith(b"\x89PNG") and LESSONS.picture("/tasks/hover/picture.png")
     for path in (
@@ -321,10 +321,10 @@ def test_only_the_pictures_of_the_texts_are_served():
         assert LESSONS.picture(path) is None
 
 
-# ---- files
+# ---- renaming, duplicating and deleting
 
 
-def test_a_script_is_renamed_and_takes_the_place_of_nothing(store, own):
+def test_renaming_a_script_overwrites_no_other_file(store, own):
     script, version = store.save_as("x.py", "text")
     store.save(script, "changed", version)
     renamed, version = store.rename(script, "y.lua")
@@ -339,14 +339,14 @@ def test_a_script_is_renamed_and_takes_the_place_of_nothing(store, own):
     assert store.read(other)[0] == "other" and (own / "y.lua").exists()
 
 
-def test_a_script_is_duplicated_as_it_is_shown(store, own):
+def test_a_duplicate_has_the_text_shown_in_the_editor(store, own):
     copy, _ = store.duplicate(store.find("built-in/pilot.py"), "shown")
     again, _ = store.duplicate(copy, "shown too")
     assert (copy.name, again.name) == ("mine/pilot.py", "mine/pilot_2.py")
     assert (own / "pilot_2.py").read_text() == "shown too"
 
 
-def test_a_deleted_script_comes_back_with_every_byte(store, own):
+def test_a_deleted_script_is_restored_byte_by_byte(store, own):
     own.mkdir()
     (own / "x.py").write_bytes(b"a\r\nb\xff")
     store.remove(store.find("mine/x.py"))
@@ -360,7 +360,7 @@ def test_a_deleted_script_comes_back_with_every_byte(store, own):
         store.remove(store.find("built-in/pilot.py"))
 
 
-def test_a_link_out_of_the_folder_is_neither_renamed_nor_deleted(store, own, tmp_path):
+def test_a_link_to_a_file_outside_is_neither_renamed_nor_deleted(store, own, tmp_path):
     own.mkdir()
     (tmp_path / "outside.py").write_text("outside")
     (own / "x.py").symlink_to(tmp_path / "outside.py")
@@ -371,7 +371,7 @@ def test_a_link_out_of_the_folder_is_neither_renamed_nor_deleted(store, own, tmp
     assert (tmp_path / "outside.py").read_text() == "outside" and (own / "x.py").is_symlink()
 
 
-def test_the_simulation_knows_a_renamed_script_that_flies(ask, own):
+def test_renaming_the_running_script_updates_the_parameter_of_the_simulation(ask, own):
     ask("save_as", name="x.py", text="x = 1")
     ask.node.parameters["script"] = str(own / "x.py")
     assert ask("rename", script="mine/x.py", name="y.py")["script"] == "mine/y.py"

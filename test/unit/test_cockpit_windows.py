@@ -1,4 +1,4 @@
-"""Pictures, and what scripts open, on their way to the browsers: no browser is needed for any of it."""
+"""Camera pictures and windows of scripts on their way to the browsers, without a browser."""
 
 import asyncio
 import json
@@ -18,14 +18,15 @@ from std_msgs.msg import String
 
 from drone_sim.ros.cockpit.panel import cameras as cameras_module
 from drone_sim.ros.cockpit.panel.board import Board
-from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows, camera_name, color_of, encode
+from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows, camera_name, encode
+from drone_sim.ros.cockpit.panel.image_conversion import css_color
 from drone_sim.ros.cockpit.server.page_socket import SendQueue
 from drone_sim.ros.cockpit.topics import ImageTopic, find_topics
 from drone_sim.ros.core import image_messages
 
 
-async def taken(box):
-    """Return all that an outbox gives at once."""
+async def take_all(box):
+    """Return all messages that a queue gives without waiting."""
     found = []
     while True:
         task = asyncio.create_task(box.take())
@@ -36,30 +37,30 @@ async def taken(box):
         found.append(task.result())
 
 
-def test_a_browser_that_shows_nothing_gets_one_picture_and_later_the_latest():
+def test_a_browser_gets_the_latest_picture_once_it_has_shown_the_last_one():
     async def talk():
         box = SendQueue()
         for number in range(1000):
             box.put_picture("front", b"%d" % number)
-        assert await taken(box) == [b"999"] and not box.wants("front")
+        assert await take_all(box) == [b"999"] and not box.wants("front")
         box.put_picture("front", b"1000")
         box.put_picture("front", b"1001")
-        assert await taken(box) == [], "the first has not been shown"
+        assert await take_all(box) == [], "the first picture has not been shown yet"
         box.shown("front")
-        assert await taken(box) == [b"1001"]
+        assert await take_all(box) == [b"1001"]
         box.put_picture("front", b"1002")
         box.forget("front")
-        assert await taken(box) == [] and box.wants("front")
+        assert await take_all(box) == [] and box.wants("front")
 
     asyncio.run(talk())
 
 
-def test_messages_to_a_browser_that_takes_none_are_bounded():
+def test_the_queue_of_a_browser_that_receives_nothing_is_bounded():
     async def talk():
         box = SendQueue()
         for number in range(1000):
             box.put(str(number))
-        assert await taken(box) == [str(number) for number in range(968, 1000)]
+        assert await take_all(box) == [str(number) for number in range(968, 1000)]
 
     asyncio.run(talk())
 
@@ -75,12 +76,12 @@ def message(image, encoding):
     return image_messages.image(image, encoding)
 
 
-def test_compressed_pictures_go_as_they_came():
+def test_compressed_pictures_are_passed_on_unchanged():
     assert encode(CompressedImage(data=b"\xff\xd8 a JPEG")) == (b"\xff\xd8 a JPEG", "")
 
 
 @pytest.mark.parametrize("encoding, unit", [("32FC1", 1.0), ("16UC1", 1000)])
-def test_depths_are_coloured_and_say_what_the_colours_mean(encoding, unit):
+def test_depths_are_coloured_with_a_legend(encoding, unit):
     depths = np.full((60, 80), 2.0)
     depths[:, 40:] = 8.0
     depths[:20] = 0.0
@@ -91,12 +92,12 @@ def test_depths_are_coloured_and_say_what_the_colours_mean(encoding, unit):
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.0])
-def test_depths_of_nothing_are_black(value):
+def test_invalid_depths_are_black(value):
     content, note = encode(message(np.full((10, 10), value, np.float32), "32FC1"))
     assert picture(content).max() == 0 and note == "nothing within range"
 
 
-def test_colours_and_greys_of_any_size():
+def test_colour_and_grey_pictures_of_any_encoding_are_scaled_down():
     red = np.zeros((8, 2000, 3), np.uint8)
     red[:, :, 0] = 255
     shown = picture(encode(message(red, "rgb8"))[0])
@@ -118,12 +119,12 @@ def test_colours_and_greys_of_any_size():
         Image(encoding="32FC3", height=1, width=1, step=12, data=b"123456789abc"),
     ],
 )
-def test_what_is_no_picture_is_refused_in_one_line(wrong):
+def test_an_invalid_picture_gets_one_line(wrong):
     with pytest.raises(ValueError, match=r"^[^\n]+$"):
         encode(wrong)
 
 
-def test_every_topic_of_pictures_is_offered_once():
+def test_every_camera_is_offered_once():
     topics = [
         ("/drone/view/bodies", "visualization_msgs/MarkerArray"),
         ("/drone/front", "sensor_msgs/Image"),
@@ -143,8 +144,8 @@ def test_every_topic_of_pictures_is_offered_once():
 # ---- switches
 
 
-class Sent:
-    """Remembers what would go to the browsers."""
+class SocketRecorder:
+    """Records the messages and pictures that would be sent to the browsers."""
 
     def __init__(self):
         self.told, self.pictures = [], []
@@ -176,7 +177,7 @@ class Subscriber:
 
 @pytest.fixture(name="sent")
 def _sent():
-    return Sent()
+    return SocketRecorder()
 
 
 @pytest.fixture(name="cameras")
@@ -188,7 +189,7 @@ def _cameras(monkeypatch, sent):
     return found
 
 
-def test_cameras_are_listened_to_while_they_are_shown_to_somebody(cameras, sent):
+def test_a_camera_is_subscribed_only_while_a_browser_shows_it(cameras, sent):
     cameras.rest(False)
     assert not Subscriber.there
     cameras.turn("/drone/front", True)
@@ -202,7 +203,7 @@ def test_cameras_are_listened_to_while_they_are_shown_to_somebody(cameras, sent)
     sent.ready = False
     hear(CompressedImage(data=b"3"))
     cameras.show()
-    assert len(sent.pictures) == 1, "no browser has shown the last one"
+    assert len(sent.pictures) == 1, "no browser has shown the last picture yet"
     cameras.rest(True)
     assert not Subscriber.there
     cameras.rest(False)
@@ -211,11 +212,11 @@ def test_cameras_are_listened_to_while_they_are_shown_to_somebody(cameras, sent)
     assert not Subscriber.there and sent.told[-2:] == ["closed /drone/front", {"pictures": []}]
 
 
-def test_a_camera_that_is_shown_stays_on_while_another_scene_with_it_is_loaded(cameras, sent):
+def test_a_shown_camera_stays_on_while_another_scene_with_it_is_loaded(cameras, sent):
     cameras.rest(False)
     cameras.turn("/drone/front", True)
     front, depth = ImageTopic("/drone/front", "/drone/front/compressed"), ImageTopic("/drone/depth/image")
-    cameras.offer(())  # the master is asked just while the one has gone, and the other has not come
+    cameras.offer(())  # the master is queried between the end of the old scene and the start of the new one
     assert not Subscriber.there
     cameras.offer((front, depth))
     assert cameras.shown == ["/drone/front"]
@@ -223,10 +224,10 @@ def test_a_camera_that_is_shown_stays_on_while_another_scene_with_it_is_loaded(c
     cameras.turn("/drone/front", False)
     cameras.offer(())
     cameras.offer((front, depth))
-    assert not cameras.shown, "who is switched off stays off"
+    assert not cameras.shown, "a camera that was switched off stays off"
 
 
-def test_boxes_and_mask_are_those_of_the_pictures_stamp(cameras, sent):
+def test_boxes_and_mask_have_the_same_stamp_as_the_picture(cameras, sent):
     cameras.rest(False)
     cameras.offer((ImageTopic("/drone/front", has_truth=True), ImageTopic("/drone/depth/image")))
     cameras.turn("/drone/front", True)
@@ -245,16 +246,16 @@ def test_boxes_and_mask_are_those_of_the_pictures_stamp(cameras, sent):
     for at, name in ((0.05, "Before"), (0.1, "Now"), (0.15, "After")):
         boxes = [{"name": one, "category": "Gate", "visible": [4.5, 4.5, 9.5, 9.5]} for one in (name, "Floor")]
         truth["boxes"](String(json.dumps({"stamp": at, "objects": boxes})))
-        seen = message(mask if name == "Now" else 0 * mask, "mono16")
-        seen.header.stamp = rospy.Time.from_sec(at)
-        truth["categories"](seen)
+        mask_message = message(mask if name == "Now" else 0 * mask, "mono16")
+        mask_message.header.stamp = rospy.Time.from_sec(at)
+        truth["categories"](mask_message)
     truth["boxes"](String("no JSON"))
     grey = message(np.full((20, 30, 3), 100, np.uint8), "rgb8")
     grey.header.stamp = rospy.Time.from_sec(0.1)
     Subscriber.there["/drone/front"](grey)
     cameras.show()
     (said, content) = sent.pictures[-1]
-    color = color_of(1)
+    color = css_color(1)
     assert said["boxes"] == [{"name": "Now", "box": [4.5, 4.5, 9.5, 9.5], "color": color}]
     assert said["legend"] == [{"name": "Gate", "color": color}] and said["overlays"] == ["boxes", "mask"]
     painted = picture(content)[7, 7].astype(int), picture(content)[15, 25].astype(int)
@@ -265,7 +266,7 @@ def test_boxes_and_mask_are_those_of_the_pictures_stamp(cameras, sent):
     assert not Subscriber.there
 
 
-def test_a_picture_waits_for_its_boxes_unless_none_come_at_all(cameras, sent):
+def test_a_picture_waits_for_its_boxes_for_a_limited_time(cameras, sent):
     cameras.rest(False)
     cameras.offer((ImageTopic("/drone/front", has_truth=True),))
     cameras.turn("/drone/front", True)
@@ -281,13 +282,13 @@ def test_a_picture_waits_for_its_boxes_unless_none_come_at_all(cameras, sent):
 
     assert take(1) == []
     truth(String(json.dumps({"stamp": 0.1, "objects": []})))
-    assert take(2) == [1], "that of the second has not come"
+    assert take(2) == [1], "the boxes of the second picture have not arrived"
     for number in range(3, 9):
         assert take(number) == [1]
     assert take(9) == [1, 9]
 
 
-def test_a_view_of_a_script_switches_its_camera(cameras):
+def test_a_view_opened_by_a_script_switches_its_camera_on_and_off(cameras):
     cameras.rest(False)
     cameras.follow_views(frozenset({"/drone/depth/image", "/later"}))
     assert cameras.shown == ["/drone/depth/image"]
@@ -304,7 +305,7 @@ def test_a_view_of_a_script_switches_its_camera(cameras):
 
 
 @pytest.mark.parametrize("wrong", ["nonsense", "[" * 100_000, "3", '{"views": 3}', '{"views": [], "dialogs": []}'])
-def test_what_is_no_state_of_windows_changes_nothing(cameras, sent, wrong):
+def test_an_invalid_state_of_windows_is_ignored(cameras, sent, wrong):
     windows = ScriptWindows("/drone_sim", cameras, sent)
     view = {"handle": 1, "topic": "/drone/front", "label": "x"}
     windows._on_message(String(json.dumps({"views": [view, 7], "dialogs": [], "consoles": []})))
@@ -318,7 +319,7 @@ def test_what_is_no_state_of_windows_changes_nothing(cameras, sent, wrong):
         windows.answers["answer"]({"handle": 1, "button": "ok"})
 
 
-def test_an_answer_that_nobody_would_receive_is_refused_and_not_lost(cameras, sent, monkeypatch):
+def test_a_dialog_answer_without_a_subscriber_is_refused(cameras, sent, monkeypatch):
     windows = ScriptWindows("/drone_sim", cameras, sent)
     publisher = windows._publisher = mock.Mock()
     publisher.get_num_connections.return_value = 0
@@ -342,7 +343,7 @@ def test_an_answer_that_nobody_would_receive_is_refused_and_not_lost(cameras, se
         ("/robot/eye", (), "robot/eye"),
     ],
 )
-def test_cameras_go_by_the_names_that_people_use(topic, vehicles, name):
+def test_cameras_have_short_names(topic, vehicles, name):
     assert camera_name(topic, vehicles) == name
 
 
@@ -354,7 +355,7 @@ def test_cameras_go_by_the_names_that_people_use(topic, vehicles, name):
         ({"on": True}, "topic = None: "),
     ],
 )
-def test_what_a_browser_asks_of_a_camera_is_checked(cameras, wrong, said):
+def test_an_invalid_camera_request_is_refused(cameras, wrong, said):
     with pytest.raises(ValueError, match=f"^{re.escape(said)}"):
         cameras.answer_camera(wrong)
     assert cameras.shown == []

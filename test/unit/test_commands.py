@@ -1,4 +1,4 @@
-"""What a key press changes: the command in force, or what was sent a moment ago."""
+"""A key press changes the command in force, or the command that was sent just before."""
 
 import re
 from pathlib import Path
@@ -18,7 +18,7 @@ def press(in_force, key):
     return command
 
 
-def test_keys_add_up_and_space_stops():
+def test_key_presses_add_up_and_the_space_key_stops():
     command = Command()
     for key in (UP, "w", UP, RIGHT, "r", "e", "q", "q"):
         command = command.after(key, COCKPIT)
@@ -40,12 +40,12 @@ def test_keys_add_up_and_space_stops():
         ("r", Command(wz=-0.2)),
     ],
 )
-def test_the_courses_keys_do_what_they_do_in_its_own_node(key, change):
+def test_the_keys_of_the_course_work_as_in_its_own_node(key, change):
     assert Command().after(key, COURSE) == change
-    assert Command().after("w", COURSE) is None, "any other key stops"
+    assert Command().after("w", COURSE) is None, "a key without a meaning returns no command"
 
 
-def test_the_keys_are_those_of_the_page():
+def test_the_keys_equal_those_of_the_page():
     page = re.findall(r"""(Key[A-Z]|Arrow\w+): \["(\w+)", (-?1)\]""", PAGE.read_text(encoding="utf-8"))
     signs = {ARROWS.get(code, code[-1].lower()): (axis, int(sign)) for code, axis, sign in page}
     assert signs.keys() == COCKPIT.keys()
@@ -57,18 +57,18 @@ def test_quick_presses_add_up_before_the_simulator_has_answered(clock):
     in_force = CommandInForce(clock)
     in_force.on_published(Command())
     press(in_force, UP)
-    in_force.on_published(Command())  # was on its way
+    in_force.on_published(Command())  # published before the key press arrived
     press(in_force, UP)
     in_force.on_published(Command(vx=0.1))
     assert press(in_force, UP) == Command(vx=0.3)
     assert in_force.published == Command(vx=0.1)
     in_force.on_published(Command(vx=0.2))
     in_force.on_published(Command(vx=0.3))
-    in_force.on_published(Command())  # stopped, by somebody else
+    in_force.on_published(Command())  # stopped by another client
     assert press(in_force, UP) == Command(vx=0.1)
 
 
-def test_a_command_that_never_comes_into_force_is_forgotten(clock):
+def test_a_sent_command_that_never_comes_into_force_is_dropped(clock):
     in_force = CommandInForce(clock)
     in_force.on_published(Command(vy=1.0))
     press(in_force, UP)
@@ -79,7 +79,7 @@ def test_a_command_that_never_comes_into_force_is_forgotten(clock):
     assert in_force.next == Command(vy=1.0)
 
 
-def test_without_an_answer_the_last_one_sent_counts(clock):
+def test_without_a_published_command_the_last_sent_command_counts(clock):
     in_force = CommandInForce(clock)
     press(in_force, UP)
     assert press(in_force, UP) == Command(vx=0.2)

@@ -1,4 +1,4 @@
-"""Against a wall, along it, on a box: it stays a drone, and comes free when the command is taken back."""
+"""Contact with a wall or a box: the drone stays stable and comes free after the command is reversed."""
 
 import math
 
@@ -16,7 +16,7 @@ MINUTE = 60.0  # s
 
 
 class Flight:
-    """A drone among objects, and the worst that it went through."""
+    """A drone among objects, with the largest turn rate and tilt of its flight."""
 
     def __init__(self, new_simulation, *objects, yaw=0.0, **overrides):
         scene = {"floor": {"size": 60}, "objects": list(objects)}
@@ -24,7 +24,7 @@ class Flight:
         self.fastest_turn = self.most_tilt = 0.0
 
     def fly(self, command, seconds):
-        """Fly a command (vx, vy, vz, wz) whose vx and vy are along the world's axes as the drone is turned now."""
+        """Fly a command (vx, vy, vz, wz) whose vx and vy are along the world's axes at the present yaw."""
         (vx, vy, vz, wz), yaw = command, frames.to_euler(self.simulation.drone.track.matrix())[2]
         ahead, left = vx * math.cos(yaw) + vy * math.sin(yaw), vy * math.cos(yaw) - vx * math.sin(yaw)
         self.simulation.drone.commands.receive(Twist(Vector3(ahead, left, vz), Vector3(0, 0, wz)))
@@ -39,7 +39,7 @@ class Flight:
         x = self.simulation.drone.body.state.position[0]
         for _ in range(
             9
-        ):  # a wall that one leans on turns the drone, and a pilot aims again: it hangs there for 2 to 4 s
+        ):  # the wall turns the drone, so the direction is corrected every second: it sticks for 2 to 4 s
             away = self.fly((-1, 0, 0, 0), 1)
         assert away.position[0] < x - 1.5
         rest = self.fly((0, 0, 0, 0), 9)
@@ -49,7 +49,7 @@ class Flight:
 
 
 @pytest.mark.parametrize(("speed", "yaw"), [(0.5, 0.0), (0.5, math.pi), (1.0, 0.0), (1.0, 0.5), (1.0, -1.2)])
-def test_a_minute_against_a_wall(new_simulation, speed, yaw):
+def test_a_drone_comes_free_after_a_minute_against_a_wall(new_simulation, speed, yaw):
     flight = Flight(new_simulation, WALL, yaw=yaw)
     pushed = flight.fly((speed, 0, 0, 0), MINUTE)
     assert pushed.position[0] == pytest.approx(1.85, abs=0.05)
@@ -61,7 +61,7 @@ def test_a_minute_against_a_wall(new_simulation, speed, yaw):
     "command",
     [(0.3, 1, 0, 0), (0.5, 1, 0, 0), (1, 1, 0, 0), (1, -1, 0, 0), (1, 0, 0.3, 0), (1, 0, 0, 1), (0.6, -0.6, 0, 0)],
 )
-def test_scraping_along_a_wall(new_simulation, command):
+def test_a_drone_comes_free_after_scraping_along_a_wall(new_simulation, command):
     flight = Flight(new_simulation, WALL)
     scraped = flight.fly(command, 10)
     assert scraped.position[0] < 1.9
@@ -69,7 +69,7 @@ def test_scraping_along_a_wall(new_simulation, command):
 
 
 @pytest.mark.parametrize("things, top", [((), 0.0), ((BOX,), 0.4), ((EDGE,), 0.4)])
-def test_landing_and_leaving(new_simulation, things, top):
+def test_a_drone_lands_on_floor_box_or_edge_and_takes_off_again(new_simulation, things, top):
     flight = Flight(new_simulation, *things)
     landed = flight.fly((0, 0, -0.5, 0), MINUTE)
     assert landed.position[2] == pytest.approx(top + 0.01, abs=0.01)
@@ -78,11 +78,11 @@ def test_landing_and_leaving(new_simulation, things, top):
     assert flight.most_tilt < 0.05
 
 
-def test_propellers_have_limits(new_simulation):
-    """Without them the bare law throws the drone off the wall at hundreds of m/s of particle velocity."""
+def test_propeller_velocity_limits_prevent_a_throw_off_the_wall(new_simulation):
+    """Without limits the bare control law throws the drone off the wall with particle velocities of hundreds of m/s."""
     bare = {"thrust_limits": "none", "recovery_margin": "none"}
-    thrown = Flight(new_simulation, WALL, control=bare, propellers={"velocity_limits": "none"})
-    thrown.fly((1, 0, 0, 0), 10)
-    held = Flight(new_simulation, WALL, control=bare, propellers={"velocity_limits": [0, 12]})
-    held.fly((1, 0, 0, 0), 10)
-    assert held.fastest_turn < 5.0 < thrown.fastest_turn
+    without_limits = Flight(new_simulation, WALL, control=bare, propellers={"velocity_limits": "none"})
+    without_limits.fly((1, 0, 0, 0), 10)
+    with_limits = Flight(new_simulation, WALL, control=bare, propellers={"velocity_limits": [0, 12]})
+    with_limits.fly((1, 0, 0, 0), 10)
+    assert with_limits.fastest_turn < 5.0 < without_limits.fastest_turn

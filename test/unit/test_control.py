@@ -1,4 +1,4 @@
-"""The tutorial's control law: signs of the mixing, corrections, limits."""
+"""The tutorial's control law: signs of the mixing, limits, the track frame, and the command's timeout."""
 
 import math
 
@@ -18,8 +18,8 @@ def _fly(new_simulation):
 def velocities_after(simulation, twist):
     simulation.step()
     simulation.drone.commands.receive(twist)
-    simulation.step()  # its sensing uses the command,
-    simulation.step()  # and this actuation what it computed
+    simulation.step()  # its sensing phase reads the command
+    simulation.step()  # this actuation phase applies the result
     return simulation.drone.propulsion.particle_velocities
 
 
@@ -34,19 +34,19 @@ def velocities_after(simulation, twist):
         (Twist(Vector3(), Vector3(0, 0, -1)), (FRONT_LEFT, BACK_RIGHT), (BACK_LEFT, FRONT_RIGHT)),
     ],
 )
-def test_mixing_signs(fly, twist, faster, slower):
+def test_a_command_speeds_up_the_right_propellers(fly, twist, faster, slower):
     velocities = velocities_after(fly(), twist)
     assert min(velocities[i] for i in faster) > max(velocities[i] for i in slower) + 0.1
 
 
-def test_vertical_command_speeds_all_alike(fly):
+def test_a_vertical_command_speeds_up_all_propellers_equally(fly):
     velocities = velocities_after(fly(), Twist(Vector3(0, 0, 1)))
     assert velocities == pytest.approx([velocities[0]] * 4)
     assert velocities[0] == pytest.approx(5.33 + 1.0, abs=0.2)
 
 
 @pytest.mark.parametrize("limits, expected", [([3, 8], 8.0), ("none", 5.33 + 5 * 2)])
-def test_thrust_limits(fly, limits, expected):
+def test_the_mean_particle_velocity_stays_within_the_thrust_limits(fly, limits, expected):
     simulation = fly(control={"thrust_limits": limits}, drone={"position": [0, 0, 5]})
     simulation.drone.body.move(Pose((0, 0, 3)))
     simulation.step()
@@ -77,7 +77,7 @@ def test_vx_is_along_the_track_frame(fly):
     assert abs(vx) < 0.05
 
 
-def test_the_last_command_holds_for_ever(fly):
+def test_without_a_timeout_the_last_command_stays_in_force(fly):
     simulation = fly()
     simulation.drone.commands.receive(Twist(Vector3(0, 0, 0.5)))
     for _ in range(400):

@@ -1,4 +1,4 @@
-"""Paths of V-REP 3.x: the line through control points, its frames, what counts for its length, from the file on."""
+"""Paths of V-REP 3.x: curves through control points, frames, length, import from a file, and script functions."""
 
 import itertools
 import math
@@ -34,13 +34,13 @@ def path(points, turns=(), before=0.5, after=0.5, count=15, **rules):
 
 
 def quadratic(first, corner, last, count):
-    """The points of a Bezier curve, as the textbooks have them."""
+    """Return `count` points of a quadratic Bezier curve."""
     t = np.linspace(0, 1, count)[:, None]
     return (1 - t) ** 2 * np.array(first) + 2 * t * (1 - t) * np.array(corner) + t**2 * np.array(last)
 
 
 def axes(m):
-    """The x, y and z axis of a frame."""
+    """Return the x, y and z axis of a frame."""
     return [tuple(round(value, 9) + 0.0 for value in m[axis:11:4]) for axis in range(3)]
 
 
@@ -48,17 +48,17 @@ def length_of(points):
     return sum(math.dist(one, other) for one, other in itertools.pairwise(points))
 
 
-# ---- the line
+# ---- points
 
 
-def test_a_corner_is_a_curve_between_the_middles_of_its_pieces():
+def test_a_corner_becomes_a_bezier_curve_between_points_of_its_segments():
     curve = quadratic((1 - 0.8 / 2, 0, 0), (1, 0, 0), (1, 0.4 / 2, 0), 7)
     way = path(CORNER, before=0.8, after=0.4, count=7)
     assert np.allclose(way.points, [(0, 0, 0), *curve, (1, 1, 0)])
     assert way.length == pytest.approx(length_of([(0, 0, 0), *curve, (1, 1, 0)]))
 
 
-def test_a_closed_line_has_a_curve_at_every_point_and_comes_back():
+def test_a_closed_path_has_a_curve_at_every_control_point():
     way = path(SQUARE, closed=True)
     assert way.points[0] == way.points[-1] == pytest.approx((0, 0.5, 0))
     assert len(way.points) == 4 * 15 + 1
@@ -68,30 +68,30 @@ def test_a_closed_line_has_a_curve_at_every_point_and_comes_back():
 
 
 @pytest.mark.parametrize("points", [[(0, 0, 0), (1, 0, 0), (3, 0, 0)], CORNER])
-def test_without_a_bend_or_a_curve_it_is_straight(points):
+def test_without_a_bend_or_a_curve_the_points_are_the_control_points(points):
     is_straight = points is not CORNER
     assert path(points, count=15 if is_straight else 1).points == points
 
 
 @pytest.mark.parametrize(("pauses", "count"), [((0, 2, 0), 15 + 2), ((0, 2, 2), 3), ((2, 2, 0), 3)])
-def test_a_pause_that_differs_from_both_neighbours_makes_a_curve(pauses, count):
+def test_a_pause_that_differs_from_both_neighbours_creates_curve_points(pauses, count):
     points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)]
     controls = [ControlPoint(Station(at, pause=pause), 0.5, 0.5, 15) for at, pause in zip(points, pauses)]
     assert len(ControlledPath(("Way",), "", None, frames.IDENTITY, controls, PathRules()).points) == count
 
 
-def test_two_points_are_not_closed():
+def test_a_path_of_two_points_cannot_be_closed():
     assert path(CORNER[:2], closed=True).length == 1
 
 
-def test_few_points():
+def test_a_path_may_have_no_point_or_one_point():
     assert path([]).length == 0 and path([]).table == []
     with pytest.raises(ValueError, match="'Way' has no points"):
         path([]).at(0)
     assert frames.position(path([(1, 2, 3)]).at(7)) == (1, 2, 3)
 
 
-# ---- what counts
+# ---- length and data
 
 
 @pytest.mark.parametrize(
@@ -106,13 +106,13 @@ def test_few_points():
         ("dac_if_nonzero", 1),
     ],
 )
-def test_the_length_counts_way_and_turn_by_its_method(counts, length):
+def test_the_length_depends_on_the_distance_method(counts, length):
     turns = [STRAIGHT_ON, about_z(2.0)]
     way = path([(0, 0, 0), (3, 0, 0)], turns, orientation="own", counts=counts, metres_per_radian=0.5)
     assert way.length == pytest.approx(length)
 
 
-def test_a_turn_on_the_spot_counts_where_there_is_no_way():
+def test_a_turn_on_the_spot_adds_to_the_length():
     points, turns = [(0, 0, 0), (1, 0, 0), (1, 0, 0), (1, 2, 0)], [STRAIGHT_ON, STRAIGHT_ON, about_z(1.5), about_z(1.5)]
     way = path(points, turns, count=1, orientation="own", metres_per_radian=2.0)
     assert way.length == pytest.approx(1 + 3 + 2)
@@ -121,14 +121,14 @@ def test_a_turn_on_the_spot_counts_where_there_is_no_way():
     assert path(points, turns, count=1, orientation="own", counts="dl").length == pytest.approx(3)
 
 
-def test_a_pause_counts():
+def test_a_pause_adds_to_the_length():
     stations = [Station((0.0, 0.0, 0.0)), Station((1.0, 0.0, 0.0), pause=0.25)]
     rules = PathRules(metres_per_pause=4.0)
     way = ControlledPath(("Way",), "", None, frames.IDENTITY, [ControlPoint(one) for one in stations], rules)
     assert way.length == pytest.approx(1 + 1)
 
 
-def test_it_carries_flags_and_numbers():
+def test_a_path_returns_flags_and_channels_at_a_distance():
     stations = [
         Station((0.0, 0.0, 0.0), flags=1, channels=(0.0, 0.0, 0.0, 8.0)),
         Station((2.0, 0.0, 0.0), flags=2, channels=(1.0, 0.0, 0.0, 4.0)),
@@ -140,7 +140,7 @@ def test_it_carries_flags_and_numbers():
 # ---- frames
 
 
-def test_z_looks_ahead_and_y_out_of_the_bend():
+def test_the_z_axis_points_ahead_and_the_y_axis_out_of_the_bend():
     way = path(CORNER, count=1)
     x, y, z = axes(way.at(1))
     half = round(math.sqrt(0.5), 9)
@@ -148,27 +148,27 @@ def test_z_looks_ahead_and_y_out_of_the_bend():
     assert [axes(way.at(along))[2] for along in (0, 2)] == [(1, 0, 0), (0, 1, 0)]
 
 
-def test_a_straight_line_has_y_up_and_x_up_where_it_says_so():
+def test_a_straight_path_has_y_up_or_x_up_by_its_orientation():
     ends = [(0, 0, 0), (0, 3, 0)]
     assert axes(path(ends).at(1)) == [(-1, 0, 0), (0, 0, 1), (0, 1, 0)]
     assert axes(path(ends, orientation="x_up").at(1)) == [(0, 0, 1), (1, 0, 0), (0, 1, 0)]
     assert axes(path([(0, 0, 0), (0, 0, 1)]).at(0)) == [(0, -1, 0), (1, 0, 0), (0, 0, 1)]
 
 
-def test_a_line_that_falls_steeply_has_y_up_too_as_in_vrep():
+def test_a_steeply_falling_path_has_y_up_as_in_vrep():
     _, y, z = axes(path([(0, 0, 0), (1, 0, -3)]).at(1))
     assert z == pytest.approx((math.sqrt(0.1), 0, -3 * math.sqrt(0.1)))
     assert y == pytest.approx((3 * math.sqrt(0.1), 0, math.sqrt(0.1)))
 
 
-def test_between_two_bends_y_turns_from_one_to_the_other():
+def test_the_y_axis_is_interpolated_between_two_bends():
     points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 2, 0), (1, 2, 1)]
     _, y, z = axes(path(points, count=1).at(2))
     assert z == (0, 1, 0)
     assert y == pytest.approx((math.sqrt(0.5), 0, -math.sqrt(0.5)))
 
 
-# ---- from a file
+# ---- import and scripts
 
 
 def mixed(double, single, numbers_before, whole, numbers_after, version):
@@ -195,18 +195,18 @@ def path_object(handle, name, *points, switches=AUTOMATIC, counts=5, version=22,
 
 @pytest.fixture(name="imported")
 def _imported(tmp_path, capsys):
-    def do(*chunks, version=22):
-        given = tmp_path / "Way.ttt"
-        given.write_bytes(file(*chunks, version=version))
-        assert main([str(given), str(tmp_path / "out"), "--force"]) == 0
-        do.said = capsys.readouterr().out
+    def import_scene(*chunks, version=22):
+        model = tmp_path / "Way.ttt"
+        model.write_bytes(file(*chunks, version=version))
+        assert main([str(model), str(tmp_path / "out"), "--force"]) == 0
+        import_scene.output = capsys.readouterr().out
         return tmp_path / "out" / "scene.yaml"
 
-    return do
+    return import_scene
 
 
 @pytest.mark.parametrize("version", [16, 22, 24, 25])
-def test_a_path_is_brought_with_its_control_points(imported, version):
+def test_a_path_is_imported_with_its_control_points(imported, version):
     turn = (math.cos(0.5), 0, 0, math.sin(0.5))
     points = [
         control_point((0, 0, 0), version=version),
@@ -232,31 +232,31 @@ def test_a_path_is_brought_with_its_control_points(imported, version):
         "along": 0.25,
         "position": [0, 0, 0],
     }
-    assert "Way: " not in imported.said
+    assert "Way: " not in imported.output
 
 
-def test_what_is_not_brought_of_a_path_is_said(imported):
+def test_the_velocity_profile_is_reported_as_not_imported(imported):
     imported(path_object(0, "Way", control_point((0, 0, 0), speed=0.5), control_point((1, 0, 0))))
-    assert "Way: a path: its velocity profile is not imported" in imported.said
+    assert "Way: a path: its velocity profile is not imported" in imported.output
 
 
-def test_more_points_than_can_be_kept_are_brought_as_fewer(imported, monkeypatch):
+def test_a_path_with_too_many_curve_points_is_imported_with_fewer(imported, monkeypatch):
     monkeypatch.setattr(entries, "MAX_LINE", 10_000)
     points = [control_point((index % 2, index, 0), count=100) for index in range(150)]
     scene = imported(path_object(0, "Way", *points))
     (entry,) = yaml.safe_load(scene.read_text())["objects"]
     assert len(entry["control_points"]) == 150 and entry["control_points"][7]["count"] == 66
-    assert "Way: a path: its curves are drawn with fewer points" in imported.said
+    assert "Way: a path: its curves are drawn with fewer points" in imported.output
     parameters.load({"scene_file": str(scene)})
 
 
 @pytest.mark.parametrize("place", [math.nan, 1e9])
-def test_a_control_point_that_is_nowhere_is_left_out(imported, place):
+def test_a_control_point_with_an_invalid_position_is_left_out(imported, place):
     points = [control_point(point) for point in ((0, 0, 0), (place, 0, 0), (3, 0, 0))]
     scene = imported(path_object(0, "Way", *points))
     (entry,) = yaml.safe_load(scene.read_text())["objects"]
     assert [one["position"] for one in entry["control_points"]] == [[0, 0, 0], [3, 0, 0]]
-    assert "Way: a path: 1 of its control points are not finite" in imported.said
+    assert "Way: a path: 1 of its control points are not finite" in imported.output
 
 
 FOLLOW = """
@@ -290,7 +290,7 @@ end
 """
 
 
-def test_3x_scripts_read_and_change_it(imported, new_simulation):
+def test_a_3x_script_can_read_and_change_a_path(imported, new_simulation):
     points = [control_point(point) for point in ((0, 0, 0), (4, 0, 0), (8, 0, 0))]
     scene = imported(path_object(0, "Way", *points, at=(1, 0, 2)))
     simulation = new_simulation({"scene_file": str(scene), "vehicles": {"drone": {}}}, steps=1, lua=FOLLOW)
@@ -313,7 +313,7 @@ threadFunction()
 
 
 @pytest.mark.parametrize(("velocity", "end"), [(2.0, 9.0), (-2.0, 1.0)])
-def test_an_object_follows_it_to_its_end_or_to_its_beginning(imported, new_simulation, velocity, end):
+def test_an_object_follows_a_path_to_its_end_or_its_beginning(imported, new_simulation, velocity, end):
     points = [control_point(point) for point in ((0, 0, 0), (4, 0, 0), (8, 0, 0))]
     scene = imported(path_object(0, "Way", *points, at=(1, 0, 2)))
     values, along = {"scene_file": str(scene), "vehicles": {"drone": {}}}, ALONG.replace("VELOCITY", str(velocity))

@@ -1,4 +1,4 @@
-"""Customization scripts: their order among child scripts, their callbacks in Lua and Python, calls, faults."""
+"""Customization scripts: order of the callbacks in Lua and Python, calls to child scripts, errors, copies."""
 
 import pytest
 
@@ -25,7 +25,7 @@ OBJECTS = [{"name": "Gate", "shape": "box", "size": [0.1, 1, 1], "position": [2,
 
 @pytest.fixture(name="fly")
 def _fly(tmp_path, new_simulation):
-    """Return a function that flies a step with texts of scripts on the gate, and returns the simulation."""
+    """Return a function that attaches scripts to an object, advances the simulation and returns it."""
 
     def fly(on="Gate", steps=1, **texts):
         entry = {"object": on, "parameters": {"size": 3.0}}
@@ -47,20 +47,20 @@ def lines(caplog):
 
 @pytest.mark.parametrize("text", [LUA, PYTHON, OLD], ids=["lua", "python", "3.x"])
 @pytest.mark.parametrize("on", ["Gate", "Quadcopter"])
-def test_each_callback_is_called_in_v_reps_order(fly, caplog, text, on):
+def test_the_callbacks_are_called_in_v_reps_order(fly, caplog, text, on):
     caplog.set_level("INFO")
     child = {"script": CHILD} if on == "Gate" else {}
     simulation = fly(on.replace("Quadcopter", "Drone"), customization=text.replace("NAME", "custom"), **child)
     simulation.stop()
-    told = [line for line in lines(caplog) if line.startswith(("custom ", "child "))]
-    own = [line for line in told if line.startswith("custom ")]
+    log_lines = [line for line in lines(caplog) if line.startswith(("custom ", "child "))]
+    own = [line for line in log_lines if line.startswith("custom ")]
     assert own == [f"custom {phase}" for phase in PHASES]
-    assert not child or told == [
+    assert not child or log_lines == [
         *own[:3], "child init", "child actuation", own[3], "child sensing", own[4], "child cleanup", *own[5:]
     ]  # fmt: skip
 
 
-def test_it_is_called_again_at_every_start(fly, caplog):
+def test_a_customization_script_is_called_again_at_every_start(fly, caplog):
     caplog.set_level("INFO")
     simulation = fly(customization=LUA.replace("NAME", "custom"))
     simulation.start()
@@ -108,7 +108,7 @@ end
 """
 
 
-def test_what_it_builds_is_there_when_the_child_scripts_begin_and_once_at_the_next_start(fly, caplog):
+def test_objects_built_before_the_simulation_exist_once_for_child_scripts(fly, caplog):
     walls = "function sysCall_init() local n = 0 while sim.getObject('/wall[' .. n .. ']', {noError = true}) > 0 do "
     walls += "n = n + 1 end print(n .. ' walls') end"
     caplog.set_level("INFO")
@@ -139,19 +139,19 @@ function sysCall_cleanup() simUI.destroy(ui) end
         ("function sysCall_userConfig() end function sysCall_init() end", "sysCall_userConfig is never called here"),
     ],
 )
-def test_a_fault_is_one_line_and_the_flight_goes_on(fly, caplog, text, said):
+def test_an_error_is_logged_in_one_line_and_the_flight_continues(fly, caplog, text, said):
     simulation = fly(customization=text, steps=20)
-    told = [line for line in lines(caplog) if "accepted and ignored" not in line]
-    assert len(told) == bool(said) and all(said in line for line in told), told
+    log_lines = [line for line in lines(caplog) if "accepted and ignored" not in line]
+    assert len(log_lines) == bool(said) and all(said in line for line in log_lines), log_lines
     assert simulation.drone.body.state.position[2] == pytest.approx(0.8, abs=0.05)
 
 
-def test_in_a_child_script_its_callbacks_are_never_called_and_the_log_says_so(fly, caplog):
+def test_a_child_script_with_callbacks_of_customization_scripts_logs_a_warning(fly, caplog):
     fly(script="function sysCall_beforeSimulation() error('called') end function sysCall_init() end")
     assert "sysCall_beforeSimulation is never called here" in caplog.text and "ERROR" not in caplog.text
 
 
-def test_copies_names_and_removals_are_those_of_both_scripts(fly):
+def test_copies_renames_and_removals_of_an_object_apply_to_its_scripts(fly):
     simulation = fly(script=CHILD, customization=PYTHON)
     scene, operations = simulation.scene, simulation.operations
     (copy,) = operations.copy([simulation.tree.handle("Gate")])

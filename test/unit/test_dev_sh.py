@@ -1,4 +1,4 @@
-"""dev.sh on a machine whose python, pip, CMake and apt are stubs: what is interrupted, shared, moved or read-only."""
+"""dev.sh with stubs for python, pip, CMake and apt: interrupted and concurrent runs, moved and read-only checkouts."""
 
 import hashlib
 import os
@@ -15,7 +15,7 @@ import pytest
 from drone_sim.files.resources import package_path
 
 ROOT = package_path()
-# Says in the log what it was asked for; where that matches STOP_AT, it says so and waits for the file `go`.
+# Logs its arguments; if they match STOP_AT, it creates the file `reached` and waits for the file `go`.
 PYTHON = """#!/bin/bash
 echo "$* [user $PIP_USER]" >>"$STUBS/log"
 if [ -n "$STOP_AT" ] && [[ "$*" = *"$STOP_AT"* ]]; then
@@ -39,7 +39,7 @@ touch devel/setup.bash
 
 
 class Machine:
-    """A checkout with nothing but dev.sh and what it reads, and a ROS that somebody has sourced."""
+    """A checkout that has only dev.sh and the files that it reads, and a sourced ROS."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -74,7 +74,7 @@ class Machine:
         path.chmod(0o755)
 
     def start(self, *command, **how):
-        """Start `./dev.sh COMMAND...` with further variables, in a process group of its own."""
+        """Start `./dev.sh COMMAND...` with additional environment variables, in its own process group."""
         return subprocess.Popen(
             [str(self.checkout / "dev.sh"), *command],
             env=self.environment | how.pop("env", {}),
@@ -87,14 +87,14 @@ class Machine:
 
     def run(self, *command, **how):
         with self.start(*command, **how) as started:
-            said, _ = started.communicate(timeout=60)
-        return started.returncode, re.sub(r"\x1b\[\d*m", "", said)
+            output, _ = started.communicate(timeout=60)
+        return started.returncode, re.sub(r"\x1b\[\d*m", "", output)
 
-    def asked(self, what):
-        """Return how often python was asked for `what`."""
-        return (self.folder / "log").read_text(encoding="utf-8").count(what)
+    def count_calls(self, argument):
+        """Return how often python was called with `argument` among its arguments."""
+        return (self.folder / "log").read_text(encoding="utf-8").count(argument)
 
-    def reached(self):
+    def wait_until_reached(self):
         wait_for((self.folder / "reached").exists)
 
 
@@ -107,83 +107,83 @@ def wait_for(there):
 
 @pytest.fixture(name="machine")
 def _machine():
-    # Not pytest's own folder, into which another user may not look.
+    # Not tmp_path, since one test runs as another user, who may not read pytest's folders.
     with tempfile.TemporaryDirectory() as folder:
         os.chmod(folder, 0o755)
         yield Machine(Path(folder).resolve())
 
 
-def test_set_up_once_is_set_up(machine):
+def test_a_repeated_setup_does_not_create_the_environment_again(machine):
     assert machine.run("setup")[0] == 0
-    assert machine.asked("install -q --find-links") == 1
+    assert machine.count_calls("install -q --find-links") == 1
     for _ in range(2):
         assert machine.run("setup", "--all")[0] == 0
-    assert machine.asked("-m venv") == 1
-    assert machine.asked("install -q --find-links") == machine.asked("-c requirements.txt") == 3
+    assert machine.count_calls("-m venv") == 1
+    assert machine.count_calls("install -q --find-links") == machine.count_calls("-c requirements.txt") == 3
     assert machine.run("setup", "-all") == (1, "[dev.sh] setup -all: takes --all or nothing\n")
 
 
 @pytest.mark.parametrize("moment", ["-m venv", "-r requirements.txt", "-r requirements-dev.txt"])
-def test_an_interrupted_environment_is_made_anew(machine, moment):
+def test_an_interrupted_environment_is_created_again(machine, moment):
     with machine.start("setup", "--all", env={"STOP_AT": moment}) as killed:
-        machine.reached()
+        machine.wait_until_reached()
         os.killpg(killed.pid, signal.SIGKILL)
-    code, said = machine.run("setup", "--all")
-    assert code == 0, said
-    assert machine.asked("-m venv") == 2
-    assert machine.asked("-r requirements.txt") >= machine.asked("-r requirements-dev.txt") >= 1
+    code, output = machine.run("setup", "--all")
+    assert code == 0, output
+    assert machine.count_calls("-m venv") == 2
+    assert machine.count_calls("-r requirements.txt") >= machine.count_calls("-r requirements-dev.txt") >= 1
 
 
-def test_where_pip_fails_set_up_ends(machine):
-    """Although it runs beside apt."""
+def test_setup_ends_with_the_status_of_a_failed_pip(machine):
+    """pip runs in parallel with apt; its status must not be lost."""
     fails = 'case "$*" in\n  *"-r requirements.txt") exit 3 ;;'
     machine.stub("ros/bin/python3", PYTHON.replace('case "$*" in', fails, 1))
-    code, said = machine.run("setup")
-    assert code == 3 and "ready" not in said and not (machine.checkout / "devel").exists()
+    code, output = machine.run("setup")
+    assert code == 3 and "ready" not in output and not (machine.checkout / "devel").exists()
 
 
-def test_other_requirements_are_installed_into_the_same_environment(machine):
+def test_changed_requirements_are_installed_into_the_same_environment(machine):
     assert machine.run("setup", "--all")[0] == 0
     (machine.checkout / "requirements.txt").write_text("pybullet==2\n", encoding="utf-8")
     assert machine.run("setup", "--all")[0] == 0
-    assert (machine.asked("-m venv"), machine.asked("-r requirements.txt")) == (1, 2)
-    assert machine.asked("-r requirements-dev.txt") == 1
+    assert (machine.count_calls("-m venv"), machine.count_calls("-r requirements.txt")) == (1, 2)
+    assert machine.count_calls("-r requirements-dev.txt") == 1
 
 
-def test_the_second_of_two_waits_for_the_first_and_says_so(machine):
+def test_a_second_setup_waits_for_the_first_and_says_so(machine):
     with machine.start("setup", env={"STOP_AT": "-r requirements.txt"}) as first:
-        machine.reached()
+        machine.wait_until_reached()
         with machine.start("setup") as second:
-            said = second.stdout.readline() + second.stdout.readline()  # the first is about the ROS that it uses
+            output = second.stdout.readline() + second.stdout.readline()  # the first line names the ROS that is used
             (machine.folder / "go").touch()
             assert first.communicate(timeout=60) and first.returncode == 0
             assert second.communicate(timeout=60) and second.returncode == 0
-    assert f"another dev.sh is at work in {machine.checkout}: waiting for it" in said
-    assert machine.asked("-m venv") == 1
+    assert f"another dev.sh is at work in {machine.checkout}: waiting for it" in output
+    assert machine.count_calls("-m venv") == 1
 
 
-def test_a_moved_checkout_makes_its_environment_anew(machine):
+def test_a_moved_checkout_creates_its_environment_again(machine):
     assert machine.run("setup")[0] == 0
     machine.checkout = machine.checkout.rename(machine.folder / "moved")
     assert machine.run("setup")[0] == 0
-    assert machine.asked(f"-m venv --system-site-packages {machine.checkout}/.venv") == 1
+    assert machine.count_calls(f"-m venv --system-site-packages {machine.checkout}/.venv") == 1
 
 
 @pytest.mark.parametrize("name", ["a checkout", "check+out", "check:out", "check#out"])
-def test_a_path_that_ros_cannot_take_is_refused(machine, name):
+def test_a_path_with_characters_unsupported_by_ros_is_refused(machine, name):
     machine.checkout = machine.checkout.rename(machine.folder / name)
-    code, said = machine.run("setup")
+    code, output = machine.run("setup")
     assert code == 1
-    assert str(machine.checkout) in said and said.count("\n") == 1
+    assert str(machine.checkout) in output and output.count("\n") == 1
 
 
-def test_a_path_with_other_letters_is_taken(machine):
+def test_a_path_with_non_ascii_letters_is_accepted(machine):
     machine.checkout = machine.checkout.rename(machine.folder / "Prüf-stand_2.0")
     assert machine.run("setup")[0] == 0
 
 
 @pytest.mark.parametrize("command", ["setup", "test", "lint", "deb"])
-def test_a_read_only_checkout_is_named(machine, command):
+def test_a_read_only_checkout_is_reported(machine, command):
     for folder in (machine.checkout, machine.checkout / "test"):
         folder.chmod(0o555)
     machine.environment["HOME"] = str(machine.folder / "home")
@@ -192,26 +192,26 @@ def test_a_read_only_checkout_is_named(machine, command):
     (machine.folder / "log").touch()
     (machine.folder / "log").chmod(0o666)
     (machine.folder / "home").chmod(0o777)
-    code, said = machine.run(command, **other)
+    code, output = machine.run(command, **other)
     machine.checkout.chmod(0o755)
     assert code == 1
-    assert f"{machine.checkout} is read-only" in said.splitlines()[-1]
-    assert machine.asked("pip") == 0
+    assert f"{machine.checkout} is read-only" in output.splitlines()[-1]
+    assert machine.count_calls("pip") == 0
 
 
-def test_pip_never_falls_back_to_the_users_own_packages(machine):
+def test_pip_never_installs_into_the_users_own_packages(machine):
     assert machine.run("setup", env={"PIP_USER": "1"})[0] == 0
-    assert machine.asked("[user 0]") > 2 and machine.asked("[user 1]") == 0
+    assert machine.count_calls("[user 0]") > 2 and machine.count_calls("[user 1]") == 0
 
 
-def test_what_a_sourced_ros_lacks_is_named_as_its_packages(machine):
+def test_missing_packages_of_a_sourced_ros_are_named_with_the_install_command(machine):
     (machine.folder / "ros/share/cv_bridge").rmdir()
     for environment, command in (
         ({"ROS_DISTRO": "one"}, "sudo apt install ros-one-cv-bridge"),
         ({"ROS_DISTRO": "noetic", "CONDA_PREFIX": str(machine.folder / "ros")}, "conda install ros-noetic-cv-bridge"),
     ):
-        code, said = machine.run("setup", env=environment)
-        assert code == 1 and f"'{command}'" in said.splitlines()[-1]
+        code, output = machine.run("setup", env=environment)
+        assert code == 1 and f"'{command}'" in output.splitlines()[-1]
     overlay = machine.folder / "devel"
     (overlay / "share/cv_bridge").mkdir(parents=True)
     prefixes = f"{overlay}:{machine.environment['CMAKE_PREFIX_PATH']}"
@@ -220,72 +220,72 @@ def test_what_a_sourced_ros_lacks_is_named_as_its_packages(machine):
 
 def test_a_conda_environment_with_ros_needs_no_cmake_prefix_path(machine):
     prefix = machine.environment.pop("CMAKE_PREFIX_PATH")
-    code, said = machine.run("setup", env={"CONDA_PREFIX": prefix})
-    assert code == 0 and f"using the ROS in {prefix}" in said
+    code, output = machine.run("setup", env={"CONDA_PREFIX": prefix})
+    assert code == 0 and f"using the ROS in {prefix}" in output
 
 
 @pytest.mark.parametrize("interrupted", ["python3-tf2 is half configured", ""])
-def test_an_interrupted_dpkg_is_named_with_its_mend(machine, interrupted):
+def test_an_interrupted_dpkg_is_reported_with_its_remedy(machine, interrupted):
     del machine.environment["CMAKE_PREFIX_PATH"]
     machine.stub("bin/sudo", '#!/bin/bash\nexec "$@"\n')
     machine.stub("bin/dpkg-query", "#!/bin/bash\nexit 1\n")
     machine.stub("bin/dpkg", f"#!/bin/bash\necho -n '{interrupted}'\n")
-    machine.stub("bin/find", "#!/bin/bash\n")  # dpkg's journal, which is this machine's
+    machine.stub("bin/find", "#!/bin/bash\n")  # hides dpkg's journal of the real machine
     machine.stub("bin/apt-get", '#!/bin/bash\n[ "$1" = update ]\n')
-    code, said = machine.run("setup")
+    code, output = machine.run("setup")
     assert code == 1
-    assert ("'sudo dpkg --configure -a' mends that" in said) == bool(interrupted)
-    assert interrupted or "cannot install: python3-venv" in said
+    assert ("'sudo dpkg --configure -a' mends that" in output) == bool(interrupted)
+    assert interrupted or "cannot install: python3-venv" in output
 
 
 @pytest.mark.parametrize("checksum", ["of the wheel", "of another", "none"])
-def test_a_wheel_of_pybullet_is_taken_only_with_its_checksum(machine, checksum):
+def test_a_pybullet_wheel_is_used_only_if_its_checksum_matches(machine, checksum):
     wheel = machine.checkout / f"wheels/pybullet-1-cp311-cp311-linux_{os.uname().machine}.whl"
     wheel.parent.mkdir()
     wheel.write_text("ours", encoding="utf-8")
     if checksum != "none":
         summed = hashlib.sha256(b"ours" if checksum == "of the wheel" else b"theirs").hexdigest()
         (wheel.parent / "SHA256SUMS").write_text(f"{summed}  {wheel.name}\n", encoding="utf-8")
-    code, said = machine.run("setup", env={"NO_WHEEL": "1"})
-    assert code == 0, said
+    code, output = machine.run("setup", env={"NO_WHEEL": "1"})
+    assert code == 0, output
     there = machine.folder / ".cache/drone_sim/wheels" / wheel.name
     if checksum == "of the wheel":
-        assert f"taking PyBullet from {wheel}, whose checksum" in said
-        assert machine.asked("pip wheel") == 0 and there.read_text(encoding="utf-8") == "ours"
+        assert f"taking PyBullet from {wheel}, whose checksum" in output
+        assert machine.count_calls("pip wheel") == 0 and there.read_text(encoding="utf-8") == "ours"
     else:
-        assert f"not taking {wheel}: its checksum is not in {wheel.parent}/SHA256SUMS" in said
-        assert machine.asked("pip wheel") == 1 and there.read_text(encoding="utf-8") == ""
+        assert f"not taking {wheel}: its checksum is not in {wheel.parent}/SHA256SUMS" in output
+        assert machine.count_calls("pip wheel") == 1 and there.read_text(encoding="utf-8") == ""
 
 
-def test_a_wheel_that_was_taken_can_be_given_on(machine):
+def test_dev_sh_wheel_repacks_an_existing_wheel(machine):
     wheel = machine.checkout / f"wheels/pybullet-1-cp311-cp311-linux_{os.uname().machine}.whl"
     wheel.parent.mkdir()
     wheel.write_text("ours", encoding="utf-8")
     summed = f"{hashlib.sha256(b'ours').hexdigest()}  {wheel.name}\n"
     (wheel.parent / "SHA256SUMS").write_text(summed, encoding="utf-8")
-    code, said = machine.run("wheel", env={"NO_WHEEL": "1"})
-    assert code == 0 and summed in said and machine.asked("pip wheel") == 0
+    code, output = machine.run("wheel", env={"NO_WHEEL": "1"})
+    assert code == 0 and summed in output and machine.count_calls("pip wheel") == 0
     log = (machine.folder / "log").read_text(encoding="utf-8")
     assert 0 < log.index("install -q wheel") < log.index("-m wheel unpack") < log.index("-m wheel pack")
 
 
-def test_a_wheel_lies_where_one_says_and_one_of_another_python_is_left_alone(machine):
+def test_a_wheel_of_another_python_in_the_given_folder_is_ignored(machine):
     name = f"pybullet-1-cp312-cp312-linux_{os.uname().machine}.whl"
     (machine.folder / "lab").mkdir()
     (machine.folder / "lab" / name).write_text("ours", encoding="utf-8")
-    code, said = machine.run("setup", env={"NO_WHEEL": "1", "DRONE_SIM_WHEELS": f"{machine.folder}/lab"})
-    assert code == 0 and name not in said and machine.asked("pip wheel") == 1
+    code, output = machine.run("setup", env={"NO_WHEEL": "1", "DRONE_SIM_WHEELS": f"{machine.folder}/lab"})
+    assert code == 0 and name not in output and machine.count_calls("pip wheel") == 1
 
 
-def test_a_wheel_that_pip_finds_is_taken_and_named(machine):
+def test_a_wheel_found_by_pip_is_used_and_named(machine):
     found = "Looking in links: /lab\nProcessing /lab/pybullet-1-cp313-cp313-linux_x86_64.whl (90 MB)"
-    code, said = machine.run("setup", env={"WHEEL": found})
-    assert code == 0 and machine.asked("pip wheel") == 0
-    assert "PyBullet from /lab/pybullet-1-cp313-cp313-linux_x86_64.whl," in said
+    code, output = machine.run("setup", env={"WHEEL": found})
+    assert code == 0 and machine.count_calls("pip wheel") == 0
+    assert "PyBullet from /lab/pybullet-1-cp313-cp313-linux_x86_64.whl," in output
 
 
 def compile_pybullet(machine, pip):
-    """Start packaging/pybullet.sh with a pip that is a bash script."""
+    """Start packaging/pybullet.sh with a stub for pip: the bash commands `pip`."""
     machine.stub("python", f"#!/bin/bash\ncase $1 in --version) echo Python 3.13.0 ;; *) {pip} ;; esac\n")
     (machine.folder / "wheels").mkdir()
     script = machine.checkout / "packaging/pybullet.sh"
@@ -298,7 +298,7 @@ def compile_pybullet(machine, pip):
     )
 
 
-def test_compilers_are_limited_by_memory(machine):
+def test_the_number_of_compilers_is_limited_by_memory(machine):
     machine.stub("bin/nproc", "#!/bin/bash\necho 100000\n")
     with compile_pybullet(machine, 'cp "$PYTHONPATH/sitecustomize.py" "$STUBS"; touch "$TMPDIR/pybullet.whl"') as one:
         one.communicate(timeout=60)
@@ -308,7 +308,7 @@ def test_compilers_are_limited_by_memory(machine):
     assert sorted(path.name for path in (machine.folder / "wheels").iterdir()) == ["pybullet.log", "pybullet.whl"]
 
 
-def test_the_compilation_estimates_what_is_left_from_what_is_done(machine):
+def test_the_compilation_shows_its_progress_and_the_remaining_time(machine):
     date = 'now=$(cat "$STUBS/time"); [ -e "$STUBS/began" ] && touch "$STUBS/go"; touch "$STUBS/began"; echo "$now"'
     machine.stub("bin/date", f"#!/bin/bash\n{date}\n")
     machine.stub("bin/find", '#!/bin/bash\n/usr/bin/find "$@"; exit 1\n')  # as while pip removes a folder
@@ -318,15 +318,15 @@ def test_the_compilation_estimates_what_is_left_from_what_is_done(machine):
     for ((i = 0; i < 500; i++)); do [ -e "$STUBS/go" ] && break; sleep 0.02; done
     touch "$TMPDIR/pybullet.whl" """
     with compile_pybullet(machine, f"until [ -e $STUBS/began ]; do sleep 0.02; done; {compiler}") as one:
-        said = one.communicate(timeout=60)[1]
-    assert one.returncode == 0 and "100 of 267 files, about 17 minutes left" in said
+        output = one.communicate(timeout=60)[1]
+    assert one.returncode == 0 and "100 of 267 files, about 17 minutes left" in output
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_an_interrupted_compilation_leaves_nothing(machine, how):
+def test_an_interrupted_compilation_leaves_no_files_and_no_process(machine, how):
     compiler = 'touch "$TMPDIR/a.o"; echo $$ >"$STUBS/pid"; touch "$STUBS/reached"; while :; do sleep 0.02; done'
     with compile_pybullet(machine, compiler) as interrupted:
-        machine.reached()
+        machine.wait_until_reached()
         os.killpg(interrupted.pid, how)
         interrupted.communicate(timeout=60)
     assert [path.name for path in (machine.folder / "wheels").iterdir()] == ["pybullet.log"]
@@ -335,10 +335,10 @@ def test_an_interrupted_compilation_leaves_nothing(machine, how):
 
 
 @pytest.mark.parametrize("status", [0, 1])
-def test_the_tests_in_a_browser_are_run_once(machine, status):
+def test_the_browser_tests_run_once_and_return_their_status(machine, status):
     (machine.checkout / "requirements-web.txt").write_text("playwright==1\n", encoding="utf-8")
     ended, _ = machine.run("test-web", "-k", "page", env={"STATUS": str(status)})
-    assert (ended, machine.asked("-m pytest test/web -n 2 --dist worksteal -k page")) == (status, 1)
+    assert (ended, machine.count_calls("-m pytest test/web -n 2 --dist worksteal -k page")) == (status, 1)
 
 
 MAKE = """#!/bin/bash
@@ -353,14 +353,14 @@ for name in $FAILED; do echo "1:$name"; done >build/Testing/Temporary/LastTestsF
 @pytest.mark.parametrize("failed", ["", "flight.test", "flight.test fleet.test"])
 def test_failed_suites_are_named_and_not_run_again(machine, failed):
     machine.stub("bin/make", MAKE)
-    ended, said = machine.run("test", env={"FAILED": failed})
-    assert ended == bool(failed), said
+    ended, output = machine.run("test", env={"FAILED": failed})
+    assert ended == bool(failed), output
     assert len((machine.folder / "made").read_text(encoding="utf-8").splitlines()) == 1
     log = machine.checkout / "build/Testing/Temporary/LastTest.log"
-    assert (" ".join(said.split()).endswith(f"the output is in {log}: {failed}")) == bool(failed)
+    assert (" ".join(output.split()).endswith(f"the output is in {log}: {failed}")) == bool(failed)
 
 
-def test_what_a_change_must_pass_leaves_no_suite_out(machine):
+def test_ci_runs_every_suite(machine):
     (machine.checkout / ".ci").mkdir()
     shutil.copy(ROOT / ".ci/run", machine.checkout / ".ci/run")
     machine.stub("checkout/dev.sh", '#!/bin/bash\necho "$1"\n')
@@ -368,7 +368,7 @@ def test_what_a_change_must_pass_leaves_no_suite_out(machine):
     assert ran.stdout.split() == ["lint", "docs", "test", "test-web", "docs-commands", "pythons", "bench"]
 
 
-# ---- packages that are installed
+# ---- installation of packages
 
 
 PLAN = """0 upgraded, 377 newly installed, 0 to remove and 2 not upgraded.
@@ -380,7 +380,7 @@ PROGRAMS = {  # Debian's packages, by the ROS packages whose programs docs run
     "image_view": "ros-image-view",
     "tf2_tools": "tf2-tools",
 }
-ELSEWHERE = {"demo_teleop", "drone_sim", "my_package", "stereo_image_proc", "tf"}  # docs say what these need
+ELSEWHERE = {"demo_teleop", "drone_sim", "my_package", "stereo_image_proc", "tf"}  # docs say how to install these
 FAKES = {
     "dpkg-query": 'for one in "${@:4}"; do grep -qx "$one" "$FOLDER/installed" && echo "installed $one"; done',
     "apt-cache": 'grep -qx "$2" "$FOLDER/known" && printf "%s:\\n  Candidate: 1.2\\n" "$2" || true',
@@ -391,9 +391,9 @@ FAKES = {
 
 @pytest.fixture(name="installed")
 def _installed(tmp_path):
-    """Return what tells what is done where some packages are installed, and apt knows some."""
-    for name, does in FAKES.items():
-        (tmp_path / name).write_text(f"#!/bin/bash\n{does}\n")
+    """Return a function that runs install_packages with given installed and available packages; it returns the log."""
+    for name, script_text in FAKES.items():
+        (tmp_path / name).write_text(f"#!/bin/bash\n{script_text}\n")
         (tmp_path / name).chmod(0o755)
     surroundings = {"PATH": f"{tmp_path}:/usr/bin:/bin", "FOLDER": str(tmp_path), "HOME": os.environ["HOME"]}
     surroundings["PLAN"] = PLAN
@@ -416,25 +416,25 @@ def _installed(tmp_path):
     return run
 
 
-def test_what_is_missing_is_installed(installed):
-    said = installed([], ["catkin", "rviz"])
-    assert "install catkin rviz\n" in said and "no rviz" not in said
+def test_missing_packages_are_installed(installed):
+    output = installed([], ["catkin", "rviz"])
+    assert "install catkin rviz\n" in output and "no rviz" not in output
 
 
-def test_how_much_is_installed_is_what_apt_says(installed):
-    said = installed([], ["catkin", "rviz"])
-    assert "377 packages, 12.3 MB/285 MB to fetch, 1189 MB on disk" in said
-    order = [said.index(one) for one in ("missing packages: catkin rviz", "update", "377 packages", "install catkin")]
+def test_the_size_of_an_installation_is_reported_as_given_by_apt(installed):
+    output = installed([], ["catkin", "rviz"])
+    assert "377 packages, 12.3 MB/285 MB to fetch, 1189 MB on disk" in output
+    order = [output.index(one) for one in ("missing packages: catkin rviz", "update", "377 packages", "install catkin")]
     assert order == sorted(order)
 
 
-def test_without_an_rviz_to_install_setup_goes_on(installed):
-    said = installed([], ["catkin"])
-    assert "this Debian has no rviz" in said and "./dev.sh run web:=true" in said
-    assert said.endswith("install catkin\n")
+def test_setup_continues_if_rviz_is_not_available(installed):
+    output = installed([], ["catkin"])
+    assert "this Debian has no rviz" in output and "./dev.sh run web:=true" in output
+    assert output.endswith("install catkin\n")
 
 
-def test_once_all_else_is_there_nothing_is_done(installed):
+def test_nothing_is_installed_if_at_most_an_unavailable_rviz_is_missing(installed):
     assert installed(["catkin"], ["catkin"]) == ""
     assert installed(["catkin", "rviz"], []) == ""
 
@@ -444,5 +444,5 @@ def test_setup_all_installs_the_programs_that_docs_run():
     text = "".join(one.read_text(encoding="utf-8") for one in (root / "README.md", *(root / "docs").glob("*.md")))
     assert set(re.findall(r"rosrun (\w+)", text)) - ELSEWHERE == set(PROGRAMS)
     program = 'source ./dev.sh help >/dev/null; packages; echo "${TESTS[@]}" "${DOCS[@]}"'
-    listed = subprocess.check_output(["bash", "-c", program, "./dev.sh"], cwd=root, text=True)
-    assert set(PROGRAMS.values()) - set(listed.split()) == set()
+    package_list = subprocess.check_output(["bash", "-c", program, "./dev.sh"], cwd=root, text=True)
+    assert set(PROGRAMS.values()) - set(package_list.split()) == set()

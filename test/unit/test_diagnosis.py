@@ -1,4 +1,4 @@
-"""One look says why a vehicle does not fly as expected; nobody needs ROS for it."""
+"""Diagnosis, which says why a vehicle does not fly as expected; ROS is not needed."""
 
 import pytest
 
@@ -22,8 +22,8 @@ WALL = {"shape": "box", "name": "Wall", "size": [0.2, 4, 4], "position": [1.0, 0
 SCRIPT = package_path() / "src/drone_sim/child_scripts/tutorial.py"
 
 
-class Looked:
-    """A flight under diagnosis, whose real time is told."""
+class DiagnosedFlight:
+    """A flight and its diagnosis, with a real time that the test sets."""
 
     def __init__(self, script):
         self.script = script
@@ -39,7 +39,7 @@ class Looked:
         return self.now
 
     def renew(self):
-        """Begin anew, at the start, with nothing said and nothing heard."""
+        """Restart the flight with its original script, an empty command log and a new diagnosis."""
         self.script.write_text(SCRIPT.read_text())
         self.player.restart()
         self.log = CommandLog(self.clock)
@@ -55,18 +55,18 @@ class Looked:
         self.drone.commands.receive(twist)
 
     def fly(self, steps, step=0.05):
-        """Fly so many steps, each in `step` s of real time."""
+        """Advance by `steps` steps, each of which takes `step` s of real time."""
         for _ in range(steps):
             self.player.step()
             self.now += step
 
-    def look(self, what="vehicle drone"):
-        return next(one for one in self.diagnosis.look() if one.name == what)
+    def look(self, subject="vehicle drone"):
+        return next(one for one in self.diagnosis.look() if one.name == subject)
 
 
 @pytest.fixture(name="flight", scope="module")
 def _flight(tmp_path_factory):
-    flight = Looked(tmp_path_factory.mktemp("scripts") / "script.py")
+    flight = DiagnosedFlight(tmp_path_factory.mktemp("scripts") / "script.py")
     yield flight
     flight.simulation.close()
 
@@ -77,99 +77,99 @@ def _looked(flight):
     return flight
 
 
-def test_all_is_well(looked):
+def test_a_normal_flight_is_ok(looked):
     looked.fly(2)
-    found = looked.look()
-    assert (found.level, found.message) == (OK, "flying; no command has been received yet")
+    entry = looked.look()
+    assert (entry.level, entry.message) == (OK, "flying; no command has been received yet")
     looked.command()
     looked.fly(10)
-    found = looked.look()
-    assert (found.level, found.message) == (OK, "flying as /pilot commands")
-    assert found.values["command came"] == "0.5 s ago"
-    assert found.values["propellers at a limit"] == "0 of the last 10 steps"
+    entry = looked.look()
+    assert (entry.level, entry.message) == (OK, "flying as /pilot commands")
+    assert entry.values["command came"] == "0.5 s ago"
+    assert entry.values["propellers at a limit"] == "0 of the last 10 steps"
     assert looked.look("simulation").level == OK
 
 
-def test_the_pace_is_what_was_flown_in_real_time(looked):
+def test_a_slow_simulation_gets_a_warning_with_its_pace(looked):
     looked.look()
-    for level in (OK, OK, WARN):  # a slow second says nothing yet
+    for level in (OK, OK, WARN):  # a single slow second is no problem yet
         looked.fly(10, step=0.1)
-        found = looked.look("simulation")
-        assert found.level == level
-    assert "too slow: 0.50 times real time" in found.message
+        entry = looked.look("simulation")
+        assert entry.level == level
+    assert "too slow: 0.50 times real time" in entry.message
     looked.fly(10)
     assert looked.look("simulation").message == "flying at 1.00 times real time"
 
 
-def test_who_holds_the_steps_up_is_told(looked):
+def test_a_client_that_holds_up_the_steps_is_reported(looked):
     looked.diagnosis = Diagnosis(
         looked.player, looked.pacer, lambda: {"drone": looked.log}, False, looked.clock, held=lambda: True
     )
     looked.look("simulation")
     looked.fly(2)
-    assert looked.look("simulation").level == OK, "every step was asked for"
+    assert looked.look("simulation").level == OK, "every step was requested"
     looked.now += 1.0
-    found = looked.look("simulation")
-    assert found.level == WARN and "a client of the remote API" in found.message
+    entry = looked.look("simulation")
+    assert entry.level == WARN and "a client of the remote API" in entry.message
 
 
-def test_what_was_counted_long_ago_says_nothing_of_now(looked):
+def test_an_old_measurement_gives_no_real_time_factor(looked):
     looked.look()
     looked.fly(1, step=100.0)
     assert looked.look("simulation").values["real-time factor"] == "not known"
 
 
-def test_a_refused_command_is_told_with_its_sender_until_a_good_one_comes(looked):
+def test_a_refused_command_is_reported_with_its_sender_until_a_valid_one_arrives(looked):
     looked.command()
     looked.now += 1
     looked.log.refuse("cmd_vel", "/child", "linear.x = nan: must lie within +-20 m/s")
     looked.log.refuse("cmd_vel", "/child", "linear.x = 50: must lie within +-20 m/s")
-    found = looked.look()
-    assert found.level == WARN
-    assert found.message.startswith("refused a message of /child on cmd_vel, and keeps the last valid one: linear.x")
-    assert (found.values["refused"], found.values["command sender"]) == ("2", "/pilot")
+    entry = looked.look()
+    assert entry.level == WARN
+    assert entry.message.startswith("refused a message of /child on cmd_vel, and keeps the last valid one: linear.x")
+    assert (entry.values["refused"], entry.values["command sender"]) == ("2", "/pilot")
     looked.now += 1
     looked.command()
-    found = looked.look()
-    assert found.level == OK
-    assert found.values["last refused"] == "cmd_vel of /child, 1.0 s ago"
+    entry = looked.look()
+    assert entry.level == OK
+    assert entry.values["last refused"] == "cmd_vel of /child, 1.0 s ago"
 
 
-def test_commands_to_what_stands_still_are_told(looked):
+def test_commands_during_a_pause_are_reported(looked):
     looked.fly(1)
     looked.player.pause(True)
     assert looked.look().message == "paused"
     looked.command()
-    found = looked.look()
-    assert found.level == WARN
-    assert "/pilot sends commands, but the simulation is paused: `pause false`" in found.message
+    entry = looked.look()
+    assert entry.level == WARN
+    assert "/pilot sends commands, but the simulation is paused: `pause false`" in entry.message
     looked.now += 60
     assert looked.look().level == OK
 
 
-def test_who_flies_on_after_its_commander_has_gone(looked):
+def test_a_drone_that_still_obeys_a_vanished_sender_is_reported(looked):
     looked.command()
     looked.log.senders = list
     looked.fly(1)
-    found = looked.look()
-    assert found.level == WARN
-    assert "still obeys the last command of /pilot" in found.message
+    entry = looked.look()
+    assert entry.level == WARN
+    assert "still obeys the last command of /pilot" in entry.message
     looked.command(Twist())
     assert looked.look().level == OK
 
 
-def test_a_script_that_does_not_listen_is_told(looked):
+def test_a_script_without_a_subscription_to_commands_is_reported(looked):
     looked.script.write_text("def sysCall_init():\n    pass\n")
     looked.player.restart()
-    deaf = "this script does not subscribe to commands: the tutorial's scripts do from stage 6 on, and `pilot` does"
-    found = looked.look()
-    assert (found.level, found.message) == (OK, f"flying; {deaf}")
-    assert found.values["listens to commands"] == "no"
+    hint = "this script does not subscribe to commands: the tutorial's scripts do from stage 6 on, and `pilot` does"
+    entry = looked.look()
+    assert (entry.level, entry.message) == (OK, f"flying; {hint}")
+    assert entry.values["listens to commands"] == "no"
     looked.command()
-    found = looked.look()
-    assert (found.level, found.message) == (WARN, deaf)
+    entry = looked.look()
+    assert (entry.level, entry.message) == (WARN, hint)
     looked.now += 6
-    assert looked.look().level == OK, "nobody sends commands any more"
+    assert looked.look().level == OK, "commands are no longer sent"
     looked.renew()
     assert looked.look().values["listens to commands"] == "yes"
 
@@ -184,18 +184,18 @@ def test_a_script_that_does_not_listen_is_told(looked):
         ((0, 0, 3.0), 3.1, "upside down", WARN),
     ],
 )
-def test_what_its_body_does_is_told_whatever_the_script_means(looked, place, turn, word, level):
+def test_the_situation_of_the_body_is_reported_for_a_script_without_states(looked, place, turn, word, level):
     looked.script.write_text("def sysCall_init():\n    pass\n")
     looked.player.restart()
     looked.drone.body.move(Pose(place, to_quaternion(from_rpy((0, 0, 0), (turn, 0, 0)))))
     looked.fly(1 if level == OK or place[2] == 3.0 else 30)
-    found = looked.look()
-    assert (found.values["does"], found.level) == (word, level)
+    entry = looked.look()
+    assert (entry.values["does"], entry.level) == (word, level)
     assert doing(looked.drone) == word
-    assert word in found.message or word == "upside down"
+    assert word in entry.message or word == "upside down"
 
 
-def test_a_drone_that_slides_or_hangs_on_a_wall_says_so(looked):
+def test_a_drone_that_slides_or_touches_a_wall_is_reported(looked):
     looked.script.write_text("def sysCall_init():\n    pass\n")
     looked.player.restart()
     looked.drone.body.move(Pose((0, 0, 0.06), UPRIGHT))
@@ -209,7 +209,7 @@ def test_a_drone_that_slides_or_hangs_on_a_wall_says_so(looked):
     assert looked.look().values["does"] == "touches Wall"
 
 
-def test_the_pilots_own_states_count_and_its_flying_is_looked_at(new_simulation):
+def test_the_states_of_the_pilot_script_are_reported(new_simulation):
     simulation = new_simulation({"start": "landed"})
     simulation.step()
     assert doing(simulation.drone) == "landed"
@@ -221,14 +221,14 @@ def test_the_pilots_own_states_count_and_its_flying_is_looked_at(new_simulation)
     assert doing(simulation.drone) == "held"
 
 
-def test_a_script_error_is_told_until_the_next_start(looked):
+def test_a_script_error_is_reported_until_the_next_start(looked):
     looked.script.write_text("def sysCall_actuation():\n    1 / 0\n")
     looked.player.restart()
     looked.fly(1)
-    for what in ("vehicle drone", "simulation"):
-        found = looked.look(what)
-        assert found.level == ERROR
-        assert f"script error: [actuation] {looked.script}:2: ZeroDivisionError" in found.message
+    for subject in ("vehicle drone", "simulation"):
+        entry = looked.look(subject)
+        assert entry.level == ERROR
+        assert f"script error: [actuation] {looked.script}:2: ZeroDivisionError" in entry.message
     looked.script.write_text("def sysCall_init():\n    1 / 0\n")
     with pytest.raises(ScriptError):
         looked.player.start()
@@ -239,39 +239,39 @@ def test_a_script_error_is_told_until_the_next_start(looked):
 
 def test_propellers_at_their_limit_are_counted(looked):
     looked.drone.body.move(Pose((0, 0, 900), UPRIGHT))
-    full = "\n".join(
+    script_body = "\n".join(
         f"    sim.setScriptSimulationParameter(sim.getScriptHandle('{name}'), 'particleVelocity', 100)"
         for name in (f"Quadricopter_propeller_respondable{number}" for number in (1, 2, 3, 4))
     )
-    looked.script.write_text(f"def sysCall_actuation():\n{full}\n")
+    looked.script.write_text(f"def sysCall_actuation():\n{script_body}\n")
     looked.player.restart()
     looked.look()
     looked.fly(10)
     assert "propellers are at their limit in 10 of the last 10 steps" in looked.look().message
 
 
-def test_what_it_touches_holds_it_up(looked):
+def test_an_obstacle_that_blocks_the_drone_is_named(looked):
     looked.drone.body.move(Pose((0.7, 0, 1), UPRIGHT))
     looked.command()
     looked.fly(60)
     looked.look()
     looked.fly(5)
-    found = looked.look()
-    assert "blocked by Wall (" in found.message
-    assert found.values["contacts"].startswith("Wall (")
+    entry = looked.look()
+    assert "blocked by Wall (" in entry.message
+    assert entry.values["contacts"].startswith("Wall (")
 
 
-def test_lying_on_its_back_is_told(looked):
+def test_a_drone_on_its_back_gets_a_warning(looked):
     upside_down = to_quaternion(from_rpy((0, 0, 0), (3.1, 0, 0)))
     looked.drone.body.move(Pose((0, 0, 0.1), upside_down))
     looked.fly(20)
-    found = looked.look()
-    assert found.level == WARN
-    assert "`restart` puts it upright" in found.message
-    assert found.values["put elsewhere"] == "1 times"
+    entry = looked.look()
+    assert entry.level == WARN
+    assert "`restart` puts it upright" in entry.message
+    assert entry.values["put elsewhere"] == "1 times"
 
 
-def test_cameras_tell_their_rate_and_what_draws(looked):
+def test_cameras_report_their_rate_and_the_renderer(looked):
     camera = looked.drone.cameras["front"]
     assert looked.look("cameras").message == "no camera is in use"
     camera.viewers.add(lambda: True)
@@ -279,27 +279,27 @@ def test_cameras_tell_their_rate_and_what_draws(looked):
         looked.fly(1)
         looked.look()
         looked.fly(8)
-        found = looked.look("cameras")
-        assert found.level == OK
-        assert found.values["drone/front"] == "20.0 of 20.0 Hz"
-        assert found.values["frame time"].endswith(" ms")
-        assert "none yet" not in found.values["renderer"]
+        entry = looked.look("cameras")
+        assert entry.level == OK
+        assert entry.values["drone/front"] == "20.0 of 20.0 Hz"
+        assert entry.values["frame time"].endswith(" ms")
+        assert "none yet" not in entry.values["renderer"]
         looked.fly(8, step=0.2)
-        found = looked.look("cameras")
-        assert found.level == WARN
-        assert "drone/front publishes at 5.0" in found.message
+        entry = looked.look("cameras")
+        assert entry.level == WARN
+        assert "drone/front publishes at 5.0" in entry.message
     finally:
         camera.viewers.clear()
 
 
-def test_the_worst_comes_first():
-    found = finding("x", "well", [Problem(WARN, "odd"), Problem(ERROR, "bad")], {})
-    assert (found.level, found.message) == (ERROR, "bad; odd")
+def test_the_worst_problem_comes_first():
+    entry = finding("x", "well", [Problem(WARN, "odd"), Problem(ERROR, "bad")], {})
+    assert (entry.level, entry.message) == (ERROR, "bad; odd")
     assert finding("x", "well", [], {}).message == "well"
 
 
 @pytest.mark.parametrize("where", ["def sysCall_init():", "def sysCall_actuation():"])
-def test_a_vehicle_whose_script_has_failed_says_so_until_it_starts_again(looked, where):
+def test_a_failed_script_of_a_vehicle_is_reported_until_the_next_start(looked, where):
     looked.script.write_text(f"{where}\n    lost()\ndef sysCall_sensing(): pass\n")
     try:
         looked.player.start()
@@ -307,14 +307,14 @@ def test_a_vehicle_whose_script_has_failed_says_so_until_it_starts_again(looked,
     except ScriptError as error:
         assert error.phase == "init"
     assert doing(looked.drone) == "script failed"
-    found = looked.look()
-    assert found.level == ERROR and "script.py:2: NameError" in found.message
+    entry = looked.look()
+    assert entry.level == ERROR and "script.py:2: NameError" in entry.message
     looked.renew()
     assert doing(looked.drone) == "flying" and looked.look().level == OK
 
 
 @pytest.mark.parametrize(("on", "is_part"), [("DronePosition", True), ("Wall", False)])
-def test_a_script_on_an_object_that_has_failed_is_an_error_with_its_line(tmp_path, on, is_part, new_simulation):
+def test_a_failed_script_on_an_object_is_an_error_with_its_line(tmp_path, on, is_part, new_simulation):
     script = tmp_path / "attached.py"
     script.write_text("def sysCall_actuation():\n    if sim.getSimulationTime() > 0.08: lost()\n")
     scene = {"objects": [WALL], "scripts": [{"object": on, "script": str(script)}]}
@@ -335,7 +335,7 @@ def test_a_script_on_an_object_that_has_failed_is_an_error_with_its_line(tmp_pat
     assert doing(simulation.drone) == "flying"
 
 
-def test_two_senders_at_once_are_named_and_a_change_of_the_sender_is_no_problem(looked):
+def test_two_senders_at_once_are_named_but_a_change_of_sender_is_no_problem(looked):
     for number in range(20):
         looked.command(sender="/old" if number < 10 else "/pilot")
         looked.fly(1)
@@ -343,15 +343,15 @@ def test_two_senders_at_once_are_named_and_a_change_of_the_sender_is_no_problem(
     for number in range(20):
         looked.command(FORWARD if number % 5 else Twist(), sender="/pilot" if number % 5 else "/zeros")
         looked.fly(1)
-    found = looked.look()
-    assert found.level == WARN and "/pilot and /zeros" in found.message and "/zeros sends only zeros" in found.message
+    entry = looked.look()
+    assert entry.level == WARN and "/pilot and /zeros" in entry.message and "/zeros sends only zeros" in entry.message
     for _ in range(80):
         looked.command()
         looked.fly(1)
     assert "/zeros" not in looked.look().message
 
 
-def test_senders_that_come_and_go_are_not_kept():
+def test_the_command_log_forgets_senders_that_are_gone():
     now = 0.0
     log = CommandLog(lambda: now)
     for number in range(100):
@@ -360,7 +360,7 @@ def test_senders_that_come_and_go_are_not_kept():
     assert len(log._moving) < 5
 
 
-def test_a_twist_that_nobody_receives_is_named_while_no_command_comes(looked):
+def test_a_twist_without_a_subscriber_is_reported_while_no_command_arrives(looked):
     looked.diagnosis = Diagnosis(
         looked.player,
         looked.pacer,
@@ -369,14 +369,14 @@ def test_a_twist_that_nobody_receives_is_named_while_no_command_comes(looked):
         looked.clock,
         unheard=lambda: {"/cmd_vel": ["/teleop"], "/bebop/cmd_vel": ["/node"]},
     )
-    found = looked.look()
-    assert found.level == WARN and "/teleop publishes /cmd_vel" in found.message
+    entry = looked.look()
+    assert entry.level == WARN and "/teleop publishes /cmd_vel" in entry.message
     cure = "without a subscriber: publish to /drone/cmd_vel, or start with profile:=bebop"
-    assert f"/node publishes /bebop/cmd_vel, {cure}" in found.message
+    assert f"/node publishes /bebop/cmd_vel, {cure}" in entry.message
     looked.command()
 
 
-# What V-REP's tutorial puts into the sensing part in "Removing existing control code", and no later step removes.
+# V-REP's tutorial adds these lines in "Removing existing control code", and no later step removes them.
 ZEROS = """    -- update twist
     twist[1] = 0 -- front speed
     twist[2] = 0 -- lateral speed
@@ -387,7 +387,7 @@ ZEROS = """    -- update twist
 
 @pytest.mark.parametrize(("zeros", "follows"), [(ZEROS, False), ("", True)])
 @pytest.mark.parametrize("twist", [FORWARD, Twist(Vector3(0, 0, 0), Vector3(0, 0, 0.5))])
-def test_a_script_that_hears_commands_and_never_uses_them_is_told(tmp_path, zeros, follows, twist, new_simulation):
+def test_a_script_that_ignores_its_commands_is_reported(tmp_path, zeros, follows, twist, new_simulation):
     """V-REP's tutorial, pasted literally, subscribes to cmd_vel and ignores every command."""
     lua = SCRIPT.with_name("tutorial_v3.lua").read_text()
     elevation = "    -- Elevation control\n"
@@ -406,15 +406,15 @@ def test_a_script_that_hears_commands_and_never_uses_them_is_told(tmp_path, zero
         player.step()
         now += 0.05
         if step % 20 == 19:
-            (found,) = (one for one in diagnosis.look() if one.name == "vehicle drone")
-            levels.append(found.level)
+            (entry,) = (one for one in diagnosis.look() if one.name == "vehicle drone")
+            levels.append(entry.level)
     moved = simulation.drone.body.state.position[0], simulation.drone.body.state.angular_velocity[2]
     assert (max(moved) > 0.1) == follows
     assert levels == ([OK] * 5 if follows else [OK, OK, OK, WARN, WARN])
-    assert ("not followed" in found.message) == (not follows)
+    assert ("not followed" in entry.message) == (not follows)
 
 
-def test_a_drone_that_is_commanded_only_now_is_given_time_to_follow(looked):
+def test_a_drone_gets_time_to_follow_its_first_command(looked):
     for _ in range(6):
         looked.fly(20)
         looked.look()

@@ -1,8 +1,8 @@
-"""docs/extending.md, followed to the letter: what it adds works, and touches what CONTRIBUTING.md says and no more.
+"""The examples in docs/extending.md work, and change only the files that CONTRIBUTING.md names.
 
 A section is `## Something to add`. Its code blocks are headed by a line with a file's name in backquotes. With a folder
-in its name, a file is one of the package: all of it, or (```diff) lines to add to it. Without, it is the reader's own:
-written into a folder of theirs, where every script is then run.
+in its name, a file belongs to the package: the whole file, or (```diff) lines to add. Without, it is the reader's own:
+it is written into a separate folder, and every script there is run.
 """
 
 import difflib
@@ -17,16 +17,16 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 SECTIONS = dict(re.findall(r"^## (.+?)\n(.*?)(?=^## |\Z)", (ROOT / "docs/extending.md").read_text(), re.S | re.M))
-PATIENCE = 120.0  # s; a trial takes a few
+PATIENCE = 120.0  # s; a script takes a few seconds
 
 
 def blocks(text):
-    """Return the code blocks that have a file's name: name, language, content."""
+    """Return file name, language and content of each code block that has a file name."""
     return re.findall(r"^`(\S+)`[^\n]*\n\n```(\w+)\n(.*?)^```$", text, re.S | re.M)
 
 
 def patterns(title):
-    """Return what CONTRIBUTING.md's row for this says: patterns of new files, and of files that get a line."""
+    """Return two lists of patterns from the title's row in CONTRIBUTING.md: new files, and files that get a line."""
     row = re.search(rf"^\| \[{re.escape(title.lower())}\].*$", (ROOT / "CONTRIBUTING.md").read_text(), re.M).group()
     _, _, new, with_a_line, _ = row.split("|")
     return [
@@ -36,24 +36,24 @@ def patterns(title):
 
 
 def patched(text, changes):
-    """Return a text with the lines of a diff added, where its other lines stand, once."""
+    """Return the text with the changes of a diff, whose context must occur exactly once."""
     for change in re.split(r"^@@.*\n", changes, flags=re.M):
         lines = change.splitlines(keepends=True)
         before = "".join(line[1:] for line in lines if line[0] != "+")
-        assert text.count(before) == 1, f"stands there once:\n{before}"
+        assert text.count(before) == 1, f"must occur exactly once:\n{before}"
         text = text.replace(before, "".join(line[1:] for line in lines if line[0] != "-"))
     return text
 
 
 def write(package, own, section):
-    """Write a section's files into the package and into a folder of one's own."""
+    """Write a section's files into the package and into the reader's folder."""
     for name, language, content in blocks(section):
         path = (package if "/" in name else own) / name
         path.write_text(patched(path.read_text(), content) if language == "diff" else content)
 
 
 def files(folder):
-    """Return the texts of a package's files, by name."""
+    """Return the contents of a package's files by their relative path."""
     found = (path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
     return {str(path.relative_to(folder)): path.read_bytes() for path in found}
 
@@ -72,7 +72,7 @@ def run(script, package):
 
 
 @pytest.mark.parametrize("title", SECTIONS)
-def test_what_a_section_adds_works_and_touches_what_it_may(title, tmp_path):
+def test_the_example_of_a_section_works_and_changes_only_the_allowed_files(title, tmp_path):
     package, own = tmp_path / "drone_sim", tmp_path / "own"
     for folder in ("src", "config", "urdf"):
         shutil.copytree(ROOT / folder, package / folder, ignore=shutil.ignore_patterns("__pycache__"))
@@ -82,7 +82,7 @@ def test_what_a_section_adds_works_and_touches_what_it_may(title, tmp_path):
     write(package, own, SECTIONS[title])
     after = files(package)
     scripts = sorted(own.glob("*.py"))
-    assert scripts, "the section tries what it adds"
+    assert scripts, "the section has a script that uses its example"
     for script in scripts:
         done = run(script, package)
         assert done.returncode == 0, done.stderr
@@ -90,7 +90,7 @@ def test_what_a_section_adds_works_and_touches_what_it_may(title, tmp_path):
     touched = {name for name in after if after[name] != before.get(name)}
     assert before.keys() <= after.keys()
     for name in touched:
-        assert any(re.fullmatch(one, name) for one in (new if name not in before else with_a_line)), name
+        assert any(re.fullmatch(pattern, name) for pattern in (new if name not in before else with_a_line)), name
         lines = difflib.ndiff(before.get(name, b"").decode().splitlines(), after[name].decode().splitlines())
-        assert not [line for line in lines if line.startswith("- ")], f"{name}: nothing is taken away"
-    assert all(any(re.fullmatch(one, name) for name in touched) for one in (*new, *with_a_line))
+        assert not [line for line in lines if line.startswith("- ")], f"{name}: lines were removed"
+    assert all(any(re.fullmatch(pattern, name) for name in touched) for pattern in (*new, *with_a_line))

@@ -1,4 +1,4 @@
-"""README.md, CONTRIBUTING.md, docs and tasks: links, commands, parameters and messages in them are what there is."""
+"""Links, commands, parameters and messages in README.md, CONTRIBUTING.md, docs and tasks are up to date."""
 
 import ast
 import importlib.util
@@ -20,12 +20,12 @@ HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 
 
 def anchors(text):
-    """Return the anchors of a page: its own, and those that GitHub gives to headings."""
+    """Return the anchors of a page: its `<a id>` elements, and those that GitHub creates for headings."""
     headings = HEADING.findall(FENCE.sub("", text))
     return {*(re.sub(r"[^\w\- ]", "", one.lower()).replace(" ", "-") for one in headings), *NAMED.findall(text)}
 
 
-def broken(page):
+def broken_links(page):
     for link in LINK.findall(FENCE.sub("", page.read_text(encoding="utf-8"))):
         name, _, anchor = link.partition("#")
         file = page.parent / name if name else page
@@ -36,20 +36,36 @@ def broken(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(Path(page).relative_to(ROOT)))
-def test_every_link_of_a_page_leads_somewhere(page):
-    assert list(broken(page)) == []
+def test_every_link_of_a_page_has_a_target(page):
+    assert list(broken_links(page)) == []
 
 
-def test_a_link_to_nowhere_is_found(tmp_path):
+def test_a_broken_link_is_found(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("# Here\n[a](page.md#here) [b](#there) [c](gone.md) [d](https://example.org) [e](.)\n")
-    assert list(broken(page)) == ["#there", "gone.md", "."]  # a folder is no page of the site
+    assert list(broken_links(page)) == ["#there", "gone.md", "."]  # a folder is not a page
+
+
+def test_every_test_that_a_page_names_exists():
+    """A row names files of tests (`test_fly`, `real_time.test`) and functions in them, whose end may be an ellipsis."""
+    paths = list(ROOT.glob("test/*/test_*.py"))  # two of them may have the same name
+    files = {path.stem for path in paths}
+    rows = [row for page in PAGES for row in page.read_text(encoding="utf-8").splitlines() if "test_" in row]
+    missing = []
+    for row in rows:
+        names = re.findall(r"(?<!\w)(test_\w+)(…?)", row)
+        suites = {name for name, _ in names} | {f"test_{suite}" for suite in re.findall(r"(\w+)\.test\b", row)}
+        source = "".join(path.read_text(encoding="utf-8") for path in paths if path.stem in suites)
+        for name, ellipsis in names:
+            if name not in files and not re.search(rf"def {name}" + (r"\(", "")[bool(ellipsis)], source):
+                missing.append(name)
+    assert rows and not missing
 
 
 # ---- commands, which `./dev.sh docs-commands` runs
 
 
-def loaded(name):
+def load_module(name):
     spec = importlib.util.spec_from_file_location(name, ROOT / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
@@ -57,46 +73,46 @@ def loaded(name):
     return module
 
 
-commands, writing = loaded("test/docs/commands"), loaded("docs/write_interface")
+commands, writing = load_module("test/docs/commands"), load_module("docs/write_interface")
 
 
-def test_what_is_left_out_is_in_the_docs():
+def test_every_excluded_command_is_in_the_docs():
     texts = {one.text for one in commands.everything()}
-    for left_out in (commands.NOT_RUN, commands.SLOW, commands.SHOWN_OTHERWISE):
-        assert set(left_out) - texts == set(), "no longer in README.md or docs: take it from the list"
+    for excluded in (commands.NOT_RUN, commands.SLOW, commands.SHOWN_OTHERWISE):
+        assert set(excluded) - texts == set(), "no longer in README.md or docs: remove it from the list"
 
 
-def test_the_commands_of_a_page_are_found_with_what_it_shows(tmp_path):
+def test_the_commands_of_a_page_are_found_with_their_output(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("```bash\nx\n```\ntext\n```console\n$ a b \\\n  c  # why\nsaid\n$ d\n```\n```python\n$ e\n```\n")
     found = [(one.line, one.text, one.shown) for one in commands.commands(page)]
     assert found == [(6, "a b \\\n  c", ("said",)), (9, "d", ())]
 
 
-def test_readme_begins_with_a_start_and_the_tests():
+def test_the_readme_begins_with_the_commands_for_start_and_tests():
     assert [one.text for one in commands.commands(ROOT / "README.md")][:2] == [
         "./dev.sh run web:=true",
         "./dev.sh test",
     ]
 
 
-# ---- the parameters in docs/interface.md; a rostest compares its other tables
+# ---- parameters in docs/interface.md, whose other tables a rostest compares
 
 
 def leaves(mapping, above=()):
-    """Return the values of a mapping by their names with slashes."""
+    """Return the values of a nested mapping by their keys joined with slashes."""
     found = {}
     for key, value in mapping.items():
         found |= leaves(value, (*above, key)) if isinstance(value, dict) and value else {"/".join((*above, key)): value}
     return found
 
 
-def test_the_page_has_the_table_that_is_made():
+def test_the_table_of_parameters_is_up_to_date():
     text = writing.PAGE.read_text(encoding="utf-8")
     assert writing.page(text) == text, "run docs/write_interface.py"
 
 
-def test_every_parameter_has_its_default():
+def test_the_table_has_the_default_of_every_parameter():
     text = writing.CONFIG.read_text(encoding="utf-8")
     assert {one.name: yaml.safe_load(one.default) for one in writing.rows(text)} == leaves(yaml.safe_load(text))
 
@@ -114,8 +130,8 @@ SPAN = re.compile(r"`([^`]+)`")
 PLACEHOLDER = "…"
 
 
-def printed():
-    """Return all texts from which messages are made: string literals of Python, shell scripts, the cockpit's page."""
+def message_texts():
+    """Return all sources of messages: Python's string literals, the shell scripts, the cockpit's JavaScript."""
     texts = [path.read_text(encoding="utf-8") for path in (ROOT / "web/src").rglob("*.js")]
     texts += [path.read_text(encoding="utf-8") for path in (ROOT / "dev.sh", *(ROOT / "packaging").glob("*.sh"))]
     for path in (ROOT / "src/drone_sim").rglob("*.py"):
@@ -124,10 +140,10 @@ def printed():
     return "\0".join(texts)
 
 
-def test_every_quoted_message_is_one_of_the_programs():
+def test_every_quoted_message_occurs_in_the_source():
     page = (ROOT / "docs/troubleshooting.md").read_text(encoding="utf-8")
     messages = [message for cell in QUOTED.findall(page) for message in SPAN.findall(cell)]
     assert len(messages) > 40
-    texts = printed()
+    texts = message_texts()
     parts = {part.strip() for message in messages for part in message.split(PLACEHOLDER)}
     assert {part for part in parts if part not in texts} == set()

@@ -1,4 +1,4 @@
-"""docs/tutorial.md: each stage flies as its text says, its commands print what it shows, its lines are the scripts'."""
+"""docs/tutorial.md: the stages fly as described, the commands print what it shows, and the snippets are current."""
 
 import ast
 import json
@@ -20,7 +20,7 @@ from drone_sim.sensors.truth import described
 from drone_sim.vehicles.types import QUADRICOPTER
 
 FORWARD_TURNING = Twist(Vector3(1, -0.3, 0.2), Vector3(0, 0, 0.5))
-RIPPLE = 0.01  # m/s, of vz: particles come whole
+RIPPLE = 0.01  # m/s, amplitude in vz: the number of particles is whole
 
 
 def blocks(language):
@@ -42,7 +42,7 @@ def test_a_stage_has_the_phases_that_it_needs(stage):
     assert ("def sysCall_cleanup():" in text) == (stage[0] in "67")
 
 
-def test_constant_thrust_sinks_slowly_slides_on_and_does_not_turn():
+def test_constant_thrust_sinks_slowly_keeps_sliding_and_does_not_turn():
     flight = fly_timeline("1_thrust", "1_thrust.yaml", seconds=12)
     assert np.all(np.diff(flight.z[::20]) < 0)
     assert 0.55 < flight.z[-1] < 0.65
@@ -52,7 +52,7 @@ def test_constant_thrust_sinks_slowly_slides_on_and_does_not_turn():
     assert np.all(flight.propellers == 5.33)
 
 
-def test_the_track_frame_follows_level_and_turned():
+def test_the_track_frame_follows_position_and_yaw_and_stays_level():
     with flying("1_thrust") as simulation:
         drone = simulation.drone
         drone.body.move(Pose((1, 2, 3), (0.0998334, 0, 0.4794255, 0.8)))
@@ -75,19 +75,19 @@ def test_elevation_climbs_holds_and_returns():
     assert np.allclose([flight.x, flight.y, flight.yaw], 0, atol=1e-9)
 
 
-def test_yaw_follows_its_command_and_the_rest_stays():
+def test_yaw_follows_its_command_while_the_position_stays():
     flight = fly_timeline("3_yaw", "3_yaw.yaml")
-    assert at(flight.wz, 1.2) / 0.5 == pytest.approx(0.6, abs=0.01)  # three steps after it is heard
+    assert at(flight.wz, 1.2) / 0.5 == pytest.approx(0.6, abs=0.01)  # three steps after the command
     assert at(flight.wz, 4) == pytest.approx(0.5, abs=0.005)
     assert at(flight.yaw, 6) == pytest.approx(1.5, abs=0.02)
     assert abs(flight.wz[-1]) < 1e-3
-    assert flight.yaw[-1] > at(flight.yaw, 6) + 0.05  # nobody remembers the heading
+    assert flight.yaw[-1] > at(flight.yaw, 6) + 0.05  # the controller does not hold a heading
     assert np.allclose([flight.x, flight.y], 0, atol=1e-6)
     assert np.allclose(flight.z, 0.8, atol=2e-3)
 
 
 @pytest.mark.parametrize("stage, along, across", [("4_pitch", "x", "y"), ("5_roll", "y", "x")])
-def test_a_speed_is_reached_held_and_braked_and_a_gust_is_taken(stage, along, across):
+def test_speed_is_reached_held_and_braked_and_recovers_from_a_gust(stage, along, across):
     flight = fly_timeline(stage, f"{stage}.yaml")
     speed = getattr(flight, f"v{along}")
     assert 1.3 < max(speed) < 1.7
@@ -100,7 +100,7 @@ def test_a_speed_is_reached_held_and_braked_and_a_gust_is_taken(stage, along, ac
     assert np.allclose(flight.z, 0.8, atol=0.02)
 
 
-def test_the_finished_control_survives_being_thrown_about():
+def test_the_finished_controller_recovers_from_disturbances():
     flight = fly_timeline("5_roll", "stability.yaml", "drone.position=[0, 0, 5]", seconds=28)
     for rest in (13.9, 19.9, 28):
         assert at(flight.z, rest) == pytest.approx(5, abs=0.01)
@@ -109,18 +109,18 @@ def test_the_finished_control_survives_being_thrown_about():
         assert abs(at(flight.vz, rest)) < RIPPLE
 
 
-def test_the_bare_law_falls_where_the_limits_hold():
+def test_the_drone_falls_without_limits_and_recovers_with_them():
     unlimited = "propellers.velocity_limits=null"
-    fallen = fly_timeline("5_roll", "fall.yaml", "drone.position=[0, 0, 5]", unlimited)
-    assert fallen.propellers.min() < 0
-    assert fallen.z[round(14 / 0.05) :].min() < 0.5
+    unlimited_flight = fly_timeline("5_roll", "fall.yaml", "drone.position=[0, 0, 5]", unlimited)
+    assert unlimited_flight.propellers.min() < 0
+    assert unlimited_flight.z[round(14 / 0.05) :].min() < 0.5
     held = fly_timeline("tutorial", "fall.yaml", "drone.position=[0, 0, 5]", seconds=26)
     assert held.z[round(14 / 0.05) :].min() > 4.98
     assert held.z[-1] == pytest.approx(5, abs=0.01)
 
 
 @pytest.mark.parametrize("stage", ["2_elevation", "3_yaw", "4_pitch", "5_roll"])
-def test_a_stage_before_ros_hears_no_commands(stage):
+def test_stages_without_ros_ignore_velocity_commands(stage):
     with flying(stage) as simulation:
         simulation.drone.commands.receive(FORWARD_TURNING)
         fly(simulation, 0.9)
@@ -128,7 +128,7 @@ def test_a_stage_before_ros_hears_no_commands(stage):
 
 
 @pytest.mark.parametrize("stage", ["6_ros", "7_camera"])
-def test_a_stage_with_ros_answers_a_twist_and_holds_it(stage):
+def test_stages_with_ros_follow_a_twist(stage):
     with flying(stage, "cameras.front.width=32", "cameras.front.height=24") as simulation:
         assert np.allclose(fly(simulation, 1).states[:, :2], 0)
         simulation.drone.bus.post("/drone/cmd_vel", FORWARD_TURNING)
@@ -139,7 +139,7 @@ def test_a_stage_with_ros_answers_a_twist_and_holds_it(stage):
 
 
 @pytest.mark.parametrize("stage", ["6_ros", "7_camera"])
-def test_the_last_stages_fly_as_the_built_in_script_to_the_last_bit(stage):
+def test_the_last_stages_fly_exactly_as_the_built_in_script(stage):
     small = ("control.thrust_limits=null", "cameras.front.width=32", "cameras.front.height=24")
     own = fly_timeline(stage, "6_ros.yaml", *small)
     built_in = fly_timeline("tutorial", "6_ros.yaml", *small)
@@ -147,7 +147,7 @@ def test_the_last_stages_fly_as_the_built_in_script_to_the_last_bit(stage):
     assert np.array_equal(own.propellers, built_in.propellers)
 
 
-def test_the_camera_stage_publishes_every_step_s_picture():
+def test_the_camera_stage_publishes_an_image_in_every_step():
     scene, backend = f"scene_file={DOCS / 'tutorial' / '7_scene.yaml'}", Recorder()
     with flying("7_camera", "cameras.front.width=64", scene, backend=backend) as simulation:
         fly(simulation, 0.15)
@@ -157,17 +157,17 @@ def test_the_camera_stage_publishes_every_step_s_picture():
     picture = backend.published[-1].message
     assert (picture.pixels.shape, picture.frame_id) == ((480, 64, 3), "front_optical")
     assert np.array_equal(picture.pixels, seen)
-    assert seen.reshape(-1, 3).std(axis=0).min() > 10  # there is something to see
+    assert seen.reshape(-1, 3).std(axis=0).min() > 10  # the image is not uniform
 
 
-def test_the_camera_stage_draws_no_picture_that_nobody_gets(monkeypatch):
+def test_the_camera_stage_renders_nothing_without_a_subscriber(monkeypatch):
     with flying("7_camera") as simulation:
         monkeypatch.setattr(simulation.vision, "picture", lambda *_: pytest.fail("a picture was drawn"))
         fly(simulation, 0.15)
 
 
-@pytest.mark.parametrize("way", ["mask", "box"])  # by color: test_the_commands_print_what_the_text_shows
-def test_the_gate_is_found_by_mask_and_box_as_by_color(tmp_path, way):
+@pytest.mark.parametrize("way", ["mask", "box"])  # color: see test_the_commands_print_what_the_text_shows
+def test_the_gate_stage_works_with_mask_and_box(tmp_path, way):
     script = tmp_path / "gate.py"
     script.write_text(STAGES["8_gate"].read_text().replace('FIND = "color"', f'FIND = "{way}"'))
     small = "cameras.front.width=160", "cameras.front.height=120"
@@ -182,16 +182,16 @@ def test_the_gate_is_found_by_mask_and_box_as_by_color(tmp_path, way):
         assert simulation.drone.body.state.position[:2] == pytest.approx((4, 2), abs=0.1)
 
 
-READ = {"1": 1, "2": 4, "3": 5, "4": 10, "5": 10, "6": 10, "7": 10}  # parameters, by stage
+PARAMETER_COUNTS = {"1": 1, "2": 4, "3": 5, "4": 10, "5": 10, "6": 10, "7": 10}  # number of tunable parameters by stage
 
 
 @pytest.mark.parametrize("stage", CONTROLLERS)
-def test_a_stage_reads_its_gains_from_parameters_that_can_be_tuned(stage):
+def test_the_gains_of_a_stage_are_tunable_parameters(stage):
     with flying(stage, "cameras.front.width=32", "cameras.front.height=24") as simulation:
         fly(simulation, 4)
         tuning = simulation.child_scripts["drone"].tuning
         gains = {name: value for name, value in tuning.values().items() if name in vars(simulation.parameters.control)}
-        assert len(gains) == READ[stage[0]]
+        assert len(gains) == PARAMETER_COUNTS[stage[0]]
         before = simulation.drone.body.state.position[2]
         tuning.change({"thrust_gravity": 5.0})
         assert fly(simulation, 2).z[-1] < before - 0.05
@@ -200,69 +200,69 @@ def test_a_stage_reads_its_gains_from_parameters_that_can_be_tuned(stage):
 # ---- the text
 
 
-def test_the_propellers_are_drawn_as_they_are():
+def test_the_diagram_shows_the_propellers_of_the_quadricopter():
     source = (DOCS / "draw_diagrams.py").read_text()
     drawn = ast.literal_eval(re.search(r"^PROPELLERS = (\(.*?^\))", source, re.MULTILINE | re.DOTALL).group(1))
     script = STAGES["1_thrust"].read_text()
     for (_, name, _, _, clockwise, signs), (known, rotation) in zip(drawn, QUADRICOPTER.rotors):
         assert name == known.replace("_", " ")
-        assert clockwise == (rotation > 0)  # the blades turn against the torque that they leave
+        assert clockwise == (rotation > 0)  # the reaction torque is opposite to the blades' rotation
         mixing = " ".join(f"{sign} self.{what}_corr" for sign, what in zip(signs, ("pitch", "roll", "yaw")))
         assert f"prop_{known} = self.thrust * (1 {mixing})" in script
 
 
 @pytest.mark.parametrize("stage", STAGES)
-def test_the_text_names_every_stage(stage):
+def test_the_text_links_every_stage(stage):
     assert f"(tutorial/{stage}.py)" in TEXT
     assert f"docs/tutorial/{stage}.py" in TEXT
 
 
 @pytest.mark.parametrize("snippet", blocks("python"), ids=lambda snippet: snippet.strip().splitlines()[0])
-def test_lines_shown_are_lines_of_a_script(snippet):
+def test_every_python_snippet_is_part_of_a_script(snippet):
     wanted = textwrap.dedent(snippet)
     assert any(wanted in textwrap.dedent(_with_margin(path, snippet)) for path in STAGES.values())
 
 
 def _with_margin(path, snippet):
-    """Return a script without the margin of a snippet, where it has that much."""
+    """Return the text of a script with the indentation of `snippet` removed from the lines that have it."""
     margin = len(snippet) - len(snippet.lstrip(" "))
     return "".join(line[margin:] if not line[:margin].strip() else line for line in path.open())
 
 
-def test_links_and_pictures_are_there():
+def test_link_and_picture_targets_exist():
     for target in re.findall(r"\]\(([^)#]+)\)", TEXT):
         assert target.startswith("http") or (DOCS / target).exists(), target
 
 
 def test_every_picture_is_made_by_a_command():
-    made = "".join((DOCS / name).read_text() for name in ("make_pictures.sh", "take_pictures.py", "draw_diagrams.py"))
-    plots = re.search(r"^plots\(\).*?^\}", made, re.MULTILINE | re.DOTALL).group()
+    code = "".join((DOCS / name).read_text() for name in ("make_pictures.sh", "take_pictures.py", "draw_diagrams.py"))
+    plots = re.search(r"^plots\(\).*?^\}", code, re.MULTILINE | re.DOTALL).group()
     for name in re.findall(r"\(pictures/tutorial_([^)]+)\.png\)", TEXT):
-        assert f"tutorial_{name}.png" in made or name in plots.split() or f" {name};" in plots, name
+        assert f"tutorial_{name}.png" in code or name in plots.split() or f" {name};" in plots, name
 
 
 def test_the_commands_print_what_the_text_shows(tmp_path, monkeypatch, capsys):
     (tmp_path / "docs").symlink_to(DOCS)
-    monkeypatch.chdir(tmp_path)  # the commands write their CSV where they stand
+    monkeypatch.chdir(tmp_path)  # the commands write CSV files into the working directory
     shown = [pair for block in blocks("console") for pair in commands_in(block)]
     assert len(shown) > 20
     for command, output in shown:
-        ran = run(command)
+        was_run = run(command)
         printed = capsys.readouterr().out
-        if ran:
+        if was_run:
             assert comparable(printed) == comparable(output), command
         else:
             assert not output, f"{command}: no test runs it, so the text may not show what it prints"
 
 
 def commands_in(block):
-    """Return the commands of a console block, with the lines shown below each."""
+    """Return pairs of a command in a console block and the output shown below it."""
     parts = re.split(r"^[12]\$ ", textwrap.dedent(block), flags=re.MULTILINE)
     return [part.partition("\n")[::2] for part in parts[1:]]
 
 
 def run(command):
-    """Run a command of the text that needs no ROS, in this process; return whether it was one."""
+    """Run a command of the text in this process if it needs no ROS; return whether it was run."""
     words = shlex.split(command)
     if words[:3] == ["rosrun", "drone_sim", "fly"]:
         drawn = words.index("--plot") if "--plot" in words else len(words)
@@ -280,5 +280,5 @@ def run(command):
 
 
 def comparable(printed):
-    """Return what a command printed, without how long it took."""
+    """Return the printed lines without the elapsed time."""
     return re.sub(r" in [\d.]+ s \([\d.]+ times real time\)", "", printed).strip().splitlines()

@@ -1,4 +1,4 @@
-"""docs/tutorial/solutions: each flies as its exercise asks, and differs from its stage by a few lines."""
+"""docs/tutorial/solutions: each solves its exercise and differs from its stage in a few lines."""
 
 import difflib
 import math
@@ -38,7 +38,7 @@ def test_a_solution_is_its_stage_with_a_few_lines_changed(name):
     assert 3 <= len(changes) <= 30
 
 
-def test_solution_a_frame_that_nobody_moves_stays():
+def test_solution_the_track_frame_stays_if_the_script_does_not_move_it():
     with flying(str(SOLUTIONS["1_frame"])) as simulation:
         fly(simulation, 0.05)
         before = simulation.drone.track.matrix()
@@ -47,19 +47,19 @@ def test_solution_a_frame_that_nobody_moves_stays():
         assert simulation.drone.track.matrix() == before
 
 
-def test_solution_a_thrust_hangs_for_a_minute():
+def test_solution_the_thrust_holds_the_height_for_a_minute():
     assert fly_solution("1_thrust", seconds=60).z[-1] == pytest.approx(0.8, abs=0.01)
 
 
 def test_solution_half_the_damping_overshoots():
-    halved = fly_solution("2_elevation", "2_elevation.yaml").z[round(6.1 / 0.05) :]
-    assert halved.max() - halved[-1] == pytest.approx(0.152, abs=0.01)
-    whole = fly_timeline("2_elevation", "2_elevation.yaml").z[round(6.1 / 0.05) :]
-    assert whole.max() - whole[-1] < 0.01
+    half_damping = fly_solution("2_elevation", "2_elevation.yaml").z[round(6.1 / 0.05) :]
+    assert half_damping.max() - half_damping[-1] == pytest.approx(0.152, abs=0.01)
+    full_damping = fly_timeline("2_elevation", "2_elevation.yaml").z[round(6.1 / 0.05) :]
+    assert full_damping.max() - full_damping[-1] < 0.01
 
 
 @pytest.mark.parametrize("start", [0, 1.7])  # 1.7: the spin goes past pi
-def test_solution_the_heading_is_held_the_short_way_round(start):
+def test_solution_the_heading_is_held_by_the_shorter_turn(start):
     flight = fly_solution("3_yaw", "3_yaw.yaml", f"drone.yaw={start}", seconds=16)
     yaw = np.unwrap(flight.yaw)
     assert at(yaw, 5.9) - start == pytest.approx(1.395, abs=0.02)
@@ -69,15 +69,15 @@ def test_solution_the_heading_is_held_the_short_way_round(start):
 
 
 def test_solution_a_gentler_outer_loop_overshoots_less_and_needs_longer():
-    gentle, given = fly_solution("4_pitch", "4_pitch.yaml"), fly_timeline("4_pitch", "4_pitch.yaml")
-    assert gentle.vx.max() == pytest.approx(1.28, abs=0.01) and given.vx.max() == pytest.approx(1.59, abs=0.01)
-    assert np.argmax(gentle.vx > 0.9) > np.argmax(given.vx > 0.9) + 8
+    gentle, original = fly_solution("4_pitch", "4_pitch.yaml"), fly_timeline("4_pitch", "4_pitch.yaml")
+    assert gentle.vx.max() == pytest.approx(1.28, abs=0.01) and original.vx.max() == pytest.approx(1.59, abs=0.01)
+    assert np.argmax(gentle.vx > 0.9) > np.argmax(original.vx > 0.9) + 8
 
 
 @pytest.mark.parametrize(
     "name, rests", [("5_square", (10.9, 20.9, 30.9, 40.9)), ("5_square_turning", (10.2, 28.6, 46.9, 65.3))]
 )
-def test_solution_a_square_has_its_corners(name, rests):
+def test_solution_the_square_is_flown_through_its_corners(name, rests):
     flight = fly_solution(name, seconds=75)
     corners = [(at(flight.x, rest), at(flight.y, rest)) for rest in rests]
     assert np.allclose(corners, [(4, 0), (4, 4), (0, 4), (0, 0)], atol=0.06)
@@ -97,32 +97,32 @@ def test_solution_the_guard_catches_the_fall():
     assert np.hypot(flight.vx[-1], flight.vy[-1]) < 0.05
 
 
-def test_solution_a_turn_without_slip():
+def test_solution_the_turn_has_no_slip():
     with_slip, without = fly_timeline("6_ros", "6_ros.yaml"), fly_solution("6_ros", "6_ros.yaml")
-    older = 0.5 * 0.0225  # w times a measured speed's age: the mean over ten sub-steps of 5 ms
-    assert slip(with_slip) == pytest.approx(-1 * 0.5 / 9.81 / 0.5 + 1 * older, abs=0.003)  # -v w / g / Kvcorr
-    assert slip(without) == pytest.approx(1 * older, abs=0.003)
+    delay_slip = 0.5 * 0.0225  # yaw rate times the age of a measured speed, a mean over ten sub-steps of 5 ms
+    assert slip(with_slip) == pytest.approx(-1 * 0.5 / 9.81 / 0.5 + 1 * delay_slip, abs=0.003)  # -v w / g / Kvcorr
+    assert slip(without) == pytest.approx(1 * delay_slip, abs=0.003)
 
 
 def slip(flight):
-    """Return the mean speed to the left (m/s) in the last three seconds of the turn: it swings."""
+    """Return the mean speed to the left (m/s) over the last 3 s of the turn, since it oscillates."""
     return np.mean(
         (np.cos(flight.yaw) * flight.vy - np.sin(flight.yaw) * flight.vx)[round(17 / 0.05) : round(20 / 0.05)]
     )
 
 
-def test_solution_every_fourth_picture_has_no_red():
+def test_solution_every_fourth_image_is_published_without_red():
     small, backend = ("cameras.front.width=64", "cameras.front.height=48"), Recorder()
     with flying(str(SOLUTIONS["7_camera"]), *small, backend=backend) as simulation:
         fly(simulation, 0.6)
-        seen = simulation.drone.cameras["front"].take()
+        camera_image = simulation.drone.cameras["front"].take()
     assert len(backend.published) == 3
     picture = backend.published[-1].message.pixels
     assert not picture[..., 0].any()
-    assert np.array_equal(picture[..., 1:], seen[..., 1:])
+    assert np.array_equal(picture[..., 1:], camera_image[..., 1:])
 
 
-def test_solution_a_gram_more_lies_on_the_floor_after_nine_seconds():
+def test_solution_with_a_gram_more_the_drone_is_on_the_floor_after_nine_seconds():
     with flying(str(SOLUTIONS["1_thrust"])) as simulation:
         push(simulation.drone, (0, 0, -9.81e-3), seconds=12)
         flight = fly(simulation, 12)

@@ -1,4 +1,4 @@
-"""The doctor finds what is wrong, says what to do, hangs nowhere and shows no traceback."""
+"""Doctor: it reports faults with advice, and no check hangs or shows a traceback."""
 
 import os
 import signal
@@ -19,12 +19,12 @@ from drone_sim.ros.doctor import master as master_checks
 from drone_sim.ros.doctor.doctor import run_check
 from drone_sim.ros.doctor.master import Master
 
-HANGS = 90.0  # s; nothing here takes nearly as long unless it hangs
+HANGS = 90.0  # s; no check takes nearly as long unless it hangs
 
 
 @pytest.fixture(name="port")
 def _port():
-    """Return a port where something listens that never answers."""
+    """Return the port of a server that accepts connections and never answers."""
     with socket.create_server(("localhost", 0)) as mute:
         yield mute.getsockname()[1]
 
@@ -36,18 +36,18 @@ def _closed():
     return number
 
 
-def served(server):
+def serve_in_thread(server):
     threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
     return f"http://localhost:{server.server_address[1]}"
 
 
-class Graph:
-    """A master that knows what it was told."""
+class MasterStub:
+    """ROS master with a fixed graph."""
 
     def __init__(self, published=(), subscribed=(), services=(), use_sim_time=None):
         self.graph = [[[name, list(nodes)] for name, nodes in one] for one in (published, subscribed, services)]
         self.use_sim_time = use_sim_time
-        self.node = ""  # where all nodes are
+        self.node = ""  # address of all nodes
 
     def getSystemState(self, _me):
         return [1, "", self.graph]
@@ -61,15 +61,15 @@ class Graph:
 
 @pytest.fixture(name="known")
 def _known(monkeypatch):
-    """Return what makes a master that knows a graph the one of this shell, and asks it."""
+    """Return a function that starts a master with a graph, sets ROS_MASTER_URI, and connects to it."""
     servers = []
 
     def make(**graph):
         server = SimpleXMLRPCServer(("localhost", 0), requestHandler=SimpleXMLRPCRequestHandler, logRequests=False)
         servers.append(server)
-        answers = Graph(**graph)
+        answers = MasterStub(**graph)
         server.register_instance(answers)
-        monkeypatch.setenv("ROS_MASTER_URI", served(server))
+        monkeypatch.setenv("ROS_MASTER_URI", serve_in_thread(server))
         found = Master()
         assert [line.mark for line in found.connection()] == [OK]
         return found, answers
@@ -81,31 +81,31 @@ def _known(monkeypatch):
 
 
 @pytest.mark.ros
-def test_without_a_master_it_ends_with_a_line_for_each_check(closed):
-    own = {"ROS_MASTER_URI": f"http://localhost:{closed}", "ROS_HOSTNAME": "localhost"}
-    done = subprocess.run(
+def test_without_a_master_every_check_prints_a_line(closed):
+    ros_variables = {"ROS_MASTER_URI": f"http://localhost:{closed}", "ROS_HOSTNAME": "localhost"}
+    process = subprocess.run(
         [sys.executable, package_path() / "scripts/doctor"],
-        env={**os.environ, **own},
+        env={**os.environ, **ros_variables},
         capture_output=True,
         text=True,
         timeout=HANGS,
     )
-    marks = [line.split()[:2] for line in done.stdout.splitlines()]
-    assert done.stderr == ""
-    assert done.returncode == int(any(mark == WRONG for mark, *_ in marks))
+    marks = [line.split()[:2] for line in process.stdout.splitlines()]
+    assert process.stderr == ""
+    assert process.returncode == int(any(mark == WRONG for mark, *_ in marks))
     for what in ("packages", "pictures", "flight"):
-        assert [OK, what] in marks, done.stdout
-    assert f"hint   master          no master runs at http://localhost:{closed}" in done.stdout
+        assert [OK, what] in marks, process.stdout
+    assert f"hint   master          no master runs at http://localhost:{closed}" in process.stdout
 
 
 @pytest.mark.parametrize("uri", ["garbage", "http://localhost:99999", "https://localhost:11311", ""])
-def test_a_master_s_address_that_is_none(monkeypatch, uri):
+def test_an_invalid_master_uri_is_reported(monkeypatch, uri):
     monkeypatch.setenv("ROS_MASTER_URI", uri)
     (line,) = Master().connection()
     assert line == Line(WRONG, "master", f"ROS_MASTER_URI = '{uri}': must be like http://localhost:11311")
 
 
-def test_a_port_that_does_not_answer(monkeypatch, port):
+def test_a_master_port_that_does_not_answer_is_reported(monkeypatch, port):
     monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{port}")
     monkeypatch.setattr(network, "TIMEOUT", 0.1)
     (line,) = Master().connection()
@@ -113,8 +113,8 @@ def test_a_port_that_does_not_answer(monkeypatch, port):
     assert f"port {port} of http://localhost:{port} does not answer as a master (timed out)" in line.text
 
 
-class NoMaster(BaseHTTPRequestHandler):
-    """A web server of another kind."""
+class WebServer(BaseHTTPRequestHandler):
+    """Web server that is no ROS master."""
 
     def do_POST(self):
         self.send_error(404)
@@ -123,9 +123,9 @@ class NoMaster(BaseHTTPRequestHandler):
         pass
 
 
-def test_a_port_with_something_else_on_it(monkeypatch):
-    server = HTTPServer(("localhost", 0), NoMaster)
-    monkeypatch.setenv("ROS_MASTER_URI", served(server))
+def test_a_web_server_on_the_master_port_is_reported(monkeypatch):
+    server = HTTPServer(("localhost", 0), WebServer)
+    monkeypatch.setenv("ROS_MASTER_URI", serve_in_thread(server))
     (line,) = Master().connection()
     assert line.mark == WRONG
     assert "does not answer as a master (HTTP 404)" in line.text
@@ -144,14 +144,14 @@ def test_a_port_with_something_else_on_it(monkeypatch):
         ({"published": [("/clock", ["/a"])]}, HINT, "/use_sim_time is not true"),
     ],
 )
-def test_clocks(known, graph, mark, said):
+def test_inconsistent_use_sim_time_and_clock_publishers_are_reported(known, graph, mark, said):
     master, _ = known(**graph)
     (line,) = master.clocks()
     assert line.mark == mark
     assert said in line.text
 
 
-def test_commands_that_nobody_hears(known):
+def test_commands_on_a_topic_without_subscribers_are_reported(known):
     published = [("/cmd_vel", ["/teleop"]), ("/drone/cmd_vel", ["/other"])]
     master, _ = known(published=published, subscribed=[("/drone/cmd_vel", ["/drone_sim"])])
     (line,) = master.commands()
@@ -159,7 +159,7 @@ def test_commands_that_nobody_hears(known):
     assert line.text.startswith("/teleop publishes /cmd_vel,") and "cmd_vel:=/drone/cmd_vel" in line.text
 
 
-def test_nodes_that_have_gone(known, closed):
+def test_dead_nodes_are_reported(known, closed):
     master, answers = known(published=[("/rosout", ["/gone"])])
     answers.node = f"http://localhost:{closed}"
     (line,) = master.dead_nodes()
@@ -167,12 +167,12 @@ def test_nodes_that_have_gone(known, closed):
     assert line.text.startswith("/gone ") and "`rosnode cleanup`" in line.text
 
 
-def test_all_nodes_are_asked_at_the_same_time(known, monkeypatch):
+def test_all_nodes_are_pinged_concurrently(known, monkeypatch):
     master, _ = known(published=[("/rosout", ["/first", "/second", "/third"])])
-    everyone_is_asked = threading.Barrier(3)  # broken, and so an exception, if one question waits for another's answer
+    all_nodes_are_pinged = threading.Barrier(3)  # it breaks and raises if the pings run one after another
 
     def answer(_master, node):
-        everyone_is_asked.wait(timeout=60)
+        all_nodes_are_pinged.wait(timeout=60)
         return node == "/second"
 
     monkeypatch.setattr(master_checks, "is_alive", answer)
@@ -181,7 +181,7 @@ def test_all_nodes_are_asked_at_the_same_time(known, monkeypatch):
     assert "/first, /third are" in line.text and "/second" not in line.text
 
 
-def test_nodes_that_never_answer_are_named_after_one_time_limit(known, monkeypatch):
+def test_nodes_that_never_answer_are_reported_after_one_time_limit(known, monkeypatch):
     master, _ = known(published=[("/rosout", ["/first", "/second"])])
     end = threading.Event()
     monkeypatch.setattr(master_checks, "is_alive", lambda *_: end.wait(HANGS))
@@ -192,7 +192,7 @@ def test_nodes_that_never_answer_are_named_after_one_time_limit(known, monkeypat
     assert "/first, /second" in line.text
 
 
-def test_one_wait_for_the_diagnostics_of_all_simulators(known, monkeypatch):
+def test_diagnostics_of_all_simulators_are_awaited_once(known, monkeypatch):
     services = [("/red/save_scene", ["/red"]), ("/blue/save_scene", ["/blue"])]
     master, _ = known(services=services)
     waits = []
@@ -202,7 +202,7 @@ def test_one_wait_for_the_diagnostics_of_all_simulators(known, monkeypatch):
     assert [(line.mark, line.text.split()[0]) for line in lines] == [(WRONG, "/blue"), (WRONG, "/red")]
 
 
-def test_a_node_s_address_that_others_cannot_use(monkeypatch):
+def test_an_unresolvable_ros_hostname_is_reported(monkeypatch):
     monkeypatch.delenv("ROS_IP", raising=False)
     monkeypatch.setenv("ROS_HOSTNAME", "localhost")
     assert [line.mark for line in environment.host_names()] == [OK]
@@ -212,7 +212,7 @@ def test_a_node_s_address_that_others_cannot_use(monkeypatch):
     assert "ROS_HOSTNAME = 'no.such.host.invalid'" in line.text
 
 
-def test_a_shell_without_ros(monkeypatch):
+def test_a_shell_without_ros_is_reported(monkeypatch):
     monkeypatch.setenv("PATH", "")
     (line,) = environment.ros()
     assert line.mark == WRONG
@@ -223,14 +223,14 @@ def test_a_shell_without_ros(monkeypatch):
 
 
 @pytest.mark.ros
-def test_a_machine_without_rviz(monkeypatch):
+def test_a_missing_rviz_gives_a_hint(monkeypatch):
     monkeypatch.setattr("drone_sim.ros.tools.show._RVIZ", "no_such_package")
     (line,) = (one for one in environment.ros() if one.what == "rviz")
     assert line.mark == HINT
     assert "is not installed" in line.text and "web:=true" in line.text
 
 
-def test_a_module_that_is_missing_and_one_that_kills(tmp_path, monkeypatch):
+def test_missing_failing_and_crashing_modules_are_reported(tmp_path, monkeypatch):
     (tmp_path / "kills.py").write_text("import os\nprint('loud')\nos.abort()\n")
     (tmp_path / "fails.py").write_text("raise RuntimeError('compiled for\\nanother numpy')\n")
     (tmp_path / "versioned.py").write_text("__version__ = '1.2'\nprint('ok')\n")
@@ -245,7 +245,7 @@ def test_a_module_that_is_missing_and_one_that_kills(tmp_path, monkeypatch):
     assert found["kills"][1].startswith("ended with -6")
 
 
-def test_a_check_neither_hangs_nor_raises():
+def test_a_check_that_hangs_or_raises_becomes_one_line():
     (line,) = run_check("slow", lambda: time.sleep(HANGS), 0.05)
     assert line == Line(WRONG, "slow", "no answer within 0.05 s")
     (line,) = run_check("broken", lambda: 1 / 0, 1.0)
@@ -253,14 +253,14 @@ def test_a_check_neither_hangs_nor_raises():
     assert "\n" not in str(Line(OK, "x", "two\nlines"))
 
 
-def test_a_check_leaves_the_timer_of_others_as_it_was():
-    rang = []
-    before = signal.signal(signal.SIGALRM, lambda *_: rang.append(True))
+def test_a_check_restores_the_previous_alarm_timer():
+    alarms = []
+    before = signal.signal(signal.SIGALRM, lambda *_: alarms.append(True))
     timer = signal.setitimer(signal.ITIMER_REAL, 0.05, 0.02)
     try:
         assert run_check("nothing", lambda: [], 10.0) == []
         assert signal.getitimer(signal.ITIMER_REAL)[1] == pytest.approx(0.02, abs=0.005)
-        while not rang:
+        while not alarms:
             signal.pause()
     finally:
         signal.signal(signal.SIGALRM, before)

@@ -1,4 +1,4 @@
-"""Linked dummies hold the bodies that carry them rigidly together, as long as they are linked."""
+"""Linked dummies hold their parent bodies rigidly together."""
 
 import math
 
@@ -29,7 +29,7 @@ def sysCall_init():
 def sysCall_actuation():
     sim.addForceAndTorque(self.heavy, [3.0, 0.0, 0.0], [0.0, 0.0, 0.0])
 """
-LIFTS = """
+LIFTING_SCRIPT = """
 def sysCall_actuation():
     for number in (1, 2, 3, 4):
         script = sim.getScriptHandle(f"Quadricopter_propeller_respondable{number}#0")
@@ -39,7 +39,7 @@ def sysCall_actuation():
 
 @pytest.fixture(name="fly")
 def _fly(new_simulation):
-    """Start a simulation of SCENE with links of dummies (by name), flown by a script."""
+    """Return a function that simulates a scene with `links` {dummy: other dummy} and a vehicle script."""
 
     def fly(text=PUSH, links=(), scene=SCENE):
         linked = {name: {"linked": other} for name, other in dict(links).items()}
@@ -60,19 +60,19 @@ def steps(simulation, count):
         simulation.step()
 
 
-def run(acceleration, seconds):
-    """Return the distance from rest: Bullet changes the speed first, then the place."""
+def distance(acceleration, seconds):
+    """Return the distance travelled from rest. Bullet updates the velocity before the position."""
     return acceleration * seconds * (seconds + SUB_STEP) / 2
 
 
-def test_two_linked_bodies_move_as_one_and_each_alone_without_the_link(fly):
+def test_linked_bodies_move_as_one_and_unlinked_bodies_move_separately(fly):
     simulation = fly(links={"HeavyTip": "LightTip"})
     steps(simulation, 20)
-    assert place(simulation, "Heavy")[0] == pytest.approx(run(1.0, 1.0), abs=1e-4)
-    assert place(simulation, "Light")[0] == pytest.approx(2.0 + run(1.0, 1.0), abs=1e-4)
+    assert place(simulation, "Heavy")[0] == pytest.approx(distance(1.0, 1.0), abs=1e-4)
+    assert place(simulation, "Light")[0] == pytest.approx(2.0 + distance(1.0, 1.0), abs=1e-4)
     alone = fly()
     steps(alone, 20)
-    assert place(alone, "Heavy")[0] == pytest.approx(run(1.5, 1.0), abs=1e-4) and place(alone, "Light")[0] == 2.0
+    assert place(alone, "Heavy")[0] == pytest.approx(distance(1.5, 1.0), abs=1e-4) and place(alone, "Light")[0] == 2.0
 
 
 def test_a_script_links_and_unlinks(fly):
@@ -88,19 +88,19 @@ def test_a_script_links_and_unlinks(fly):
 """
     )
     steps(simulation, 20)
-    assert place(simulation, "Light")[0] == pytest.approx(2.0 + run(1.0, 1.0), abs=1e-3)
+    assert place(simulation, "Light")[0] == pytest.approx(2.0 + distance(1.0, 1.0), abs=1e-3)
     before = place(simulation, "Light")[0]
     steps(simulation, 20)
-    assert place(simulation, "Light")[0] - before == pytest.approx(1.0, abs=1e-2), "it keeps its speed"
-    assert place(simulation, "Heavy")[0] == pytest.approx(run(1.0, 1.0) + 1.0 + run(1.5, 1.0), abs=1e-2)
+    assert place(simulation, "Light")[0] - before == pytest.approx(1.0, abs=1e-2), "the unlinked body keeps its speed"
+    assert place(simulation, "Heavy")[0] == pytest.approx(distance(1.0, 1.0) + 1.0 + distance(1.5, 1.0), abs=1e-2)
     simulation.stop()
     assert place(simulation, "Light")[0] == 2.0
     simulation.load_scripts()
     steps(simulation, 20)
-    assert place(simulation, "Light")[0] == pytest.approx(2.0 + run(1.0, 1.0), abs=1e-3), "and again from the start"
+    assert place(simulation, "Light")[0] == pytest.approx(2.0 + distance(1.0, 1.0), abs=1e-3), "a restart is the same"
 
 
-def test_a_body_that_is_linked_to_a_static_one_hangs_there(fly):
+def test_a_body_linked_to_a_static_body_does_not_fall(fly):
     simulation = fly("def sysCall_init(): pass", links={"WallTip": "HeavyTip"})
     steps(simulation, 20)
     x, _, z = place(simulation, "Heavy")
@@ -115,19 +115,19 @@ def test_two_drones_dock(fly, tmp_path):
         {"name": "Bottom", "kind": "dummy", "parent": "Quadricopter#0", "position": [0.0, 0.0, -0.2]},
     ]
     lifts = tmp_path / "lifts.py"
-    lifts.write_text(LIFTS, encoding="utf-8")
-    two = {
+    lifts.write_text(LIFTING_SCRIPT, encoding="utf-8")
+    pair = {
         "below": {"position": [0.0, 0.0, 2.0], "script": "none"},
         "above": {"position": [0.0, 0.0, 2.4], "script": str(lifts)},
     }
-    simulation = fly("def sysCall_init(): pass", {"Top": "Bottom"}, {"objects": dummies, "vehicles": two})
+    simulation = fly("def sysCall_init(): pass", {"Top": "Bottom"}, {"objects": dummies, "vehicles": pair})
     steps(simulation, 10)
     below, above = (simulation.vehicles[name].body.state.position for name in ("below", "above"))
     assert below[2] > 2.1 and math.dist(below, above) == pytest.approx(0.4, abs=1e-3)
 
 
 @pytest.mark.parametrize("linked", ["Nobody", "Heavy", "HeavyTip"])
-def test_a_link_to_no_other_dummy_is_one_line(fly, linked):
+def test_a_link_to_something_else_than_another_dummy_is_refused(fly, linked):
     with pytest.raises(ParameterError, match=r"objects/3/linked = .*must be the name of another dummy"):
         fly(links={"HeavyTip": linked})
 
@@ -137,7 +137,7 @@ def test_a_dummy_has_one_link(fly):
         fly(links={"HeavyTip": "LightTip", "WallTip": "LightTip"})
 
 
-def test_operations_keep_links(fly, tmp_path):
+def test_links_survive_rename_copy_and_remove(fly, tmp_path):
     simulation = fly(links={"HeavyTip": "LightTip"})
     operations, tree = simulation.operations, simulation.context.objects
     tip, other = tree.handle("HeavyTip"), tree.handle("LightTip")
@@ -147,7 +147,7 @@ def test_operations_keep_links(fly, tmp_path):
     assert operations.linked(tip) == other and operations.entry(tip).linked == "Renamed"
     handles = [tree.handle(name) for name in ("Heavy", "Light", "HeavyTip", "Renamed")]
     copies = operations.copy(handles)
-    assert operations.linked(copies[2]) == copies[3], "a copy is linked to the copy"
+    assert operations.linked(copies[2]) == copies[3], "a copied dummy is linked to the copy of the other"
     alone = operations.copy([tip])
     assert operations.linked(alone[0]) == -1
     steps(simulation, 2)
@@ -157,8 +157,8 @@ def test_operations_keep_links(fly, tmp_path):
     with pytest.raises(ValueError, match="must be the name of another dummy"):
         operations.add([{"name": "New", **TIP, "linked": "Nobody"}])
     operations.write_model([tip], tmp_path / "tip.yaml")
-    assert "linked" not in (tmp_path / "tip.yaml").read_text(encoding="utf-8"), "its other end is not in the model"
+    assert "linked" not in (tmp_path / "tip.yaml").read_text(encoding="utf-8"), "the linked dummy is not in the model"
     operations.remove([other])
-    assert operations.linked(tip) == -1 and operations.entry(tip).linked == "", "a file of the scene can be read again"
+    assert operations.linked(tip) == -1 and operations.entry(tip).linked == "", "no link to a removed dummy is saved"
     assert operations.linked(tree.handle("Track_base")) == -1
     steps(simulation, 2)

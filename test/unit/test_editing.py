@@ -1,4 +1,4 @@
-"""The scene's editor: edits as records, undo and redo, the scene's text, files, drafts."""
+"""Scene editor: edits, undo and redo, the text of the scene, files and drafts."""
 
 import errno
 import os
@@ -34,39 +34,39 @@ objects:
 
 @pytest.fixture(name="editor")
 def _editor():
-    made = editor_of()
-    yield made
-    made.simulation.close()
+    new_editor = editor_of()
+    yield new_editor
+    new_editor.simulation.close()
 
 
 @pytest.fixture(name="course")
 def _course(tmp_path):
     file = tmp_path / "course.yaml"
     file.write_text(COURSE, encoding="utf-8")
-    made = editor_of({"scene_file": str(file)})
-    yield made
-    made.simulation.close()
+    new_editor = editor_of({"scene_file": str(file)})
+    yield new_editor
+    new_editor.simulation.close()
 
 
 @pytest.fixture(name="shared", scope="module")
 def _shared(tmp_path_factory):
-    made = editor_of()
-    made.simulation.document.folder = tmp_path_factory.mktemp("shared")
-    edit(made, {"do": "add", "objects": [GATE]})
-    yield made
-    made.simulation.close()
+    new_editor = editor_of()
+    new_editor.simulation.document.folder = tmp_path_factory.mktemp("shared")
+    edit(new_editor, {"do": "add", "objects": [GATE]})
+    yield new_editor
+    new_editor.simulation.close()
 
 
 def changed_lines(before, after):
-    """Return the lines that only one of two texts has."""
+    """Return the lines that only `before` has, and the lines that only `after` has."""
     first, second = before.splitlines(), after.splitlines()
     return [one for one in first if one not in second], [one for one in second if one not in first]
 
 
-# ---- what an edit does
+# ---- edits
 
 
-def test_an_edit_is_done_as_a_whole_or_not_at_all(editor):
+def test_an_edit_is_done_completely_or_not_at_all(editor):
     before = picture(editor.simulation)
     with pytest.raises(ValueError, match="no object named 'nobody'"):
         edit(editor, {"do": "add", "objects": [GATE]}, {"do": "remove", "objects": ["nobody"]})
@@ -74,7 +74,7 @@ def test_an_edit_is_done_as_a_whole_or_not_at_all(editor):
     assert not editor.history.undo_name
 
 
-def test_what_lands_stands_on_the_floor_under_a_free_name(editor):
+def test_added_objects_stand_on_the_floor_and_get_a_free_name(editor):
     first = edit(editor, {"do": "add", "objects": [GATE], "position": [3, 1, 0]})["handles"]
     second = edit(editor, {"do": "add", "objects": [GATE], "position": [3, 2, 0], "yaw": 0.5})["handles"]
     tree = editor.simulation.context.objects
@@ -93,7 +93,7 @@ def test_a_drag_is_one_step_of_undo(editor):
     assert place(editor, "Gate") == [3, 4, 1]
 
 
-def test_a_drag_that_is_taken_back_leaves_what_another_did_meanwhile(editor):
+def test_undoing_a_drag_keeps_edits_of_other_clients_made_meanwhile(editor):
     edit(editor, {"do": "add", "objects": [GATE, {**GATE, "name": "Other"}], "position": [3, 0, 0]})
     edit(editor, {"do": "move", "object": "Gate", "position": [3, 4, 1]}, merge="mine 1")
     edit(editor, {"do": "move", "object": "Drone", "position": [1, 0, 1]}, merge="mine 2")
@@ -111,7 +111,7 @@ def test_a_drag_that_is_taken_back_leaves_what_another_did_meanwhile(editor):
         editor.answer({"undo": True, "merge": "nobody's"})
 
 
-def test_a_parent_takes_its_children_along_and_keeps_them_where_they_are(editor):
+def test_reparented_objects_keep_their_pose_and_move_with_the_parent(editor):
     edit(editor, {"do": "add", "objects": [GATE], "position": [3, 0, 0]})
     edit(editor, {"do": "add", "objects": [{"name": "Mark", "kind": "dummy"}], "position": [1, 0, 0]})
     edit(editor, {"do": "reparent", "objects": ["Mark"], "parent": "Gate"})
@@ -136,7 +136,7 @@ def test_handles_stay_through_undo_redo_start_and_stop(editor):
     assert simulation.context.objects.handle("Gate") == handle
 
 
-def test_stop_undoes_what_was_edited_in_flight(editor):
+def test_stop_reverts_edits_made_in_flight(editor):
     edit(editor, {"do": "add", "objects": [GATE], "position": [3, 0, 0]}, name="Add")
     editor.simulation.start()
     answer = edit(editor, {"do": "move", "object": "Gate", "position": [3, 3, 1]}, name="Move")
@@ -147,7 +147,7 @@ def test_stop_undoes_what_was_edited_in_flight(editor):
     assert editor.history.undo_name == "Add"
 
 
-def test_no_more_than_a_hundred_steps_are_undone(editor):
+def test_undo_is_limited_to_a_hundred_steps(editor):
     for number in range(103):
         edit(editor, {"do": "add", "objects": [{"name": f"Mark{number}", "kind": "dummy"}]})
     for _ in range(100):
@@ -157,7 +157,7 @@ def test_no_more_than_a_hundred_steps_are_undone(editor):
     assert "Mark2" in editor.simulation.context.objects
 
 
-def test_vehicles_and_floor(editor):
+def test_edits_of_vehicles_and_floor_can_be_undone(editor):
     before = picture(editor.simulation)
     edit(editor, {"do": "set", "object": "Floor", "values": {"size": 10}})
     edit(editor, {"do": "add_vehicle", "name": "second", "position": [2, 0, 1]})
@@ -174,18 +174,18 @@ def test_vehicles_and_floor(editor):
     assert "TrackCam" not in editor.simulation.context.objects
     edit(editor, {"do": "copy", "objects": ["Drone#0"], "counts": [1, 2, 1], "steps": [0, 1, 0]})
     assert place(editor, "Drone#1") == [2, 3, 1]
-    edit(editor, {"do": "remove", "objects": ["Drone"]})  # the other one's objects keep their names
+    edit(editor, {"do": "remove", "objects": ["Drone"]})  # the objects of the other vehicle keep their names
     assert "Drone#0" in editor.simulation.context.objects
     while editor.history.undo_name:
         editor.answer({"undo": True})
     assert picture(editor.simulation) == before
 
 
-def test_a_new_drone_flies_what_the_scene_says(editor, tmp_path):
+def test_added_drones_fly_the_scripts_named_in_the_scene(editor, tmp_path):
     editor.answer({"new": True})
     assert editor.described()["new"]
     (drone,) = edit(editor, {"do": "add_vehicle", "position": [0, 0, 0]})["handles"]
-    assert "script" not in yaml_files.parse(text_of(editor))["vehicles"]["quadricopter"], "what is run flies it"
+    assert "script" not in yaml_files.parse(text_of(editor))["vehicles"]["quadricopter"], "the run's script flies it"
     edit(editor, {"do": "add_vehicle", "position": [1, 0, 0]})
     assert yaml_files.parse(text_of(editor))["vehicles"]["quadricopter2"]["script"] == "pilot"
     (tmp_path / "mine.py").write_text("def sysCall_actuation():\n    pass\n")
@@ -193,13 +193,13 @@ def test_a_new_drone_flies_what_the_scene_says(editor, tmp_path):
     editor.answer({"save": str(tmp_path / "scene.yaml")})
     assert not editor.described()["new"]
     editor.answer({"open": str(tmp_path / "scene.yaml")})
-    editor.simulation.script = "target"  # what a client has run
+    editor.simulation.script = "target"  # the script that a client has chosen
     editor.simulation.start()
     assert editor.simulation.child_scripts["quadricopter"].path == str(tmp_path / "mine.py")
     assert editor.simulation.child_scripts["quadricopter2"].path.endswith("/pilot.py")
 
 
-def test_a_name_that_is_taken_is_refused_with_the_place_of_the_other_object(editor):
+def test_the_error_for_a_taken_name_shows_the_path_of_the_other_object(editor):
     edit(editor, {"do": "add", "objects": [GATE, {"name": "Camera", "kind": "vision_sensor", "parent": "Gate"}]})
     with pytest.raises(ValueError, match=r"'TrackCam' already exists: \S+/TrackCam, a part of the vehicle 'drone'$"):
         edit(editor, {"do": "rename", "object": "Gate", "name": "TrackCam"})
@@ -217,7 +217,7 @@ WRONG_MODELS = {
 
 
 @pytest.mark.parametrize("name", WRONG_MODELS)
-def test_what_is_no_model_is_refused_in_one_line(shared, name, tmp_path):
+def test_saving_a_non_model_as_model_raises_a_one_line_error(shared, name, tmp_path):
     edit(shared, {"do": "add", "objects": [{"name": "Lamp", "kind": "dummy", "parent": "Quadricopter_base"}]})
     with pytest.raises(ValueError, match=WRONG_MODELS[name]):
         shared.answer({"save_model": name, "file": str(tmp_path / "model.yaml")})
@@ -247,7 +247,7 @@ def test_vehicles_floor_and_weather_are_edited_in_flight_until_stop(editor):
     assert simulation.drone is drone
     assert next(one for one in simulation.world.pictures.visuals() if one.floor).shape.size == 12
     edit(editor, {"do": "move", "object": "Drone", "position": [1, 2, 2], "rpy": [0, 0, 1]})
-    assert simulation.drone is drone, "it is only moved, and flies on"
+    assert simulation.drone is drone, "a move does not rebuild the vehicle"
     simulation.step()
     assert place(editor, "Drone") == pytest.approx([1, 2, 2], abs=0.1)
     edit(editor, {"do": "set", "object": "Drone", "values": {"cameras": {"front": {"width": 320}}}})
@@ -286,7 +286,7 @@ def test_vehicles_floor_and_weather_are_edited_in_flight_until_stop(editor):
         "collections: [{name: all, items: [{what: all}]}]",
     ],
 )
-def test_what_no_flight_can_go_on_with_is_refused(editor, said):
+def test_keys_that_cannot_change_in_flight_are_refused_until_stop(editor, said):
     editor.simulation.start()
     key = said.partition(":")[0]
     with pytest.raises(ValueError, match=f"{key}: can only be changed while"):
@@ -296,7 +296,7 @@ def test_what_no_flight_can_go_on_with_is_refused(editor, said):
     editor.answer({"write": f"{text_of(editor)}{said}\n"})
 
 
-def test_a_vehicle_that_cannot_begin_leaves_all_as_it_was(editor, tmp_path):
+def test_a_vehicle_whose_script_fails_in_init_changes_nothing(editor, tmp_path):
     wrong = tmp_path / "wrong.py"
     wrong.write_text("def sysCall_init():\n    raise ValueError('not today')\n", encoding="utf-8")
     editor.simulation.start()
@@ -317,7 +317,7 @@ def test_a_vehicle_that_cannot_begin_leaves_all_as_it_was(editor, tmp_path):
     assert list(editor.simulation.vehicles) == ["drone"]
 
 
-def test_a_model_is_grouped_copied_into_a_row_and_removed_whole(editor):
+def test_a_model_can_be_grouped_copied_into_a_row_removed_and_ungrouped(editor):
     edit(editor, {"do": "add", "objects": [GATE, {**GATE, "name": "Post"}], "position": [3, 0, 0]})
     (base,) = edit(editor, {"do": "group", "objects": ["Gate", "Post"], "name": "Arena"})["handles"]
     copies = edit(editor, {"do": "copy", "objects": [base], "counts": [3, 1, 1], "steps": [2, 0, 0]})["handles"]
@@ -331,7 +331,7 @@ def test_a_model_is_grouped_copied_into_a_row_and_removed_whole(editor):
     assert "Gate" in tree
 
 
-def test_a_script_is_attached_and_taken_away(course):
+def test_a_script_can_be_attached_and_detached(course):
     folder = course.simulation.document.file.parent
     edit(course, {"do": "attach_script", "object": "Lamp"})
     assert "sysCall_actuation" in (folder / "lamp.lua").read_text(encoding="utf-8")
@@ -380,7 +380,7 @@ def test_a_script_is_attached_and_taken_away(course):
         ({"draft": "take"}, "no draft"),
     ],
 )
-def test_what_cannot_be_gets_one_line_and_changes_nothing(editor, request_, said):
+def test_an_invalid_request_raises_a_one_line_error_and_changes_nothing(editor, request_, said):
     before = picture(editor.simulation)
     with pytest.raises(ValueError, match=said) as raised:
         editor.answer(request_)
@@ -402,7 +402,7 @@ OPERATION = st.fixed_dictionaries(
 
 @settings(max_examples=20)
 @given(requests=st.lists(st.one_of(OPERATION.map(lambda one: {"edit": [one]}), JUNK), min_size=1, max_size=3))
-def test_rubbish_is_refused(shared, requests):
+def test_random_requests_raise_at_most_one_line_errors(shared, requests):
     for one in requests:
         try:
             shared.answer(one)
@@ -413,21 +413,21 @@ def test_rubbish_is_refused(shared, requests):
 # ---- texts and files
 
 
-def test_a_text_keeps_what_its_author_wrote(course):
+def test_edits_keep_comments_and_formatting_of_the_scene_file(course):
     assert text_of(course) == COURSE
     edit(course, {"do": "move", "object": "Right", "position": [3, -1.5, 1]})
     was, now = changed_lines(COURSE, text_of(course))
     assert now == [was[0].replace("[3, -1, 1]", "[3, -1.5, 1]")]
     edit(course, {"do": "remove", "objects": ["Left"]})
     text = text_of(course)
-    assert "color: &red [0.9, 0.1, 0.1, 1]}  # the other post" in text  # what was an alias of what is gone
+    assert "color: &red [0.9, 0.1, 0.1, 1]}  # the other post" in text  # was an alias of a removed anchor
     assert all(one in text for one in ("# A course, by hand.", "# wide enough", "# red", "# and what is on them"))
     for _ in range(2):
         course.answer({"undo": True})
     assert text_of(course) == COURSE
 
 
-def test_a_text_becomes_the_scene_and_is_kept_as_it_was_written(course):
+def test_a_written_text_becomes_the_scene_and_stays_verbatim(course):
     handle = course.simulation.context.objects.handle("Left")
     written = (
         COURSE.replace("[3, 1, 1]", "[3, 2, 1]")
@@ -445,7 +445,7 @@ def test_a_text_becomes_the_scene_and_is_kept_as_it_was_written(course):
     )
 
 
-def test_saved_as_another_file_it_is_that_scene(course, tmp_path):
+def test_saving_under_another_name_switches_to_that_file(course, tmp_path):
     edit(course, {"do": "add", "objects": [GATE], "position": [5, 0, 0]})
     other = tmp_path / "other" / "mine.yaml"
     course.answer({"save": str(other)})
@@ -459,7 +459,7 @@ def test_saved_as_another_file_it_is_that_scene(course, tmp_path):
     course.simulation.stop()
 
 
-def test_in_flight_it_is_saved_as_it_stands_and_stays_the_scene_that_it_was(course):
+def test_saving_in_flight_writes_the_current_poses_until_stop_restores_the_scene(course):
     course.simulation.start()
     course.simulation.drone.body.move(Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0)))
     said = course.answer({"save": True})["said"]
@@ -472,7 +472,7 @@ def test_in_flight_it_is_saved_as_it_stands_and_stays_the_scene_that_it_was(cour
     assert text_of(course) == COURSE
 
 
-def test_saved_as_another_file_in_flight_it_is_a_copy_and_the_answer_says_so(course, tmp_path):
+def test_saving_under_another_name_in_flight_writes_a_copy_and_reports_it(course, tmp_path):
     course.simulation.start()
     other = tmp_path / "other.yaml"
     said = course.answer({"save": str(other)})["said"]
@@ -480,7 +480,7 @@ def test_saved_as_another_file_in_flight_it_is_a_copy_and_the_answer_says_so(cou
     assert course.simulation.document.file == tmp_path / "course.yaml"
 
 
-def test_a_start_reads_what_somebody_has_written_since_it_was_saved(course):
+def test_start_reloads_a_scene_file_changed_since_it_was_saved(course):
     edit(course, {"do": "move", "object": "Left", "position": [4, 1, 1]})
     course.answer({"save": True})
     file = course.simulation.document.file
@@ -491,7 +491,7 @@ def test_a_start_reads_what_somebody_has_written_since_it_was_saved(course):
     assert place(course, "Left") == [5, 1, 1]
 
 
-def test_a_scene_of_the_package_is_copied(monkeypatch, tmp_path):
+def test_saving_a_scene_of_the_package_writes_a_copy_in_the_home_folder(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     editor = editor_of({"scene_file": "package://drone_sim/config/scenes/gates.yaml"})
     shipped = editor.simulation.document.file
@@ -505,7 +505,7 @@ def test_a_scene_of_the_package_is_copied(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["1e3", "true", "~", "2026-01-01", "1:30", "010", ".inf", "a: b", "- a", "<<"])
-def test_whatever_its_name_it_can_be_saved_and_loaded(course, tmp_path, name):
+def test_objects_with_names_special_in_yaml_can_be_saved_and_loaded(course, tmp_path, name):
     edit(course, {"do": "add", "objects": [{"name": name, "kind": "dummy", "model": True}]})
     course.answer({"save": str(tmp_path / "named.yaml")})
     course.answer({"save_model": name, "file": str(tmp_path / "model.yaml")})
@@ -516,7 +516,7 @@ def test_whatever_its_name_it_can_be_saved_and_loaded(course, tmp_path, name):
 
 
 @pytest.mark.parametrize("values", [{"script_parameters": 5}, {"mass": "x"}])
-def test_an_edit_that_fails_in_its_midst_leaves_nothing(course, values):
+def test_an_edit_that_fails_halfway_changes_nothing(course, values):
     edit(course, {"do": "attach_script", "object": "Lamp"})
     before, revision = text_of(course), course.revision
     with pytest.raises(ValueError) as raised:
@@ -529,7 +529,7 @@ def test_an_edit_that_fails_in_its_midst_leaves_nothing(course, values):
     assert (text_of(course), course.revision) == (before, revision)
 
 
-def test_a_draft_outlives_the_node(tmp_path):
+def test_a_draft_is_offered_after_the_node_restarts(tmp_path):
     first = editor_of(drafts=tmp_path)
     edit(first, {"do": "add", "objects": [GATE], "position": [5, 0, 0]})
     first.keep_draft()
@@ -544,7 +544,7 @@ def test_a_draft_outlives_the_node(tmp_path):
     second.keep_draft()
     edit(second, {"do": "move", "object": "Gate", "position": [6, 0, 1]})
     second.keep_draft()  # writes nothing so soon after the last one
-    second.simulation.load_scene("")  # of somebody else's
+    second.simulation.load_scene("")  # as by another client
     second.follow()
     assert not second.is_modified
     second.answer({"draft": "take"})
@@ -552,7 +552,7 @@ def test_a_draft_outlives_the_node(tmp_path):
     second.simulation.close()
 
 
-def test_edits_in_flight_that_the_load_of_a_scene_reverts_leave_no_draft(tmp_path):
+def test_edits_in_flight_reverted_by_loading_a_scene_leave_no_draft(tmp_path):
     editor = editor_of(drafts=tmp_path)
     editor.simulation.start()
     editor.follow()
@@ -564,7 +564,7 @@ def test_edits_in_flight_that_the_load_of_a_scene_reverts_leave_no_draft(tmp_pat
     editor.simulation.close()
 
 
-def test_a_draft_that_cannot_be_written_is_said_once(tmp_path, monkeypatch, caplog):
+def test_a_failure_to_write_drafts_is_reported_once(tmp_path, monkeypatch, caplog):
     def full(path, _text):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
@@ -576,13 +576,13 @@ def test_a_draft_that_cannot_be_written_is_said_once(tmp_path, monkeypatch, capl
             kept.wait()
     assert [one.levelname for one in caplog.records] == ["WARNING"]
     assert os.strerror(errno.ENOSPC) in caplog.text
-    assert ": no effect: " in caplog.text, "by which the cockpit's page shows it as a notice"
+    assert ": no effect: " in caplog.text, "the cockpit shows log lines with this text as notices"
     kept.keep("", "third")
     kept.wait()
     assert drafts.Drafts(tmp_path).offered.text == "third" and len(caplog.records) == 1
 
 
-def test_undo_and_redo_back_to_what_was_saved_leave_nothing_to_save(editor, tmp_path):
+def test_undo_and_redo_back_to_the_saved_state_clear_the_modified_flag(editor, tmp_path):
     edit(editor, {"do": "add", "objects": [GATE], "position": [5, 0, 0]})
     editor.answer({"save": str(tmp_path / "gate.yaml")})
     edit(editor, {"do": "move", "object": "Gate", "position": [6, 0, 1]})
@@ -592,7 +592,7 @@ def test_undo_and_redo_back_to_what_was_saved_leave_nothing_to_save(editor, tmp_
         assert editor.is_modified == is_modified, request
 
 
-def test_a_scene_that_is_loaded_in_flight_is_not_modified(editor):
+def test_a_scene_loaded_in_flight_is_not_modified(editor):
     edit(editor, {"do": "add", "objects": [GATE], "position": [5, 0, 0]})
     editor.simulation.start()
     editor.follow()
@@ -601,7 +601,7 @@ def test_a_scene_that_is_loaded_in_flight_is_not_modified(editor):
     assert not editor.is_modified
 
 
-def test_models_of_the_package_are_written_for_any_machine(editor):
+def test_models_of_the_package_are_written_with_package_urls(editor):
     pads = {"do": "add_model", "model": "landing_pad", "position": [1, 0, 0]}
     edit(editor, pads, {"do": "add_model", "model": "pole", "position": [2, 0, 0]})
     assert text_of(editor).splitlines()[-9:] == [
@@ -617,7 +617,7 @@ def test_models_of_the_package_are_written_for_any_machine(editor):
     ]
 
 
-def test_a_vehicle_is_no_model(editor, tmp_path):
+def test_a_vehicle_cannot_be_saved_as_a_model(editor, tmp_path):
     vehicle = editor.simulation.object_handles["Drone"]
     with pytest.raises(ValueError, match="'Drone' is part of a vehicle"):
         editor.answer({"save_model": vehicle, "file": str(tmp_path / "model.yaml")})

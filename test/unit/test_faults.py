@@ -1,4 +1,4 @@
-"""What is wrong with a vehicle: propellers as theory has them, a slow link, sensors; always the same."""
+"""Faults of a vehicle: propellers against theory, a slow and lossy radio link, sensors; all reproducible."""
 
 import collections
 import math
@@ -35,12 +35,12 @@ def _simulate(new_simulation):
 
 
 def fly(simulation, steps, each=lambda: None):
-    """Return the state after each step, and what `each` returned."""
-    flown = []
+    """Return pairs of the state after each step and the result of `each`."""
+    results = []
     for _ in range(steps):
         simulation.step()
-        flown.append((simulation.drone.body.state, each()))
-    return flown
+        results.append((simulation.drone.body.state, each()))
+    return results
 
 
 # ---- propellers
@@ -48,8 +48,8 @@ def fly(simulation, steps, each=lambda: None):
 
 @pytest.mark.parametrize("number", range(4))
 @pytest.mark.parametrize("share", [0.7, 0.0])
-def test_a_weak_propeller_turns_the_drone_as_its_lever_and_inertia_say(simulate, number, share):
-    """I α = r × f + reaction, of all four; while it turns slowly, and so in the first step."""
+def test_a_weak_propeller_causes_the_angular_acceleration_of_its_lost_torque(simulate, number, share):
+    """I α = Σ (r × f + reaction torque) holds while the drone turns slowly, so only the first step is checked."""
     simulation = simulate()
     fly(simulation, 20)
     drone = simulation.drone
@@ -64,27 +64,27 @@ def test_a_weak_propeller_turns_the_drone_as_its_lever_and_inertia_say(simulate,
         point = frames.position(frames.multiply(drone.body.inertial_from_root, link))
         torque += np.cross(point, (0, 0, thrust))
         torque[2] += sense * 0.002 * velocity
-    gained = (np.array(drone.body.state.angular_velocity) - before) / 0.05
+    acceleration = (np.array(drone.body.state.angular_velocity) - before) / 0.05
     expected = np.linalg.solve(drone.body.rigid.inertia, torque)
-    assert gained[:2] == pytest.approx(expected[:2], rel=5e-3)
-    assert gained[2] == pytest.approx(expected[2], rel=0.05)  # the least of them, and the drone turns meanwhile
+    assert acceleration[:2] == pytest.approx(expected[:2], rel=5e-3)
+    assert acceleration[2] == pytest.approx(expected[2], rel=0.05)  # small, and the drone turns in the step
 
 
-def test_a_tenth_less_of_one_propeller_leaves_a_turn_and_a_drift(simulate):
-    """All four must blow alike again, for which every correction is d = -(1 - e) / (1 + 3e)."""
+def test_a_propeller_with_a_tenth_less_thrust_causes_yaw_and_drift(simulate):
+    """All four thrusts become equal again when every correction is d = -(1 - e) / (1 + 3e) for efficiency e."""
     simulation = simulate(faults={"propellers": [0.9, 1, 1, 1]})
     state = fly(simulation, 300)[-1][0]
     correction = -0.1 / 3.7
     track = frames.rotate(frames.invert(simulation.drone.track.matrix()), state.linear_velocity)
     assert state.angular_velocity[2] == pytest.approx(-correction, rel=1e-3)  # Dyaw = 1
-    # Level: Pangle (Kvcorr (0 - v)) = d, forwards; the same to the side.
+    # When level, Pangle Kvcorr (0 - v) = d, both forwards and sideways.
     assert track[0] == pytest.approx(-correction / 0.3 / 0.5, rel=0.05)
     assert math.hypot(*state.angular_velocity[:2]) < 1e-3
     thrusts = simulation.drone.body.thrusts
     assert thrusts == pytest.approx([thrusts[0]] * 4, rel=1e-3)
 
 
-def test_limits_are_of_what_is_commanded(simulate):
+def test_velocity_limits_apply_to_the_command_before_the_fault(simulate):
     simulation = simulate(propellers={"velocity_limits": [4, 5]}, faults={"propellers": [0.5, 0, 1, 1]})
     fly(simulation, 1)
     weak, stopped, *sound = simulation.drone.body.thrusts
@@ -92,7 +92,7 @@ def test_limits_are_of_what_is_commanded(simulate):
     assert sound == [2 * weak] * 2
 
 
-def test_a_propeller_comes_back_at_the_next_start_and_with_a_snapshot(simulate):
+def test_propeller_faults_are_reset_by_start_and_restored_by_snapshots(simulate):
     simulation = simulate()
     first = fly(simulation, 30)
     simulation.start()
@@ -113,14 +113,14 @@ def test_a_propeller_comes_back_at_the_next_start_and_with_a_snapshot(simulate):
 # ---- a radio link
 
 
-def test_a_command_takes_effect_when_it_comes(simulate):
+def test_a_delayed_command_takes_effect_after_its_latency(simulate):
     simulation = simulate(faults={"commands": {"latency": 0.2}}, cmd_vel_timeout=0.5)
     simulation.drone.commands.receive(FORWARD)
     commands = [command for _, command in fly(simulation, 20, lambda: simulation.drone.commands.now)]
     assert commands == [Twist()] * 4 + [FORWARD] * 10 + [Twist()] * 6
 
 
-def test_a_bad_link_loses_the_same_commands_in_every_flight(simulate):
+def test_a_lossy_link_loses_the_same_commands_in_every_flight(simulate):
     simulation = simulate(faults={"commands": WIFI})
 
     def flight():
@@ -137,7 +137,7 @@ def test_a_bad_link_loses_the_same_commands_in_every_flight(simulate):
     assert flight() == first
 
 
-def test_a_snapshot_brings_back_what_is_under_way(simulate):
+def test_a_snapshot_restores_delayed_commands(simulate):
     simulation = simulate()
     simulation.drone.change_faults({"commands": {"latency": 0.3, "jitter": 0.3}})
     simulation.drone.commands.receive(FORWARD)
@@ -149,20 +149,20 @@ def test_a_snapshot_brings_back_what_is_under_way(simulate):
     assert FORWARD in [command for _, command in first]
 
 
-def test_pictures_come_late_and_know_how_old_they_are(simulate):
+def test_delayed_images_arrive_late_and_report_their_age(simulate):
     simulation = simulate(faults={"images": {"latency": 0.1}})
     camera = simulation.drone.cameras["front"]
     camera.viewers.add(lambda: True)
     simulation.drone.commands.receive(FORWARD)
-    taken, came = [], []
+    taken, received = [], []
     look = camera.look
     camera.look = lambda: taken.append(look()) or taken[-1]
     for _ in range(12):
         simulation.step()
-        came.append(camera.image)
+        received.append(camera.image)
         assert camera.image is None or camera.age == pytest.approx(0.1)
-    assert came[:2] == [None, None]
-    assert all(one is other for one, other in zip(came[2:], taken))
+    assert received[:2] == [None, None]
+    assert all(one is other for one, other in zip(received[2:], taken))
     simulation.drone.change_faults({"images": {"loss": 1}})
     simulation.drone.change_faults({"images": {"latency": 0}})
     fly(simulation, 3)
@@ -172,7 +172,7 @@ def test_pictures_come_late_and_know_how_old_they_are(simulate):
 # ---- sensors
 
 
-def test_sensors_fall_silent_freeze_and_come_back_as_if_nothing_had_been(simulate):
+def test_silent_and_frozen_sensors_recover_with_the_readings_of_sound_ones(simulate):
     sound, failing = simulate(sensors=SENSORS), simulate(sensors=SENSORS)
     instruments = failing.drone.instruments
 
@@ -183,10 +183,10 @@ def test_sensors_fall_silent_freeze_and_come_back_as_if_nothing_had_been(simulat
 
     last = step()
     failing.drone.change_faults({"sensors": {"imu": "silent", "range": "frozen"}})
-    kept = instruments.by_name["imu"].read()
+    frozen_reading = instruments.by_name["imu"].read()
     for _ in range(5):
         now = step()
-        assert now["imu"] == [] and instruments.by_name["imu"].read() == kept
+        assert now["imu"] == [] and instruments.by_name["imu"].read() == frozen_reading
         assert [one.value for one in now["range"]] == [last["range"][-1].value]
         assert [one.at for one in now["range"]] == [failing.steps * 10]
     failing.drone.change_faults({"sensors": {"imu": "ok", "range": "ok"}})
@@ -195,7 +195,7 @@ def test_sensors_fall_silent_freeze_and_come_back_as_if_nothing_had_been(simulat
         assert one.readings == sound.drone.instruments.by_name[name].readings != []
 
 
-def test_cameras_fail_too(simulate):
+def test_cameras_can_be_frozen_or_silent(simulate):
     simulation = simulate(cameras={"front": {**SMALL["front"], "mount": None}})
     camera = simulation.drone.cameras["front"]
     camera.viewers.add(lambda: True)
@@ -214,10 +214,10 @@ def test_cameras_fail_too(simulate):
     assert (camera.image != first).any()
 
 
-# ---- how they come
+# ---- parameter, timeline and call
 
 
-def test_parameter_timeline_and_call_fly_alike(simulate, tmp_path):
+def test_faults_by_parameter_timeline_and_call_give_equal_flights(simulate, tmp_path):
     faults = {"propellers": [1.0, 0.95, 1.0, 1.0], "commands": {"latency": 0.1, "jitter": 0.05}}
     weather = {"wind": [1.0, 0.0, 0.0], "gusts": {"deviation": [1.0, 1.0, 1.0]}}
     file = tmp_path / "faults.yaml"
@@ -233,7 +233,7 @@ def test_parameter_timeline_and_call_fly_alike(simulate, tmp_path):
     assert flights[0] == flights[1] == flights[2]
 
 
-def test_the_pages_example_is_allowed(tmp_path):
+def test_the_example_in_the_docs_is_valid(tmp_path):
     page = (Path(__file__).parents[2] / "docs" / "weather.md").read_text(encoding="utf-8")
     file = tmp_path / "storm.yaml"
     file.write_text(re.search(r"^```yaml\n(weather:.*?)^```", page, re.S | re.M)[1])
@@ -253,7 +253,7 @@ def test_the_pages_example_is_allowed(tmp_path):
         (5, "faults = 5: must hold `key: value` lines with propellers, commands, images, sensors, seed"),
     ],
 )
-def test_a_mistake_gets_one_line_whichever_way_it_comes(simulate, tmp_path, faults, message):
+def test_invalid_faults_raise_the_same_error_by_parameter_and_timeline(simulate, tmp_path, faults, message):
     with pytest.raises(ParameterError) as refused:
         parameters.load({"faults": faults})
     assert f"parameter {message}" in str(refused.value)
@@ -268,36 +268,36 @@ def test_a_mistake_gets_one_line_whichever_way_it_comes(simulate, tmp_path, faul
 # ---- the radio link by itself
 
 
-def test_ages_and_shares_over_a_link_are_those_of_its_order_statistics():
-    """Sent each 0.1 s, looked for each 0.05 s, 200 ± 100 ms late and one in five lost.
+def test_message_ages_over_a_link_match_their_theoretical_distribution():
+    """A message is sent every 0.1 s with a delay of 200 ± 100 ms, one in five is lost, polled every 0.05 s.
 
-    What is not lost comes after 0.15, 0.2, 0.25 or 0.3 s, each as often. A message of 0.25 s is overtaken by the next
-    one where that takes 0.15 s, of 0.3 s where it takes 0.15 or 0.2 s, unless it is lost: 1, 1, 1 - 0.8/4, 1 - 0.8/2.
+    A message that is not lost arrives after 0.15, 0.2, 0.25 or 0.3 s with equal probability. The next one overtakes it
+    if it takes 0.25 s and the next 0.15 s, or 0.3 s and the next at most 0.2 s: factors 1, 1, 1 - 0.8/4, 1 - 0.8/2.
     """
     link = RadioLink(LinkParameters(**WIFI), (1,), 100)
     ages = collections.Counter()
     for step in range(40_000):
         if step % 2 == 0:
             link.send(step * 0.05, step)
-        came = link.receive(step * 0.05)
-        if came:
-            ages[round(came[0], 3)] += 1
-            assert step * 0.05 - came[1] * 0.05 == pytest.approx(came[0])
+        received = link.receive(step * 0.05)
+        if received:
+            ages[round(received[0], 3)] += 1
+            assert step * 0.05 - received[1] * 0.05 == pytest.approx(received[0])
     shares = {age: count / 20_000 for age, count in ages.items()}
     assert shares == pytest.approx({0.15: 0.2, 0.2: 0.2, 0.25: 0.16, 0.3: 0.12}, abs=0.01)
 
 
-def test_a_link_that_only_delays_loses_nothing():
+def test_a_link_without_jitter_and_loss_loses_nothing():
     link = RadioLink(LinkParameters(latency=0.15, jitter=0, loss=0), (1,), 100)
-    came = []
+    received = []
     for step in range(1000):
         link.send(step * 0.05, step)
-        came.append(link.receive(step * 0.05))
-    assert [one[1] for one in came[3:]] == list(range(997))
-    assert came[:3] == [None] * 3
+        received.append(link.receive(step * 0.05))
+    assert [one[1] for one in received[3:]] == list(range(997))
+    assert received[:3] == [None] * 3
 
 
-def test_more_than_the_buffer_holds_is_lost():
+def test_messages_beyond_the_buffer_size_are_lost():
     link = RadioLink(LinkParameters(latency=2, jitter=0, loss=0), (1,), 5)
     for number in range(1000):
         link.send(0.0, number)

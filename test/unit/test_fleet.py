@@ -1,4 +1,4 @@
-"""Several vehicles in one world: each is its own, and who comes or goes disturbs nobody."""
+"""Several vehicles in one world: independent control, collisions, adding and removing, scenes."""
 
 import ctypes
 import gc
@@ -22,7 +22,7 @@ def _fly(new_simulation):
 
 
 def path(simulation, name, steps):
-    """Step, and return where a vehicle went, to the last bit."""
+    """Step, and return the states of the vehicle `name` after each step."""
     states = []
     for _ in range(steps):
         simulation.step()
@@ -34,13 +34,13 @@ def forward(speed):
     return Twist(Vector3(speed, 0.0, 0.0))
 
 
-def test_a_number_of_vehicles_stands_in_a_row(fly):
+def test_a_number_of_vehicles_creates_a_row(fly):
     simulation = fly(vehicles=3)
     places = {name: vehicle.body.state.position for name, vehicle in simulation.vehicles.items()}
     assert places == {"drone1": (0, 1, 0.8), "drone2": (0, 0, 0.8), "drone3": (0, -1, 0.8)}
 
 
-def test_each_obeys_its_own_commands(fly):
+def test_each_vehicle_obeys_its_own_commands(fly):
     simulation = fly(vehicles=THREE)
     simulation.vehicles["drone1"].commands.receive(forward(1.0))
     simulation.vehicles["drone3"].commands.receive(Twist(Vector3(0.0, 0.0, 0.5)))
@@ -52,14 +52,14 @@ def test_each_obeys_its_own_commands(fly):
     assert three[2] > 3.5 and three[:2] == pytest.approx((2, -3), abs=0.01)
 
 
-def test_who_flies_in_company_flies_as_alone(fly):
+def test_a_vehicle_in_a_fleet_flies_exactly_as_if_alone(fly):
     company, alone = fly(vehicles=THREE), fly(drone={"position": [0, 3, 1.2]})
     for simulation, name in ((company, "drone2"), (alone, "drone")):
         simulation.vehicles[name].commands.receive(Twist(Vector3(0.7, -0.2, 0.1), Vector3(0.0, 0.0, 0.4)))
     assert path(company, "drone2", 200) == path(alone, "drone", 200)
 
 
-def test_entries_change_what_they_name_alone(fly):
+def test_an_entry_overrides_only_its_own_vehicle_s_parameters(fly):
     simulation = fly(
         vehicles={"slow": {"control": {"angle_max": 0.1}, "script_parameters": {"MyGain": 3}}, "fast": {"yaw": 1.0}},
         control={"angle_max": 0.4},
@@ -89,19 +89,19 @@ def test_entries_change_what_they_name_alone(fly):
         ({"a": {"cameras": {"front": {"width": 0}}}}, r"parameter vehicles/a/cameras/front/width = 0: "),
     ],
 )
-def test_a_wrong_entry_is_named(vehicles, said):
+def test_the_error_names_a_wrong_entry(vehicles, said):
     with pytest.raises(parameters.ParameterError, match=said) as refused:
         parameters.load({"vehicles": vehicles})
     assert "\n" not in str(refused.value)
 
 
-def test_a_wrong_key_at_the_top_is_named_once():
+def test_a_wrong_top_level_value_is_reported_once():
     with pytest.raises(parameters.ParameterError) as refused:
         parameters.load({"vehicles": 5, "control": {"Kzref": "much"}})
     assert str(refused.value).count("Kzref") == 1
 
 
-def test_they_collide_and_come_free(fly):
+def test_two_vehicles_collide_and_separate(fly):
     simulation = fly(vehicles={"left": {"position": [0, 0, 1]}, "right": {"position": [1.5, 0, 1], "yaw": math.pi}})
     vehicles = simulation.vehicles.values()
     for vehicle in vehicles:
@@ -110,7 +110,7 @@ def test_they_collide_and_come_free(fly):
     for _ in range(36):
         simulation.step()
         apart.append(math.dist(*(vehicle.body.state.position for vehicle in vehicles)))
-    assert 0.3 < min(apart) < 0.4, "wing tip to wing tip: each is some 0.17 m long from its middle"
+    assert 0.3 < min(apart) < 0.4, "they touch: each reaches about 0.17 m from its centre"
     for vehicle in vehicles:
         vehicle.commands.receive(forward(-0.6))
     for _ in range(80):
@@ -119,7 +119,7 @@ def test_they_collide_and_come_free(fly):
     assert right[0] - left[0] > 2 and left[2] == pytest.approx(right[2], abs=0.05) and left[2] > 0.5
 
 
-def test_they_see_one_another(fly):
+def test_a_vehicle_appears_in_another_vehicle_s_camera(fly):
     simulation = fly(vehicles={"one": {}, "two": {"position": [1.5, 0, 0.9]}})
     camera = simulation.drone.cameras["front"]
     with_two = camera.take().astype(int)
@@ -127,11 +127,11 @@ def test_they_see_one_another(fly):
     without = camera.take().astype(int)
     changed = np.abs(with_two - without).max(axis=2) > 20
     rows, columns = np.nonzero(changed)
-    assert changed.sum() > 500 and abs(columns.mean() - 320) < 40, "a drone, straight ahead"
+    assert changed.sum() > 500 and abs(columns.mean() - 320) < 40, "the other drone is straight ahead"
     assert rows.min() < 240 < rows.max() or rows.mean() < 300
 
 
-def test_scripts_share_signals_and_find_their_own(fly, tmp_path):
+def test_scripts_share_signals_and_find_their_own_vehicle(fly, tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
         "def sysCall_init():\n"
@@ -150,7 +150,7 @@ def test_scripts_share_signals_and_find_their_own(fly, tmp_path):
     assert [signals.get(float, f"y{number}") for number in (1, 2, 3)] == pytest.approx([1, 0, -1], abs=1e-6)
 
 
-def test_who_comes_and_goes_disturbs_nobody(fly):
+def test_adding_and_removing_vehicles_does_not_change_other_flights(fly):
     quiet, busy = fly(vehicles=THREE), fly(vehicles=THREE)
     for simulation in (quiet, busy):
         simulation.vehicles["drone2"].commands.receive(Twist(Vector3(0.5, 0.1, 0.0), Vector3(0.0, 0.0, 0.3)))
@@ -165,7 +165,7 @@ def test_who_comes_and_goes_disturbs_nobody(fly):
     assert list(busy.vehicles) == ["drone2", "drone3"]
 
 
-def test_fifty_times_leave_nothing_behind(fly):
+def test_adding_and_removing_a_vehicle_leaks_no_files_names_or_visuals(fly):
     simulation = fly(vehicles=2)
     files, names = open_files(), set(simulation.context.objects.names)
     visuals = len(simulation.world.pictures.visuals())
@@ -178,29 +178,29 @@ def test_fifty_times_leave_nothing_behind(fly):
     assert set(simulation.context.objects.names) == names
     assert len(simulation.world.pictures.visuals()) == visuals
     simulation.set_vehicles({"drone1": {}, "drone2": {}, "guest": {}})
-    assert simulation.vehicles["guest"].object_name == "Drone#1", "the suffix that is free"
+    assert simulation.vehicles["guest"].object_name == "Drone#1", "the suffix of the removed vehicle is free again"
 
 
-def test_what_they_took_is_given_back(fly):
-    """But for some 13 kB that PyBullet keeps of each body until the next start."""
+def test_removed_vehicles_free_their_memory_and_files(fly):
+    """PyBullet keeps about 13 kB of each body until the next start."""
     simulation = fly(vehicles=1)
     folder = Path(simulation.world._files._folder.name)
 
-    def come_and_go(times):
+    def add_and_remove(times):
         for _ in range(times):
             simulation.set_vehicles({"drone1": {}, "guest": {"position": [-2, 0, 1]}})
             simulation.set_vehicles({"drone1": {}})
         gc.collect()
 
-    come_and_go(5)
+    add_and_remove(5)
     files = sorted(folder.iterdir())
     growth = []
     for _ in range(3):
         before = allocated()
-        come_and_go(15)
+        add_and_remove(15)
         growth.append(allocated() - before)
     assert sorted(folder.iterdir()) == files
-    # What leaks grows in every round. A table of the process that doubles, whoever's it is, grows in one.
+    # A leak grows in every round. A table of the process that doubles its size grows in only one of them.
     assert min(growth) < 15 * 16_000
 
 
@@ -212,7 +212,7 @@ class Mallinfo(ctypes.Structure):
 
 
 def allocated():
-    """Return how many bytes C code has allocated."""
+    """Return the number of bytes allocated by C code."""
     mallinfo = ctypes.CDLL(None).mallinfo2
     mallinfo.restype = Mallinfo
     return mallinfo().used
@@ -222,7 +222,7 @@ def open_files():
     return len(os.listdir("/proc/self/fd"))
 
 
-def test_one_whose_script_fails_goes_again_and_takes_back_those_added_before_it(fly, tmp_path):
+def test_a_vehicle_whose_script_fails_is_removed_with_those_added_before_it(fly, tmp_path):
     script = tmp_path / "broken.py"
     script.write_text("def sysCall_init():\n    no_such_name\n", encoding="utf-8")
     simulation = fly(vehicles=1)
@@ -238,7 +238,7 @@ def test_one_whose_script_fails_goes_again_and_takes_back_those_added_before_it(
     simulation.step()
 
 
-def test_a_failing_cleanup_keeps_no_vehicle(fly, tmp_path):
+def test_vehicles_are_removed_although_their_cleanup_fails(fly, tmp_path):
     script = tmp_path / "broken.py"
     script.write_text("def sysCall_init():\n    pass\n\n\ndef sysCall_cleanup():\n    no_such_name\n", encoding="utf-8")
     failing = {"script": str(script)}
@@ -249,7 +249,7 @@ def test_a_failing_cleanup_keeps_no_vehicle(fly, tmp_path):
     simulation.step()
 
 
-def test_one_that_cannot_be_built_leaves_nothing(fly):
+def test_a_vehicle_that_cannot_be_built_leaves_nothing_behind(fly):
     simulation = fly(vehicles=1)
     names, bodies = set(simulation.context.objects.names), len(simulation.world.pictures.visuals())
     wrong = {"guest": {"cameras": {"front": {"frame": "nowhere"}}, "position": [2, 0, 1]}}
@@ -259,7 +259,7 @@ def test_one_that_cannot_be_built_leaves_nothing(fly):
     simulation.step()
 
 
-def test_start_brings_back_those_that_were_set(fly):
+def test_start_restores_the_vehicles_set_last(fly):
     simulation = fly(vehicles=2)
     simulation.set_vehicles({"drone1": {"position": [1, 1, 1]}})
     assert list(simulation.vehicles) == ["drone1"]
@@ -267,7 +267,7 @@ def test_start_brings_back_those_that_were_set(fly):
     assert simulation.drone.body.state.position == (1, 1, 1)
 
 
-def test_snapshots_bring_all_back_until_one_comes(fly):
+def test_a_snapshot_restores_all_vehicles_until_the_fleet_changes(fly):
     simulation = fly(vehicles=3)
     for vehicle in simulation.vehicles.values():
         vehicle.commands.receive(forward(0.3))
@@ -281,7 +281,7 @@ def test_snapshots_bring_all_back_until_one_comes(fly):
         simulation.restore(snapshot)
 
 
-def test_a_scene_says_who_flies_and_is_saved(fly, tmp_path):
+def test_a_scene_defines_the_vehicles_and_saves_them(fly, tmp_path):
     scene = tmp_path / "scene.yaml"
     scene.write_text(
         "objects: []\nvehicles:\n  red: {position: [1, 0, 1], script: target}\n  blue: {position: [-1, 0, 1]}\n"
@@ -296,7 +296,7 @@ def test_a_scene_says_who_flies_and_is_saved(fly, tmp_path):
     assert again.vehicles["blue"].body.state.position == (-1.5, 2.0, 1.0)
 
 
-def test_a_wrong_vehicle_of_a_scene_is_named_with_its_line(tmp_path):
+def test_the_error_names_the_line_of_a_wrong_vehicle_in_a_scene(tmp_path):
     scene = tmp_path / "scene.yaml"
     scene.write_text("vehicles:\n  red:\n    position: [1, 0]\n")
     with pytest.raises(
@@ -314,5 +314,5 @@ def test_a_wrong_vehicle_of_a_scene_is_named_with_its_line(tmp_path):
         ({"drone": {"name": "red"}}, ["red/"]),
     ],
 )
-def test_the_only_one_has_the_frames_of_the_drone_if_it_has_its_name(given, prefixes):
+def test_frame_prefixes_are_empty_only_for_a_single_vehicle_named_drone(given, prefixes):
     assert [one.frame_prefix for one in parameters.load(given).fleet] == prefixes

@@ -1,4 +1,4 @@
-"""Markers of a vehicle's flight are sent when they look different, and not in every step."""
+"""Flight markers in rviz: they are published only when their appearance changes."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.ros.rviz import flight_markers, marker_topics
 
-_SETTLED = 300  # steps, after which the drone hovers, or flies evenly
+_SETTLED = 300  # steps, after which the drone hovers or flies at constant velocity
 
 
 class Topic:
@@ -61,7 +61,7 @@ def test_the_arrow_of_a_turning_drone_turns_with_it(flown):
     assert arc.points
 
 
-def test_the_text_stands_above_a_tilted_drone(flown):
+def test_the_text_is_vertically_above_a_tilted_drone(flown):
     class Text(flight_markers.StateText):
         def __init__(self, simulation):
             super().__init__(simulation, None)

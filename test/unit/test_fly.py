@@ -1,4 +1,4 @@
-"""The `fly` command: what it flies, writes, draws, and how it ends."""
+"""The `fly` command: flights, CSV files, plots, errors and signals."""
 
 import csv
 import os
@@ -54,7 +54,7 @@ def environment(**more):
 # ---- CSV
 
 
-def test_csv_holds_the_flight_to_the_last_bit(tmp_path, commands, new_simulation):
+def test_csv_holds_exactly_the_states_of_the_flight(tmp_path, commands, new_simulation):
     out = tmp_path / "out.csv"
     assert main(["--commands", commands, "--duration", "1", "--csv", str(out)]) == 0
     header, rows = read_csv(out)
@@ -75,7 +75,7 @@ def test_csv_holds_the_flight_to_the_last_bit(tmp_path, commands, new_simulation
         simulation.step()
 
 
-def test_numbers_are_as_short_as_they_can_be(tmp_path):
+def test_csv_numbers_are_at_most_as_long_as_their_repr(tmp_path):
     out = tmp_path / "out.csv"
     assert main(["--duration", "0.1", "--set", "drone.position=[0.1, 0, 0.8]", "--csv", str(out)]) == 0
     first, second, _ = out.read_text().splitlines()[1:]
@@ -94,10 +94,10 @@ def test_entries_take_effect_in_the_step_that_begins_at_their_time(tmp_path, com
     assert main(["--commands", commands, "--csv", str(out)]) == 0
     _, rows = read_csv(out)
     assert [row[14] for row in rows[:6]] == [0, 0, 0, 0, 1, 1]  # the step that begins at 0.15 s ends at 0.20 s
-    assert rows[30][3] < 2 < rows[31][3]  # put to z = 3 at 1.5 s
+    assert rows[30][3] < 2 < rows[31][3]  # moved to z = 3 m at 1.5 s
 
 
-def test_two_processes_write_the_same_bytes(tmp_path, commands):
+def test_two_processes_write_identical_csv_files(tmp_path, commands):
     written = []
     for seed in ("1", "2"):
         out = tmp_path / f"{seed}.csv"
@@ -123,14 +123,14 @@ def test_two_processes_write_the_same_bytes(tmp_path, commands):
         (["--commands", "COMMANDS"], 6.5),
     ],
 )
-def test_duration(tmp_path, commands, arguments, last):
+def test_the_flight_lasts_as_long_as_requested_or_as_its_commands(tmp_path, commands, arguments, last):
     out = tmp_path / "out.csv"
     arguments = [commands if argument == "COMMANDS" else argument for argument in arguments]
     assert main([*arguments, "--csv", str(out)]) == 0
     assert read_csv(out)[1][-1][0] == pytest.approx(last, abs=1e-9)
 
 
-def test_a_script_gets_the_twists_as_messages(script, commands, capsys):
+def test_a_script_receives_the_twists_as_messages(script, commands, capsys):
     path = script(
         """
 def sysCall_init():
@@ -155,12 +155,12 @@ def test_settings_are_nested_by_dots_and_read_as_yaml():
 
 
 @pytest.mark.parametrize("assignment", ["gravity", "=3", "control.=3", "control..Kzref=3", "gravity=["])
-def test_a_setting_that_cannot_be_read_is_refused(assignment):
+def test_an_invalid_setting_is_refused(assignment):
     with pytest.raises(ParameterError, match="--set"):
         settings([assignment])
 
 
-def test_settings_are_what_is_flown(tmp_path):
+def test_settings_take_effect_in_the_flight(tmp_path):
     out = tmp_path / "out.csv"
     assert main(["--duration", "1", "--set", "drone.position=[1, 2, 5]", "--set", "gravity=0", "--csv", str(out)]) == 0
     _, rows = read_csv(out)
@@ -168,7 +168,7 @@ def test_settings_are_what_is_flown(tmp_path):
     assert rows[-1][3] > 5.1  # nothing holds it down
 
 
-# ---- how it ends
+# ---- errors, signals and exit
 
 
 @pytest.mark.parametrize(
@@ -204,11 +204,11 @@ def test_settings_are_what_is_flown(tmp_path):
         (["--csv", "a.txt", "--plot", "./a.txt"], "--csv a.txt: must not be the same file"),
     ],
 )
-def test_a_mistake_ends_with_one_line_and_status_1(tmp_path, monkeypatch, capsys, arguments, says):
+def test_a_wrong_argument_gives_one_line_and_status_1(tmp_path, monkeypatch, capsys, arguments, says):
     monkeypatch.chdir(tmp_path)
     try:
         status = main(arguments)
-    except SystemExit as ended:  # argparse's own way
+    except SystemExit as ended:  # argparse exits
         status = ended.code
     lines = capsys.readouterr().err.splitlines()
     assert status == 1
@@ -227,7 +227,7 @@ def test_a_mistake_ends_with_one_line_and_status_1(tmp_path, monkeypatch, capsys
         ["--commands", "scene.yaml"],
     ],
 )
-def test_what_cannot_begin_leaves_the_last_table_alone(tmp_path, monkeypatch, capsys, arguments):
+def test_a_flight_that_cannot_start_keeps_the_previous_csv_file(tmp_path, monkeypatch, capsys, arguments):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.yaml").write_text("boxes: []\n")
     (tmp_path / "bad.py").write_text("x = = 1\n")
@@ -237,7 +237,7 @@ def test_what_cannot_begin_leaves_the_last_table_alone(tmp_path, monkeypatch, ca
     assert (tmp_path / "flight.csv").read_text() == "the last flight"
 
 
-def test_scene_and_config_are_flown_as_the_launch_file_does(tmp_path):
+def test_scene_values_override_config_values_as_in_the_launch_file(tmp_path):
     (tmp_path / "scene.yaml").write_text("drone: {position: [1, 2, 3], yaw: 1}\n")
     (tmp_path / "config.yaml").write_text("gravity: 0.0\ndrone: {position: [7, 7, 7]}\n")
     files = ["--scene", str(tmp_path / "scene.yaml"), "--config", str(tmp_path / "config.yaml")]
@@ -247,7 +247,7 @@ def test_scene_and_config_are_flown_as_the_launch_file_does(tmp_path):
     assert rows[-1][3] > 3.1  # nothing holds it down
 
 
-def test_a_script_error_leaves_the_csv_up_to_there_and_runs_cleanup(tmp_path, script, capsys):
+def test_a_script_error_keeps_the_rows_until_then_and_runs_cleanup(tmp_path, script, capsys):
     out = tmp_path / "out.csv"
     path = script(
         """
@@ -268,7 +268,7 @@ def sysCall_cleanup():
     assert [row[0] for row in read_csv(out)[1]] == pytest.approx([step * 0.05 for step in range(11)])
 
 
-def test_an_error_in_init_is_not_hidden_by_one_in_cleanup(script, capsys):
+def test_an_error_in_init_is_not_hidden_by_an_error_in_cleanup(script, capsys):
     file = script("def sysCall_init():\n    first\n\ndef sysCall_cleanup():\n    second\n")
     assert main(["--script", file, "--duration", "1"]) == 1
     said = capsys.readouterr()
@@ -276,12 +276,12 @@ def test_an_error_in_init_is_not_hidden_by_one_in_cleanup(script, capsys):
     assert "[cleanup]" in said.out and "'second'" in said.out
 
 
-def test_an_error_in_cleanup_is_told_too(script, capsys):
+def test_an_error_in_cleanup_is_reported(script, capsys):
     assert main(["--script", script("def sysCall_cleanup():\n    undefined\n"), "--duration", "1"]) == 1
     assert "NameError" in capsys.readouterr().err
 
 
-def test_ctrl_c_stops_and_keeps_what_was_flown(tmp_path, script):
+def test_ctrl_c_stops_the_flight_and_keeps_its_rows(tmp_path, script):
     out = tmp_path / "out.csv"
     path = script(
         """
@@ -353,10 +353,10 @@ def test_a_signal_ends_the_flight_whatever_a_script_does(script, does, number, s
     assert "Traceback" not in errors
 
 
-def test_what_a_script_leaves_behind_does_not_keep_it(script):
-    left = "threading.Thread(target=time.sleep, args=(1000,)).start(); atexit.register(time.sleep, 1000)"
-    path = script(f"import atexit, threading, time\n\ndef sysCall_init():\n    {left}\n")
-    done = subprocess.run(
+def test_threads_and_exit_handlers_of_a_script_do_not_delay_the_end(script):
+    leftovers = "threading.Thread(target=time.sleep, args=(1000,)).start(); atexit.register(time.sleep, 1000)"
+    path = script(f"import atexit, threading, time\n\ndef sysCall_init():\n    {leftovers}\n")
+    completed = subprocess.run(
         [sys.executable, str(ROOT / "scripts" / "fly"), "--script", path, "--duration", "0.1"],
         env=environment(),
         capture_output=True,
@@ -364,29 +364,29 @@ def test_what_a_script_leaves_behind_does_not_keep_it(script):
         timeout=60,
         check=True,
     )
-    assert done.stdout.startswith("flew 0.10 s in")
-    assert done.stderr.startswith("fly: ended without waiting for ") and done.stderr.count("\n") == 1
+    assert completed.stdout.startswith("flew 0.10 s in")
+    assert completed.stderr.startswith("fly: ended without waiting for ") and completed.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
-def test_what_a_script_says_is_shown_whatever_it_is(script, encoding):
-    """Half a surrogate pair, which UTF-8 has not, and what the terminal cannot show."""
+def test_output_of_a_script_that_cannot_be_encoded_is_shown_escaped(script, encoding):
+    """The text has a lone surrogate, which UTF-8 cannot encode, and an umlaut, which ASCII cannot encode."""
     said = "\n    ".join(
         f"{say}('\\ud800 \u00e4')" for say in ("print", "self.x =", "sim.addStatusbarMessage", "raise ValueError")
     )
     path = script(f"def sysCall_actuation():\n    {said}\n")
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, str(ROOT / "scripts" / "fly"), "--script", path, "--duration", "0.1"],
         env={**environment(), "PYTHONIOENCODING": encoding},
         capture_output=True,
         check=False,
     )
     shown = "\\ud800 \u00e4".encode(encoding, "backslashreplace")
-    assert done.stdout.splitlines()[:2] == [shown, shown]
-    assert done.stderr.splitlines() == [f"fly: [actuation] {path}:5: ValueError: ".encode() + shown]
+    assert completed.stdout.splitlines()[:2] == [shown, shown]
+    assert completed.stderr.splitlines() == [f"fly: [actuation] {path}:5: ValueError: ".encode() + shown]
 
 
-def test_it_needs_no_ros(tmp_path):
+def test_fly_works_without_ros(tmp_path):
     program = (
         "import sys\n"
         "for name in ('rospy', 'rospkg', 'roslib', 'genpy', 'geometry_msgs'): sys.modules[name] = None\n"
@@ -401,7 +401,7 @@ def test_it_needs_no_ros(tmp_path):
 
 
 @pytest.mark.parametrize("option, module", [("--plot", "matplotlib.axes"), ("--video", "av")])
-def test_a_package_that_few_need_is_named_before_the_flight(tmp_path, monkeypatch, capsys, option, module):
+def test_a_missing_optional_package_is_reported_before_the_flight(tmp_path, monkeypatch, capsys, option, module):
     for ours in ("plot", "video"):
         monkeypatch.delitem(sys.modules, f"drone_sim.offline.{ours}", raising=False)
         monkeypatch.delattr(f"drone_sim.offline.{ours}", raising=False)
@@ -414,7 +414,7 @@ def test_a_package_that_few_need_is_named_before_the_flight(tmp_path, monkeypatc
     assert capsys.readouterr().err == said and not table.exists()
 
 
-def test_plot_is_a_picture(tmp_path, commands):
+def test_plot_writes_a_png_file(tmp_path, commands):
     out = tmp_path / "out.png"
     assert main(["--commands", commands, "--plot", str(out)]) == 0
     assert out.read_bytes().startswith(b"\x89PNG")
@@ -436,9 +436,9 @@ def test_plot_shows_velocities_in_the_track_frame(tmp_path, drawn):
     axes = {ax.get_ylabel(): ax for ax in drawn[0].axes}
     commanded, flown = axes["forward $v_x$ [m/s]"].get_lines()[:2]
     assert commanded.get_ydata()[-1] == 1.0
-    assert flown.get_ydata()[-1] == pytest.approx(0.911, rel=0.02)  # which is along y in the world
+    assert flown.get_ydata()[-1] == pytest.approx(0.911, rel=0.02)  # the drone flies along the world's y axis
     pitch, roll = axes["attitude [rad]"].get_lines()[:2]
-    assert max(pitch.get_ydata()) > 0.1  # nose down to go forward
+    assert max(pitch.get_ydata()) > 0.1  # the nose is down in forward flight
     assert max(abs(roll.get_ydata())) < 0.01
     assert axes["yaw [rad]"].get_lines()[0].get_ydata()[-1] == pytest.approx(1.5708, abs=1e-3)
 
@@ -451,7 +451,7 @@ def test_plot_shows_the_path_from_above_with_a_gap_at_a_pose(tmp_path, drawn):
     line, start, end = path.get_lines()
     x, y = line.get_data()
     gap = np.flatnonzero(np.isnan(x))
-    assert list(gap) == [41]  # 0 s to 2 s, and what came of the step in which it was put there
+    assert list(gap) == [41]  # rows for 0 s to 2 s, and one for the step with the pose command
     assert max(y[:41]) < 0.1 and min(y[42:]) > 4.9
     assert (*start.get_data(), *end.get_data()) == (0, 0, x[-1], y[-1])
     assert path.get_aspect() == 1
@@ -460,11 +460,11 @@ def test_plot_shows_the_path_from_above_with_a_gap_at_a_pose(tmp_path, drawn):
 @pytest.mark.parametrize(
     "commands, low, high, cut",
     [
-        ("[]", 4.5, 6, False),  # not down to the 0 before the first step
+        ("[]", 4.5, 6, False),  # without the 0 before the first step
         ("[{at: 2, pose: {position: [0, 0, 2], rpy: [0.3, 0, 0]}}]", 1, 8, True),
     ],
 )
-def test_the_propellers_axis_shows_what_they_do_most_of_the_time(tmp_path, drawn, commands, low, high, cut):
+def test_the_propeller_axis_is_scaled_without_outliers(tmp_path, drawn, commands, low, high, cut):
     (tmp_path / "commands.yaml").write_text(commands)
     assert main(["--commands", "commands.yaml", "--duration", "17", "--plot", "out.png"]) == 0
     (ax,) = (ax for ax in drawn[0].axes if ax.get_ylabel() == "propellers [m/s]")
@@ -479,9 +479,9 @@ def test_the_propellers_axis_shows_what_they_do_most_of_the_time(tmp_path, drawn
     "where", ["", "def sysCall_init():\n    ", "def sysCall_actuation():\n    ", "def sysCall_thread():\n    "]
 )
 def test_a_script_that_forks_flies_once(script, where, tmp_path):
-    """The copy ends where it would go on in the simulator; what else a script may begin does its work."""
+    """The forked copy ends before it returns to the simulator. Pools and subprocesses of a script work."""
     before = "import multiprocessing, os, subprocess, sys\nself.pid = os.getpid()\n"
-    began = """
+    forking = """
 def begun():
     if os.getpid() == self.pid and not hasattr(self, "child"):
         with multiprocessing.get_context("fork").Pool(1) as pool:
@@ -490,7 +490,7 @@ def begun():
         self.child = os.fork()
 """
     path = script(
-        f"{before}{began}{where}begun()\ndef sysCall_cleanup():\n    print('ended', os.waitpid(self.child, 0)[1])\n"
+        f"{before}{forking}{where}begun()\ndef sysCall_cleanup():\n    print('ended', os.waitpid(self.child, 0)[1])\n"
     )
     arguments = ["--script", path, "--duration", "0.2", "--csv", str(tmp_path / "o.csv")]
     flown = subprocess.run(

@@ -1,4 +1,4 @@
-"""Submissions that would rather not fly: none gains a point by it, each gets a line, and nothing stays behind."""
+"""Grading of hostile submissions: they gain no points, are reported in one line and leave nothing behind."""
 
 import contextlib
 import os
@@ -18,7 +18,7 @@ from drone_sim.scripting import load
 from drone_sim.scripting.api.calls import contents
 from drone_sim.scripting.api.ignored import MODULES
 
-SETTINGS = settings.load({"limits": {"seconds": 30.0, "patience": 100.0, "memory": 256}})  # however busy the machine
+SETTINGS = settings.load({"limits": {"seconds": 30.0, "patience": 100.0, "memory": 256}})  # enough on a busy machine
 SECRET = 123_456_789_012
 PLAN = """
 name: attacked
@@ -30,7 +30,7 @@ criteria:
   - {kind: signal, signal: found, equals: nothing, points: 0.5}
 """
 IMPATIENT = PLAN.replace("60.0", "1.0")  # for scripts that do not return
-# What a Python script does in its first sensing: each attempt returns what it has laid its hands on, if anything.
+# A Python script that makes all attempts in its first sensing; an attempt returns what it could get, if anything.
 PYTHON = """
 import contextlib, ctypes, gc, glob, mmap, os, re, resource, signal, socket, struct, subprocess, sys, tempfile, time
 LIBC = ctypes.CDLL(None)
@@ -69,7 +69,7 @@ def attempt():
 
 ATTEMPTS[{what!r}] = attempt
 """
-RULES = {  # what is called, and what is refused
+RULES = {  # the forbidden call, and a part of the error message
     "moves itself": ("sim.setObjectPosition(self.drone, -1, [3, 0, 1])", "move Drone"),
     "moves itself by name": (
         "sim.setObjectPosition(position=[3, 0, 1], handle=self.drone, relativeTo=-1)",
@@ -95,7 +95,7 @@ RULES = {  # what is called, and what is refused
     ),
     "writes a file": ("sim.saveModel(self.drone, 'mine.ttm')", "write Drone"),
 }
-SEARCHES = {  # each would find something, were it there
+SEARCHES = {  # each finds something if the sandbox does not hide it
     "the judge by gc": "found = [type(one) for one in gc.get_objects() if type(one).__module__.startswith("
     "('drone_sim.grading.flight', 'drone_sim.grading.plan', 'drone_sim.run', 'drone_sim.world'))]",
     "the judge by modules": "found = [one for one in sys.modules if one.startswith("
@@ -130,7 +130,7 @@ SEARCHES = {  # each would find something, were it there
     "the home": "open(os.path.expanduser('~/.attacked'), 'w')",
     "the disk": "open(FOLDER + '/written', 'w')",
 }
-ENDS = {  # what ends the flight, and what is said of it
+ENDINGS = {  # the code that ends the flight, and a part of the error message
     "a forged end": (
         "os.write(3, struct.pack('<I', 12) + b'[[\"end\",1,1]]')\n    os._exit(0)",
         "sent an invalid message: not JSON",
@@ -155,18 +155,18 @@ ENDS = {  # what ends the flight, and what is said of it
     "the door closed": ("os.close(3)", "before the flight was over"),
     "a stop": ("os.kill(os.getpid(), signal.SIGSTOP)", "did not return after 1 s (script_time_limit)"),
     "a step without end": ("while True:\n        pass", "stopped after 1 s without returning"),
-    "a fork bomb": ("while True:\n        os.fork()", ""),  # too many, or no return, whichever comes first
+    "a fork bomb": ("while True:\n        os.fork()", ""),  # the process limit or the time limit ends it
     "a crash": ("ctypes.string_at(0)", "crashed: its process was ended by SIGSEGV"),
 }
-WITHOUT_END = ("a stop", "a step without end", "a fork bomb")
-FAR = {  # of the judge, where no sandbox hides it: each would find something, were it in reach
+ENDLESS = ("a stop", "a step without end", "a fork bomb")
+JUDGE_SEARCHES = {  # each finds something if the judge can be reached where no sandbox hides it
     **{what: SEARCHES[what] for what in ("the judge by gc", "the judge by modules", "the seed", "the plan in memory")},
     **{what: SEARCHES[what] for what in ("descriptors", "the parent's memory", "passwords in the environment")},
     "the judge's memory": "found = of_judges(lambda one: open(f'/proc/{one}/mem', 'rb'))",
     "the judge's descriptors": "found = of_judges(lambda one: os.stat(f'/proc/{one}/fd/4'))",
     "the judge, traced": "found = of_judges(lambda one: ctypes.CDLL(None).ptrace(16, int(one), None, None) == 0)",
 }
-OF_JUDGES = f"""
+JUDGE_HELPERS = f"""
 def is_of_test(process):
     while process > 1 and process != {os.getpid()}:
         process = int(open(f"/proc/{{process}}/stat").read().rpartition(")")[2].split()[1])
@@ -181,9 +181,9 @@ def of_judges(look):
                     found.append(one)
     return found
 """
-NUMBER = "{'x86_64': %d, 'aarch64': %d}[os.uname().machine]"  # of a system call that the C library has no function for
+NUMBER = "{'x86_64': %d, 'aarch64': %d}[os.uname().machine]"  # of a system call without a C library function
 ADD_KEY, IO_URING_SETUP = NUMBER % (248, 217), NUMBER % (425, 425)
-CALLS = {  # of the system: each would find something, were it allowed
+SYSTEM_CALLS = {  # each finds something if the system call is allowed
     "System V memory": "found = LIBC.shmget(4321, 2**20, 0o1600) != -1",
     "System V semaphores": "found = LIBC.semget(4321, 1, 0o1600) != -1",
     "System V messages": "found = LIBC.msgget(4321, 0o1600) != -1",
@@ -204,7 +204,7 @@ CALLS = {  # of the system: each would find something, were it allowed
     "the host of a virtual machine": "found = socket.socket(40, socket.SOCK_STREAM)",
     "large buffers": "socket.socketpair()[0].setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2**22)\n    found = 'set'",
 }
-EXCESS = {  # of what no limit of a single process counts, and what is said of it
+EXCESSES = {  # code that exceeds a limit of all processes together, and a part of the error message
     "memory of many copies, which may each write to theirs": (
         "all(os.fork() for _ in range(20))\n    time.sleep(99)",
         "more than 256 MiB of memory",
@@ -219,7 +219,7 @@ EXCESS = {  # of what no limit of a single process counts, and what is said of i
         "more than 20000 files",
     ),
 }
-STAYS = {  # what would outlive the flight
+LEFTOVERS = {  # code whose effect would outlive the flight
     "a daemon": "subprocess.Popen(['sleep', '4321'], start_new_session=True)",
     "a daemon's daemon": "os.fork() or (os.setsid(), os.fork() and os._exit(0), time.sleep(4321))",
     "a copy": "os.fork() or (os.setsid(), time.sleep(4321))",
@@ -229,7 +229,7 @@ STAYS = {  # what would outlive the flight
     "another clock": "import drone_sim.mechanics.clock as clock\n    clock.Clock.time = 99.0",
     "other permissions": "import drone_sim.scripting.rpc.connection as end\n    end.ScriptConnection.permit = None",
 }
-LUA = {  # the same in Lua, as far as it goes there, and what is said of it
+LUA = {  # the attempts that are possible in Lua, and a part of the recorded line
     "moves itself": ("sim.setObjectPosition(drone, -1, {3, 0, 1})", "tried to move Drone"),
     "moves itself in V-REP": ("simSetObjectPosition(drone, -1, {3, 0, 1})", "tried to move Drone"),
     "moves itself with more": ("sim.setObjectPosition(drone, -1, {3, 0, 1}, 1, 2, 3)", "tried to move Drone"),
@@ -245,15 +245,15 @@ LUA = {  # the same in Lua, as far as it goes there, and what is said of it
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("attacked")
-    (made / "attacked.yaml").write_text(PLAN)
-    (made / "impatient.yaml").write_text(IMPATIENT)
-    (made / "secret").write_bytes(os.urandom(32))
-    (made / "other.py").write_text("def sysCall_init(): pass\n")
-    return made
+    directory = tmp_path_factory.mktemp("attacked")
+    (directory / "attacked.yaml").write_text(PLAN)
+    (directory / "impatient.yaml").write_text(IMPATIENT)
+    (directory / "secret").write_bytes(os.urandom(32))
+    (directory / "other.py").write_text("def sysCall_init(): pass\n")
+    return directory
 
 
-def no_sandbox():
+def sandbox_error():
     try:
         sandbox.command(1)
     except sandbox.NoSandbox as why:
@@ -261,8 +261,8 @@ def no_sandbox():
     return ""
 
 
-def flying(sandboxed):
-    """Yield a function that flies a submission by a plan, whose folder gets the script."""
+def yield_fly_function(sandboxed):
+    """Yield a function that writes a script into the folder of a plan and grades a flight of it."""
     with contextlib.closing(Flyer(SETTINGS.limits, sandboxed=sandboxed)) as flyer:
 
         def flown(name, text, plan, seed=SECRET):
@@ -277,7 +277,7 @@ def flying(sandboxed):
 
 @pytest.fixture(scope="module")
 def fly_by_plan():
-    yield from flying(sandboxed=False)
+    yield from yield_fly_function(sandboxed=False)
 
 
 @pytest.fixture(scope="module")
@@ -287,12 +287,12 @@ def fly_without_sandbox(fly_by_plan, folder):
 
 @pytest.fixture(scope="module")
 def fly(folder):
-    with contextlib.contextmanager(flying)(sandboxed=not no_sandbox()) as flown:
+    with contextlib.contextmanager(yield_fly_function)(sandboxed=not sandbox_error()) as flown:
         yield lambda name, text, plan="attacked": flown(name, text, folder / f"{plan}.yaml")
 
 
-def python(attempts, folder, port=9):
-    """Return a script that makes attempts, given by their names."""
+def python_script(attempts, folder, port=9):
+    """Return a script that makes the attempts: {name: body of the attempt}."""
     text = PYTHON + "".join(ATTEMPT.format(what=what, body=body) for what, body in attempts.items())
     title = bytes(one ^ 1 for one in b"A word of the plan that nobody needs")
     words = {"TITLE": repr(title), "FOLDER": repr(str(folder)), "TASKS": repr(str(Path(__file__).parents[2] / "tasks"))}
@@ -301,15 +301,15 @@ def python(attempts, folder, port=9):
     return text
 
 
-# A plan by which a script learns of the scene by its sensors alone, and what does not go round that.
-OWN = """
+# A plan under which a script may read only its own objects and sensors, and a script that tries to read others.
+PLAN_WITH_READS_OWN = """
 duration: 0.3
 scene: package://drone_sim/tasks/gates_vision/scene.yaml
 reads: own
 criteria:
   - {kind: signal, signal: found, equals: nothing}
 """
-READS = """
+READING_SCRIPT = """
 def attempts():
     yield lambda: sim.getObjectPosition(gate, -1)
     yield lambda: sim.getObjectPosition(drone, gate)
@@ -347,76 +347,76 @@ def sysCall_sensing():
 """
 
 
-def test_who_may_read_of_his_own_alone_learns_nothing_of_the_scene(fly_by_plan, tmp_path):
+def test_a_submission_under_reads_own_cannot_read_other_objects(fly_by_plan, tmp_path):
     path = tmp_path / "own.yaml"
-    path.write_text(OWN)
-    result = fly_by_plan("reads.py", READS, path)
+    path.write_text(PLAN_WITH_READS_OWN)
+    result = fly_by_plan("reads.py", READING_SCRIPT, path)
     assert result.error is None and result.outcomes[0].passed, result.outcomes[0].said
     assert "tried to read Red at 0.05 s (sim.getObjectPosition)" in result.tried and not result.passed
 
 
-def nothing_gained(result):
-    """Whether no point was had for arriving, and what is said is one line."""
+def gained_nothing(result):
+    """Return whether the goal criterion gave no points and every reported trouble is one printable line."""
     return (
         result.outcomes[0].points == 0 and not result.passed and all(printable(one) == one for one in result.troubles)
     )
 
 
-def nothing_found(result):
-    assert nothing_gained(result) and result.error is None, result.error
+def assert_nothing_found(result):
+    assert gained_nothing(result) and result.error is None, result.error
     assert result.outcomes[1].passed, result.outcomes[1].said
 
 
-def test_who_breaks_the_rules_is_told_and_gains_nothing(fly, folder):
+def test_forbidden_calls_are_refused_reported_and_earn_no_points(fly, folder):
     calls = {what: f"found = refused(lambda: {call}, {said!r})" for what, (call, said) in RULES.items()}
-    result = fly("breaks.py", python(calls, folder))
-    nothing_found(result)
+    result = fly("breaks.py", python_script(calls, folder))
+    assert_nothing_found(result)
     assert result.flown == pytest.approx(0.5)
-    told = {said for _, said in RULES.values()}
-    assert all(" at 0.05 s (" in one and any(said in one for said in told) for one in result.tried)
-    assert all(any(said in one for one in result.tried) for said in told)
+    expected = {said for _, said in RULES.values()}
+    assert all(" at 0.05 s (" in one and any(said in one for said in expected) for one in result.tried)
+    assert all(any(said in one for one in result.tried) for said in expected)
 
 
-def test_what_is_found_would_be_told(fly_without_sandbox, folder):
-    result = fly_without_sandbox("finds.py", python({"a treasure": "found = 'gold'"}, folder))
+def test_an_attempt_that_finds_something_appears_in_the_outcome(fly_without_sandbox, folder):
+    result = fly_without_sandbox("finds.py", python_script({"a treasure": "found = 'gold'"}, folder))
     assert all(word in result.outcomes[1].said for word in ("a treasure", "gold")) and not result.passed
 
 
-@pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
-def test_who_searches_finds_nothing(fly, folder, monkeypatch):
+@pytest.mark.skipif(bool(sandbox_error()), reason=sandbox_error())
+def test_searches_in_the_sandbox_find_nothing(fly, folder, monkeypatch):
     monkeypatch.setenv("COURSE_SECRET", "swordfish")
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        nothing_found(fly("searches.py", python(SEARCHES, folder, listener.getsockname()[1])))
+        assert_nothing_found(fly("searches.py", python_script(SEARCHES, folder, listener.getsockname()[1])))
     assert not (folder / "written").exists() and not Path("~/.attacked").expanduser().exists()
 
 
-def test_without_a_sandbox_the_judge_is_as_far(fly_without_sandbox, folder, monkeypatch):
+def test_without_a_sandbox_the_judge_is_still_out_of_reach(fly_without_sandbox, folder, monkeypatch):
     monkeypatch.setenv("COURSE_SECRET", "swordfish")
-    nothing_found(fly_without_sandbox("searches.py", python(FAR, folder) + OF_JUDGES))
+    assert_nothing_found(fly_without_sandbox("searches.py", python_script(JUDGE_SEARCHES, folder) + JUDGE_HELPERS))
 
 
-@pytest.mark.parametrize("what", ENDS)
-def test_who_ends_a_flight_otherwise_has_flown_nothing(fly, folder, what):
-    body, said = ENDS[what]
-    if what == "a fork bomb" and no_sandbox():
-        pytest.skip(no_sandbox())
-    result = fly("ends.py", python({what: body}, folder), "impatient" if what in WITHOUT_END else "attacked")
-    assert nothing_gained(result) and said in result.error
-    assert fly("flies.py", python({}, folder)).error is None
+@pytest.mark.parametrize("what", ENDINGS)
+def test_a_submission_that_breaks_off_its_flight_gets_no_points(fly, folder, what):
+    body, said = ENDINGS[what]
+    if what == "a fork bomb" and sandbox_error():
+        pytest.skip(sandbox_error())
+    result = fly("ends.py", python_script({what: body}, folder), "impatient" if what in ENDLESS else "attacked")
+    assert gained_nothing(result) and said in result.error
+    assert fly("flies.py", python_script({}, folder)).error is None
 
 
-@pytest.mark.parametrize("what", STAYS)
-def test_what_stays_behind_is_nothing(fly, folder, what, capfd):
-    fly("flies.py", python({}, folder))
+@pytest.mark.parametrize("what", LEFTOVERS)
+def test_a_submission_leaves_no_processes_and_no_output_behind(fly, folder, what, capfd):
+    fly("flies.py", python_script({}, folder))
     before = descendants()
-    result = fly("stays.py", python({what: STAYS[what]}, folder))
-    assert nothing_gained(result) and result.error is None and result.flown == pytest.approx(0.5)
+    result = fly("stays.py", python_script({what: LEFTOVERS[what]}, folder))
+    assert gained_nothing(result) and result.error is None and result.flown == pytest.approx(0.5)
     assert capfd.readouterr() == ("", "")
     assert descendants() <= before
 
 
 def descendants():
-    """Return all processes that this one has begun, by now or through others."""
+    """Return the ids of all descendants of this process."""
     children = {}
     for path in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
@@ -424,27 +424,27 @@ def descendants():
             children.setdefault(parent, []).append(int(path.parent.name))
     found, waiting = set(), [os.getpid()]
     while waiting:
-        begun = children.get(waiting.pop(), [])
-        found.update(begun)
-        waiting += begun
+        child_processes = children.get(waiting.pop(), [])
+        found.update(child_processes)
+        waiting += child_processes
     return found
 
 
 @pytest.mark.parametrize("where", ["fly", "fly_without_sandbox"])
-def test_the_system_is_not_called_for_what_outlives_a_flight_or_is_not_counted(where, folder, request):
-    nothing_found(request.getfixturevalue(where)("calls.py", python(CALLS, folder)))
+def test_system_calls_with_lasting_or_uncounted_effects_are_refused(where, folder, request):
+    assert_nothing_found(request.getfixturevalue(where)("calls.py", python_script(SYSTEM_CALLS, folder)))
 
 
-@pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
-@pytest.mark.parametrize("what", EXCESS)
+@pytest.mark.skipif(bool(sandbox_error()), reason=sandbox_error())
+@pytest.mark.parametrize("what", EXCESSES)
 def test_all_processes_of_a_submission_are_counted_together(fly, folder, what):
-    body, said = EXCESS[what]
-    result = fly("takes.py", python({what: body}, folder))
-    assert nothing_gained(result) and said in result.error
+    body, said = EXCESSES[what]
+    result = fly("takes.py", python_script({what: body}, folder))
+    assert gained_nothing(result) and said in result.error
 
 
 @pytest.mark.parametrize("what", LUA)
-def test_lua_gains_as_little(fly, what):
+def test_attacks_in_lua_gain_nothing(fly, what):
     body, said = LUA[what]
     result = fly(
         "attacks.lua",
@@ -456,11 +456,11 @@ def test_lua_gains_as_little(fly, what):
             sim.setStringSignal('found', found and 'something' or 'nothing')
         end""",
     )
-    assert nothing_gained(result) and result.error is None and result.outcomes[1].passed
+    assert gained_nothing(result) and result.error is None and result.outcomes[1].passed
     assert [said in one for one in result.tried] == ([True] if said else [])
 
 
-# A scene whose scripts may do what a submission may not, and submissions that would have these do it for them.
+# A scene whose scripts have more permissions than a submission, and submissions that try to make use of them.
 SCENE = """
 drone: {position: [0, 0, 1]}
 objects:
@@ -506,7 +506,7 @@ criteria:
   - {kind: signal, name: score, signal: score, equals: 0}
   - {kind: signal, name: verdict, topic: /verdict, equals: 0}
 """
-NOT_ITS_OWN = {  # what is called, and what is said of it
+SCENE_ATTACKS = {  # the call, and a part of the error message
     "the API of a Lua script": ("sim.callScriptFunction('simRemoveObject', lamp, box)", "call simRemoveObject of the"),
     "a phase": ("sim.callScriptFunction('sysCall_init', post)", "call sysCall_init of the script of Post"),
     "a phase at an object": ("sim.callScriptFunction('sysCall_cleanup@Lamp', 1)", "call sysCall_cleanup of the"),
@@ -545,9 +545,9 @@ NOT_ITS_OWN = {  # what is called, and what is said of it
     "the goal in a motion": ("sim.moveToPose({'object': goal, 'targetPose': here() + [0, 0, 0, 1]})", "move Goal"),
     "what the goal is on": ("sim.setObjectPosition(sim.getObject('/Board'), -1, here())", "move Flag"),
 }
-WITH_ALL = "allowed: [move, push, change]"
-NEVER = {  # what no plan allows
-    **{what: one for what, one in NOT_ITS_OWN.items() if "call " in one[1] or "run " in one[1] or "the goal" in what},
+ALL_ALLOWED = "allowed: [move, push, change]"
+NEVER_ALLOWED = {  # calls that no plan can allow
+    **{what: one for what, one in SCENE_ATTACKS.items() if "call " in one[1] or "run " in one[1] or "the goal" in what},
     "the goal's name": ("sim.setObjectName(goal, 'Goal2')", "change Goal"),
     "the goal, removed": ("sim.removeObjects([box, goal])", "change Goal"),
     "the goal's copy": ("sim.removeObject(sim.getObject('/Board'))", "change Flag"),
@@ -556,7 +556,7 @@ NEVER = {  # what no plan allows
     "a path": ("simOMPL.createTask('t')", "plan a path in the judge's process"),
     "a file": ("sim.saveModel(box, 'mine.yaml')", "write Box"),
 }
-TRIES = """
+CALLING_SCRIPT = """
 ATTEMPTS = {}
 found = {}
 
@@ -579,9 +579,9 @@ def sysCall_sensing():
 """
 
 
-def tries(attempts):
-    """Return a script that makes calls, given by their names, each with what is said of it."""
-    return TRIES + "".join(
+def script_of_calls(attempts):
+    """Return a script that makes the calls: {name: (call, a part of the expected error message)}."""
+    return CALLING_SCRIPT + "".join(
         f"ATTEMPTS[{what!r}] = lambda: {call}, {said!r}\n" for what, (call, said) in attempts.items()
     )
 
@@ -602,48 +602,48 @@ def fly_in_scene(fly_by_plan, tmp_path_factory):
     return fly
 
 
-@pytest.mark.parametrize("half", [0, 1])  # since a result lists at most MAX_TRIED calls
-def test_what_belongs_to_the_scene_is_out_of_reach(fly_in_scene, half):
-    attempts = dict(list(NOT_ITS_OWN.items())[half::2])
-    result = fly_in_scene(tries(attempts))
+@pytest.mark.parametrize("half", [0, 1])  # a result lists at most MAX_TRIED calls
+def test_a_submission_cannot_change_the_scene_s_objects_data_or_scripts(fly_in_scene, half):
+    attempts = dict(list(SCENE_ATTACKS.items())[half::2])
+    result = fly_in_scene(script_of_calls(attempts))
     assert result.error is None and not result.passed
     assert [one.passed for one in result.outcomes] == [False, True, True, True], result.outcomes
-    assert recorded(result.tried, attempts)
+    assert are_all_recorded(result.tried, attempts)
 
 
-def recorded(tried, attempts):
-    """Whether each attempt has been recorded, and nothing else."""
+def are_all_recorded(tried, attempts):
+    """Return whether each attempt is in `tried`, and nothing else is."""
     texts = {text for _, text in attempts.values()}
     each_is_recorded = all(any(text in line for line in tried) for text in texts)
     return each_is_recorded and all(any(text in line for text in texts) for line in tried)
 
 
-def test_no_plan_lends_the_scenes_rights_or_its_goals(fly_in_scene):
-    result = fly_in_scene(tries(NEVER), WITH_ALL)
+def test_no_plan_can_allow_calling_scene_scripts_or_moving_goals(fly_in_scene):
+    result = fly_in_scene(script_of_calls(NEVER_ALLOWED), ALL_ALLOWED)
     assert result.error is None and result.outcomes[1].passed, result.outcomes
-    assert recorded(result.tried, NEVER)
+    assert are_all_recorded(result.tried, NEVER_ALLOWED)
 
 
-def test_a_topic_of_the_scene_is_not_a_submissions(fly_in_scene):
+def test_a_submission_cannot_publish_on_a_topic_of_the_scene(fly_in_scene):
     publish = "simROS.publish(simROS.advertise('/verdict', 'std_msgs/Int32'), {'data': 5})"
-    result = fly_in_scene(tries({"a topic": (publish, "scripts of the scene publish on this topic")}))
+    result = fly_in_scene(script_of_calls({"a topic": (publish, "scripts of the scene publish on this topic")}))
     assert [one.passed for one in result.outcomes] == [False, True, True, True], result.outcomes
 
 
-CALLED = "(sim.callScriptFunction('door', post, 3), sim.callScriptFunction('shine@Lamp', 1, 1))"
+CALLS_OF_LISTED_FUNCTIONS = "(sim.callScriptFunction('door', post, 3), sim.callScriptFunction('shine@Lamp', 1, 1))"
 
 
 def test_a_plan_lists_the_functions_that_a_submission_may_call(fly_in_scene):
     calls = "calls: [door, shine, helper]"
-    result = fly_in_scene(tries({"listed": (CALLED, "")}), calls)
+    result = fly_in_scene(script_of_calls({"listed": (CALLS_OF_LISTED_FUNCTIONS, "")}), calls)
     assert result.error is None and result.tried == (), result.error
     assert "(6, 2)" in result.outcomes[1].said
     imported = ("sim.callScriptFunction('helper', post, 'x')", "call helper of the script of Post")
-    result = fly_in_scene(tries({"imported": imported}), calls)
+    result = fly_in_scene(script_of_calls({"imported": imported}), calls)
     assert "tried to call helper of the script of Post" in result.tried[0] and result.outcomes[1].passed
 
 
-ITS_OWN = """
+SCRIPT_WITH_OWN_DATA = """
 def sysCall_init():
     self.mark, self.drone = sim.createDummy(0.01), sim.getObject("/Quadcopter")
     self.tube, self.mine = sim.tubeOpen(0, "mine", 1), sim.createCollection()
@@ -669,13 +669,13 @@ def twice(value):
 """
 
 
-def test_what_is_its_own_a_submission_may_set_and_call(fly_in_scene):
-    result = fly_in_scene(ITS_OWN)
+def test_a_submission_may_use_its_own_objects_data_and_functions(fly_in_scene):
+    result = fly_in_scene(SCRIPT_WITH_OWN_DATA)
     assert result.error is None and result.tried == ()
     assert [one.passed for one in result.outcomes] == [False, True, True, True], result.outcomes
 
 
-# What a submission reaches by each function of the API; a new function must be entered here, and decided on.
+# The effect that a submission can have by each function of the API. Each new function must be entered here.
 REACHES = {
     "nothing but answers": """
         sim: boolAnd32 boolOr32 boolXor32 getCollectionHandle getCollectionName getCollectionObjects
@@ -766,8 +766,8 @@ REACHES = {
 }
 
 
-def entered():
-    """Yield each function of the table as module.name, and what a submission reaches by it."""
+def reached_functions():
+    """Yield (module.name, effect) of each function in REACHES."""
     for reached, text in REACHES.items():
         module = ""
         for word in text.split():
@@ -776,7 +776,7 @@ def entered():
                 yield f"{module[:-1]}.{word}", reached
 
 
-def test_it_is_known_of_every_function_what_a_submission_reaches_by_it(new_simulation):
+def test_every_api_function_is_entered_in_reaches_and_checked_as_entered(new_simulation):
     found = {}
 
     def note(path, modules, *others):
@@ -787,28 +787,28 @@ def test_it_is_known_of_every_function_what_a_submission_reaches_by_it(new_simul
     drone = simulation.drone
     actions = permissions.Actions(simulation, [drone], {drone.object_name})
     values = SceneValues(simulation, set())
-    looks = {
+    members = {
         "values that the scene's scripts have not set": {*values.checks},
         "its own parameters": {"sim.setScriptSimulationParameter", "sim.setUserParameter"},
         "its own blades": {"sim.setJointPosition"},
     }
     ignored = {f"{name}.{key}" for name, groups in MODULES.items() for one in groups for key in one.functions}
-    reached = dict(entered())
-    assert len(reached) == sum(1 for _ in entered())
+    reached = dict(reached_functions())
+    assert len(reached) == sum(1 for _ in reached_functions())
     for name, function in found.items():
         if name in ignored:
             continue  # it does nothing
         own = f"{name.partition('.')[0]}.{function.__name__}"
-        assert own in reached, f"{own}: enter in REACHES what a submission reaches by it"
+        assert own in reached, f"{own}: enter in REACHES the effect that a submission can have by it"
         what, needs = reached[own], actions.action_of(name, [])
-        assert (name in values.checks) == (own in looks["values that the scene's scripts have not set"])
+        assert (name in values.checks) == (own in members["values that the scene's scripts have not set"])
         if what in ("move", "push", "change", "call", "run", "load", "write", "open", "plan"):
             assert needs == what, name
         elif what == "its own frames":
             assert actions.action_of(name, [simulation.context.objects.handle_of(drone.object)]) in ("move", None), name
             assert name not in permissions.free_functions(), name
-        elif what in looks:
-            assert own in looks[what] and (name in permissions.free_functions()) == (name in values.checks), name
+        elif what in members:
+            assert own in members[what] and (name in permissions.free_functions()) == (name in values.checks), name
         else:
             assert needs is None and name not in values.checks, name
     assert {*reached} <= {*found}

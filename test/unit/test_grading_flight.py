@@ -53,7 +53,7 @@ def sysCall_sensing():
 
 @pytest.fixture
 def written(tmp_path):
-    """Return what writes a plan, a scene with a wall so far away (m) and scripts, and reads the plan."""
+    """Return a function that writes a plan, a scene with a wall at x = `wall` m and scripts, and reads the plan."""
 
     def write(text=STEP, wall=50.0, **scripts):
         (tmp_path / "scene.yaml").write_text(SCENE.replace("WALL", str(wall)))
@@ -69,7 +69,7 @@ def said(result):
     return {one.name: one.said for one in result.outcomes}
 
 
-def test_a_flight_is_the_same_to_the_bit_whatever_flew_before(written):
+def test_a_graded_flight_does_not_depend_on_earlier_flights(written):
     steps = written()
     first = [flight.grade(steps, seed=seed) for seed in (0, 1, 2)]
     connect_ahead()
@@ -79,7 +79,7 @@ def test_a_flight_is_the_same_to_the_bit_whatever_flew_before(written):
     assert all(one.passed and one.error is None for one in first)
 
 
-def test_seed_0_is_the_plan_as_it_stands_and_the_table_is_that_of_fly(written, tmp_path):
+def test_seed_0_applies_no_spread_and_gives_the_table_of_fly(written, tmp_path):
     steps = written(STEP.replace("spread:", "spread: {} #"))
     spread = written()
     result = flight.grade(spread, table=tmp_path / "graded.csv")
@@ -92,7 +92,7 @@ def test_seed_0_is_the_plan_as_it_stands_and_the_table_is_that_of_fly(written, t
     assert (tmp_path / "graded.csv").read_text() == (tmp_path / "flown.csv").read_text()
 
 
-def test_what_a_seed_draws_depends_on_nothing_else(written):
+def test_each_value_drawn_for_a_seed_is_independent_of_the_others(written):
     steps = written()
     start, other = steps.parameters(1), steps.model_copy(update={"spread": Randomization(position=(0.2, 0.2, 0.1))})
     (own,) = start.fleet
@@ -108,17 +108,17 @@ def test_what_a_seed_draws_depends_on_nothing_else(written):
         for one in map(steps.parameters, range(3))
         for own in one.fleet
     }
-    assert len({seed for three in seeds for seed in three}) == 7  # 0 three times, and two of each
+    assert len({seed for three in seeds for seed in three}) == 7  # 0 for seed 0, three each for 1 and 2
 
 
-def test_a_seed_is_spread_evenly(written):
+def test_seeds_spread_the_start_position_evenly(written):
     steps = written()
     drawn = np.array([steps.parameters(seed).fleet[0].position for seed in range(1, 201)])
     assert np.abs(drawn.mean(axis=0) - (0, 0, 1)).max() < 0.03
     assert drawn.max(axis=0) == pytest.approx([0.2, 0.2, 1.1], abs=0.01)
 
 
-def test_a_plan_names_the_files_that_it_is_made_of(written, tmp_path):
+def test_a_plan_lists_its_files(written, tmp_path):
     scene = package_path() / "config" / "scenes" / "gates.yaml"
     (tmp_path / "other.yaml").write_text("script: target\n")
     steps = written(TALKING + "scene: package://drone_sim/config/scenes/gates.yaml\nconfig: other.yaml", counting="")
@@ -135,20 +135,20 @@ criteria:
 """
 
 
-def test_a_path_of_the_scene_can_be_what_is_flown_along(written, tmp_path, monkeypatch):
+def test_a_path_criterion_can_name_a_path_of_the_scene(written, tmp_path, monkeypatch):
     way = "{name: Way, kind: path, closed: true, points: [[0, 0, 0], [3, 0, 0], [3, 2, 0]], parent: Frame}"
     frame = "{name: Frame, kind: dummy, position: [2, 1, 1], rpy: [0, 0, 1.5707963267948966]}"
     monkeypatch.setitem(globals(), "SCENE", f"{SCENE}  - {frame}\n  - {way}\n")
     steps = written(ALONG)
-    named, as_said = flight.grade(steps).outcomes
-    assert named.value == pytest.approx(as_said.value) and named.value > 1 and "is allowed" in named.said
-    named, as_said = flight.grade(steps, seed=1).outcomes
-    assert abs(named.value - as_said.value) > 0.01  # which the seed has moved
+    named, unnamed = flight.grade(steps).outcomes
+    assert named.value == pytest.approx(unnamed.value) and named.value > 1 and "is allowed" in named.said
+    named, unnamed = flight.grade(steps, seed=1).outcomes
+    assert abs(named.value - unnamed.value) > 0.01  # the seed has moved the named path
     with pytest.raises(PlanError, match=r"line 6: criteria/0/along = 'Wa': no such path; near names are Way"):
         written(ALONG.replace("Way, at", "Wa, at"))
 
 
-def test_changes_are_laid_over_the_plan(written):
+def test_changes_override_values_of_the_plan(written):
     steps = written()
     lazy = flight.grade(steps, changes={"control": {"Kvcorr": 0.0}})
     assert (lazy.passed, lazy.changes) == (False, {"control": {"Kvcorr": 0.0}})
@@ -168,18 +168,18 @@ criteria:
 """
 
 
-def test_who_watches_contacts_changes_no_bit_of_the_crash(written):
-    seen = flight.grade(written(CONTACT, wall=1.5))
-    unseen = flight.grade(written(CONTACT.replace("  - {kind: no_contact}\n", ""), wall=1.5))
-    assert seen.digest == unseen.digest
-    assert not seen.outcomes[0].passed
-    assert seen.outcomes[0].said.startswith("touched Wall at ")
-    assert seen.outcomes[1].passed
+def test_recording_contacts_does_not_change_the_flight(written):
+    with_contacts = flight.grade(written(CONTACT, wall=1.5))
+    without_contacts = flight.grade(written(CONTACT.replace("  - {kind: no_contact}\n", ""), wall=1.5))
+    assert with_contacts.digest == without_contacts.digest
+    assert not with_contacts.outcomes[0].passed
+    assert with_contacts.outcomes[0].said.startswith("touched Wall at ")
+    assert with_contacts.outcomes[1].passed
     assert flight.grade(written(CONTACT, wall=50)).outcomes[0].passed
 
 
-def test_a_blow_counts_that_is_over_before_the_step_is(written):
-    """Its arm begins 5 mm inside the wall, which throws it out within one sub-step."""
+def test_a_contact_that_ends_within_the_step_counts(written):
+    """An arm starts 5 mm inside the wall, which pushes it out within one sub-step."""
     result = flight.grade(written(CONTACT.replace("duration: 4", "duration: 0.2"), wall=0.245))
     assert said(result)["no_contact"] == "touched Wall at 0.05 s; it may touch nothing"
 
@@ -197,7 +197,7 @@ criteria:
 """
 
 
-def test_what_a_script_says_and_that_it_ends_the_flight(written):
+def test_signals_and_topics_of_a_script_are_graded_until_it_ends_the_flight(written):
     talking = written(TALKING, counting=COUNTING)
     result = flight.grade(talking)
     assert {one.name for one in result.outcomes if one.passed} == {"signal", "topic", "state", "drawn"}
@@ -205,7 +205,7 @@ def test_what_a_script_says_and_that_it_ends_the_flight(written):
     assert said(result)["mute"] == "counter has no value at 2.00 s"
     assert said(result)["low"] == "the flight was over at 2.10 s, too early for this"
     assert (result.error, round(result.flown, 9), result.points, result.of) == (None, 2.1, 4.0, 6.0)
-    assert flight.grade(talking) == result  # a script that draws draws the same again
+    assert flight.grade(talking) == result  # random numbers of a script are the same again
     assert said(flight.grade(talking, seed=1))["drawn"] != said(result)["drawn"]
     assert Result.from_json(json.loads(json.dumps(result.to_json()))) == result
 
@@ -220,7 +220,7 @@ def test_what_a_script_says_and_that_it_ends_the_flight(written):
         ("def sysCall_sensing(): pass\ndef sysCall_cleanup():\n    1 / 0", "[cleanup] {}:3: ZeroDivisionError", 4.0),
     ],
 )  # fmt: skip
-def test_a_script_that_fails_is_named_in_one_line(written, tmp_path, source, error, flown):
+def test_a_failing_script_is_reported_in_one_line(written, tmp_path, source, error, flown):
     result = flight.grade(written(TALKING, counting=COUNTING, mine=source), str(tmp_path / "mine.py"))
     assert result.error.startswith(error.format(tmp_path / "mine.py"))
     assert "\n" not in result.error
@@ -229,7 +229,7 @@ def test_a_script_that_fails_is_named_in_one_line(written, tmp_path, source, err
     assert result.script == str(tmp_path / "mine.py")
 
 
-def test_who_flies(written, tmp_path):
+def test_the_submission_replaces_the_script_of_the_config(written, tmp_path):
     of_config = TALKING.replace("script: counting.py", "config: {script: counting.py}")
     plain, inside = written(of_config.replace("counting.py", "''"), counting=COUNTING), written(of_config)
     assert flight.grade(inside).flown == pytest.approx(2.1)
@@ -239,7 +239,7 @@ def test_who_flies(written, tmp_path):
 
 
 @pytest.mark.parametrize(("script", "falls"), [(None, True), ("", True), ("pilot", False)])
-def test_nobody_flies_a_vehicle_of_the_scene_that_has_no_script_unless_one_is_given(written, tmp_path, script, falls):
+def test_a_scene_vehicle_without_script_falls_unless_a_script_is_given(written, tmp_path, script, falls):
     (tmp_path / "alone.yaml").write_text("vehicles: {drone: {position: [0, 0, 0.8], script: none}}\n")
     found = flight.Flight(
         written("{scene: alone.yaml, duration: 2, criteria: [{kind: rise_time, of: z, to: 2, at_most: 1}]}"), script
@@ -248,7 +248,7 @@ def test_nobody_flies_a_vehicle_of_the_scene_that_has_no_script_unless_one_is_gi
     assert (found.rows[-1, 3] < 0.2) == falls
 
 
-def test_a_plan_of_two_vehicles_grades_the_one_that_it_names(written):
+def test_a_plan_with_two_vehicles_grades_the_named_vehicle(written):
     two = """
 duration: 2
 vehicle: wing
@@ -263,7 +263,7 @@ criteria:
     assert "no object named 'Elsewhere'" in flight.grade(written(two)).error
 
 
-def test_a_landing_of_the_built_in_script(written):
+def test_a_landing_of_the_built_in_script_passes_landed(written):
     landing = """
 duration: 8
 timeline: [{at: 0.5, land: {}}]
@@ -276,7 +276,7 @@ criteria:
     assert early.said.startswith("is in the air at 1.00 s")
 
 
-PLAYING = """
+MOVING_PLAN = """
 duration: 1
 timeline:
   - {at: 0.3, pose: {position: [0, 0, 1]}}
@@ -286,7 +286,7 @@ criteria:
   - {kind: drift, at_most: 1}
   - {kind: reach, places: [[0, 0, 0.8], [5, 0, 2]], within: 0.5, partial: true}
 """
-CHEATS = {  # what a script does in a step, and what is said of it
+CHEATS = {  # the call in a phase of the script, and the verb in the error message
     "position.py": ("sim.setObjectPosition(self.d, -1, [5, 0, 2])", "moved"),
     "pose.py": ("sim.setObjectPose(self.d, -1, [5, 0, 2, 0, 0, 0, 1])", "moved"),
     "gate.py": ("sim.getSimulationTime() < 0.2 or sim.setObjectPosition(self.d, -1, [5, 0, 2])", "moved"),
@@ -298,7 +298,7 @@ CHEATS = {  # what a script does in a step, and what is said of it
     "position.lua": ("sim.setObjectPosition(d, -1, {5, 0, 2})", "moved"),
     "torque.lua": ("sim.addForceAndTorque(d, {0, 0, 2}, {0, 0, 0})", "pushed"),
 }
-IN_PYTHON = """
+PYTHON_CHEAT = """
 def sysCall_init():
     self.d, self.t = sim.getObjectHandle("Quadricopter"), sim.getObjectHandle("Track_base")
     sim.setObjectParent(self.t, -1, True)
@@ -306,7 +306,7 @@ def sysCall_init():
 def sysCall_PHASE():
     DOES
 """
-IN_LUA = """
+LUA_CHEAT = """
 function sysCall_init()
     d = sim.getObjectHandle("Quadricopter")
 end
@@ -319,30 +319,30 @@ end
 
 @pytest.mark.parametrize("phase", ["actuation", "sensing"])
 @pytest.mark.parametrize("name", CHEATS)
-def test_who_moves_or_pushes_the_drone_himself_gains_nothing_by_it(written, tmp_path, name, phase):
+def test_a_script_that_moves_or_pushes_the_drone_ends_its_flight(written, tmp_path, name, phase):
     does, done = CHEATS[name]
-    source = IN_LUA if name.endswith(".lua") else IN_PYTHON
+    source = LUA_CHEAT if name.endswith(".lua") else PYTHON_CHEAT
     (tmp_path / name).write_text(source.replace("PHASE", phase).replace("DOES", does))
     action, whom = {"moved": ("move", "drone"), "pushed": ("push", "drone"), "changed": ("change", "the scene")}[done]
-    result = flight.grade(written(PLAYING), str(tmp_path / name))
+    result = flight.grade(written(MOVING_PLAN), str(tmp_path / name))
     assert result.error.startswith(f"a script {done} {whom} at 0.")
     assert result.error.endswith(f" s; the plan does not allow that (allowed: [{action}] would)")
     assert not result.passed
-    assert [one.points for one in result.outcomes] in ([0.0, 0.5], [0.0, 0.0])  # the place where it began, at most
+    assert [one.points for one in result.outcomes] in ([0.0, 0.5], [0.0, 0.0])  # at most the place where it started
     assert result.flown < 0.3
 
-    allowed = flight.grade(written(PLAYING + f"allowed: [{action}]\n"), str(tmp_path / name))
+    allowed = flight.grade(written(MOVING_PLAN + f"allowed: [{action}]\n"), str(tmp_path / name))
     assert allowed.error is None
     assert allowed.flown == pytest.approx(1)
 
 
-BUILDS = """
+BUILDING_SCRIPT = """
 def sysCall_sensing():
     sim.removeObject(sim.createPrimitiveShape(sim.primitiveshape_cuboid, [0.1, 0.1, 0.1]))
     sim.addForce(sim.getObject("/Quadcopter"), [0, 0, 0], [0, 0, 1e-3])
     sim.setObjectPosition(sim.getObject("/Goal"), -1, [0, 0, 0.8])
 """
-BUILT = """
+BUILDING_PLAN = """
 duration: 0.4
 scene: built.yaml
 criteria:
@@ -355,21 +355,21 @@ scripts: [{object: Goal, script: builds.py}]
 """
 
 
-def test_what_the_scenes_scripts_do_is_theirs_and_a_submission_is_told_of_its_own(written, tmp_path):
+def test_scripts_of_the_scene_may_do_what_a_submission_may_not(written, tmp_path):
     (tmp_path / "built.yaml").write_text(BUILT_SCENE)
-    (tmp_path / "builds.py").write_text(BUILDS)
-    plan = written(BUILT)
-    theirs = flight.grade(plan)
-    assert theirs.error is None and theirs.passed, theirs.outcomes  # a goal that moves is followed
+    (tmp_path / "builds.py").write_text(BUILDING_SCRIPT)
+    plan = written(BUILDING_PLAN)
+    scene_result = flight.grade(plan)
+    assert scene_result.error is None and scene_result.passed, scene_result.outcomes  # the goal is moved
     for name in ("floor.lua", "force.py"):
         does, done = CHEATS[name]
-        source = IN_LUA if name.endswith(".lua") else IN_PYTHON
+        source = LUA_CHEAT if name.endswith(".lua") else PYTHON_CHEAT
         (tmp_path / name).write_text(source.replace("PHASE", "sensing").replace("DOES", does))
         assert flight.grade(plan, str(tmp_path / name)).error.startswith(f"a script {done} ")
 
 
-def test_what_the_plan_itself_does_breaks_no_rule(written):
-    result = flight.grade(written(PLAYING))
+def test_the_timeline_of_a_plan_may_move_and_push_the_drone(written):
+    result = flight.grade(written(MOVING_PLAN))
     assert result.error is None
     assert result.flown == pytest.approx(1)
 
@@ -386,7 +386,7 @@ WRONG = {
     "duration: 5\ncriteria:\n- {kind: landed, at: [1, 2, 3]}": "criteria/0/at = [1, 2, 3]: must be 2 numbers",
     "duration: 5\ncriteria:\n- {kind: rise_time, of: vx, from: 1, to: 1, at_most: 1}": "criteria/0/to = 1: is the same",
 }
-BESIDE = {
+WRONG_LINES = {
     "duratoin: 5": "line 1: duratoin: unknown key; near names are duration",
     "name: a b": "line 1: name = 'a b': must begin with a letter",
     "calls: [sysCall_init]": "line 1: calls/0 = 'sysCall_init': must be a function that a script of the scene defines",
@@ -405,12 +405,12 @@ BESIDE = {
 @cache
 def _cases():
     fine = "duration: 5\ncriteria: [{kind: no_contact}]"
-    return {**WRONG, **{f"{line}\n{fine}": text for line, text in BESIDE.items() if "duratoin" not in line},
-            f"duratoin: 5\n{fine}": BESIDE["duratoin: 5"]}  # fmt: skip
+    return {**WRONG, **{f"{line}\n{fine}": text for line, text in WRONG_LINES.items() if "duratoin" not in line},
+            f"duratoin: 5\n{fine}": WRONG_LINES["duratoin: 5"]}  # fmt: skip
 
 
 @pytest.mark.parametrize("text", _cases())
-def test_a_mistake_in_a_plan_is_named_in_one_line(written, text):
+def test_an_error_in_a_plan_is_reported_in_one_line(written, text):
     with pytest.raises(PlanError) as caught:
         written(text)
     assert _cases()[text] in str(caught.value)
@@ -418,7 +418,7 @@ def test_a_mistake_in_a_plan_is_named_in_one_line(written, text):
     assert "\n" not in str(caught.value)
 
 
-def test_a_script_that_no_vehicle_would_fly_is_not_graded(written):
+def test_a_script_that_no_vehicle_would_run_is_not_graded(written):
     text = "duration: 1\nconfig: {vehicles: {drone: {script: target}}}\ncriteria: [{kind: no_contact}]\n"
     assert "the scene names vehicles/drone/script: target" in flight.grade(written(text), "pilot").error
-    assert not flight.grade(written(text)).error, "the plan names no script: the vehicle's own one is graded"
+    assert not flight.grade(written(text)).error, "the plan names no script, so the vehicle's script is graded"

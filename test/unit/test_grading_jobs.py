@@ -1,4 +1,4 @@
-"""Flights in processes of their own: what a script does costs its own flight; Dask; results that are kept."""
+"""Grading in separate processes: isolation of the flights, Dask workers, and stored results."""
 
 import contextlib
 import itertools
@@ -26,7 +26,7 @@ from drone_sim.grading.jobs.pool import FlightOptions, PoolError
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 SETTINGS = settings.load({"limits": {"seconds": 30.0, "patience": 100.0, "memory": 256}, "batches": {"largest": 1}})
-LEFT_BEHIND = f"left-behind-{os.getpid()}"  # another checkout's tests may run on this machine
+LEFT_BEHIND = f"left-behind-{os.getpid()}"  # tests of another checkout may run on this machine
 PLAN = """
 name: hold
 duration: 0.2
@@ -61,15 +61,15 @@ HOSTILE = {
         "with status 0, before the flight was over",
     ),
 }
-IN_A_SANDBOX = {
+SANDBOXED = {
     "kills": "import os, signal; os.kill(os.getppid(), signal.SIGKILL)",
     "stops": "import os, signal; os.kill(os.getppid(), signal.SIGSTOP)",
     "writes": "open({folder!r} + '/written', 'w')",
     "deletes": "import os; os.unlink({folder!r} + '/hold.yaml')",
     "calls": "import socket; socket.create_connection(('127.0.0.1', {port}), 1)",
 }
-# What each gives, if anything: said in the flight's error.
-LOOKS = {
+# Each expression returns what it could get, if anything; the error of the flight shows it.
+SEARCHES = {
     "other submissions": "(HERE / 'other.py').read_text()",
     "the real folder": "os.listdir({folder!r})",
     "what lies beside it": "sorted(set(os.listdir(HERE)) - {{'looks.py', 'gains.csv'}})",
@@ -88,7 +88,7 @@ LOOKS = {
     "other processes": "[one for one in os.listdir('/proc') if one.isdigit() and int(one) not in (1, os.getpid())]",
     "descriptors": "[one for one in os.listdir('/proc/self/fd') if open_elsewhere(one)]",
 }
-LOOKING = """
+SEARCH_SCRIPT = """
 import os, socket, stat, sys
 from pathlib import Path
 from unittest import mock
@@ -133,7 +133,7 @@ def job_of(plan, path, seed, changes=None):
     return Job(str(plan.path), path, seed, changes, key_of(contents_of(plan, path), seed, changes))
 
 
-def no_sandbox():
+def sandbox_error():
     try:
         sandbox.command(1)
     except sandbox.NoSandbox as why:
@@ -155,19 +155,19 @@ def plan(folder):
 
 @pytest.fixture(scope="module")
 def server():
-    with contextlib.closing(Flyer(SETTINGS.limits, sandboxed=not no_sandbox())) as made:
+    with contextlib.closing(Flyer(SETTINGS.limits, sandboxed=not sandbox_error())) as made:
         yield made
 
 
 @pytest.fixture
 def programs(server, monkeypatch, tmp_path):
-    """The programs fly with the fork server that is there, and keep their results in a folder of their own."""
+    """Let the programs use the fork server of `server`, and keep their results in `tmp_path`."""
 
-    class Lent:
+    class SharedFlyer:
         def __init__(self, *_):
             self.fly, self.close = server.fly, lambda: None
 
-    monkeypatch.setattr(pool, "Flyer", Lent)
+    monkeypatch.setattr(pool, "Flyer", SharedFlyer)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
 
 
@@ -190,7 +190,7 @@ def processes():
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_what_a_script_does_costs_its_own_flight(name, server, plan, folder):
+def test_a_hostile_script_fails_its_own_flight_and_no_other(name, server, plan, folder):
     body, said = HOSTILE[name]
     flight = server.fly(job_of(plan, script(folder, name, body), 0))
     assert not flight.result.passed
@@ -198,21 +198,21 @@ def test_what_a_script_does_costs_its_own_flight(name, server, plan, folder):
     assert server.fly(job_of(plan, "", 0)).result.passed
 
 
-@pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
-@pytest.mark.parametrize("name", IN_A_SANDBOX)
-def test_in_the_sandbox_nothing_else_is_in_reach(name, server, plan, folder):
+@pytest.mark.skipif(bool(sandbox_error()), reason=sandbox_error())
+@pytest.mark.parametrize("name", SANDBOXED)
+def test_the_sandbox_blocks_signals_writes_and_network_connections(name, server, plan, folder):
     import socket
 
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        body = IN_A_SANDBOX[name].format(folder=str(folder), port=listener.getsockname()[1])
+        body = SANDBOXED[name].format(folder=str(folder), port=listener.getsockname()[1])
         result = server.fly(job_of(plan, script(folder, name, body), 0)).result
-    assert (result.error is None) == (name in ("kills", "stops"))  # a signal to the first process has no effect
+    assert (result.error is None) == (name in ("kills", "stops"))  # a signal to process 1 of the sandbox has no effect
     assert sorted(path.suffix for path in folder.iterdir() if path.stem in ("hold", "written")) == [".yaml"]
 
 
-@pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
+@pytest.mark.skipif(bool(sandbox_error()), reason=sandbox_error())
 @pytest.mark.parametrize("of", ["plan", "script"])
-def test_a_folder_that_python_imports_from_must_not_hold_plan_or_submission(server, plan, tmp_path, monkeypatch, of):
+def test_a_folder_in_pythonpath_that_holds_plan_or_submission_is_refused(server, plan, tmp_path, monkeypatch, of):
     flown = tmp_path / "flies.py"
     flown.write_text("def sysCall_init():\n    pass\n")
     folder = (plan.path if of == "plan" else flown).parent
@@ -222,8 +222,8 @@ def test_a_folder_that_python_imports_from_must_not_hold_plan_or_submission(serv
     assert "\n" not in str(raised.value)
 
 
-@pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
-def test_in_the_sandbox_nothing_else_is_to_be_seen(server, plan, tmp_path, monkeypatch):
+@pytest.mark.skipif(bool(sandbox_error()), reason=sandbox_error())
+def test_a_sandboxed_script_cannot_access_foreign_files_sockets_or_processes(server, plan, tmp_path, monkeypatch):
     (tmp_path / "other.py").write_text("def sysCall_init():\n    pass\n")
     (tmp_path / "unnamed.csv").write_text("3")
     (tmp_path / "gains.csv").write_text("1,2")
@@ -231,9 +231,9 @@ def test_in_the_sandbox_nothing_else_is_to_be_seen(server, plan, tmp_path, monke
     os.mkfifo(tmp_path / "fifo")
     abstract = f"\0{tmp_path}"
     values = {"folder": str(tmp_path), "abstract": abstract, "root": str(SOURCE.parent), "tasks": str(tasks.folder())}
-    looking = tmp_path / "looks.py"
-    looks = "".join(f"    ({what!r}, lambda: {look}),\n" for what, look in LOOKS.items())
-    looking.write_text(f"{LOOKING}\nLOOKS = [\n{looks}]\n".format(**values))
+    search_script = tmp_path / "looks.py"
+    searches = "".join(f"    ({what!r}, lambda: {search}),\n" for what, search in SEARCHES.items())
+    search_script.write_text(f"{SEARCH_SCRIPT}\nLOOKS = [\n{searches}]\n".format(**values))
     with contextlib.ExitStack() as open_here:
         open_here.callback(os.close, os.open(tmp_path / "fifo", os.O_RDONLY | os.O_NONBLOCK))
         monkeypatch.chdir(tmp_path)  # a UNIX socket's whole path may be too long
@@ -241,11 +241,11 @@ def test_in_the_sandbox_nothing_else_is_to_be_seen(server, plan, tmp_path, monke
             listener = open_here.enter_context(socket.socket(socket.AF_UNIX))
             listener.bind(address)
             listener.listen()
-        result = server.fly(job_of(plan, str(looking), 0)).result
+        result = server.fly(job_of(plan, str(search_script), 0)).result
     assert result.error is None, result.error
 
 
-def test_a_process_that_a_script_leaves_is_ended(server, plan, folder):
+def test_a_process_left_by_a_script_is_ended(server, plan, folder):
     waits = f"[sys.executable, '-c', 'input()', {LEFT_BEHIND!r}], stdin=-1, start_new_session=True"
     body = f"import subprocess, sys; subprocess.Popen({waits})"
     assert server.fly(job_of(plan, script(folder, "daemon", body), 0)).result.passed
@@ -258,7 +258,7 @@ def test_a_script_that_forks_is_graded_once(server, plan, folder):
     assert forked.passed and forked.digest == alone.digest
 
 
-def test_a_flight_has_its_time(plan, folder):
+def test_a_flight_beyond_its_time_limit_is_ended(plan, folder):
     limits = SETTINGS.limits.model_copy(update={"seconds": 1.5, "seconds_per_second": 0.0, "patience": 1.0})
     with contextlib.closing(Flyer(limits, sandboxed=False)) as server:
         job = job_of(plan, script(folder, "sleeps", "import ctypes; ctypes.CDLL(None).sleep(1000)"), 0)
@@ -266,9 +266,9 @@ def test_a_flight_has_its_time(plan, folder):
     assert flight.is_lost and flight.result.error == "the script did not end within 1.5 s of real time"
 
 
-def test_without_a_sandbox_a_script_can_end_what_watches_it_and_the_next_flight_is_anothers(plan, folder):
+def test_without_a_sandbox_the_next_flight_survives_a_killed_watch_process(plan, folder):
     with contextlib.closing(Flyer(SETTINGS.limits, sandboxed=False)) as server:
-        killed = server.fly(job_of(plan, script(folder, "kills", IN_A_SANDBOX["kills"]), 0))
+        killed = server.fly(job_of(plan, script(folder, "kills", SANDBOXED["kills"]), 0))
         assert killed.is_lost and killed.result.error == "the script ended the process that watches its flight"
         assert server.fly(job_of(plan, "", 0)).result.passed
         temporary = server.folder
@@ -276,13 +276,13 @@ def test_without_a_sandbox_a_script_can_end_what_watches_it_and_the_next_flight_
     assert not os.path.exists(temporary)
 
 
-def test_the_table_is_that_of_fly(server, plan):
+def test_a_flight_returns_the_table_of_fly(server, plan):
     flight = server.fly(job_of(plan, "", 0), table=True)
     lines = flight.table.decode().splitlines()
     assert lines[0].startswith("t [s],x [m]") and len(lines) == 1 + 5
 
 
-def test_a_warm_up_flight_that_fails_leaves_a_traceback_and_the_plan(folder, monkeypatch, caplog):
+def test_a_failing_warm_up_flight_logs_a_traceback_and_keeps_the_plan(folder, monkeypatch, caplog):
     def fail(*_):
         raise KeyError("ours")
 
@@ -294,7 +294,7 @@ def test_a_warm_up_flight_that_fails_leaves_a_traceback_and_the_plan(folder, mon
     assert read.value.name == "hold" and "warm-up" in caplog.text and "KeyError: 'ours'" in caplog.text
 
 
-def test_a_plan_that_is_replaced_is_flown_as_it_is_by_then(server, folder, tmp_path):
+def test_a_replaced_plan_is_read_again(server, folder, tmp_path):
     path = tmp_path / "changed.yaml"
     for duration, steps in (("0.2", 5), ("0.4", 9)):
         (tmp_path / "new.yaml").write_text(PLAN.replace("0.2\n", f"{duration}\nscene: room{duration}.yaml\n", 1))
@@ -304,9 +304,9 @@ def test_a_plan_that_is_replaced_is_flown_as_it_is_by_then(server, folder, tmp_p
         assert flight.result.error is None and len(flight.table.splitlines()) == 1 + steps
 
 
-# ---- what cannot be read
+# ---- unreadable submissions
 
-ODD = {  # what is handed in, and what is said of it
+ODD = {  # how to create the submission, and a part of the error message
     "a FIFO": (os.mkfifo, "is not a regular file"),
     "a folder": (os.mkdir, "is not a regular file"),
     "a link to nothing": (lambda path: path.symlink_to("nowhere.py"), "nor a link to one"),
@@ -319,8 +319,8 @@ ODD = {  # what is handed in, and what is said of it
     "a NUL": (lambda path: path.write_bytes(b"x = '\0'"), "null bytes"),
 }
 NAMES = ["new\nline.py", "bell\a\33[2J.py", "-rf.py", "--html=.py", os.fsdecode(b"latin\xe9.py"), "\u202eyp.py"]
-# Names of what must not be read, in a comment.
-NAMED = [
+# Paths that must not be read although a comment in the script names them.
+NAMED_PATHS = [
     "/proc/self/mem",
     "/proc/kmsg",
     "../../../../../proc/kmsg",
@@ -332,7 +332,7 @@ NAMED = [
 ]
 
 
-def test_what_cannot_be_read_costs_its_own_flights(programs, folder, tmp_path, capsys):
+def test_an_unreadable_script_fails_and_the_other_scripts_are_graded(programs, folder, tmp_path, capsys):
     made = {what: tmp_path / f"odd{number}.py" for number, what in enumerate(ODD)}
     for what, path in made.items():
         ODD[what][0](path)
@@ -347,19 +347,19 @@ def test_what_cannot_be_read_costs_its_own_flights(programs, folder, tmp_path, c
         assert ODD[what][1] in errors[str(path)] and str(path) in errors[str(path)] and "\n" not in errors[str(path)]
 
 
-def test_names_in_a_script_lead_to_nothing_that_hangs_or_lies_elsewhere(server, plan, tmp_path):
+def test_file_names_in_a_script_do_not_open_devices_links_or_huge_files(server, plan, tmp_path):
     os.mkfifo(tmp_path / "fifo")
     (tmp_path / "away").symlink_to("/proc/self")
     (tmp_path / "huge.bin").touch()
     os.truncate(tmp_path / "huge.bin", 5 * 10**9)
-    (tmp_path / "helper.py").write_text(f"# {' '.join(NAMED)}\nx = 1\n")
+    (tmp_path / "helper.py").write_text(f"# {' '.join(NAMED_PATHS)}\nx = 1\n")
     named = Path(script(tmp_path, "named", "import helper"))
-    named.write_text(f"# {' '.join(NAMED)} helper\n{named.read_text()}")
+    named.write_text(f"# {' '.join(NAMED_PATHS)} helper\n{named.read_text()}")
     assert files.of_script(plan, str(named)) == [named, tmp_path / "helper.py"]
     assert server.fly(job_of(plan, str(named), 0)).result.passed
 
 
-def test_a_script_has_what_it_names_beside_it_but_nobody_elses(plan, tmp_path):
+def test_a_script_gets_the_files_it_names_but_no_other_submission(plan, tmp_path):
     kept = ["helper.py", "gains.csv", "more/__init__.py", "more/deep/one.py", "lib/inner.py"]
     left = ["other.py", "others/my.py", "others/helper.py", "unnamed.py"]
     for name in (*kept, *left):
@@ -371,7 +371,7 @@ def test_a_script_has_what_it_names_beside_it_but_nobody_elses(plan, tmp_path):
     assert {str(one.relative_to(tmp_path)) for one in files.of_script(plan, str(own))} == {"own.py", *kept}
 
 
-def test_a_script_of_any_name_is_flown_and_told(programs, folder, tmp_path, capsys, monkeypatch):
+def test_scripts_with_unusual_names_are_flown_and_reported(programs, folder, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in NAMES:
         Path(name).write_text("def sysCall_init():\n    pass\n")
@@ -383,10 +383,10 @@ def test_a_script_of_any_name_is_flown_and_told(programs, folder, tmp_path, caps
     assert len(json.loads(Path("o.json").read_text())["results"]) == len(NAMES)
 
 
-# ---- many
+# ---- many flights
 
 
-def test_the_key_is_of_the_contents_wherever_they_lie(plan, folder, tmp_path):
+def test_the_key_depends_on_file_contents_and_not_on_their_location(plan, folder, tmp_path):
     (folder / "helper.py").write_text("gain = 1\n")
     path = script(folder, "imports", "import helper")
     key = job_of(plan, path, 0).key
@@ -419,7 +419,7 @@ def two_workers():
                 one.wait(60)
 
 
-def test_a_worker_that_is_killed_loses_no_flight_and_results_are_the_same_everywhere(plan, server):
+def test_a_killed_worker_loses_no_flight_and_results_are_equal_everywhere(plan, server):
     from distributed import Client
 
     jobs = [job_of(plan, "", seed) for seed in range(8)]
@@ -432,16 +432,16 @@ def test_a_worker_that_is_killed_loses_no_flight_and_results_are_the_same_everyw
             flights = []
             for flight in fly(jobs):
                 flights.append(flight)
-                workers[0].kill()  # each has more than one flight left
+                workers[0].kill()  # each worker has more than one flight left
     assert len({one.digest for one in alone.values()}) == 8
     assert sorted(one.job.seed for one in flights) == list(range(8))
     assert {one.job.seed: one.result for one in flights} == alone
 
 
-def test_two_workers_here_and_files_that_are_others(plan, server):
+def test_two_local_workers_agree_and_refuse_files_that_differ(plan, server):
     jobs = [job_of(plan, "", seed) for seed in range(4)]
     other = [*jobs, type(jobs[0])(jobs[0].plan, "", 9, {}, "another key")]
-    with pool.open_pool(FlightOptions(SETTINGS.limits, SETTINGS.batches, not no_sandbox()), workers=2) as fly:
+    with pool.open_pool(FlightOptions(SETTINGS.limits, SETTINGS.batches, not sandbox_error()), workers=2) as fly:
         flights = list(fly(jobs))
         with pytest.raises(
             PoolError, match=r"worker on .*: .*hold\.yaml, the built-in script, .* not the same as here"
@@ -450,7 +450,7 @@ def test_two_workers_here_and_files_that_are_others(plan, server):
     assert {one.job: one.result for one in flights} == {job: server.fly(job).result for job in jobs}
 
 
-def test_a_scheduler_that_is_lost_is_told_in_one_line(plan):
+def test_a_lost_scheduler_raises_a_one_line_error(plan):
     import dask
     from distributed import Client, LocalCluster
 
@@ -476,7 +476,7 @@ def test_a_scheduler_that_is_lost_is_told_in_one_line(plan):
 # ---- the programs
 
 
-def test_a_report_of_good_and_hostile_scripts(programs, folder, tmp_path, capsys):
+def test_good_and_hostile_scripts_are_graded_in_one_run(programs, folder, tmp_path, capsys):
     scripts = [script(folder, f"good{number}", "pass") for number in range(5)]
     scripts += [script(folder, name, HOSTILE[name][0]) for name in ("aborts", "closes", "forges")]
     arguments = [str(folder / "hold.yaml"), *scripts, "--jobs", "1", "--seeds", "2", "--json", str(tmp_path / "o.json")]
@@ -487,7 +487,7 @@ def test_a_report_of_good_and_hostile_scripts(programs, folder, tmp_path, capsys
     assert [(one["script"], one["seed"]) for one in results] == [(one, seed) for one in scripts for seed in (0, 1)]
 
 
-def test_what_was_flown_is_not_flown_again(programs, folder, tmp_path, capsys, monkeypatch):
+def test_finished_flights_are_not_flown_again(programs, folder, tmp_path, capsys, monkeypatch):
     arguments = [str(folder / "hold.yaml"), "--jobs", "1", "--seeds", "3"]
 
     whole = grade.Runner.fly
@@ -501,7 +501,7 @@ def test_what_was_flown_is_not_flown_again(programs, folder, tmp_path, capsys, m
         assert grade.main(arguments) == 130
     assert "2 of 3 flights were flown, and are kept" in capsys.readouterr().err
     (file,) = (tmp_path / "drone_sim" / "grading").glob("hold-*.jsonl")
-    file.write_bytes(file.read_bytes() + b'{"key": "half a li')  # as a machine that fails leaves it
+    file.write_bytes(file.read_bytes() + b'{"key": "half a li')  # as after a crash of the machine
     assert grade.main(arguments) == 0
     assert "2 of 3 flights are known" in capsys.readouterr().err
     assert grade.main(arguments) == 0
@@ -539,8 +539,8 @@ def test_a_class_is_graded_to_the_same_marks_after_a_kill(programs, folder, tmp_
 
 
 @contextlib.contextmanager
-def no_room():
-    """No file may be longer than 100 bytes, as where a disk is full."""
+def full_disk():
+    """Limit files to 100 bytes, which has the effect of a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
     try:
@@ -549,19 +549,19 @@ def no_room():
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def test_a_full_disk_is_named_and_loses_no_result(programs, folder, tmp_path, capsys):
+def test_a_full_disk_is_reported_per_file_and_no_result_is_lost(programs, folder, tmp_path, capsys):
     named = {"--json": "o.json", "--junit": "o.xml", "--gradescope": "results.json", "--html": "report"}
     outputs = {option: str(tmp_path / name) for option, name in named.items()}
     written = [word for pair in outputs.items() for word in pair]
     arguments = [str(folder / "hold.yaml"), "--jobs", "1", "--seeds", "2", "--results", str(tmp_path / "kept")]
-    with no_room():
+    with full_disk():
         assert grade.main([*arguments, *written]) == 2
     said = capsys.readouterr()
     assert "2/2" in said.out and "Traceback" not in said.err
     for name in (*outputs.values(), str(tmp_path / "kept")):
         lines = [line for line in said.err.splitlines() if f" {name}" in line]
         assert len(lines) == 1 and "File too large" in lines[0], (name, said.err)
-    assert grade.main([*arguments, *written]) == 0  # behind the half of a line that is there
+    assert grade.main([*arguments, *written]) == 0  # appends after the half line that is there
     assert grade.main(arguments) == 0
     assert "2 of 2 flights are known" in capsys.readouterr().err
     assert len(json.loads((tmp_path / "o.json").read_text())["results"]) == 2
@@ -582,14 +582,14 @@ def test_a_full_disk_is_named_and_loses_no_result(programs, folder, tmp_path, ca
         (["{plan}", "--scheduler", "tcp://127.0.0.1:1", "--fresh"], "no scheduler answers there"),
     ],
 )
-def test_a_mistake_gets_one_line_and_status_2(programs, folder, capsys, monkeypatch, arguments, said):
+def test_a_wrong_argument_gives_one_line_and_status_2(programs, folder, capsys, monkeypatch, arguments, said):
     monkeypatch.setattr(pool, "_CONNECT_TIMEOUT", 0.2)
     assert grade.main([one.format(plan=folder / "hold.yaml") for one in arguments]) == 2
     error = capsys.readouterr().err
     assert said in error.splitlines()[-1] and error.startswith("grade: ") and "Traceback" not in error
 
 
-def test_seeds_follow_from_a_secret_and_are_nobodys_guess(tmp_path):
+def test_seeds_are_derived_from_the_secret(tmp_path):
     for name, content in (("first", b"a" * 16), ("same", b"a" * 16), ("other", b"b" * 16), ("short", b"a" * 15)):
         (tmp_path / name).write_bytes(content)
     first, same, other = (grade.seeds_of(500, str(tmp_path / name)) for name in ("first", "same", "other"))

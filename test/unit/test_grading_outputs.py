@@ -1,4 +1,4 @@
-"""What is made of results for a terminal, for programs, and for CI systems."""
+"""Output of results: table, JSON, JUnit, Gradescope and Moodle."""
 
 import csv
 import io
@@ -23,22 +23,22 @@ def _plan(tmp_path_factory):
     return read_plan(tmp_path_factory.mktemp("plan"))
 
 
-def a_class(scripts=40, seeds=20):
-    chance = random.Random(1)
+def results_of_a_class(scripts=40, seeds=20):
+    rng = random.Random(1)
     return [
-        result(f"/home/students/{'x' * script}{script}/solution.py", seed, [chance.random() < 0.8 for _ in range(2)])
+        result(f"/home/students/{'x' * script}{script}/solution.py", seed, [rng.random() < 0.8 for _ in range(2)])
         for script in range(scripts)
         for seed in range(seeds)
     ]
 
 
-def test_scripts_are_told_apart_by_as_much_of_their_paths_as_it_takes():
+def test_labels_are_the_shortest_path_endings_that_differ():
     scripts = ["/a/my.py", "/b/my.py", "/b/other.py", ""]
     labels = [one.label for one in group_by_script([result(script) for script in scripts])]
     assert labels == ["a/my.py", "b/my.py", "other.py", "(built-in)"]
 
 
-def test_a_script_is_as_good_as_the_mean_of_its_flights_and_its_worst_is_named():
+def test_a_script_gets_the_mean_points_of_its_flights_and_the_worst_flight():
     flights = [result(seed=0), result(seed=2, passed=(False, False)), result(seed=1, passed=(True, False))]
     (script,) = group_by_script(flights)
     assert [one.seed for one in script.flights] == [0, 1, 2]
@@ -46,15 +46,15 @@ def test_a_script_is_as_good_as_the_mean_of_its_flights_and_its_worst_is_named()
     assert script.failures == [("no_contact", 2), ("forward", 1)]
 
 
-def test_forty_scripts_fit_into_eighty_columns_a_line_each(plan):
-    lines = table.text(plan, a_class()).splitlines()
+def test_the_table_has_one_line_of_eighty_columns_per_script(plan):
+    lines = table.text(plan, results_of_a_class()).splitlines()
     assert len(lines) == 43
     assert all(len(line) <= 80 for line in lines)
     assert "solution.py" in lines[-2]
     assert re.fullmatch(r"\d+ of 40 scripts passed every flight", lines[-1])
 
 
-def test_a_single_flight_is_told_criterion_by_criterion(plan):
+def test_the_table_of_a_single_flight_lists_its_criteria(plan):
     text = table.text(plan, [result(passed=(True, False), error="it broke")])
     assert re.search(r"ok +forward +2/2 +it rose in 0.5 s\n", text)
     assert re.search(r"FAIL +no_contact +0/1 +it rose in 0.5 s \(at 1.50 s\)\n", text)
@@ -63,30 +63,30 @@ def test_a_single_flight_is_told_criterion_by_criterion(plan):
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_colours_are_for_terminals_alone(plan, terminal):
+def test_only_terminals_get_colours(plan, terminal):
     file = io.StringIO()
     file.isatty = lambda: terminal
     table.show(plan, [result()], file)
     assert ("\033[32m" in file.getvalue()) is terminal
 
 
-def test_no_name_and_no_error_commands_the_terminal(plan):
+def test_control_characters_in_names_and_errors_are_not_printed(plan):
     evil = [result(f"{EVIL}{number}.py", error=EVIL, names=(EVIL, EVIL)) for number in (1, 2)]
     for results in (evil, evil[:1]):
         assert not re.search("[\x1b\x07\ud800]", table.text(plan, results))
 
 
-def test_json_holds_everything(plan, tmp_path):
-    results = [*a_class(2, 2), result(EVIL, error=EVIL, changes={"control": {"Kzref": float("inf")}})]
+def test_json_holds_all_results(plan, tmp_path):
+    results = [*results_of_a_class(2, 2), result(EVIL, error=EVIL, changes={"control": {"Kzref": float("inf")}})]
     as_json.write(plan, results, tmp_path / "r.json")
-    said = json.loads((tmp_path / "r.json").read_text(), parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
-    assert (said["version"], said["plan"]["name"], len(said["scripts"])) == (1, "steps", 3)
-    assert said["results"][0] == results[0].to_json() | {"outcomes": said["results"][0]["outcomes"]}
-    assert said["results"][0]["outcomes"][0] == results[0].to_json()["outcomes"][0]
-    assert said["results"][-1]["changes"] == {"control": {"Kzref": None}}
+    data = json.loads((tmp_path / "r.json").read_text(), parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+    assert (data["version"], data["plan"]["name"], len(data["scripts"])) == (1, "steps", 3)
+    assert data["results"][0] == results[0].to_json() | {"outcomes": data["results"][0]["outcomes"]}
+    assert data["results"][0]["outcomes"][0] == results[0].to_json()["outcomes"][0]
+    assert data["results"][-1]["changes"] == {"control": {"Kzref": None}}
 
 
-def test_junit_counts_what_it_says(plan, tmp_path):
+def test_junit_counts_match_its_test_cases(plan, tmp_path):
     flights = [result(seed=0), result(seed=1, passed=(True, False)), result("b.py", error="it broke", passed=(False,))]
     junit.write(plan, flights, tmp_path / "r.xml")
     root = ElementTree.parse(tmp_path / "r.xml").getroot()
@@ -101,22 +101,22 @@ def test_junit_counts_what_it_says(plan, tmp_path):
     assert len(set(cases)) == len(cases)
 
 
-def test_two_criteria_of_one_name_are_two_cases(plan):
+def test_two_criteria_of_equal_name_become_two_test_cases(plan):
     root = ElementTree.fromstring(junit.text(plan, [result(names=("reach", "reach"))]))
     assert [case.get("name") for case in root.iter("testcase")][1:] == ["seed 0: reach", "seed 0: reach (2)"]
 
 
-def test_junit_is_xml_whatever_names_and_errors_hold(plan, tmp_path):
+def test_junit_is_valid_xml_for_any_names_and_errors(plan, tmp_path):
     junit.write(plan, [result(EVIL, error=EVIL, passed=(False, False), names=(EVIL, EVIL))], tmp_path / "r.xml")
     root = ElementTree.parse(tmp_path / "r.xml").getroot()
     assert "<script>alert(1)" in root.find(".//error").get("message")
     assert r"\x1b[31m\x07\x00\x9b\u202e\ud800" in root.find(".//error").text
 
 
-def test_gradescope_gets_the_mean_over_the_flights(plan):
-    said = gradescope.content(plan, [result(seed=0), result(seed=1, passed=(True, False), error=EVIL)])
-    assert said["score"] == sum(test["score"] for test in said["tests"]) == 2.5
-    forward, contact = said["tests"]
+def test_gradescope_scores_are_means_over_the_flights(plan):
+    data = gradescope.content(plan, [result(seed=0), result(seed=1, passed=(True, False), error=EVIL)])
+    assert data["score"] == sum(test["score"] for test in data["tests"]) == 2.5
+    forward, contact = data["tests"]
     assert (forward["name"], forward["score"], forward["max_score"], forward["status"]) == ("forward", 2, 2, "passed")
     assert (contact["name"], contact["score"], contact["max_score"], contact["status"]) == (
         "no_contact",
@@ -125,20 +125,20 @@ def test_gradescope_gets_the_mean_over_the_flights(plan):
         "failed",
     )
     assert "seed 1: FAILED: it rose in 0.5 s (at 1.50 s)" in contact["output"]
-    assert said["output_format"] == said["test_output_format"] == said["test_name_format"] == "text"
-    assert escaped(EVIL) in said["output"]
+    assert data["output_format"] == data["test_output_format"] == data["test_name_format"] == "text"
+    assert escaped(EVIL) in data["output"]
 
 
-def test_gradescope_grades_one_script(plan, tmp_path):
+def test_gradescope_output_of_two_scripts_is_refused(plan, tmp_path):
     with pytest.raises(ValueError, match=r"must be of one script, not 2"):
         gradescope.write(plan, [result("a.py"), result("b.py")], tmp_path / "r.json")
     assert not (tmp_path / "r.json").exists()
 
 
-# Gradescope's autograder specifications, "Output format": what each key holds. Its harness refuses other values.
+# Allowed values by Gradescope's autograder specifications, "Output format". Its harness refuses other values.
 VISIBILITY = {"hidden", "after_due_date", "after_published", "visible"}
 FORMATS = {"text", "html", "simple_format", "md", "ansi"}
-OF_A_TEST = {
+TEST_KEYS = {
     "score": float,
     "max_score": float,
     "status": {"passed", "failed"},
@@ -151,7 +151,7 @@ OF_A_TEST = {
     "visibility": VISIBILITY,
     "extra_data": dict,
 }
-OF_ALL = {
+RESULT_KEYS = {
     "score": float,
     "execution_time": float,
     "output": str,
@@ -163,50 +163,50 @@ OF_ALL = {
 }
 
 
-def check_keys(said, known):
-    assert said.keys() <= known.keys()
-    for key, value in said.items():
-        kind = known[key]
+def check_keys(data, permitted):
+    assert data.keys() <= permitted.keys()
+    for key, value in data.items():
+        kind = permitted[key]
         assert value in kind if isinstance(kind, set) else isinstance(value, (int, float) if kind is float else kind)
 
 
-def test_gradescopes_file_is_as_its_specification_says(plan):
+def test_the_gradescope_file_follows_its_specification(plan):
     flights = [result(seed=0), result(seed=1, passed=(False, False), error=EVIL, names=("forward", EVIL))]
-    said = gradescope.content(plan, flights)
-    check_keys(said, OF_ALL)
-    texts = [said["output"], *(one[key] for one in said["tests"] for key in ("name", "output"))]
+    data = gradescope.content(plan, flights)
+    check_keys(data, RESULT_KEYS)
+    texts = [data["output"], *(one[key] for one in data["tests"] for key in ("name", "output"))]
     assert [escaped(one) for one in texts] == texts and escaped(EVIL) in texts
-    for one in said["tests"]:
-        check_keys(one, OF_A_TEST)
+    for one in data["tests"]:
+        check_keys(one, TEST_KEYS)
         assert 0 <= one["score"] <= one["max_score"]
-    assert "score" in said and len(said["tests"]) == 3
+    assert "score" in data and len(data["tests"]) == 3
 
 
-# Jenkins' schema of JUnit's XML (xunit-plugin, junit-10.xsd): attributes, those that must be there, elements inside.
-OF_A_SUITE = "name tests failures errors group time skipped timestamp hostname id package file log url"
+# Jenkins' schema of JUnit's XML (xunit-plugin, junit-10.xsd): allowed attributes, required attributes, children.
+SUITE_KEYS = "name tests failures errors group time skipped timestamp hostname id package file log url"
 JUNIT = {
     "testsuites": ("name time tests failures errors", "", "testsuite"),
-    "testsuite": (OF_A_SUITE, "name tests failures errors", "testsuite properties testcase system-out system-err"),
+    "testsuite": (SUITE_KEYS, "name tests failures errors", "testsuite properties testcase system-out system-err"),
     "testcase": ("name time classname group", "name", "skipped error failure system-out system-err"),
     "error": ("type message", "", ""),
     "failure": ("type message", "", ""),
 }
 
 
-def test_junits_file_is_as_the_schema_says(plan):
+def test_the_junit_file_follows_its_schema(plan):
     flights = [result(seed=0), result(seed=1, passed=(True, False)), result("b.py", error=EVIL, passed=(False,))]
     tried = ("tried to move Drone at 1.00 s (sim.setObjectPosition)",)
     flights.append(replace(result("c.py"), tried=tried, passed=False))
     root = ElementTree.fromstring(junit.text(plan, flights))
     assert root.tag == "testsuites" and {one.tag for one in root.iter()} == {*JUNIT}
     for one in root.iter():
-        known, needed, inside = (words.split() for words in JUNIT[one.tag])
-        assert {*needed} <= one.attrib.keys() <= {*known} and {child.tag for child in one} <= {*inside}
+        permitted, mandatory, inside = (words.split() for words in JUNIT[one.tag])
+        assert {*mandatory} <= one.attrib.keys() <= {*permitted} and {child.tag for child in one} <= {*inside}
         if "time" in one.attrib:
             assert re.fullmatch(r"\d*(\.\d*)?", one.get("time"))
 
 
-def test_marks_are_as_moodle_reads_them(tmp_path):
+def test_the_marks_file_can_be_imported_by_moodle(tmp_path):
     submissions = [
         Submission("a.py", (Person("Ada Lovelace", "7"),)),
         Submission("b.py", (Person("=Bo", id="8", email="b@x"), Person("Che"))),
@@ -217,7 +217,7 @@ def test_marks_are_as_moodle_reads_them(tmp_path):
     flights = [result("a.py"), result("b.py", passed=(True, False)), result("b.py", 1), result("c.py", error="a\nb")]
     marks.write(submissions, group_by_script(flights, names), tmp_path / "m.csv")
     ada, bo, che, script = csv.DictReader((tmp_path / "m.csv").read_text().splitlines())
-    # What Moodle's worksheet must have, by its importer: Identifier, Grade, Last modified (grade).
+    # Moodle's importer requires the columns Identifier, Grade, and Last modified (grade).
     assert (ada["Identifier"], ada["Grade"], ada["Last modified (grade)"]) == ("Participant 7", "3", "-")
     assert (bo["Full name"], bo["ID number"], bo["Email address"], bo["Grade"]) == ("'=Bo", "8", "b@x", "2.5")
     assert bo["Maximum Grade"] == "3" and bo["Feedback comments"] == "1 of 2 flights passed; failed: no_contact in 1"
@@ -225,7 +225,7 @@ def test_marks_are_as_moodle_reads_them(tmp_path):
     assert script["Feedback comments"] == "0 of 1 flights passed; ended by an error: 1"
 
 
-def test_the_marks_name_an_error_by_which_nothing_was_flown(plan, tmp_path):
+def test_marks_show_the_error_if_nothing_was_flown(plan, tmp_path):
     why = "[load] /class/b.py:1: SyntaxError: invalid syntax\x1b[31m"
     broken = [result_of(plan, "/class/b.py", seed, {}, why) for seed in range(3)]
     later = [result("c.py", seed, (False, True), error="[actuation] c.py:4: boom") for seed in range(3)]
@@ -240,6 +240,6 @@ def test_the_marks_name_an_error_by_which_nothing_was_flown(plan, tmp_path):
     assert "not flown" not in che and "failed: forward in 3" in che and "ended by an error: 3" in che
 
 
-def test_a_plan_without_a_title_goes_by_its_name(tmp_path):
+def test_a_plan_without_a_title_is_shown_by_its_name(tmp_path):
     plan = read_plan(tmp_path, PLAN.replace("title: Hover & <b>more</b>\n", ""))
     assert table.text(plan, [result()]).startswith("steps\n")

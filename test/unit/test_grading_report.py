@@ -1,4 +1,4 @@
-"""The report for the browser, as files; test/web opens it."""
+"""Files of the HTML report; test/web opens it in a browser."""
 
 import json
 import re
@@ -16,7 +16,7 @@ from drone_sim.offline.recording import COLUMNS
 
 
 class Page(HTMLParser):
-    """What a browser makes of a page."""
+    """Tags, links and text of an HTML page."""
 
     def __init__(self, path):
         super().__init__()
@@ -45,7 +45,7 @@ def _report(tmp_path_factory):
     return folder / "out"
 
 
-def test_every_link_leads_somewhere_in_the_folder(report):
+def test_every_link_points_to_a_file_of_the_report(report):
     pages = [*report.glob("*.html"), *report.glob("scripts/*/*.html")]
     assert len(pages) == 3
     for page in pages:
@@ -54,7 +54,7 @@ def test_every_link_leads_somewhere_in_the_folder(report):
             assert link.startswith(("data:,", "#")) or (page.parent / file).is_file(), f"{page}: {link}"
 
 
-def test_names_and_errors_are_text(report):
+def test_html_in_names_and_errors_is_escaped(report):
     pages = {report / "index.html": 1, **dict.fromkeys(report.glob("scripts/*/*.html"), 5)}
     for page, scripts in pages.items():
         tags = Page(page).tags
@@ -62,13 +62,13 @@ def test_names_and_errors_are_text(report):
     assert "<script>alert(1)</script>" in Page(report / "index.html").text
 
 
-def test_control_characters_can_be_seen(report):
+def test_control_characters_are_shown_as_escape_sequences(report):
     for path in (one for one in report.rglob("*") if one.is_file()):
         assert not re.search("[\0-\x08\x0b-\x1f\x7f-\x9f\u202e]", path.read_text(encoding="utf-8")), path
     assert r"\x1b[31m\x07\x00\x9b\u202e\ud800" in Page(report / "index.html").text
 
 
-def test_a_flights_figures_are_those_of_its_table(report):
+def test_the_data_of_a_flight_match_its_table(report):
     (file,) = report.glob("scripts/*/flights/*.js")
     name, _, figures = file.read_text().partition(" = ")
     assert name == 'report.flights["0"]'
@@ -77,7 +77,7 @@ def test_a_flights_figures_are_those_of_its_table(report):
     assert (figures["t"][20], *(figures[axis][20] for axis in "xyz")) == pytest.approx((1, *place(1)), abs=1e-4)
 
 
-def test_objects_stand_as_boxes_where_the_scene_has_them(report):
+def test_scene_objects_become_boxes_at_their_poses(report):
     scene = json.loads(next(report.glob("scripts/*/files/scene.js")).read_text().partition(" = ")[2].rstrip(";\n"))
     gate, pole = scene["boxes"]
     assert gate["name"] == "<i>Gate</i>"
@@ -86,9 +86,9 @@ def test_objects_stand_as_boxes_where_the_scene_has_them(report):
     assert pole["corners"][7][2] == pytest.approx(2.5)
 
 
-def test_the_teachers_page_ranks_counts_and_holds_similar_scripts_side_by_side(tmp_path):
+def test_the_index_page_has_a_ranking_histogram_and_similar_scripts(tmp_path):
     text = "\n".join(f"x = sim.getObjectPosition(h, -1)[0]{' * x + 1' * number}" for number in range(20))
-    other = "# <b>\x0c\x85\u2028\r\n" + text.replace("x", "y").replace("\n", "\r\n")  # lines that end in one way only
+    other = "# <b>\x0c\x85\u2028\r\n" + text.replace("x", "y").replace("\n", "\r\n")  # \x0c and \x85 end no line
     scripts = {"a.py": text, "b.py": other, "c.py": "def sysCall_init(): pass"}
     results = [result("a.py"), result("b.py", passed=(False, True)), result("c.py", passed=(False, False))]
     report.write(read_plan(tmp_path), results, lambda _: None, tmp_path / "out", {"b.py": "Ada"}, scripts)
@@ -97,12 +97,12 @@ def test_the_teachers_page_ranks_counts_and_holds_similar_scripts_side_by_side(t
     assert all(said in text for said in ("1a.py1/1", "2Ada0/1", "3c.py0/1"))  # rank, script, passed
     assert all(said in text for said in ("2.7to31", "0.9to1.21", "0to0.31"))  # points, scripts
     assert "similar/1.html" in index.links
-    beside = Page(tmp_path / "out/similar/1.html")
-    assert beside.tags.count("pre") == 2 and beside.tags.count("b") == 0 and beside.tags.count("span") == 41
-    assert "# <b>\\x0c\\x85\u2028\ny = sim.getObjectPosition" in beside.text
+    comparison = Page(tmp_path / "out/similar/1.html")
+    assert comparison.tags.count("pre") == 2 and comparison.tags.count("b") == 0 and comparison.tags.count("span") == 41
+    assert "# <b>\\x0c\\x85\u2028\ny = sim.getObjectPosition" in comparison.text
 
 
-def test_a_students_folder_keeps_the_letters_of_the_name(tmp_path):
+def test_folder_names_keep_the_letters_of_the_student_s_name(tmp_path):
     names = {
         "1.py": "Kurt Go\u0308del",
         "2.py": "\u674e \u660e",
@@ -120,7 +120,7 @@ def test_a_students_folder_keeps_the_letters_of_the_name(tmp_path):
     )
 
 
-def test_another_report_takes_the_place_of_the_first_and_nothing_else(tmp_path):
+def test_a_report_overwrites_only_an_earlier_report(tmp_path):
     plan = read_plan(tmp_path)
     report.write(plan, [result("a.py"), result("b.py")], lambda _: None, tmp_path / "out")
     report.write(plan, [result("c.py")], lambda _: None, tmp_path / "out")
@@ -143,7 +143,7 @@ def test_another_report_takes_the_place_of_the_first_and_nothing_else(tmp_path):
         (",".join(COLUMNS) + "\n" + ",".join(["nan"] * len(COLUMNS)) + "\n", "line 2: must hold numbers below"),
     ],
 )
-def test_a_table_that_shows_nothing_is_told_of(tmp_path, text, said):
+def test_an_unusable_table_is_reported_on_the_page(tmp_path, text, said):
     (tmp_path / "t.csv").write_text(text)
     report.write(read_plan(tmp_path), [result()], lambda _: tmp_path / "t.csv", tmp_path / "out")
     (page,) = tmp_path.glob("out/scripts/*/index.html")
@@ -162,7 +162,7 @@ def test_a_long_flight_is_thinned(tmp_path):
 
 
 T = times()
-CHARTED = {
+SCENE_DATA = {
     "floor": 10,
     "boxes": [
         {
@@ -176,7 +176,7 @@ CHARTED = {
 
 
 def chart(columns, at=None, **values):
-    return chart_of(criterion(**values), flown(T, **columns).columns, CHARTED, at)
+    return chart_of(criterion(**values), flown(T, **columns).columns, SCENE_DATA, at)
 
 
 def points(text):
@@ -185,23 +185,23 @@ def points(text):
 
 def test_a_drift_is_drawn_from_above_with_the_allowed_circle_and_the_place_where_it_failed():
     drawn = chart({"x": 0.2 * T}, at=T[-1], kind="drift", at_most=0.5)
-    (x, y, radius), way = drawn.circles[0], points(drawn.flown)
-    assert tuple(way[0]) == pytest.approx((x, y), abs=0.1) and tuple(way[-1]) == pytest.approx(drawn.failed, abs=0.1)
-    metre = (way[-1, 0] - way[0, 0]) / (0.2 * (T[-1] - T[0]))  # px
+    (x, y, radius), line = drawn.circles[0], points(drawn.flown)
+    assert tuple(line[0]) == pytest.approx((x, y), abs=0.1) and tuple(line[-1]) == pytest.approx(drawn.failed, abs=0.1)
+    metre = (line[-1, 0] - line[0, 0]) / (0.2 * (T[-1] - T[0]))  # px
     assert radius == pytest.approx(0.5 * metre, rel=0.02)
-    assert ((way >= 0) & (way <= SIDE)).all() and drawn.objects[0][1] == "rgb(255 0 0)"
+    assert ((line >= 0) & (line <= SIDE)).all() and drawn.objects[0][1] == "rgb(255 0 0)"
 
 
-def test_a_bound_is_drawn_over_time_in_the_part_that_counts():
+def test_a_bound_is_drawn_over_time_within_its_interval():
     values = {"kind": "stays", "of": "z", "after": 1.0, "until": 3.0, "at_least": 0.9, "at_most": 1.1}
     drawn = chart({"z": 1 + 0.0 * T}, **values)
-    (top, height), way = drawn.bands[0], points(drawn.flown)
-    assert drawn.failed is None and np.ptp(way[:, 1]) == 0
-    assert way[0, 1] == pytest.approx(top + height / 2, abs=0.2) and ((way >= 0) & (way <= (WIDTH, HEIGHT))).all()
+    (top, height), line = drawn.bands[0], points(drawn.flown)
+    assert drawn.failed is None and np.ptp(line[:, 1]) == 0
+    assert line[0, 1] == pytest.approx(top + height / 2, abs=0.2) and ((line >= 0) & (line <= (WIDTH, HEIGHT))).all()
     assert [text for *_, text in drawn.labels] == ["0.9", "1.1", "1 s", "3 s"]
 
 
-def test_a_path_is_a_corridor_and_places_are_circles():
+def test_a_path_is_drawn_as_a_corridor_and_places_as_circles():
     path = chart({"x": T}, kind="path", along=[[0, 0, 1], [1, 0, 1]], at_most=0.3)
     assert len(points(path.corridor[0])) == 2 and path.corridor[1] > 0
     assert len(chart({"x": T}, kind="reach", places=[[1, 0, 1], [2, 0, 1], "Gate"], within=0.5).circles) == 2
@@ -211,5 +211,5 @@ def test_a_path_is_a_corridor_and_places_are_circles():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_says_what_to_try(kind):
+def test_every_criterion_has_a_hint_that_is_a_sentence(kind):
     assert kind.model_fields["hint"].default.endswith((".", "?"))

@@ -1,4 +1,4 @@
-"""What a class hands in: folders, zips of Moodle and Gradescope, tables; hostile ones; who is alike."""
+"""Submissions of a class: folders, Moodle and Gradescope zips, tables, hostile files, similarity."""
 
 import os
 import stat
@@ -30,15 +30,15 @@ submission_12:
 """
 
 
-def laid(folder, **files):
+def write(folder, **files):
     for name, text in files.items():
         path = folder / name.replace("__", "/").replace("_dot_", ".")
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
 
 
-def zipped(path, members):
-    """Write a zip of texts, bytes and ready ZipInfos by their names."""
+def pack(path, members):
+    """Write a zip file of {name or ZipInfo: content} and return its path."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
         for name, content in members.items():
             file.writestr(name, content)
@@ -50,44 +50,44 @@ def moodle(name, number, file=""):
 
 
 def found(given, tmp_path):
-    """Return what was found, by what its name ends with below the folder of the unpacked."""
+    """Return the submissions in `given` by student's name, or by file name if there is none."""
     return {one.name or Path(one.script).name: one for one in submissions_of(str(given), tmp_path / "store")}
 
 
-def test_a_folder_holds_scripts_and_folders_with_one(tmp_path):
+def test_a_folder_may_hold_scripts_and_folders_with_one_script(tmp_path):
     folder = tmp_path / "class"
-    laid(
+    write(
         folder, alice_dot_py=SCRIPT, bob__deep__main_dot_lua="function sysCall_init() end\n", bob__pid_dot_py="x = 1\n"
     )
-    laid(folder, helper_dot_py="x = 1\n", notes_dot_txt=SCRIPT, empty__notes_dot_txt="")
-    laid(folder, **{".git__hook_dot_py": SCRIPT})
+    write(folder, helper_dot_py="x = 1\n", notes_dot_txt=SCRIPT, empty__notes_dot_txt="")
+    write(folder, **{".git__hook_dot_py": SCRIPT})
     (folder / "carol.py").symlink_to("nowhere.py")
-    zipped(folder / "dave.zip", {"mine/main.py": SCRIPT, "mine/pid.py": "x = 1\n"})
+    pack(folder / "dave.zip", {"mine/main.py": SCRIPT, "mine/pid.py": "x = 1\n"})
     submissions = submissions_of(str(folder), tmp_path / "store")
-    named = [one.script.removeprefix(f"{folder}/") for one in submissions]
-    assert named[:3] == ["alice.py", "bob/deep/main.lua", "carol.py"] and named[3].endswith("/mine/main.py")
-    assert not any(one.error or one.people for one in submissions) and len(named) == 4
+    scripts = [one.script.removeprefix(f"{folder}/") for one in submissions]
+    assert scripts[:3] == ["alice.py", "bob/deep/main.lua", "carol.py"] and scripts[3].endswith("/mine/main.py")
+    assert not any(one.error or one.people for one in submissions) and len(scripts) == 4
 
 
-def test_a_script_is_itself_whatever_it_is(tmp_path):
+def test_a_name_or_path_of_a_script_is_one_submission(tmp_path):
     for given in ("pilot", str(tmp_path / "none.py")):
         assert submissions_of(given, tmp_path) == [Submission(given)]
 
 
-def test_folders_that_say_nothing_get_a_line_and_who_hands_in_too_much_pays_alone(tmp_path):
+def test_empty_folders_and_folders_with_two_scripts_are_reported(tmp_path):
     folder = tmp_path / "class"
     folder.mkdir()
     with pytest.raises(ValueError, match="no submission is in it"):
         submissions_of(str(folder), tmp_path)
-    laid(folder, dave__one_dot_py=SCRIPT, dave__two_dot_py=SCRIPT, eve__notes_dot_txt="", fay__my_dot_py=SCRIPT)
+    write(folder, dave__one_dot_py=SCRIPT, dave__two_dot_py=SCRIPT, eve__notes_dot_txt="", fay__my_dot_py=SCRIPT)
     dave, eve, fay = submissions_of(str(folder), tmp_path)
     assert dave.error.startswith("'dave': holds 2 child scripts (one.py, two.py)")
     assert eve.error.startswith("'eve': holds no child script") and not fay.error
 
 
-def test_moodles_zip_with_and_without_folders(tmp_path):
-    inner = zipped(tmp_path / "inner.zip", {"project/main.py": SCRIPT, "project/pid.py": ""}).read_bytes()
-    path = zipped(
+def test_a_moodle_zip_is_read_with_and_without_folders(tmp_path):
+    inner = pack(tmp_path / "inner.zip", {"project/main.py": SCRIPT, "project/pid.py": ""}).read_bytes()
+    path = pack(
         tmp_path / "Hover-42.zip",
         {
             f"{moodle('Ada Lovelace', 7)}/my.py": SCRIPT,
@@ -111,14 +111,14 @@ def test_moodles_zip_with_and_without_folders(tmp_path):
     assert [one.script for one in submissions_of(str(path), tmp_path / "store")] == [one.script for one in submissions]
 
 
-def test_gradescopes_zip_and_its_unpacked_folder(tmp_path):
+def test_a_gradescope_export_is_read_as_zip_and_as_folder(tmp_path):
     members = {
         "assignment_1_export/submission_metadata.yml": METADATA,
         "assignment_1_export/submission_11/my.py": SCRIPT,
         "assignment_1_export/submission_12/a.py": SCRIPT,
         "assignment_1_export/submission_12/b.py": SCRIPT,
     }
-    both, che = submissions_of(str(zipped(tmp_path / "export.zip", members)), tmp_path / "store")
+    both, che = submissions_of(str(pack(tmp_path / "export.zip", members)), tmp_path / "store")
     assert both.people == (Person("Ada Lovelace", id="007", email="ada@x.org"), Person("Bo Ek"))
     assert (che.name, "holds 2 child scripts" in che.error) == ("Che Li", True)
     folder = Path(both.script).parents[1]
@@ -128,8 +128,8 @@ def test_gradescopes_zip_and_its_unpacked_folder(tmp_path):
         submissions_of(str(folder), tmp_path / "store")
 
 
-def test_a_table_of_names_and_paths(tmp_path):
-    laid(tmp_path, one__my_dot_py=SCRIPT, two_dot_py=SCRIPT)
+def test_a_csv_table_of_names_and_paths_is_read(tmp_path):
+    write(tmp_path, one__my_dot_py=SCRIPT, two_dot_py=SCRIPT)
     (tmp_path / "class.csv").write_text(
         "\ufeffName;Path;ID\nAda;one;7\nBo;two.py;8\nChe;three.py;9\nDu;two.py;10\n", encoding="utf-8"
     )
@@ -150,13 +150,13 @@ def test_a_table_of_names_and_paths(tmp_path):
 
 def _member(name="link.py", kind=stat.S_IFREG, method=zipfile.ZIP_DEFLATED):
     info = zipfile.ZipInfo("replaced")
-    info.filename = name  # as it stands, with a NUL
+    info.filename = name  # set after construction, which cuts a name at a NUL
     info.external_attr = (kind | 0o777) << 16
     info.compress_type = method
     return info
 
 
-HOSTILE = {  # what a student's zip holds, and what is said of it
+HOSTILE = {  # the content of a student's zip, and a part of the error message
     "a bomb": ({"a.bin": bytes(2**20), "my.py": SCRIPT}, "holds more than 1 MiB"),
     "many files": ({f"{number}.txt": "" for number in range(1001)}, "holds more than 1000 files"),
     "a path outside": ({"../../evil.py": SCRIPT}, "holds a path that leads out of it: '../../evil.py'"),
@@ -175,14 +175,14 @@ HOSTILE = {  # what a student's zip holds, and what is said of it
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_hostile_zips_cost_their_own_marks_and_leave_nothing_outside(tmp_path, monkeypatch):
+def test_a_hostile_zip_fails_only_its_student_and_writes_nothing_outside(tmp_path, monkeypatch):
     monkeypatch.setattr(archive, "MAX_SIZE", 2**20)
     members = {f"{moodle('Good', 1)}/my.py": SCRIPT}
     for number, (what, (content, _)) in enumerate(HOSTILE.items(), start=2):
         (tmp_path / "s.zip").unlink(missing_ok=True)
-        raw = content if isinstance(content, bytes) else zipped(tmp_path / "s.zip", content).read_bytes()
+        raw = content if isinstance(content, bytes) else pack(tmp_path / "s.zip", content).read_bytes()
         members[moodle(what, number, "s.zip")] = raw
-    whole = zipped(tmp_path / "class.zip", {**members, f"{moodle('Bad', 99)}/../../../evil.py": SCRIPT})
+    whole = pack(tmp_path / "class.zip", {**members, f"{moodle('Bad', 99)}/../../../evil.py": SCRIPT})
     before = {*tmp_path.iterdir()}
     submissions = found(whole, tmp_path)
     assert submissions.pop("Good").error == ""
@@ -197,13 +197,13 @@ def test_hostile_zips_cost_their_own_marks_and_leave_nothing_outside(tmp_path, m
 
 @pytest.fixture(name="removed")
 def _removed(monkeypatch):
-    """Trees that were to be removed: none is, whatever goes wrong."""
+    """Return the folders passed to shutil.rmtree, which removes nothing here."""
     paths = []
     monkeypatch.setattr("shutil.rmtree", lambda path, *_, **__: paths.append(Path(path)))
     return paths
 
 
-OUT = {  # a member's name, and to whom it belongs
+OUTSIDE_MEMBERS = {  # name of a zip member, and its student ("": none)
     **dict.fromkeys(("/", "//x", "..", "/home/x.py", "../z", "../../z"), ""),
     "\\x/..": "\\x",
     "Bad_9_assignsubmission_file_/../../z": "Bad",
@@ -215,53 +215,53 @@ OUT = {  # a member's name, and to whom it belongs
 
 
 @pytest.mark.parametrize("around", ["", "export/"])
-@pytest.mark.parametrize("name", OUT)
-def test_a_member_that_leads_out_costs_its_student_and_nobody_else(tmp_path, removed, name, around):
+@pytest.mark.parametrize("name", OUTSIDE_MEMBERS)
+def test_a_zip_member_outside_the_folder_fails_only_its_student(tmp_path, removed, name, around):
     good = {f"{around}{moodle(who, number)}/my.py": SCRIPT for number, who in enumerate(("Ada", "Bo", "Che"), start=1)}
-    path = zipped(tmp_path / "class.zip", {**good, name if name[0] in "./" else around + name: "", _member("../y"): ""})
+    path = pack(tmp_path / "class.zip", {**good, name if name[0] in "./" else around + name: "", _member("../y"): ""})
     submissions = found(path, tmp_path)
     for who in ("Ada", "Bo", "Che"):
         one = submissions.pop(who)
         assert one.error == "" and Path(one.script).read_text() == SCRIPT
     assert "leads out" in submissions.pop("class.zip").error or "_.." in name
-    if OUT[name]:
-        assert submissions.pop(OUT[name]).error
+    if OUTSIDE_MEMBERS[name]:
+        assert submissions.pop(OUTSIDE_MEMBERS[name]).error
     assert not submissions
     assert all(one.is_relative_to(tmp_path / "store") and one != tmp_path / "store" for one in removed)
     written = {one.relative_to(tmp_path).parts[0] for one in tmp_path.rglob("*")}
     assert written == {"class.zip", "store"} and not [*tmp_path.rglob("z"), *tmp_path.rglob("y")]
 
 
-def test_one_bomb_of_several_parts_leaves_room_for_the_others(tmp_path, monkeypatch):
+def test_large_submissions_in_a_zip_leave_room_for_the_others(tmp_path, monkeypatch):
     monkeypatch.setattr(archive, "_MIN_ROOM", 2 * 2**20)
     monkeypatch.setattr(archive, "_MAX_RATIO", 1)
     bombs = {f"{number}/my.py": SCRIPT + "#" * 1_000_000 for number in range(4)}
-    path = zipped(tmp_path / "class.zip", {**bombs, "good/my.py": SCRIPT})
+    path = pack(tmp_path / "class.zip", {**bombs, "good/my.py": SCRIPT})
     errors = {
         one.script.split("/")[-1]: one.error for one in submissions_of(str(path), tmp_path / "store") if one.error
     }
     assert [*errors] == ["2", "3"] and all("more than is left" in one for one in errors.values())
 
 
-def test_a_students_file_named_as_anothers_is_that_students(tmp_path):
+def test_a_file_named_like_another_submission_belongs_to_its_author(tmp_path):
     name = moodle("Ada", 7, moodle("Bob", 8, "my.py"))
-    (one,) = submissions_of(str(zipped(tmp_path / "class.zip", {name: SCRIPT})), tmp_path / "store")
+    (one,) = submissions_of(str(pack(tmp_path / "class.zip", {name: SCRIPT})), tmp_path / "store")
     assert one.people == (Person("Ada", "7"),) and not one.error
 
 
-def test_names_in_gradescopes_file_are_texts(tmp_path):
+def test_names_in_gradescope_metadata_must_be_strings(tmp_path):
     aliases = "".join(f"  a{number}: &a{number} [{f'*a{number - 1}, ' * 9}]\n" for number in range(1, 6))
     people = f"submission_1:\n  a0: &a0 [x]\n{aliases}  :submitters:\n  - :name: *a5\n"
     members = {"submission_metadata.yml": people, "submission_1/my.py": SCRIPT}
     with pytest.raises(ValueError, match=":submitters:"):
-        submissions_of(str(zipped(tmp_path / "export.zip", members)), tmp_path / "store")
+        submissions_of(str(pack(tmp_path / "export.zip", members)), tmp_path / "store")
 
 
-def test_what_is_odd_in_a_folder_costs_nobody_else(tmp_path, monkeypatch):
+def test_odd_entries_of_a_folder_do_not_affect_other_submissions(tmp_path, monkeypatch):
     folder = tmp_path / "class"
-    laid(folder, good_dot_py=SCRIPT, unreadable_dot_py=SCRIPT)
-    laid(tmp_path, solution__my_dot_py=SCRIPT)
-    zipped(tmp_path / "solution.zip", {"my.py": SCRIPT})
+    write(folder, good_dot_py=SCRIPT, unreadable_dot_py=SCRIPT)
+    write(tmp_path, solution__my_dot_py=SCRIPT)
+    pack(tmp_path / "solution.zip", {"my.py": SCRIPT})
     for name in ("solution", "solution.zip"):
         (folder / moodle("Eve", len(name))).with_suffix(Path(name).suffix).symlink_to(tmp_path / name)
     os.mkfifo(folder / moodle("Fifo", 1, "my.zip"))
@@ -281,22 +281,22 @@ def test_what_is_odd_in_a_folder_costs_nobody_else(tmp_path, monkeypatch):
     assert len(errors) == 5 and sum("leads out of its folder" in one for one in errors) == 2
 
 
-def test_a_zip_that_lies_about_its_sizes_is_refused(tmp_path):
-    path = zipped(tmp_path / "lies.zip", {"my.py": SCRIPT * 100})
+def test_a_zip_with_wrong_member_sizes_is_refused(tmp_path):
+    path = pack(tmp_path / "lies.zip", {"my.py": SCRIPT * 100})
     content = path.read_bytes()
     path.write_bytes(content.replace(len(SCRIPT * 100).to_bytes(4, "little"), bytes(4)))
     with pytest.raises(archive.Refused):
         archive.unpack_whole(path, tmp_path / "store")
 
 
-# ---- who is alike
+# ---- similarity
 
 
 def solution(task):
     return (tasks.folder() / task / "solution.py").read_text()
 
 
-def test_renamed_and_reordered_copies_are_found_and_own_work_is_not(tmp_path):
+def test_renamed_copies_are_similar_and_different_solutions_are_not(tmp_path):
     original = solution("hover")
     copy = original.replace("self.", "me.").replace("self", "me").replace("0.", "1.").replace("home", "start")
     copy = "".join(f"{line}  # mine\n" for line in copy.splitlines() if line)
@@ -304,11 +304,11 @@ def test_renamed_and_reordered_copies_are_found_and_own_work_is_not(tmp_path):
     given = similarity.provided_sources(read_plan(tmp_path))
     (pair,) = similarity.find_similar(sources, given)
     assert (pair.first, pair.second) == ("hover.py", "copy.py") and pair.share > 0.9
-    marked = [original.splitlines()[line - 1] for line in pair.lines[0]]
-    assert len(marked) > 10
+    similar_lines = [original.splitlines()[line - 1] for line in pair.lines[0]]
+    assert len(similar_lines) > 10
 
 
-def test_what_was_given_or_most_have_is_no_copy():
+def test_provided_code_and_code_that_most_share_is_not_similar():
     text = solution("hover")
     assert similarity.find_similar({"a.py": text, "b.py": text}, {}) and not similarity.find_similar(
         {"a.py": text, "b.py": text}, {"start.py": text}
@@ -316,7 +316,7 @@ def test_what_was_given_or_most_have_is_no_copy():
     assert not similarity.find_similar({f"{number}.py": text for number in range(6)}, {})
 
 
-def test_lua_is_compared_as_lua_and_no_text_takes_long():
+def test_lua_copies_are_found_and_hostile_texts_take_no_long_time():
     lines = [f"local v = sim.getObjectPosition(h, -1)[3]{' * v + 1' * number}" for number in range(20)]
     other = ["-- [[ mine ]]", *(line.replace(" v", " mine") for line in lines)]
     (pair,) = similarity.find_similar({"a.lua": "\n".join(lines), "b.lua": "\n".join(other)}, {})
@@ -328,7 +328,7 @@ def test_lua_is_compared_as_lua_and_no_text_takes_long():
 # ---- Gradescope's autograder
 
 
-def test_an_autograder_has_what_gradescope_runs_and_no_solution(tmp_path, capsys):
+def test_an_autograder_zip_has_gradescope_s_files_and_no_solution(tmp_path, capsys):
     path = tmp_path / "hover.zip"
     assert grade.main(["hover", "--seeds", "3", "--autograder", str(path)]) == 0
     with zipfile.ZipFile(path) as file:
@@ -340,7 +340,7 @@ def test_an_autograder_has_what_gradescope_runs_and_no_solution(tmp_path, capsys
     first = path.read_bytes()
     assert grade.main(["hover", "--seeds", "3", "--autograder", str(path)]) == 0 and path.read_bytes() == first
     (tmp_path / "room.yaml").write_text("objects: []\n")
-    laid(tmp_path, own__plan_dot_yaml=f"scene: {tmp_path}/room.yaml\nduration: 1\ncriteria: [{{kind: no_contact}}]\n")
+    write(tmp_path, own__plan_dot_yaml=f"scene: {tmp_path}/room.yaml\nduration: 1\ncriteria: [{{kind: no_contact}}]\n")
     for arguments, said in (
         (["hover", "my.py"], "takes only a plan and --seeds"),
         ([str(tmp_path / "own/plan.yaml")], "room.yaml: the plan needs it, but it is not in the plan's folder"),

@@ -1,4 +1,4 @@
-"""Streams of graphs, and the topic on which their numbers and those of signals are told."""
+"""Graph streams, and the topic that publishes the numbers of graphs and signals."""
 
 import json
 from types import SimpleNamespace
@@ -9,7 +9,7 @@ from drone_sim.scripting.api.graphs import Graphs
 from drone_sim.scripting.api.signals import Signals
 
 
-def test_streams_keep_their_latest_value_and_come_back_with_a_snapshot():
+def test_streams_keep_their_latest_value_and_are_restored_by_a_snapshot():
     graphs = Graphs()
     height = graphs.add(1, 7, "height")
     assert graphs.add(2, 7, "height") == height and graphs.add(3, 8, "height") == 3
@@ -28,7 +28,7 @@ def test_streams_keep_their_latest_value_and_come_back_with_a_snapshot():
     assert graphs.values() == {}
 
 
-def test_streams_are_bounded_and_a_wrong_handle_gets_one_line():
+def test_the_number_of_streams_is_limited_and_a_wrong_handle_is_refused():
     graphs = Graphs()
     with pytest.raises(ValueError, match=r"^the graph 7 has no stream with the handle 1$"):
         graphs.set(7, 1, 2.0)
@@ -40,18 +40,18 @@ def test_streams_are_bounded_and_a_wrong_handle_gets_one_line():
         graphs.add(1000, 7, "one more")
 
 
-def test_numbers_are_told_after_each_step_while_somebody_listens(monkeypatch):
+def test_signals_are_published_after_each_step_while_there_are_subscribers(monkeypatch):
     rospy = pytest.importorskip("rospy", reason="needs ROS")
     from drone_sim.ros.node.inspection import SignalTopic
 
-    published, listeners = [], [0]
+    published, connections = [], [0]
 
     class Publisher:
         def __init__(self, *_, **__):
             pass
 
         def get_num_connections(self):
-            return listeners[0]
+            return connections[0]
 
         def publish(self, text):
             published.append(json.loads(text))
@@ -63,7 +63,7 @@ def test_numbers_are_told_after_each_step_while_somebody_listens(monkeypatch):
     context.signals.set(float, "gain", 2.5)
     topic.update()
     assert published == []
-    listeners[0] = 1
+    connections[0] = 1
     topic.update()
     topic.update()
     assert published == [{"time": 0.05, "signals": {"gain": 2.5}}]
@@ -77,4 +77,4 @@ def test_numbers_are_told_after_each_step_while_somebody_listens(monkeypatch):
     context.graphs.clear()
     for simulation.time in (0.15, 0.2, 0.25):
         topic.update()
-    assert published[2:] == [{"time": 0.15, "signals": {}}], "that they are gone is told once"
+    assert published[2:] == [{"time": 0.15, "signals": {}}], "the empty state is published only once"

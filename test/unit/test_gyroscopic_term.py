@@ -1,4 +1,4 @@
-"""Bodies turn as in V-REP, without the term ω × Iω, or as Euler's equations say."""
+"""Rotation of rigid bodies: without the gyroscopic term ω × Iω as in V-REP, or with it by Euler's equations."""
 
 import contextlib
 
@@ -18,7 +18,7 @@ from drone_sim.world import World
 from drone_sim.world.assemblies import Link, LinkJoint
 
 SUB_STEP = 0.005  # s
-TUMBLE = (4.0, 7.0, 4.0)  # rad/s, 9 in all
+TUMBLE = (4.0, 7.0, 4.0)  # rad/s, magnitude 9
 MASS = 1.0  # kg
 BOX = Box((0.1, 0.3, 0.5))  # m
 MOMENTS = np.array([0.34, 0.26, 0.10]) * MASS / 12  # kg m²
@@ -26,7 +26,7 @@ MOMENTS = np.array([0.34, 0.26, 0.10]) * MASS / 12  # kg m²
 
 @contextlib.contextmanager
 def tumbling(gyroscopic, add, sub_step=SUB_STEP):
-    """Give a world without gravity, and a body of it that tumbles."""
+    """Yield a world without gravity and the number of a tumbling body in it."""
     world = World(sub_step, gravity=0.0, gyroscopic=gyroscopic)
     try:
         body = add(world)
@@ -41,7 +41,7 @@ def add_box(world):
 
 
 def add_box_on_a_hinge(world):
-    """Add a small ball's mass with the box as its second link, about the same centre."""
+    """Add an assembly of a small light box and the box, with a fixed joint at their common centre."""
     parts = [Part(BOX, IDENTITY, WHITE)]
     small = [Part(Box((0.01, 0.01, 0.01)), IDENTITY, WHITE)]
     joint = LinkJoint(0, IDENTITY, "fixed", None, 0.0)
@@ -52,8 +52,8 @@ def add_box_on_a_hinge(world):
     return world.add_assembly(links, Pose((0.0, 0.0, 1.0)), ["", ""])[0]
 
 
-def turning(world, body):
-    """Return angular velocity (rad/s), angular momentum (N m s, world) and energy (J) of the box."""
+def rotation_state(world, body):
+    """Return angular velocity (rad/s), angular momentum (N m s) and energy (J) of the box in the world frame."""
     _, orientation, _, velocity = world.state(body)
     turn = np.reshape(frames.from_quaternion((0, 0, 0), orientation), (3, 4))[:, :3]
     momentum = turn @ (MOMENTS * (turn.T @ velocity))
@@ -62,32 +62,32 @@ def turning(world, body):
 
 @pytest.mark.parametrize("pushes", [[False] * 20, [True] * 20, [True, False] * 2], ids=["never", "ever", "at times"])
 @pytest.mark.parametrize("add", [add_box, add_box_on_a_hinge])
-def test_what_tumbles_keeps_its_angular_velocity_as_in_vrep(add, pushes):
+def test_without_the_gyroscopic_term_angular_velocity_is_constant_as_in_vrep(add, pushes):
     with tumbling(False, add) as (world, body):
         for pushed in pushes:
             world.advance({body: Wrench()} if pushed else {}, 100)
-        assert turning(world, body)[0] == pytest.approx(TUMBLE, abs=1e-8)
+        assert rotation_state(world, body)[0] == pytest.approx(TUMBLE, abs=1e-8)
 
 
 @pytest.mark.parametrize("pushed", [False, True])
-def test_the_textbooks_tumble_keeps_momentum_and_energy_over_10_s(pushed):
+def test_the_gyroscopic_term_conserves_momentum_and_energy_over_10_s(pushed):
     with tumbling(True, add_box) as (world, body):
-        _, momentum, energy = turning(world, body)
+        _, momentum, energy = rotation_state(world, body)
         for _ in range(20):
             world.advance({body: Wrench()} if pushed else {}, 100)
-            _, momentum_now, energy_now = turning(world, body)
+            _, momentum_now, energy_now = rotation_state(world, body)
             assert momentum_now == pytest.approx(momentum, abs=1e-5 * np.linalg.norm(momentum))
             assert energy_now == pytest.approx(energy, rel=0.01)
 
 
 @pytest.mark.parametrize("add", [add_box, add_box_on_a_hinge])
-def test_the_textbooks_tumble_is_what_eulers_equations_say(add):
+def test_with_the_gyroscopic_term_a_tumbling_body_follows_euler_s_equations(add):
     def euler(_, rate):
         return -np.cross(rate, MOMENTS * rate) / MOMENTS
 
     with tumbling(True, add, sub_step=SUB_STEP / 20) as (world, body):
         world.advance({}, 2000)
-        velocity, *_ = turning(world, body)
+        velocity, *_ = rotation_state(world, body)
         turn = np.reshape(frames.from_quaternion((0, 0, 0), world.state(body).orientation), (3, 4))[:, :3]
         expected = solve_ivp(euler, (0, 100 * SUB_STEP), TUMBLE, rtol=1e-9, atol=1e-12).y[:, -1]
         assert turn.T @ velocity == pytest.approx(expected, abs=0.02 * np.linalg.norm(expected))

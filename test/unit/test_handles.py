@@ -1,4 +1,4 @@
-"""A handle that is dragged while the simulation starts anew, or its vehicle goes."""
+"""Dragging a vehicle's handle in rviz, also across start, stop, snapshots and removal of the vehicle."""
 
 from unittest import mock
 
@@ -17,7 +17,7 @@ from drone_sim.ros.rviz.handles import TIMEOUT, HeldHandles
 
 @pytest.fixture
 def dragged(monkeypatch, new_simulation):
-    """Return a simulation, and the inbox in which a drag to x = 2 m waits."""
+    """Return a simulation and its inbox, in which a drag to x = 2 m is waiting."""
     monkeypatch.setattr(handles, "MarkerServer", mock.MagicMock())
     simulation, inbox = new_simulation({"script": ""}), Inbox()
     shown = handles.VehicleHandles(simulation, inbox)
@@ -27,27 +27,27 @@ def dragged(monkeypatch, new_simulation):
     return simulation, inbox
 
 
-def test_it_moves_the_vehicle_that_is_there_by_then(dragged):
+def test_a_waiting_drag_moves_the_vehicle_after_a_restart(dragged):
     simulation, inbox = dragged
     simulation.start()
     inbox.run_jobs()
     assert simulation.drone.body.state.position == pytest.approx((2, 0, 1))
 
 
-def test_it_moves_nothing_where_the_vehicle_has_gone(dragged):
+def test_a_waiting_drag_of_a_removed_vehicle_moves_nothing(dragged):
     simulation, inbox = dragged
     simulation.set_vehicles({"other": {}})
     inbox.run_jobs()
     assert simulation.vehicles["other"].body.state.position[0] == 0
 
 
-class Hand:
-    """Somebody who holds the drone's handle, and says so."""
+class HandleClient:
+    """Client that sends feedback on the handle of the drone."""
 
     def __init__(self, shown, simulation, inbox):
         self.shown, self.simulation, self.inbox = shown, simulation, inbox
 
-    def tell(self, kind, *place):
+    def send(self, kind, *place):
         feedback = InteractiveMarkerFeedback(event_type=kind, marker_name="Drone", client_id="hand")
         feedback.pose.orientation.w = 1.0
         if place:
@@ -69,7 +69,7 @@ class Hand:
 def _hand(monkeypatch, new_simulation):
     monkeypatch.setattr(handles, "MarkerServer", mock.MagicMock())
     simulation, inbox = new_simulation({"script": "", "weather": {"wind": [5, 0, 0]}}), Inbox()
-    return Hand(handles.VehicleHandles(simulation, inbox), simulation, inbox)
+    return HandleClient(handles.VehicleHandles(simulation, inbox), simulation, inbox)
 
 
 DOWN, MOVED, UP = (
@@ -79,29 +79,29 @@ DOWN, MOVED, UP = (
 )
 
 
-def test_a_vehicle_stands_still_while_it_is_held_and_flies_on_from_rest(hand):
+def test_a_held_vehicle_stays_in_place_and_continues_from_rest(hand):
     hand.fly(20)
-    hand.tell(DOWN)
+    hand.send(DOWN)
     held = hand.state.position
     hand.fly(20)
     assert hand.state.position == held and hand.state.linear_velocity == (0, 0, 0)
-    hand.tell(MOVED, 1.0, 2.0, 3.0)
+    hand.send(MOVED, 1.0, 2.0, 3.0)
     hand.simulation.drone.pushes.add(Push((3, 0, 0), (0, 0, 0), 0.2))
     hand.fly(40)
     assert hand.state.position == pytest.approx((1, 2, 3)) and hand.state.linear_velocity == (0, 0, 0)
     objects = hand.simulation.context.objects
     base = objects.handle("Quadricopter_base")
-    assert hand.simulation.context.velocities.velocity(base)[0] == (0, 0, 0), "nor does the script measure a speed"
-    hand.tell(UP)
+    assert hand.simulation.context.velocities.velocity(base)[0] == (0, 0, 0), "the script measures no velocity either"
+    hand.send(UP)
     hand.fly(1)
-    assert abs(hand.state.linear_velocity[2]) < 0.5, "let go at rest"
+    assert abs(hand.state.linear_velocity[2]) < 0.5, "it is at rest when released"
     hand.fly(100)
-    assert hand.state.position[2] == pytest.approx(0.8, abs=0.05), "the controller goes on"
+    assert hand.state.position[2] == pytest.approx(0.8, abs=0.05), "the controller returns it to its height"
 
 
-def test_who_is_silent_for_a_second_lets_go(hand):
+def test_a_vehicle_is_released_when_its_client_stops_sending(hand):
     hand.shown._held._clock = lambda: 0.0
-    hand.tell(DOWN)
+    hand.send(DOWN)
     assert hand.simulation.drone.body.is_held
     hand.shown._held._clock = lambda: 5.0
     hand.fly(1)
@@ -109,67 +109,67 @@ def test_who_is_silent_for_a_second_lets_go(hand):
 
 
 @pytest.mark.parametrize("begin", ["start", "stop"])
-def test_a_start_and_a_stop_let_go(hand, begin):
-    hand.tell(DOWN)
+def test_start_and_stop_release_a_held_vehicle(hand, begin):
+    hand.send(DOWN)
     getattr(hand.simulation, begin)()
     assert not hand.simulation.drone.body.is_held
 
 
-def test_a_restored_snapshot_lets_go_and_flies_on_as_before(hand):
+def test_restoring_a_snapshot_releases_the_vehicle_and_repeats_the_flight(hand):
     hand.fly(5)
     snapshot = hand.simulation.snapshot()
     hand.fly(20)
     flown = hand.state
     hand.simulation.restore(snapshot)
-    hand.tell(DOWN)
+    hand.send(DOWN)
     hand.simulation.restore(snapshot)
-    hand.tell(UP)
+    hand.send(UP)
     hand.fly(20)
     assert hand.state == flown
 
 
-def test_a_held_vehicle_may_go(hand):
-    hand.tell(DOWN)
+def test_a_held_vehicle_can_be_removed(hand):
+    hand.send(DOWN)
     hand.simulation.set_vehicles({"other": {}})
     hand.fly(1)
-    hand.tell(UP)
+    hand.send(UP)
     hand.fly(1)
     assert not hand.simulation.vehicles["other"].body.is_held
 
 
-# ---- handles that somebody holds
+# ---- HeldHandles
 
 
-TAKEN, HELD, LET_GO = (
+PRESSED, ALIVE, RELEASED = (
     InteractiveMarkerFeedback.MOUSE_DOWN,
     InteractiveMarkerFeedback.KEEP_ALIVE,
     InteractiveMarkerFeedback.MOUSE_UP,
 )
 
 
-def told(held, kind, client):
+def send_feedback(held, kind, client):
     held.on_feedback(InteractiveMarkerFeedback(marker_name="Drone", client_id=client, event_type=kind))
 
 
-def test_a_handle_is_held_until_it_is_let_go_of(clock):
+def test_a_handle_is_held_until_all_clients_release_it(clock):
     held = HeldHandles(clock)
-    told(held, TAKEN, "rviz 1")
-    told(held, TAKEN, "rviz 2")
-    told(held, LET_GO, "rviz 1")
+    send_feedback(held, PRESSED, "rviz 1")
+    send_feedback(held, PRESSED, "rviz 2")
+    send_feedback(held, RELEASED, "rviz 1")
     assert held.names() == {"Drone"}
-    told(held, LET_GO, "rviz 2")
+    send_feedback(held, RELEASED, "rviz 2")
     assert held.names() == set()
 
 
-def test_a_hand_that_says_nothing_has_let_go(clock):
+def test_a_handle_is_released_if_its_client_sends_no_keep_alive(clock):
     held = HeldHandles(clock)
-    told(held, TAKEN, "rviz")
+    send_feedback(held, PRESSED, "rviz")
     for _ in range(10):
         clock.now += 0.75 * TIMEOUT
         assert held.names() == {"Drone"}
-        told(held, HELD, "rviz")
-        told(held, HELD, "another rviz, which does not hold it")
+        send_feedback(held, ALIVE, "rviz")
+        send_feedback(held, ALIVE, "another rviz, which does not hold it")
     clock.now += TIMEOUT
     assert held.names() == set()
-    told(held, HELD, "rviz")
-    assert held.names() == set(), "it comes back only when it is taken again"
+    send_feedback(held, ALIVE, "rviz")
+    assert held.names() == set(), "a keep-alive does not hold a released handle"

@@ -1,4 +1,4 @@
-"""A second type of vehicle: six propellers, flown by the same script API."""
+"""Hexacopter: a vehicle type with six propellers that uses the same script API."""
 
 import math
 
@@ -24,7 +24,7 @@ def fly(simulation, seconds):
     return simulation.drone.body.state
 
 
-def test_it_takes_off_and_hovers(simulate):
+def test_the_hexacopter_takes_off_and_hovers(simulate):
     simulation = simulate(start="landed")
     assert len(simulation.drone.propulsion.particle_velocities) == 6
     assert str(simulation.drone.flight_state) == "landed" and simulation.drone.body.state.position[2] < 0.1
@@ -36,7 +36,7 @@ def test_it_takes_off_and_hovers(simulate):
 
 
 @pytest.mark.parametrize("x, y, turn", [(0.5, 0, 0), (-0.3, 0.3, 0), (0, -0.5, 0), (0, 0, 0.5)])
-def test_it_follows_a_command(simulate, x, y, turn):
+def test_the_hexacopter_follows_a_velocity_command(simulate, x, y, turn):
     simulation = simulate()
     simulation.drone.commands.receive(Twist(Vector3(x, y, 0), Vector3(0, 0, turn)))
     state = fly(simulation, 4.0)
@@ -59,7 +59,7 @@ def test_each_propeller_has_a_script_and_blades(simulate):
     assert sum(propulsion.law.thrusts) == pytest.approx(0.72 * 9.81, rel=0.05)
 
 
-def test_it_flies_beside_a_quadricopter(simulate):
+def test_a_hexacopter_and_a_quadricopter_fly_in_one_world(simulate):
     simulation = simulate(
         config="",
         vehicles={
@@ -78,29 +78,29 @@ def test_it_flies_beside_a_quadricopter(simulate):
     assert [one.body.state.position[2] for one in simulation.vehicles.values()] == pytest.approx([0.8, 0.8], abs=0.05)
 
 
-def test_four_numbers_are_of_the_first_four_propellers(simulate):
+def test_four_fault_values_apply_to_the_first_four_propellers(simulate):
     simulation = simulate(faults={"propellers": [1, 0.5, 1, 1]})
     assert simulation.drone.faults.now.propellers == (1, 0.5, 1, 1, 1, 1)
 
 
-def test_each_propeller_may_fail_and_the_body_turns_towards_it(simulate):
-    """A failed propeller lacks its thrust and its reaction torque: propeller 6 is the mirror image of propeller 1."""
-    sound, first, sixth = simulate(), simulate(), simulate(faults={"propellers": [1, 1, 1, 1, 1, 0]})
+def test_the_body_turns_towards_a_failed_propeller(simulate):
+    """A failed propeller has no thrust and no reaction torque. Propeller 6 is the mirror image of propeller 1."""
+    intact, first, sixth = simulate(), simulate(), simulate(faults={"propellers": [1, 1, 1, 1, 1, 0]})
     first.child_scripts["drone"].tuning.change({"faults/propellers/front_left": 0.0})
     motion = {}
-    for one in (sound, first, sixth):
+    for one in (intact, first, sixth):
         one.step()
         motion[one] = [*one.drone.body.state.angular_velocity, *one.drone.body.state.linear_velocity]
-    roll, pitch, yaw, _, _, climb = (ours - its for ours, its in zip(motion[sixth], motion[sound]))
-    thrust = sound.drone.propulsion.law.thrusts[5]
-    assert sixth.drone.propulsion.law.thrusts[:] == [*sound.drone.propulsion.law.thrusts[:5], 0]
-    assert climb == pytest.approx(-thrust * 0.05 / sound.drone.body.mass, rel=1e-3)
-    assert roll > 0.1 and pitch > 0.1 and yaw < -0.001, "right side and nose go down; it loses a positive torque"
-    mirrored = [ours - its for ours, its in zip(motion[first], motion[sound])][:3]
+    roll, pitch, yaw, _, _, climb = (ours - its for ours, its in zip(motion[sixth], motion[intact]))
+    thrust = intact.drone.propulsion.law.thrusts[5]
+    assert sixth.drone.propulsion.law.thrusts[:] == [*intact.drone.propulsion.law.thrusts[:5], 0]
+    assert climb == pytest.approx(-thrust * 0.05 / intact.drone.body.mass, rel=1e-3)
+    assert roll > 0.1 and pitch > 0.1 and yaw < -0.001, "right side and nose go down; a positive torque is lost"
+    mirrored = [ours - its for ours, its in zip(motion[first], motion[intact])][:3]
     assert mirrored == pytest.approx([-roll, pitch, -yaw], rel=0.02)
 
 
-def test_propellers_5_and_6_have_names_in_files_and_in_tuning(simulate):
+def test_propellers_5_and_6_can_be_named_in_files_and_tuned(simulate):
     six = {"drone": {"objects": {"Quadricopter_propeller_respondable6": {"alias": "sixth"}}}}
     simulation = simulate(**six)
     objects = simulation.context.objects
@@ -114,14 +114,14 @@ def test_propellers_5_and_6_have_names_in_files_and_in_tuning(simulate):
 
 
 @pytest.mark.parametrize("count", [3, 5, 7])
-def test_another_number_of_propellers_is_refused(simulate, count):
+def test_a_wrong_number_of_propeller_faults_is_refused(simulate, count):
     with pytest.raises(ParameterError, match=r"faults/propellers = \[1, .*must be 6 numbers"):
         simulate(faults={"propellers": [1] * count})
     with pytest.raises(ParameterError, match=r"faults/propellers = \[1, .*must be 6 numbers"):
         simulate().drone.change_faults({"propellers": [1] * count})
 
 
-def test_a_snapshot_comes_again_to_the_bit(simulate):
+def test_a_restored_snapshot_repeats_the_flight_exactly(simulate):
     simulation = simulate()
     fly(simulation, 0.5)
     simulation.drone.commands.receive(Twist(Vector3(1, 0, 0)))
@@ -131,7 +131,7 @@ def test_a_snapshot_comes_again_to_the_bit(simulate):
     assert fly(simulation, 1.0) == first
 
 
-def test_a_type_that_there_is_not_and_a_urdf_of_another_are_named():
+def test_an_unknown_type_and_a_urdf_of_another_type_are_refused():
     with pytest.raises(ParameterError, match=r"drone/type = .*hexacopte.*: no such type; .*hexacopter"):
         parameters.load({"drone": {"type": "hexacopte"}})
     with pytest.raises(UrdfError, match=r"drone\.urdf: no link propeller_left"):

@@ -1,6 +1,6 @@
-"""Meshes, textures and URDFs that would crash, fill or hang the process: each gets one line, or is built.
+"""Meshes, textures and URDFs that could crash, fill or hang the process: each is refused in one line or built.
 
-They are loaded in child processes with little memory, so that a crash is a failed test.
+They are loaded in a child process with limited memory, so that a crash is a failed test.
 """
 
 import json
@@ -27,7 +27,7 @@ from drone_sim.shapes.visual import Visual
 pytestmark = pytest.mark.long
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
-HANGS = 300.0  # s for all files; they take a few
+HANGS = 300.0  # s, limit for all files together, which take a few seconds
 MEMORY = 4 * 2**30  # bytes
 LOAD = """
 import json, sys
@@ -98,7 +98,7 @@ URDFS = {
     ),
     "deep": ("<a>" * 100_000 + "</a>" * 100_000, "must have at least one link"),
     "broken": ("<link", "not well-formed"),
-    # What is odd, and can be built all the same.
+    # Unusual files that can be built.
     "no inertial": ("<link name='a'/>", "built"),
     "no inertia": (link("a", inertia=""), "built"),
     "a chain": (
@@ -160,7 +160,7 @@ SCENES = {
 
 @pytest.fixture(name="said", scope="module")
 def _said(tmp_path_factory):
-    """Return, for each scene with a hostile file, what the child said that loaded it; and how the child ended."""
+    """Return {scene: reply of the child process that loaded it}, and the completed child process."""
     folder = tmp_path_factory.mktemp("hostile")
     scenes = {name: scene for name, (scene, _) in SCENES.items()}
     for number, (name, (text, _)) in enumerate(URDFS.items()):
@@ -193,7 +193,7 @@ def _said(tmp_path_factory):
     return dict(map(json.loads, child.stdout.splitlines())), child
 
 
-def assert_said(said, name, words):
+def assert_reply(said, name, words):
     lines, child = said
     assert name in lines, f"the process ended with {child.returncode} after {list(lines)[-1:]}: {child.stderr[-500:]}"
     assert words in lines[name]
@@ -202,25 +202,25 @@ def assert_said(said, name, words):
 
 @pytest.mark.parametrize("mass", [0, 1])
 @pytest.mark.parametrize("name", URDFS)
-def test_no_urdf_ends_the_process(said, name, mass):
-    assert_said(said, f"urdf {name} {mass}", URDFS[name][1])
+def test_a_hostile_urdf_never_ends_the_process(said, name, mass):
+    assert_reply(said, f"urdf {name} {mass}", URDFS[name][1])
 
 
 @pytest.mark.parametrize("mass", [0, 1])
 @pytest.mark.parametrize("name", MESHES)
-def test_no_mesh_ends_the_process(said, name, mass):
-    assert_said(said, f"{name} {mass}", MESHES[name][1])
+def test_a_hostile_mesh_never_ends_the_process(said, name, mass):
+    assert_reply(said, f"{name} {mass}", MESHES[name][1])
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_no_scene_ends_the_process(said, name):
-    assert_said(said, name, SCENES[name][1])
+def test_a_hostile_scene_never_ends_the_process(said, name):
+    assert_reply(said, name, SCENES[name][1])
 
 
 @pytest.mark.parametrize(
     "text", [DOCTYPE + "<robot name='r'/>", "", "\0", "<?xml version='1.0' encoding='foo'?><robot/>"]
 )
-def test_a_urdf_that_is_none_gets_one_line(tmp_path, text):
+def test_an_invalid_urdf_of_the_drone_raises_a_one_line_error(tmp_path, text):
     (tmp_path / "drone.urdf").write_text(text)
     with pytest.raises(ValueError, match=r"drone\.urdf: ") as refused:
         Simulation(parameters.load({"drone": {"urdf": str(tmp_path / "drone.urdf")}}))
@@ -235,12 +235,12 @@ def test_a_circle_of_joints_in_the_drone_is_refused(tmp_path):
 
 
 def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch, new_simulation):
-    """By the check, by the world, by the renderer, and by the next start."""
+    """The check, the world, the renderer and the next start all use the mesh."""
     ball = trimesh.creation.icosphere()
     ball.export(str(tmp_path / "ball.stl"))
     (tmp_path / "scene.yaml").write_text("objects: [{shape: mesh, file: ball.stl, position: [9, 0, 1]}]")
     read, loaded = [], trimesh.load
-    monkeypatch.setattr(trimesh, "load", lambda *given, **how: read.append(how["file_type"]) or loaded(*given, **how))
+    monkeypatch.setattr(trimesh, "load", lambda *args, **kw: read.append(kw["file_type"]) or loaded(*args, **kw))
     simulation = new_simulation({"scene_file": str(tmp_path / "scene.yaml")})
     for visual in simulation.world.pictures.visuals():
         load(visual)
@@ -253,18 +253,18 @@ def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch, new_simulat
     assert read.count("stl") == 2
 
 
-def test_a_moving_mesh_of_80000_triangles_does_not_hold_up_a_step(tmp_path, new_simulation):
-    """Bullet asks each of a hull's corners again and again: it is given few."""
+def test_the_hull_of_a_moving_mesh_of_80000_triangles_has_few_corners(tmp_path, new_simulation):
+    """Bullet iterates over all corners of a hull in every step, so the hull is simplified."""
     ball = trimesh.creation.icosphere(subdivisions=6)
     ball.export(str(tmp_path / "ball.stl"))
     corners = np.frombuffer(mesh_files.as_stl(str(tmp_path / "ball.stl"), hull=True)[84:], np.uint8)
-    assert len(corners) / 50 * 3 < 300, "corners of the hull"
+    assert len(corners) / 50 * 3 < 300, "the number of corners of the hull"
     (tmp_path / "scene.yaml").write_text("objects: [{shape: mesh, file: ball.stl, position: [5, 0, 3], mass: 1}]")
     simulation = new_simulation({"scene_file": str(tmp_path / "scene.yaml")}, steps=40)
-    assert simulation.scene.visuals()[1][0, 2, 3] == pytest.approx(1.0, abs=0.05), "it lies on the floor"
+    assert simulation.scene.visuals()[1][0, 2, 3] == pytest.approx(1.0, abs=0.05), "the ball lies on the floor"
 
 
-def test_a_disc_of_20000_triangles_is_flat_to_the_eye(tmp_path):
+def test_a_disc_of_20000_triangles_is_rendered_flat(tmp_path):
     angles = np.linspace(0, 2 * np.pi, 20_001)
     rim = np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
     corners = np.stack([0 * rim[1:], rim[:-1], rim[1:]], axis=1)

@@ -1,11 +1,11 @@
-"""simVision, and the scripts of vision sensors that see every picture (sysCall_vision)."""
+"""simVision, and scripts of vision sensors that process every image (sysCall_vision)."""
 
 import math
 
 import pytest
 from pytest import approx
 
-# A camera that looks down from 2 m on a red box beside the middle of its picture.
+# A camera that looks down from 2 m at a red box, which is off the centre of the image.
 OBJECTS = [
     {"name": "Eye", "kind": "vision_sensor", "position": [50, 0, 2], "rpy": [math.pi, 0, 0],
      "width": 256, "height": 256, "fov": math.pi / 2, "near": 0.1, "far": 4.0},
@@ -57,7 +57,7 @@ def _simulate(tmp_path, new_simulation):
     [FILTER.format(require=""), FILTER.format(require="simVision = require 'simVision'"), PYTHON],
     ids=["Lua", "required", "Python"],
 )
-def test_a_blob_is_where_and_as_large_as_it_is(simulate, text):
+def test_blob_detection_returns_position_and_size_of_a_blob(simulate, text):
     simulation = simulate(text)
     eye = simulation.context.objects[simulation.context.objects.handle("Eye")]
     trigger, (packet,) = eye.detected
@@ -65,16 +65,16 @@ def test_a_blob_is_where_and_as_large_as_it_is(simulate, text):
     count, size, share, turn, x, y, wide, high = memoryview(packet).cast("f")
     assert (count, size) == (1, 6)
     pixel = 1 / 256
-    away = 2.0 - 0.01  # m, of its upper side, of which 2 · away m are seen
-    assert share == approx(0.08 / (2 * away) ** 2, rel=0.06)
+    distance = 2.0 - 0.01  # m, to the upper side of the box; the image is 2 · distance wide there
+    assert share == approx(0.08 / (2 * distance) ** 2, rel=0.06)
     assert turn == approx(0, abs=0.02)
-    assert abs(x - 0.5) == approx(0.5 / (2 * away), abs=pixel)
+    assert abs(x - 0.5) == approx(0.5 / (2 * distance), abs=pixel)
     assert y == approx(0.5, abs=pixel)
-    assert (wide, high) == (approx(0.4 / (2 * away), abs=2 * pixel), approx(0.2 / (2 * away), abs=2 * pixel))
+    assert (wide, high) == (approx(0.4 / (2 * distance), abs=2 * pixel), approx(0.2 / (2 * distance), abs=2 * pixel))
     assert simulation.context.signals.get(str, "blobs")
 
 
-def test_depths_become_points(simulate):
+def test_depths_are_converted_to_points(simulate):
     text = """
 function sysCall_vision(seen)
   simVision.sensorDepthMapToWorkImg(seen.handle)
@@ -85,14 +85,14 @@ end"""
     eye = simulation.context.objects[simulation.context.objects.handle("Eye")]
     columns, rows, *points = memoryview(eye.detected.packets[0]).cast("f")
     assert (columns, rows) == (3, 3)
-    places = [points[index : index + 4] for index in range(0, 36, 4)]
-    assert places[4] == approx([50, 0, 0, 2], abs=0.01)  # straight down
-    assert sorted(round(x - 50) for x, _, _, _ in places) == [-2, -2, -2, 0, 0, 0, 2, 2, 2]
-    assert all(z == approx(0, abs=0.02) for _, _, z, _ in places)
-    assert places[0][3] == approx(math.sqrt(12), rel=0.01)
+    vectors = [points[index : index + 4] for index in range(0, 36, 4)]
+    assert vectors[4] == approx([50, 0, 0, 2], abs=0.01)  # the middle point is straight below
+    assert sorted(round(x - 50) for x, _, _, _ in vectors) == [-2, -2, -2, 0, 0, 0, 2, 2, 2]
+    assert all(z == approx(0, abs=0.02) for _, _, z, _ in vectors)
+    assert vectors[0][3] == approx(math.sqrt(12), rel=0.01)
 
 
-def test_what_has_changed_since_the_last_picture_is_so_after_a_snapshot_too(simulate):
+def test_changed_pixels_compare_with_the_last_image_also_after_a_snapshot(simulate):
     text = """
 function sysCall_vision(seen)
   local grey = n and n % 3 == 0 and 0.5 or 0.1
@@ -114,7 +114,7 @@ end"""
         simulation.restore(snapshot)
 
 
-def test_what_it_packs_comes_back_with_a_snapshot_and_a_failure_is_told_once(simulate, caplog):
+def test_packets_are_restored_by_a_snapshot_and_an_error_is_logged_once(simulate, caplog):
     simulation = simulate("function sysCall_vision(seen) return {packedPackets = {sim.packFloatTable{7}, 3}} end")
     snapshot = simulation.snapshot()
     simulation.step()
@@ -122,5 +122,5 @@ def test_what_it_packs_comes_back_with_a_snapshot_and_a_failure_is_told_once(sim
     eye = simulation.context.objects[simulation.context.objects.handle("Eye")]
     assert [list(memoryview(one).cast("f")) for one in eye.detected.packets] == [[7.0]]
     simulate("function sysCall_vision(seen) simVision.workImgToBuffer1(seen.handle) end", 4)
-    told = [one for one in caplog.messages if "has no work image yet: call sensorImgToWorkImg first" in one]
-    assert len(told) == 1
+    errors = [one for one in caplog.messages if "has no work image yet: call sensorImgToWorkImg first" in one]
+    assert len(errors) == 1

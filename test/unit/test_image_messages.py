@@ -1,4 +1,4 @@
-"""Pictures of every encoding as messages and back, and what cv_bridge alone would read wrongly."""
+"""Conversion between arrays and image messages of every encoding, also where cv_bridge is wrong."""
 
 import cv2
 import numpy as np
@@ -23,22 +23,22 @@ HEIGHT, WIDTH = 6, 8
 
 
 def noise(encoding):
-    """Return random numbers of an encoding's type, (height, width, channels)."""
+    """Return a random image of the encoding's type, (height, width, channels)."""
     kind, channels = BRIDGE.encoding_to_dtype_with_channels(encoding)
     return np.random.RandomState(1).randint(0, 120, (HEIGHT, WIDTH, channels)).astype(kind)
 
 
-def sent(encoding, margin=0):
-    """Return a picture of noise as a message, with `margin` bytes after the pixels of each row."""
+def encode(encoding, margin=0):
+    """Return an image message of noise, with `margin` padding bytes at the end of each row."""
     picture = noise(encoding)
     rows = [row.tobytes() + bytes(margin) for row in picture]
     return Image(height=HEIGHT, width=WIDTH, encoding=encoding, step=len(rows[0]), data=b"".join(rows))
 
 
 @pytest.mark.parametrize("encoding", [*COLORS, *NUMBERS, "yuv422"])
-@pytest.mark.parametrize("margin", [0, 8])  # which cv_bridge 1.16 takes for pixels
-def test_pixels_are_those_that_were_sent(encoding, margin):
-    found, picture = image_messages.pixels(sent(encoding, margin)), noise(encoding)
+@pytest.mark.parametrize("margin", [0, 8])  # cv_bridge 1.16 takes padding for pixels
+def test_decoded_pixels_equal_the_sent_pixels(encoding, margin):
+    found, picture = image_messages.pixels(encode(encoding, margin)), noise(encoding)
     assert found.dtype == picture.dtype
     assert np.array_equal(found, picture[:, :, 0] if picture.shape[2] == 1 else picture)
 
@@ -46,30 +46,30 @@ def test_pixels_are_those_that_were_sent(encoding, margin):
 @pytest.mark.parametrize(
     "encoding", [one for one in COLORS if "16" not in one or not one.startswith("bayer")] + ["yuv422"]
 )
-def test_colors_are_those_of_cv_bridge(encoding):
-    ours, theirs = image_messages.bgr(sent(encoding, margin=8)), BRIDGE.imgmsg_to_cv2(sent(encoding), "bgr8")
+def test_bgr_colors_equal_those_of_cv_bridge(encoding):
+    ours, theirs = image_messages.bgr(encode(encoding, margin=8)), BRIDGE.imgmsg_to_cv2(encode(encoding), "bgr8")
     assert ours.shape == (HEIGHT, WIDTH, 3) and np.array_equal(ours, theirs)
 
 
 @pytest.mark.parametrize("encoding, named", [("8UC1", "mono8"), ("8UC3", "bgr8"), ("8UC4", "bgra8")])
-def test_bytes_without_a_color_are_in_opencvs_order(encoding, named):
-    assert np.array_equal(image_messages.bgr(sent(encoding)), image_messages.bgr(sent(named)))
+def test_encodings_without_colors_are_read_in_opencv_order(encoding, named):
+    assert np.array_equal(image_messages.bgr(encode(encoding)), image_messages.bgr(encode(named)))
 
 
 @pytest.mark.parametrize("encoding", ["bgr8", "rgba8", "mono8", "mono16", "32FC1", "16UC1", "32FC3"])
-def test_cv_bridge_reads_what_is_sent(encoding):
+def test_cv_bridge_can_read_the_messages(encoding):
     kind, channels = BRIDGE.encoding_to_dtype_with_channels(encoding)
     shape = (HEIGHT, WIDTH) if channels == 1 else (HEIGHT, WIDTH, channels)
     picture = np.arange(np.prod(shape)).reshape(shape).astype(kind)
     assert np.array_equal(BRIDGE.imgmsg_to_cv2(image_messages.image(picture, encoding)), picture)
 
 
-def test_a_picture_of_another_type_than_its_encoding_is_not_sent():
+def test_an_array_whose_type_differs_from_the_encoding_is_refused():
     with pytest.raises(TypeError, match="rgb8"):
         image_messages.image(np.zeros((HEIGHT, WIDTH), np.float32), "rgb8")
 
 
-def test_numbers_may_come_from_a_big_endian_machine():
+def test_big_endian_images_are_decoded():
     depths = np.array([[1.5, np.nan]], np.float32)
     message = Image(height=1, width=2, encoding="32FC1", step=8, is_bigendian=1, data=depths.astype(">f4").tobytes())
     found = image_messages.pixels(message)
@@ -90,20 +90,20 @@ def test_numbers_may_come_from_a_big_endian_machine():
         ({"height": 0}, "has no pixels"),
     ],
 )
-def test_what_cannot_be_read_is_said_in_one_line(changes, said):
-    message = sent("bgr8")
+def test_an_invalid_image_message_raises_an_error(changes, said):
+    message = encode("bgr8")
     for key, value in changes.items():
         setattr(message, key, value)
     with pytest.raises(ValueError, match=said):
         image_messages.pixels(message)
 
 
-def test_what_is_no_color_is_said():
+def test_bgr_of_a_depth_image_raises_an_error():
     with pytest.raises(ValueError, match="is not a color format"):
-        image_messages.bgr(sent("32FC1"))
+        image_messages.bgr(encode("32FC1"))
 
 
-# ---- messages as pictures
+# ---- decoding messages for display
 
 
 BLUE = np.full((4, 6, 3), (255, 0, 0), np.uint8)
@@ -117,19 +117,19 @@ BLUE = np.full((4, 6, 3), (255, 0, 0), np.uint8)
         CompressedImage(format="rgb8; png compressed bgr8", data=cv2.imencode(".png", BLUE)[1].tobytes()),
     ],
 )
-def test_colours_are_what_they_are(message):
+def test_raw_and_compressed_color_images_are_decoded(message):
     assert np.array_equal(pictures.decode(message), BLUE)
 
 
-def test_grey_becomes_grey():
+def test_a_mono_image_is_decoded_to_grey():
     grey = np.arange(24, dtype=np.uint8).reshape(4, 6)
     assert np.array_equal(pictures.decode(image(grey, "mono8")), np.repeat(grey[:, :, None], 3, axis=2))
 
 
-def test_depth_is_the_darker_the_farther_and_black_without_any():
+def test_far_depths_are_darker_and_missing_depths_are_black():
     metres = np.array([[0.0, 3.0, 100.0, np.nan, np.inf, -1.0]], np.float32)
-    near, three, far, nothing, infinite, absurd = pictures.decode(image(metres, "32FC1"))[0, :, 0]
-    assert (near, three, absurd) == (255, 127, 255)
+    near, three, far, nothing, infinite, negative = pictures.decode(image(metres, "32FC1"))[0, :, 0]
+    assert (near, three, negative) == (255, 127, 255)
     assert 0 < far < 10
     assert (nothing, infinite) == (0, 0)
     millimetres = np.array([[3000, 0]], np.uint16)
@@ -148,13 +148,13 @@ def test_depth_is_the_darker_the_farther_and_black_without_any():
         (CompressedImage(format="32FC1; compressedDepth", data=b"x"), "compressedDepth is not shown"),
     ],
 )
-def test_what_cannot_be_shown_is_told_in_one_line(message, said):
+def test_an_image_that_cannot_be_shown_raises_a_one_line_error(message, said):
     with pytest.raises(ValueError, match=said) as error:
         pictures.decode(message)
     assert "\n" not in str(error.value)
 
 
-def test_pictures_stand_side_by_side_and_fit():
+def test_images_are_tiled_side_by_side_within_the_size_limit():
     red = np.full((8, 3, 3), (0, 0, 255), np.uint8)
     one = pictures.tile([("a", BLUE)])
     caption = one.shape[0] - 4

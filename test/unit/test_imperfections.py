@@ -1,4 +1,4 @@
-"""Cameras that are not perfect, against the formulas that they are made by; and the same picture every time."""
+"""Camera imperfections against their formulas; equal flights give equal images."""
 
 import math
 
@@ -28,8 +28,8 @@ ALL = {
 }
 
 
-class Wall:
-    """A subject: a white wall at 5 m, before which a black board moves to the right."""
+class MovingBoard:
+    """Scene of a white wall at 5 m and a black board in front of it that moves to the right."""
 
     changes = 1
 
@@ -47,11 +47,11 @@ class Wall:
 
 
 def edges(light):
-    """Return where the board's right edge is in each row, px: its front, at 4 m, begins in the picture's middle."""
+    """Return the column (px) of the board's right edge in each row. It starts in the middle; its front is at 4 m."""
     return np.sum(1 - light.mean(axis=-1) / light[0, -1].mean(), axis=1) - 0.5
 
 
-def gathered(subject, shutter, velocity=STILL):
+def render(subject, shutter, velocity=STILL):
     vision = Vision()
     vision.look_at(subject, [])
     light = vision.light(CAMERA, AHEAD, velocity, shutter)
@@ -64,7 +64,7 @@ def test_a_rolling_shutter_shears_by_speed_times_readout(who):
     speed, readout = 100.0, 0.2  # px/s, s
     sideways = speed * 4.0 / CAMERA.fx  # m/s
     board, camera = (sideways, 0.0) if who == "board" else (0.0, sideways)
-    places = edges(gathered(Wall(board), Shutter(0.0, readout), np.array([0, camera, 0, 0, 0, 0])))
+    places = edges(render(MovingBoard(board), Shutter(0.0, readout), np.array([0, camera, 0, 0, 0, 0])))
     rows = np.arange(CAMERA.height) - CAMERA.cy
     slope, middle = np.polyfit(rows, places, 1)
     assert slope * CAMERA.height == pytest.approx(speed * readout, rel=0.02)
@@ -74,16 +74,16 @@ def test_a_rolling_shutter_shears_by_speed_times_readout(who):
 
 def test_motion_blurs_by_speed_times_exposure():
     speed, exposure = 1000.0, 0.04
-    light = gathered(Wall(speed * 4.0 / CAMERA.fx), Shutter(exposure, 0.0))[120].mean(axis=-1)
+    light = render(MovingBoard(speed * 4.0 / CAMERA.fx), Shutter(exposure, 0.0))[120].mean(axis=-1)
     light = light / light[-1]
-    wanted = (np.arange(CAMERA.width) - CAMERA.cx) / (speed * exposure) + 0.5
-    assert np.abs(light - np.clip(wanted, 0, 1)).max() < 0.06
+    expected_light = (np.arange(CAMERA.width) - CAMERA.cx) / (speed * exposure) + 0.5
+    assert np.abs(light - np.clip(expected_light, 0, 1)).max() < 0.06
 
 
-def test_every_value_of_a_picture_is_some_light_and_comes_back():
+def test_decoding_and_encoding_light_restores_every_pixel_value():
     values = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, axis=2)
     np.testing.assert_array_equal(encoded(decoded(values)), values)
-    assert decoded(values)[11, 12, 0] == pytest.approx(0.5, abs=0.003)  # 188 is half of the light
+    assert decoded(values)[11, 12, 0] == pytest.approx(0.5, abs=0.003)  # pixel value 188 is half of the light
 
 
 def shot(exposure=0.01, gain=1.0):
@@ -92,8 +92,8 @@ def shot(exposure=0.01, gain=1.0):
     )
 
 
-def test_noise_grows_with_light_as_photons_do():
-    """EMVA 1288's photon transfer: the variance in electrons is the mean's, and that of reading."""
+def test_noise_variance_follows_the_photon_transfer_curve():
+    """By EMVA 1288, the variance in electrons is the mean plus the variance of the read noise."""
     noise, gain = PixelNoiseParameters(full_well=2000.0, read=12.0), 2.0
     for electrons in (50.0, 400.0, 1000.0):
         light = np.full((300, 300, 3), gain * electrons / noise.full_well, np.float32)
@@ -101,12 +101,12 @@ def test_noise_grows_with_light_as_photons_do():
         assert measured.mean() == pytest.approx(electrons, rel=0.01)
         assert measured.var() == pytest.approx(electrons + noise.read**2, rel=0.02)
     full = noise.apply(np.full((300, 300, 3), 10.0, np.float32), shot(gain=gain))
-    assert full.mean() == pytest.approx(gain, rel=0.01), "the well is full"
+    assert full.mean() == pytest.approx(gain, rel=0.01), "saturated at the full well"
 
 
-def test_noise_in_the_dark_is_cut_at_black():
+def test_noise_in_the_dark_is_clipped_at_black():
     noise = PixelNoiseParameters(full_well=2000.0, read=math.sqrt(141.0))
-    mean, deviation = 3.0 / 2000, 12.0 / 2000  # of 3 electrons, with a variance of 3 + 141
+    mean, deviation = 3.0 / 2000, 12.0 / 2000  # 3 electrons, with a variance of 3 + 141
     light = noise.apply(np.full((300, 300, 3), mean, np.float32), shot())
     assert (light.mean(), light.std()) == pytest.approx((mean, deviation), rel=0.02)
     seen = decoded(encoded(light))
@@ -118,36 +118,36 @@ def test_noise_in_the_dark_is_cut_at_black():
     assert (seen.mean(), seen.std()) == pytest.approx((cut_mean, math.sqrt(cut_variance)), rel=0.01)
 
 
-def test_a_lens_darkens_the_corners_by_the_fourth_power_of_the_cosine():
+def test_the_vignette_follows_the_cosine_fourth_power_law():
     light = VignetteParameters(power=4.0).apply(np.ones((CAMERA.height, CAMERA.width, 3), np.float32), shot())
-    away = np.hypot(CAMERA.cx, CAMERA.cy) / CAMERA.fx
-    assert light[0, 0] == pytest.approx(math.cos(math.atan(away)) ** 4, rel=1e-5)
+    tangent = np.hypot(CAMERA.cx, CAMERA.cy) / CAMERA.fx
+    assert light[0, 0] == pytest.approx(math.cos(math.atan(tangent)) ** 4, rel=1e-5)
     assert light[120, 160] == pytest.approx(1.0, abs=1e-4)
 
 
-def test_exposure_and_gain_multiply_light():
+def test_exposure_time_and_gain_scale_the_light():
     own = ExposureParameters(time=0.005, gain=20.0)
     assert own.settings(own.most) == pytest.approx((0.005, 10.0))
     light = own.apply(np.full((2, 2, 3), 0.1, np.float32), shot(*own.settings(own.most)))
     assert light == pytest.approx(0.1 * 0.5 * 10.0)
 
 
-def test_automatic_exposure_follows_the_light_in_its_time():
+def test_automatic_exposure_settles_with_its_time_constant_within_its_limits():
     own, control = ExposureParameters(time=0.02, gain=12.0, automatic=True, settling=0.5), ExposureControl()
     control.meter(np.full((4, 4, 3), 0.18, np.float32), None, 0.0)
     assert own.settings(control.brightness(own, 0.0)) == pytest.approx((0.01, 1.0))
     dark = np.full((4, 4, 3), 0.06, np.float32)
     control.meter(dark, 1.0, 1.0)
-    assert control.brightness(own, 1.0) == pytest.approx(1.0), "the picture that shows it is too dark"
+    assert control.brightness(own, 1.0) == pytest.approx(1.0), "the first dark image is still exposed as before"
     assert math.log(3 / control.brightness(own, 1.5)) == pytest.approx(math.log(3) / math.e)
     control.meter(dark, control.brightness(own, 1.5), 1.5)
     assert own.settings(control.brightness(own, 60.0)) == pytest.approx((0.02, 1.5))
     control.meter(dark / 1000, 3.0, 60.0)
-    assert control.brightness(own, 120.0) == pytest.approx(2 * 10**0.6), "it has its limits"
+    assert control.brightness(own, 120.0) == pytest.approx(2 * 10**0.6), "limited by exposure time and gain"
 
 
-def flown(front, steps=6, first=0):
-    """Return the pictures of a flight that somebody looks at from a step on, and what it is restored to."""
+def fly(front, steps=6, first=0):
+    """Return the images of a flight with a viewer from step `first` on, and the image after a restored snapshot."""
     simulation = Simulation(parameters.load({"cameras": {"front": {"width": 80, "height": 60, **front}}}))
     camera = simulation.drone.cameras["front"]
     camera.viewers.add(lambda: len(pictures) >= first)
@@ -165,25 +165,25 @@ def flown(front, steps=6, first=0):
     return pictures, again
 
 
-def test_the_same_flight_has_the_same_pictures_to_the_last_bit():
-    first, again = flown(ALL)
-    second, _ = flown(ALL)
+def test_equal_flights_and_restored_snapshots_give_identical_images():
+    first, again = fly(ALL)
+    second, _ = fly(ALL)
     np.testing.assert_array_equal(first, second)
     np.testing.assert_array_equal(again, first[3])
-    other, _ = flown({**ALL, "noise": {**ALL["noise"], "seed": 4}})
+    other, _ = fly({**ALL, "noise": {**ALL["noise"], "seed": 4}})
     assert all((one != two).mean() > 0.3 for one, two in zip(first, other))
 
 
-def test_automatic_exposure_is_the_same_whoever_looks():
-    always, _ = flown(ALL)
-    late, _ = flown(ALL, first=4)
+def test_automatic_exposure_does_not_depend_on_the_first_requested_image():
+    always, _ = fly(ALL)
+    late, _ = fly(ALL, first=4)
     assert late[:4] == [None] * 4
     np.testing.assert_array_equal(late[4:], always[4:])
     steady = {**ALL, "exposure": {**ALL["exposure"], "automatic": False}}
-    assert (decoded(flown(steady)[0][5]).mean() / decoded(always[5]).mean()) > 1.5, "it is bright, and follows that"
+    assert (decoded(fly(steady)[0][5]).mean() / decoded(always[5]).mean()) > 1.5, "automatic exposure darkens the scene"
 
 
-def test_blades_blur_at_the_speed_at_which_they_are_seen_to_turn(new_simulation):
+def test_the_motion_blur_of_blades_matches_their_visible_rotation(new_simulation):
     simulation = new_simulation({})
     drone, shutter = simulation.drone, Shutter(0.03, 0.0)
     track = drone.cameras["track"]
@@ -194,23 +194,23 @@ def test_blades_blur_at_the_speed_at_which_they_are_seen_to_turn(new_simulation)
         pose = np.reshape((*track.pose(), 0, 0, 0, 1), (4, 4))
         return simulation.vision.light(track.intrinsics, pose, STILL, exposed)
 
-    def blurred():
+    def count_blurred_pixels():
         return (np.abs(light(shutter) - light(Shutter(0.0, 0.0))) > 0.02).any(axis=-1).sum()
 
-    assert blurred() > 20
+    assert count_blurred_pixels() > 20
     pictures, time_step = simulation.world.pictures, simulation.parameters.time_step
     before, velocities = pictures.visual_poses(), pictures.visual_velocities()
     simulation.step()
-    light(shutter)  # only who looks turns them
+    light(shutter)  # the blades turn only when an image is rendered
     turned, expected = pictures.visual_poses()[:, :3, :3], moved(before, velocities, time_step)[:, :3, :3]
     assert np.abs(turned - before[:, :3, :3]).max() > 0.1
     np.testing.assert_allclose(turned, expected, atol=0.01)
     for number in range(1, 5):
         drone.propulsion.blades.turn(f"Quadricopter_propeller_joint{number}", 0.3)
-    assert blurred() == 0
+    assert count_blurred_pixels() == 0
 
 
-def test_it_is_tuned_in_flight_and_fails(new_simulation):
+def test_camera_imperfections_can_be_tuned_and_combined_with_faults(new_simulation):
     simulation = new_simulation({"cameras": {"front": {"width": 80, "height": 60}}})
     camera, tuning = simulation.drone.cameras["front"], simulation.child_scripts["drone"].tuning
     perfect = camera.take()
@@ -222,12 +222,12 @@ def test_it_is_tuned_in_flight_and_fails(new_simulation):
     tuning.change({"cameras/front/noise/full_well": 1e4})
     with pytest.raises(ParameterError, match="cameras/front/noise/read = 3: needs `full_well`"):
         tuning.change({"cameras/front/noise/full_well": 0.0, "cameras/front/noise/read": 3.0})
-    kept = camera.look()
+    frozen_image = camera.look()
     simulation.drone.change_faults({"sensors": {"front": "frozen"}})
     simulation.step()
-    np.testing.assert_array_equal(camera.look(), kept)
+    np.testing.assert_array_equal(camera.look(), frozen_image)
     simulation.drone.change_faults({"sensors": {"front": "ok"}})
-    assert not np.array_equal(camera.look(), kept), "noise is another one at another time"
+    assert not np.array_equal(camera.look(), frozen_image), "noise differs at another time"
     simulation.drone.change_faults({"sensors": {"front": "silent"}})
     assert not camera.look().any()
 
@@ -243,6 +243,6 @@ def test_it_is_tuned_in_flight_and_fails(new_simulation):
         ),
     ],
 )
-def test_a_mistake_gets_one_line(front, said):
+def test_invalid_imperfections_are_refused(front, said):
     with pytest.raises(ParameterError, match=said):
         parameters.load({"cameras": {"front": front}})

@@ -1,4 +1,4 @@
-"""A file of V-REP's becomes a scene that flies here, with its own masses, places and scripts."""
+"""Import of V-REP files: the scene keeps the masses, poses and scripts of the file, and flies."""
 
 import logging
 import math
@@ -45,26 +45,26 @@ end
 
 @pytest.fixture
 def imported(tmp_path, capsys, new_simulation):
-    """Import a file of these chunks; return what the scene file says.
+    """Return a function that imports a file with the given chunks and returns the content of the scene file.
 
-    What was said, the scene file's path, and the parameters that name it are left in `said`, `scene` and `values`;
-    `fly` makes a simulation of it.
+    Its attributes `output`, `scene` and `values` hold the printed output, the path of the scene file, and the
+    parameters that name it. Its `fly` creates a simulation of the scene.
     """
 
-    def do(*chunks, suffix=".ttt", **given):
+    def import_file(*chunks, suffix=".ttt", **options):
         path = tmp_path / f"Thing{suffix}"
-        path.write_bytes(file(*chunks, **given))
+        path.write_bytes(file(*chunks, **options))
         assert main([str(path), str(tmp_path / "out"), "--force"]) == 0
-        do.said = capsys.readouterr().out
-        do.scene = tmp_path / "out" / "scene.yaml"
-        do.values = {"scene_file": str(do.scene)}
-        return yaml.safe_load(do.scene.read_text())
+        import_file.output = capsys.readouterr().out
+        import_file.scene = tmp_path / "out" / "scene.yaml"
+        import_file.values = {"scene_file": str(import_file.scene)}
+        return yaml.safe_load(import_file.scene.read_text())
 
     def fly(steps=0, started=True, **more):
-        return new_simulation({**do.values, **more}, steps, started=started)
+        return new_simulation({**import_file.values, **more}, steps, started=started)
 
-    do.fly = fly
-    return do
+    import_file.fly = fly
+    return import_file
 
 
 def objects(content):
@@ -74,7 +74,7 @@ def objects(content):
 # ---- objects
 
 
-def test_shapes_in_their_tree(imported):
+def test_shapes_keep_their_size_mass_pose_and_parent(imported):
     sphere = shape(
         1,
         "Ball",
@@ -100,10 +100,10 @@ def test_shapes_in_their_tree(imported):
     assert found["Ball"]["inertia"] == {"moments": [0.005, 0.01, 0.015], "position": [0.0, 0.0, 0.05]}
     assert found["Ball"]["position"] == [0.0, 0.0, 1.0] and found["Ball"]["parent"] == "Box"
     ball = imported.fly(40).scene.things()["Ball"]
-    assert ball.matrix()[11] == pytest.approx(0.1, abs=0.01), "the tree does not weld"
+    assert ball.matrix()[11] == pytest.approx(0.1, abs=0.01), "a dynamic child falls to the floor by itself"
 
 
-def test_a_compound_keeps_its_parts_and_what_is_no_simple_form_is_a_mesh(imported):
+def test_a_compound_keeps_its_parts_and_an_ellipsoid_becomes_a_mesh(imported):
     cabin = shape(0, "Cabin", mesh(size=(1, 1, 1), at=(0, 0, 2)), mesh("cylinder", (2, 2, 5)), at=(9, 9, 9))
     found = objects(imported(cabin, shape(1, "Egg", mesh("sphere", (1, 2, 3)))))
     assert found["Cabin"]["parts"][0]["position"] == [0.0, 0.0, 2.0]
@@ -113,28 +113,28 @@ def test_a_compound_keeps_its_parts_and_what_is_no_simple_form_is_a_mesh(importe
 
 
 RED, GREEN, BLUE, GREY = (255, 0, 0), (0, 255, 0), (0, 0, 255), (9, 9, 9)
-IMAGE = np.array([[RED, GREEN], [BLUE, GREY]], np.uint8)  # the bottom row first, as in the file
+IMAGE = np.array([[RED, GREEN], [BLUE, GREY]], np.uint8)  # the bottom row is first, as in the file
 _IMAGE = chunk("Gon", text("tiles.jpg")) + chunk("Img", IMAGE.tobytes())
 TEXTURE = chunk("TEX", integers("Ipa", 77, 2, 2) + _IMAGE + b"EOO")
-AS_IS = struct.pack("<7d", 1, 0, 0, 0, 0, 0, 0)
+IDENTITY_POSE = struct.pack("<7d", 1, 0, 0, 0, 0, 0, 0)
 
 
-def cover(*more, number=77, way=0, scaling=(1.0, 1.0)):
-    ob = chunk("_ob", struct.pack("<2i2d", number, way, *scaling))
-    return chunk("Toj", ob + chunk("_rc", AS_IS) + b"".join(more) + b"EOO")
+def uv_map(*more, number=77, mode=0, scaling=(1.0, 1.0)):
+    ob = chunk("_ob", struct.pack("<2i2d", number, mode, *scaling))
+    return chunk("Toj", ob + chunk("_rc", IDENTITY_POSE) + b"".join(more) + b"EOO")
 
 
 @pytest.mark.parametrize(
     "covered, corners",
     [
-        (cover(chunk("Ftc", struct.pack("<6f", 0, 0, 1, 0, 0.25, 1))), [[0, 0], [1, 0], [0.25, 1]]),
-        (cover(scaling=(2.0, 4.0)), [[0.5, 0.5], [1, 0.5], [0.5, 0.75]]),
-        (cover(way=3), [[0.5, 0.5], [1.5, 0.5], [0.5, 1.5]]),
+        (uv_map(chunk("Ftc", struct.pack("<6f", 0, 0, 1, 0, 0.25, 1))), [[0, 0], [1, 0], [0.25, 1]]),
+        (uv_map(scaling=(2.0, 4.0)), [[0.5, 0.5], [1, 0.5], [0.5, 0.75]]),
+        (uv_map(mode=3), [[0.5, 0.5], [1.5, 0.5], [0.5, 1.5]]),
     ],
     ids=["as the file says", "seen along z", "on a cube"],
 )
-def test_a_mesh_is_covered_with_its_texture(imported, covered, corners):
-    """Of a triangle (0, 0, 0), (1, 0, 0), (0, 1, 0)."""
+def test_a_textured_mesh_keeps_its_texture_and_uv_coordinates(imported, covered, corners):
+    """The mesh is the triangle (0, 0, 0), (1, 0, 0), (0, 1, 0)."""
     leaf = objects(imported(TEXTURE, shape(0, "Leaf", mesh("none", more=covered))))["Leaf"]
     assert leaf["shape"] == "mesh" and "color" not in leaf
     (part,) = mesh_files.read(str(imported.scene.parent / leaf["file"]))
@@ -145,22 +145,22 @@ def test_a_mesh_is_covered_with_its_texture(imported, covered, corners):
 
 @pytest.mark.parametrize(
     "covered",
-    [cover(number=78), cover(way=1), cover(chunk("Ftc", struct.pack("<6f", 0, 0, math.nan, 0, 0, 1)))],
+    [uv_map(number=78), uv_map(mode=1), uv_map(chunk("Ftc", struct.pack("<6f", 0, 0, math.nan, 0, 0, 1)))],
     ids=["no such texture", "round a cylinder", "not finite"],
 )
-def test_what_covers_a_mesh_in_another_way_is_left_out(imported, covered):
+def test_an_unsupported_texture_mapping_is_not_imported(imported, covered):
     leaf = objects(imported(TEXTURE, shape(0, "Leaf", mesh("none", more=covered))))["Leaf"]
     (part,) = mesh_files.read(str(imported.scene.parent / leaf["file"]))
     assert part.texture is None and "color" in leaf
 
 
-def test_a_texture_that_is_cut_is_one_line():
+def test_a_truncated_texture_raises_a_one_line_error():
     cut = chunk("TEX", integers("Ipa", 77, 2, 2) + chunk("Img", bytes(11)) + b"EOO")
     with pytest.raises(VrepFileError, match=r"^TEX: a texture of 2 x 2 px in 11 bytes$"):
         read(file(cut))
 
 
-def test_joints_and_what_hangs_on_them(imported):
+def test_joints_keep_their_limits_value_and_children(imported):
     own = integers("Jtt", 10) + numbers("_rt", "Prt", 0.5) + numbers("_mr", "Pmr", -1, 3) + chunk("Va9", b"\0")
     content = imported(scene_object("JNT", 0, "Hinge", own=own), shape(1, "Door", mesh(), parent=0, at=(1, 0, 0)))
     found = objects(content)
@@ -178,7 +178,7 @@ def test_joints_and_what_hangs_on_them(imported):
     assert np.allclose(place[3::4], [np.cos(0.5), np.sin(0.5), 0], atol=1e-6)
 
 
-def test_a_path_of_4_x_is_a_path(imported):
+def test_a_path_of_coppeliasim_4_becomes_a_path_object(imported):
     corners = [(0, 0, 1), (2, 0, 1), (2, 2, 1)]
     turns = [(0.0, 0.0, 0.0, 1.0), (0.0, 0.6, 0.0, 0.8), (1.0, 0.0, 0.0, 0.0)]
     content = struct.pack("<21d", *(number for both in zip(corners, turns) for part in both for number in part))
@@ -198,14 +198,14 @@ def test_a_path_of_4_x_is_a_path(imported):
 
 
 @pytest.mark.parametrize("engine, turns", [(0, False), (1, True), (4, True)], ids=["Bullet", "ODE", "MuJoCo"])
-def test_bodies_tumble_as_in_the_files_engine(imported, engine, turns):
+def test_the_gyroscopic_term_follows_the_physics_engine_of_the_file(imported, engine, turns):
     imported(
         shape(0, "Mark", mesh(size=(1, 1, 1))), chunk("DYN", chunk("En3", struct.pack("<i3fi", engine, 0, 0, -9.81, 0)))
     )
     assert parameters.load(imported.values).physics.gyroscopic == turns
 
 
-def test_the_floor_the_step_and_gravity(imported):
+def test_floor_time_step_and_gravity_are_imported(imported):
     flat = shape(1, "Floor_part", mesh(size=(2, 2, 0.1)), parent=0)
     chunks = [shape(0, "ResizableFloor_5_25", mesh(size=(1, 1, 1))), flat]
     moon = chunk("DYN", chunk("En3", struct.pack("<i3fi", 0, 0, 0, -1.62, 0)))
@@ -217,12 +217,12 @@ def test_the_floor_the_step_and_gravity(imported):
         parameters.load().in_scene(str(imported.scene))
 
 
-def test_nobody_flies_in_a_file_without_a_quadricopter_unless_that_is_asked_for(imported, tmp_path):
+def test_a_file_without_a_quadricopter_has_no_vehicle_unless_one_is_requested(imported, tmp_path):
     ball = shape(1, "Ball", mesh("sphere", (0.2, 0.2, 0.2)), at=(0, 0, 2), dynamic=True, wrapper=weight(1.0))
     imported(ball, script(1, "sim.setFloatSignal('height', sim.getObjectPosition(sim.getObject('/Ball'), -1)[3])"))
     simulation = imported.fly(20)
     assert not simulation.vehicles
-    assert simulation.scene.things()["Ball"].matrix()[11] == pytest.approx(0.1, abs=0.01), "on the floor"
+    assert simulation.scene.things()["Ball"].matrix()[11] == pytest.approx(0.1, abs=0.01), "it lies on the floor"
     assert simulation.context.signals.get(float, "height") == 2.0
     simulation.save_scene(tmp_path / "saved.yaml")
     simulation.restore(simulation.snapshot())
@@ -236,7 +236,7 @@ def test_nobody_flies_in_a_file_without_a_quadricopter_unless_that_is_asked_for(
         parameters.load(imported.values).first  # noqa: B018
 
 
-TWICE = {
+SAME_NAMES = {
     "roots": (shape(0, "water12", mesh()), shape(1, "water12", mesh())),
     "one in the other": (shape(0, "water12", mesh()), shape(1, "water12", mesh(), parent=0)),
     "beside each other": (scene_object("DMY", 0, "D"), *(shape(n, "water12", mesh(), parent=0) for n in (1, 2))),
@@ -245,16 +245,16 @@ TWICE = {
 }
 
 
-@pytest.mark.parametrize("objects_twice", TWICE.values(), ids=TWICE)
-def test_of_two_objects_of_one_name_the_second_gets_a_free_one(imported, objects_twice):
+@pytest.mark.parametrize("objects_twice", SAME_NAMES.values(), ids=SAME_NAMES)
+def test_the_second_of_two_objects_of_equal_name_gets_another_name(imported, objects_twice):
     content = imported(*objects_twice)
     names = [one["name"] for one in content["objects"]]
     assert len({*names}) == len(names) and "water12" in names
-    assert ": is called water12" in imported.said
+    assert ": is called water12" in imported.output
     imported.fly(started=False)
 
 
-def test_scripts_on_each_other_have_an_object_each(imported):
+def test_script_objects_with_script_children_get_one_object_each(imported):
     def scripted(handle, name, parent):
         own = script(99, f"function sysCall_init() sim.setInt32Signal('{name}', 1) end", tag="Soo")
         return scene_object("SCT", handle, name, parent=parent, own=own, alias="Script")
@@ -267,7 +267,7 @@ def test_scripts_on_each_other_have_an_object_each(imported):
     assert [signals.get(int, name) for name in ("one", "two", "on")] == [1, 1, 1]
 
 
-def test_what_cannot_be_brought_is_said_object_by_object(imported):
+def test_parts_that_cannot_be_imported_are_reported_per_object(imported):
     own = scene_object("PTC", 0, "Points"), scene_object("GRH", 1, "Graph"), scene_object("DMY", 2, "Drone")
     imported(*own, script(2, "x = 1", kind=6), script(2, "y = 1", switches=10))
     listed = (imported.scene.parent / "IMPORT.txt").read_text()
@@ -276,11 +276,11 @@ def test_what_cannot_be_brought_is_said_object_by_object(imported):
         "Drone: is called Drone#0 here",
         "Drone: its child script is disabled in the file, and is not imported",
     ):
-        assert line in listed and line in imported.said
-    assert "The file has no quadricopter" in imported.said
+        assert line in listed and line in imported.output
+    assert "The file has no quadricopter" in imported.output
 
 
-CUSTOMIZES = """
+CUSTOMIZATION = """
 function sysCall_init() state = sim.getSimulationState() end
 function sysCall_beforeSimulation() sim.setInt32Signal('before', state == sim.simulation_stopped and 1 or 2) end
 function sysCall_actuation()
@@ -290,9 +290,9 @@ end
 
 
 @pytest.mark.parametrize("child", [True, False])
-def test_a_customization_script_comes_with_its_object_and_its_child_script(imported, child):
+def test_a_customization_script_is_imported_with_its_object_and_child_script(imported, child):
     own = [script(0, "function own() return 'own' end function sysCall_init() end", parameters=(("size", "3"),))]
-    text = CUSTOMIZES if child else CUSTOMIZES.replace("sim.callScriptFunction", "tostring")
+    text = CUSTOMIZATION if child else CUSTOMIZATION.replace("sim.callScriptFunction", "tostring")
     content = imported(scene_object("DMY", 0, "Mover"), script(0, text, kind=6), *(own if child else ()))
     (entry,) = content["scripts"]
     assert set(entry) >= {"object", "customization"} and ("script" in entry) == child
@@ -303,14 +303,14 @@ def test_a_customization_script_comes_with_its_object_and_its_child_script(impor
 
 
 def linked(tag_of_type=b""):
-    """Two bodies, each with a dummy that is linked to the other's."""
+    """Yield two bodies, each with a dummy that is linked to the dummy of the other body."""
     for first, other in ((0, 3), (2, 1)):
         yield shape(first, f"Body{first}", mesh(), at=(0, 0, 1 + first), dynamic=True, wrapper=weight(0.1))
         link = integers("Lli", other) + tag_of_type
         yield scene_object("DMY", first + 1, f"Tip{first}", parent=first, own=link)
 
 
-def test_an_overlap_constraint_of_two_dummies_holds_their_bodies_together(imported):
+def test_an_overlap_constraint_becomes_a_link_between_two_dummies(imported):
     imported(*linked())
     simulation = imported.fly(vehicles={"drone": {}})
     tip, other = (simulation.context.objects.handle(name) for name in ("Tip0", "Tip2"))
@@ -327,8 +327,8 @@ end
 """
 
 
-def _rigid(end=""):
-    """A quadricopter of one piece, as no vehicle is: its propellers have scripts, and nothing else."""
+def _rigid_quadricopter(end=""):
+    """Yield a rigid model with a quadricopter's names. It is no vehicle: its propellers have only scripts."""
     yield shape(0, f"Quadricopter{end}", mesh(size=(0.3, 0.3, 0.05)), at=(3, 0, 1), base=chunk("Var", b"\1"))
     for number in (1, 2):
         name = f"Quadricopter_propeller_respondable{number}{end}"
@@ -337,31 +337,31 @@ def _rigid(end=""):
 
 
 @pytest.mark.parametrize("end", ["", "#0", "#3"])
-def test_a_model_whose_names_a_drone_has_is_a_copy_and_its_scripts_find_its_own_objects(imported, end):
+def test_a_model_with_a_drone_s_names_gets_a_suffix_and_its_scripts_find_its_objects(imported, end):
     copy = end or "#0"
-    found = objects(imported(*_rigid(end), suffix=".ttm"))
+    found = objects(imported(*_rigid_quadricopter(end), suffix=".ttm"))
     assert [*found] == [f"Quadricopter{copy}", *(f"Quadricopter_propeller_respondable{n}{copy}" for n in (1, 2))]
     simulation = imported.fly(1, vehicles=1)
-    told = [simulation.context.signals.find(str(n)) for n in (1, 2)]
-    assert told == [f"Quadricopter_propeller_respondable{n}{copy} of Quadricopter{copy}" for n in (1, 2)]
+    aliases = [simulation.context.signals.find(str(n)) for n in (1, 2)]
+    assert aliases == [f"Quadricopter_propeller_respondable{n}{copy} of Quadricopter{copy}" for n in (1, 2)]
 
 
-def test_a_propeller_without_a_drone_finds_none_of_another_ones(imported, caplog):
-    """V-REP's rule: the script of a copy does not find the original's objects."""
+def test_a_script_of_a_copy_does_not_find_another_drone_s_objects(imported, caplog):
+    """V-REP has the same rule: the script of a copy does not find the objects of the original."""
     code = "function sysCall_init() sim.getObjectHandle('Quadricopter_base') end"
-    imported(*_rigid("#0"), scene_object("DMY", 7, "Eye"), script(0, code))
+    imported(*_rigid_quadricopter("#0"), scene_object("DMY", 7, "Eye"), script(0, code))
     imported.fly(vehicles=1)
     assert "no object named 'Quadricopter_base#0'" in caplog.text
 
 
-def test_names_of_a_tree_that_has_a_suffix_here_are_found_from_outside_of_it(imported):
+def test_scripts_outside_of_a_renamed_tree_find_its_objects_by_their_old_names(imported):
     code = "sim.setStringSignal('found', sim.getObjectName(sim.getObjectHandle('Arm')))"
     robot = scene_object("DMY", 0, "Drone"), scene_object("DMY", 1, "Arm", 0), scene_object("DMY", 2, "Eye")
     imported(*robot, script(2, f"function sysCall_init() {code} end"))
     assert imported.fly(vehicles=1).context.signals.find("found") == "Arm#0"
 
 
-def test_scripts_lie_on_their_objects(imported):
+def test_scripts_are_attached_to_their_objects_with_their_parameters(imported):
     lamp = scene_object("DMY", 3, "Lamp", base=chunk("Lsp", integers("Par", 0)[:0]))
     content = imported(lamp, script(3, "-- é\nfunction sysCall_init() end", parameters=[("on", "true"), ("n", "3")]))
     assert content["scripts"] == [
@@ -370,7 +370,7 @@ def test_scripts_lie_on_their_objects(imported):
     assert (imported.scene.parent / "Lamp.lua").read_text() == "-- é\nfunction sysCall_init() end\n"
 
 
-TELL = """
+PATH_LOOKUPS = """
 function sysCall_init()
     local paths = {'.', '..', './Eye', '../Eye', '../Eye[1]', ':', ':/Eye', '::', '/Robot/*/Eye', '/R*t/Eye[1]'}
     for _, path in pairs(paths) do
@@ -381,8 +381,8 @@ end
 """
 
 
-def _told(scene, name):
-    """What the script `name` found under each path."""
+def _found_by_path(scene, name):
+    """Return the aliases that the script `name` found, by path."""
     simulation = Simulation(parameters.load({"scene_file": str(scene)}))
     signals = simulation.context.signals
     paths = ".", "..", "./Eye", "../Eye", "../Eye[1]", ":", ":/Eye", "::", "/Robot/*/Eye", "/R*t/Eye[1]"
@@ -392,7 +392,7 @@ def _told(scene, name):
 
 
 def _robots(*more):
-    """Two robots as of CoppeliaSim 4.3: models with an arm each, whose second eye is its own."""
+    """Yield two robot models as in CoppeliaSim 4.3, each with an arm that has an Eye, and with two Eyes of its own."""
     for index, name in ((0, "Robot"), (10, "Robot#0")):
         base, end = chunk("Var", b"\1"), name[5:]
         yield scene_object("DMY", index, name, at=(index, 0, 0), base=base, alias="Robot")
@@ -403,9 +403,9 @@ def _robots(*more):
     yield from more
 
 
-def test_paths_of_a_script_of_up_to_4_8_begin_at_its_object(imported):
-    imported(*_robots(script(11, TELL.replace("NAME", "'arm'"))))
-    assert _told(imported.scene, "arm") == {
+def test_relative_paths_in_scripts_up_to_4_8_start_at_the_object(imported):
+    imported(*_robots(script(11, PATH_LOOKUPS.replace("NAME", "'arm'"))))
+    assert _found_by_path(imported.scene, "arm") == {
         ".": "/Robot[1]/Arm",
         "..": "/Robot[1]",
         "./Eye": "/Robot[1]/Arm/Eye",
@@ -419,16 +419,16 @@ def test_paths_of_a_script_of_up_to_4_8_begin_at_its_object(imported):
     }
 
 
-def test_paths_of_a_script_of_4_9_begin_at_the_script_which_is_an_object(imported):
-    own = script(99, TELL.replace("NAME", "'arm'"), tag="Soo")
+def test_relative_paths_in_scripts_of_4_9_start_at_the_script_object(imported):
+    own = script(99, PATH_LOOKUPS.replace("NAME", "'arm'"), tag="Soo")
     scripted = scene_object("SCT", 20, "Script", parent=11, own=own, alias="Script")
     found = objects(imported(*_robots(scripted)))
     assert found["Script"]["kind"] == "script" and found["Script"]["parent"] == "Arm#0"
-    told = _told(imported.scene, "arm")
-    assert told[".."] == "/Robot[1]/Arm" and told["../Eye"] == "/Robot[1]/Arm/Eye" and told[":"] == "/Robot[1]"
+    aliases = _found_by_path(imported.scene, "arm")
+    assert aliases[".."] == "/Robot[1]/Arm" and aliases["../Eye"] == "/Robot[1]/Arm/Eye" and aliases[":"] == "/Robot[1]"
 
 
-def test_a_script_object_is_a_script_where_one_is_asked_for(imported):
+def test_a_script_object_is_accepted_where_the_api_takes_a_script_handle(imported):
     own = script(99, "function twice(x) return 2 * x end", tag="Soo")
     scripted = scene_object("SCT", 20, "Script", parent=11, own=own, alias="Script")
     code = """
@@ -463,7 +463,7 @@ def test_collections_are_found_by_their_names(imported, tmp_path):
             "items": [{"what": "tree", "object": "Robot"}, {"what": "single", "object": "Eye", "removes": True}],
         }
     ]
-    assert "arm: a collection: some of its objects are not imported" in imported.said
+    assert "arm: a collection: some of its objects are not imported" in imported.output
     simulation = imported.fly()
     simulation.save_scene(tmp_path / "saved.yaml")
     found = [name for name in simulation.context.objects.names if simulation.context.signals.find(name)]
@@ -477,12 +477,12 @@ def test_collections_are_found_by_their_names(imported, tmp_path):
 # ---- quadricopters
 
 
-def test_a_quadricopter_is_a_vehicle_with_its_own_masses_and_flies(imported):
-    """V-REP's own: its built-in law hovers at the velocity at which V-REP's does."""
+def test_a_quadricopter_becomes_a_vehicle_with_its_masses_and_hovers(imported):
+    """The model is V-REP's. With the built-in thrust law it hovers at the same particle velocity as in V-REP."""
     content = imported(*quadricopter(code=HOVER), compressed=True)
     vehicle = content["vehicles"]["drone"]
     assert vehicle["propellers"]["particle_size"] == 0.005 and "scripts" not in content and content["objects"] == []
-    assert "Quadricopter: the built-in thrust model" in imported.said
+    assert "Quadricopter: the built-in thrust model" in imported.output
     assert vehicle["script_parameters"] == {"gain": 2.5, "shown": True}
     rigid = urdf.read(str(imported.scene.parent / vehicle["urdf"]))
     assert rigid.mass == pytest.approx(0.52) and np.diag(rigid.inertia) == pytest.approx(
@@ -491,7 +491,7 @@ def test_a_quadricopter_is_a_vehicle_with_its_own_masses_and_flies(imported):
     assert imported.fly(40).drone.body.state.position[2] == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_scaled_one_has_the_propellers_of_its_size(imported):
+def test_a_scaled_quadricopter_has_scaled_propellers_masses_and_offsets(imported):
     vehicle = imported(*quadricopter(scale=1.3), suffix=".ttm")["vehicles"]["drone"]
     assert vehicle["propellers"]["particle_size"] == pytest.approx(0.0065)
     assert vehicle["objects"]["Quadricopter_base"]["position"] == [0.0, 0.0, -0.013]
@@ -501,16 +501,16 @@ def test_a_scaled_one_has_the_propellers_of_its_size(imported):
 
 
 def test_a_script_of_a_scaled_propeller_reads_its_size_factor(imported):
-    """The force goes with the cube of the size factor, as the mass does: it hovers at the unscaled one's velocity."""
+    """Force and mass scale with the cube of the size factor, so it hovers at the velocity of the unscaled model."""
     own = PROPELLER.replace("function sysCall_actuation()", "function sysCall_actuation()\n  local own = 'setObject'")
     content = imported(*quadricopter(scale=0.5, code=HOVER, propeller=own))
     assert len(content["scripts"]) == 4
     simulation = imported.fly(40)
     tree, operations = simulation.context.objects, simulation.operations
     factor = operations.factors(tree.handle("Quadricopter_propeller1"))
-    height, begun = simulation.drone.body.state.position[2], simulation.drone.parameters.position[2]
+    height, start_height = simulation.drone.body.state.position[2], simulation.drone.parameters.position[2]
     assert factor == (0.5, 0.5, 0.5)
-    assert height == pytest.approx(begun, abs=0.02)
+    assert height == pytest.approx(start_height, abs=0.02)
 
 
 def test_a_scaled_object_of_the_scene_keeps_its_size_factor(imported):
@@ -531,10 +531,10 @@ def test_propellers_with_scripts_of_their_own_keep_them(imported):
     assert "propellers" not in content["vehicles"]["drone"]
 
 
-def test_a_target_in_the_world_is_the_target(imported):
+def test_a_target_without_a_parent_becomes_the_target_of_the_vehicle(imported):
     target = shape(90, "Quadricopter_target", mesh("sphere", (0.1,) * 3), at=(1, 2, 3), respondable=False)
     chunks = quadricopter()
-    del chunks[2]  # the one that hangs on it
+    del chunks[2]  # the target that is a child of the quadricopter
     vehicle = imported(*chunks, target)["vehicles"]["drone"]
     assert vehicle["objects"]["DronePosition"] == {
         "name": "Quadricopter_target",
@@ -545,7 +545,7 @@ def test_a_target_in_the_world_is_the_target(imported):
     assert tree.matrix(tree.handle("Quadricopter_target"))[3::4] == (1.0, 2.0, 3.0)
 
 
-def test_names_without_a_suffix_mean_the_objects_of_the_copy(imported):
+def test_names_without_a_suffix_in_a_copy_s_script_mean_its_own_objects(imported):
     code = "function sysCall_init() sim.getObjectHandle('{}_propeller_joint3') end"
     one, other = (
         quadricopter(first=first, end="#7", name=name, at=(first, 0, 1), code=code.format(name))
@@ -555,7 +555,7 @@ def test_names_without_a_suffix_mean_the_objects_of_the_copy(imported):
     imported.fly()
 
 
-def test_several_keep_their_names_whatever_they_are_called(imported):
+def test_several_quadricopters_keep_the_names_of_their_objects(imported):
     content = imported(*quadricopter(), *quadricopter(40, "#3", (2, 0, 1), "UAV"))
     first, second = content["vehicles"]["Quadricopter"], content["vehicles"]["UAV_3"]
     assert (first["suffix"], second["suffix"]) == (-1, 3)
@@ -567,13 +567,13 @@ def test_several_keep_their_names_whatever_they_are_called(imported):
     assert found[0] is found[1] and tree.matrix(tree.handle("UAV#3"))[3] == pytest.approx(2.0)
 
 
-def test_one_may_be_called_as_objects_of_another_are_here(imported):
+def test_a_quadricopter_may_be_called_drone_like_an_object_of_another_vehicle(imported):
     content = imported(*quadricopter(), *quadricopter(40, "", (2, 0, 1), "Drone"))
     assert [one.get("suffix") for one in content["vehicles"].values()] == [-1, 0]
     imported.fly(started=False)
 
 
-def test_what_hangs_on_a_quadricopter_goes_with_it(imported):
+def test_sensors_and_shapes_attached_to_a_quadricopter_stay_attached(imported):
     eye = scene_object(
         "RSN",
         70,
@@ -588,12 +588,12 @@ def test_what_hangs_on_a_quadricopter_goes_with_it(imported):
     content = imported(*quadricopter(), eye, ray, tail)
     camera = content["vehicles"]["drone"]["cameras"]["front"]
     assert (camera["object"], camera["width"], camera["mount"]["position"]) == ("FrontVision", 64, [0.2, 0.0, 0.0])
-    assert camera["mount"]["rpy"] == pytest.approx([0, 0, 0], abs=1e-5), "along +x"
+    assert camera["mount"]["rpy"] == pytest.approx([0, 0, 0], abs=1e-5), "the camera looks along +x"
     assert [(one["name"], one["parent"]) for one in content["objects"]] == [("Sonar", "Quadricopter_base")]
     parameters.load(imported.values)
 
 
-def test_a_vision_sensor_that_is_called_like_a_camera_of_v_reps_sees(imported):
+def test_a_vision_sensor_named_like_a_v_rep_camera_becomes_a_camera(imported):
     own = numbers("_cp", "Ccp", 1, 1.0, 0.01, 50) + integers("Res", 64, 48) + chunk("Va3", b"\1")
     content = imported(*quadricopter(), scene_object("RSN", 70, "DroneFloorCamera", 0, (0, 0, -0.1), own=own))
     vehicle = content["vehicles"]["drone"]
@@ -601,29 +601,29 @@ def test_a_vision_sensor_that_is_called_like_a_camera_of_v_reps_sees(imported):
     assert [one["object"] for one in vehicle["cameras"].values()] == ["DroneFloorCamera"]
 
 
-def test_a_rope_weighs_where_it_hangs_and_a_hand_is_of_one_piece(imported):
+def test_masses_of_jointed_bodies_count_where_they_are_attached(imported):
     def link(handle, parent, name):
         thread = {"dynamic": True, "wrapper": weight(0.05, (1e-4, 1e-4, 1e-4))}
         ball = scene_object("JNT", handle, f"Ball{handle}", parent, (0, 0, -0.5), own=integers("Jtt", 12))
         return [ball, shape(handle + 1, name, mesh(size=(0.01, 0.01, 1)), parent=handle, at=(0, 0, -0.5), **thread)]
 
-    tie = [scene_object("DMY", 86 + at, f"Tie{at}", 85 * (1 - at), own=integers("Lli", 87 - at)) for at in (0, 1)]
-    imported(*quadricopter(), *link(80, 0, "Upper"), *link(82, 81, "Lower"), *link(84, 0, "Finger"), *tie)
-    assert "Upper, Lower: on Quadricopter: is rigidly attached: its mass counts" in imported.said
-    assert "Finger: on Quadricopter: is rigidly attached" in imported.said
+    ties = [scene_object("DMY", 86 + at, f"Tie{at}", 85 * (1 - at), own=integers("Lli", 87 - at)) for at in (0, 1)]
+    imported(*quadricopter(), *link(80, 0, "Upper"), *link(82, 81, "Lower"), *link(84, 0, "Finger"), *ties)
+    assert "Upper, Lower: on Quadricopter: is rigidly attached: its mass counts" in imported.output
+    assert "Finger: on Quadricopter: is rigidly attached" in imported.output
     body = urdf.read(str(next(imported.scene.parent.glob("*.urdf"))))
     assert body.mass == pytest.approx(0.52 + 3 * 0.05)
     assert body.centre_of_mass[2] == pytest.approx((4 * 0.1 * 0.002 - 0.1 * 0.5 - 0.05) / 0.67, abs=1e-4)
 
 
-def test_a_thread_that_weighs_next_to_nothing_is_no_mistake(imported):
+def test_a_jointed_body_of_tiny_mass_is_imported(imported):
     ball = scene_object("JNT", 80, "Ball", 0, (0, 0, -0.5), own=integers("Jtt", 12))
     dust = {"dynamic": True, "wrapper": weight(8e-9, (1e-4, 1e-4, 1e-4))}
     imported(*quadricopter(), ball, shape(81, "Thread", mesh(size=(0.01, 0.01, 1)), parent=80, **dust))
     assert urdf.read(str(next(imported.scene.parent.glob("*.urdf")))).mass == pytest.approx(0.52, abs=1e-5)
 
 
-def test_one_that_begins_tilted_and_without_a_script(imported):
+def test_a_tilted_quadricopter_without_a_script_keeps_its_tilt(imported):
     chunks = quadricopter(code="", propeller="")
     chunks[0] = shape(
         0,
@@ -636,11 +636,11 @@ def test_one_that_begins_tilted_and_without_a_script(imported):
     )
     vehicle = imported(*chunks)["vehicles"]["drone"]
     assert vehicle["tilt"] == pytest.approx([0.2, 0.0], abs=1e-6) and vehicle["script"] == "none"
-    assert "Quadricopter: has no child script" in imported.said
+    assert "Quadricopter: has no child script" in imported.output
 
 
-def test_a_target_that_the_file_has_not_is_where_the_base_is(imported):
-    """A body that lies on its side has a base that stands upright; so does the target that its scripts follow."""
+def test_a_target_missing_in_the_file_is_created_at_the_base(imported):
+    """The body lies on its side and its base is upright, so the target that its scripts follow is upright too."""
     _root, base, _, *others = quadricopter()
     upright = (np.cos(0.75), 0, np.sin(0.75), 0)
     side = shape(
@@ -659,10 +659,10 @@ def test_a_target_that_the_file_has_not_is_where_the_base_is(imported):
     assert np.allclose(found, wanted, atol=1e-5) and wanted[10] == pytest.approx(1.0, abs=1e-5)
 
 
-# ---- in one step, and what goes wrong
+# ---- a V-REP file as scene_file, and errors
 
 
-def test_a_file_of_v_reps_is_a_scene(tmp_path, monkeypatch, caplog):
+def test_a_ttt_file_can_be_the_scene_file(tmp_path, monkeypatch, caplog):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "My scene.ttt").write_bytes(file(*quadricopter(), scene_object("PTC", 90, "Points")))
     with caplog.at_level(logging.INFO):
@@ -672,12 +672,12 @@ def test_a_file_of_v_reps_is_a_scene(tmp_path, monkeypatch, caplog):
     assert caplog.messages == [caplog.messages[0]] * 2 and "IMPORT.txt" in caplog.messages[0]
 
 
-ASKS = "require 'scripts/fly'\ndofile('own.lua')\nrequire('../out')\nrequire 'linked'\nrequire 'nothing'\n"
+REQUIRES = "require 'scripts/fly'\ndofile('own.lua')\nrequire('../out')\nrequire 'linked'\nrequire 'nothing'\n"
 
 
 @pytest.fixture(name="beside")
 def _beside(tmp_path, monkeypatch):
-    """A folder with a scene, and what its script asks for; others lie around it."""
+    """Return a folder with a scene and the modules that its script requires. Other files lie outside."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "repo" / "scripts").mkdir(parents=True)
     for name, content in {
@@ -688,15 +688,15 @@ def _beside(tmp_path, monkeypatch):
     }.items():
         (tmp_path / f"{name}.lua").write_text(content)
     (tmp_path / "repo" / "linked.lua").symlink_to(tmp_path / "out.lua")
-    (tmp_path / "repo" / "a.ttt").write_bytes(file(*quadricopter(name="own", code=ASKS)))
+    (tmp_path / "repo" / "a.ttt").write_bytes(file(*quadricopter(name="own", code=REQUIRES)))
     return tmp_path / "repo"
 
 
-def test_files_of_lua_beside_a_scene_are_brought(beside, capsys):
+def test_lua_modules_beside_the_scene_are_imported(beside, capsys):
     out = beside / "out"
     assert main([str(beside / "a.ttt"), str(out)]) == 0
     assert (out / "MODULES.txt").read_text().split() == ["scripts/fly.lua", "own.lua", "more.lua"]
-    assert (out / "own_2.lua").read_text() == ASKS, "the scene's own script"
+    assert (out / "own_2.lua").read_text() == REQUIRES, "own_2.lua is the script of the scene"
     assert sorted(str(one.relative_to(out)) for one in out.rglob("*.lua")) == [
         "more.lua",
         "own.lua",
@@ -705,7 +705,7 @@ def test_files_of_lua_beside_a_scene_are_brought(beside, capsys):
     ]
 
 
-def test_a_script_is_not_called_as_the_helper_that_it_asks_for(imported, tmp_path, caplog):
+def test_a_script_file_is_not_named_like_a_module_that_it_requires(imported, tmp_path, caplog):
     (tmp_path / "blimp.lua").write_text("return {lift = 3}")
     code = "function sysCall_init() sim.setInt32Signal('lift', require('blimp').lift) end"
     content = imported(scene_object("DMY", 0, "blimp"), script(0, code))
@@ -718,15 +718,15 @@ def test_a_script_is_not_called_as_the_helper_that_it_asks_for(imported, tmp_pat
     assert "no module 'blimp': there is no file blimp.lua" in caplog.text
 
 
-def test_they_are_brought_anew_whenever_the_scene_is_asked_for(beside):
+def test_lua_modules_are_copied_again_at_each_load_of_the_scene(beside):
     for content in ("x = 1", "x = 2"):
         (beside / "more.lua").write_text(content)
         scene = parameters.load({"scene_file": str(beside / "a.ttt")}).scene_file
         assert Path(scene).with_name("more.lua").read_text() == content
-        assert Path(scene).with_name("own_2.lua").read_text() == ASKS
+        assert Path(scene).with_name("own_2.lua").read_text() == REQUIRES
 
 
-def test_a_broken_file_as_a_scene_gets_one_line(tmp_path, monkeypatch):
+def test_a_truncated_ttt_file_as_scene_raises_a_one_line_error(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "a.ttt").write_bytes(container(b"", length=9))
     with pytest.raises(parameters.ParameterError, match=r"parameter scene_file = .*a\.ttt: is truncated: 0 of 9 bytes"):
@@ -744,14 +744,14 @@ def test_a_broken_file_as_a_scene_gets_one_line(tmp_path, monkeypatch):
         ("a.ttt", "a.ttt", "is not a folder"),
     ],
 )
-def test_a_users_mistake_gets_one_line(tmp_path, capsys, name, out, words):
+def test_a_wrong_argument_is_reported_in_one_line(tmp_path, capsys, name, out, words):
     (tmp_path / "a.ttt").write_bytes(b"")
     assert main([str(tmp_path / name), str(tmp_path / out)]) == 1
-    said = capsys.readouterr().err
-    assert said.startswith("import_scene: ") and words in said and said.count("\n") == 1
+    output = capsys.readouterr().err
+    assert output.startswith("import_scene: ") and words in output and output.count("\n") == 1
 
 
-def test_a_name_that_cannot_be_is_changed(imported):
+def test_invalid_names_are_changed_to_valid_ones(imported):
     content = imported(
         scene_object("DMY", 0, "x" * 200), scene_object("DMY", 1, "a\nb", base=chunk("Ali", text("a\nb")))
     )

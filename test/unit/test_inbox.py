@@ -1,4 +1,4 @@
-"""Work from other threads: in order, answered, and never after its time. Needs no ROS."""
+"""Inbox for jobs from other threads: order, answers, timeouts. Needs no ROS."""
 
 import threading
 
@@ -8,21 +8,21 @@ from drone_sim.ros.core.inbox import Inbox
 
 
 def ask(inbox, job):
-    """Ask in a thread; return the thread, and what will hold the answer or the error."""
-    said = []
+    """Ask in a thread; return the thread, and a list that will hold the answer or the error."""
+    outcomes = []
 
     def run():
         try:
-            said.append(inbox.ask(job))
+            outcomes.append(inbox.ask(job))
         except Exception as error:
-            said.append(error)
+            outcomes.append(error)
 
     thread = threading.Thread(target=run)
     thread.start()
-    return thread, said
+    return thread, outcomes
 
 
-def test_jobs_are_done_in_order_by_who_empties():
+def test_jobs_run_in_order_in_the_thread_that_calls_run_jobs():
     inbox, done = Inbox(), []
     for number in range(3):
         inbox.put(lambda number=number: done.append((number, threading.get_ident())))
@@ -31,21 +31,21 @@ def test_jobs_are_done_in_order_by_who_empties():
     assert done == [(number, threading.get_ident()) for number in range(3)]
 
 
-def test_what_comes_while_it_empties_waits_for_the_next_time():
+def test_a_job_added_by_a_running_job_waits_for_the_next_run_jobs():
     inbox, done = Inbox(), []
 
-    def again():
+    def add_itself():
         done.append(1)
-        inbox.put(again)
+        inbox.put(add_itself)
 
-    inbox.put(again)
+    inbox.put(add_itself)
     inbox.run_jobs()
     assert done == [1]
     inbox.run_jobs()
     assert done == [1, 1]
 
 
-def test_a_job_may_have_its_own_jobs_executed_at_once():
+def test_run_directly_executes_jobs_added_by_a_job_at_once():
     inbox, done = Inbox(), []
 
     def first():
@@ -61,17 +61,17 @@ def test_a_job_may_have_its_own_jobs_executed_at_once():
     assert done == ["inside", "first", "later"]
 
 
-def test_who_asks_gets_the_answer_or_the_error():
+def test_ask_returns_the_answer_or_raises_the_error_of_the_job():
     inbox = Inbox()
     for job, expected in ((lambda: "done", "done"), (lambda: str(1 / 0), ZeroDivisionError)):
-        thread, said = ask(inbox, job)
+        thread, outcomes = ask(inbox, job)
         inbox.wait(10)
         inbox.run_jobs()
         thread.join(10)
-        assert said[0] == expected if expected == "done" else isinstance(said[0], expected)
+        assert outcomes[0] == expected if expected == "done" else isinstance(outcomes[0], expected)
 
 
-def test_a_request_that_timed_out_is_not_carried_out_later():
+def test_a_request_that_timed_out_is_not_executed_later():
     inbox, done = Inbox(timeout=0.05), []
     with pytest.raises(TimeoutError, match=r"no answer within 0\.05 s: it will not be executed"):
         inbox.ask(lambda: done.append(1) or "")
@@ -79,29 +79,29 @@ def test_a_request_that_timed_out_is_not_carried_out_later():
     assert not done
 
 
-def test_a_request_that_has_begun_is_said_to_be_under_way():
-    inbox, answered = Inbox(timeout=0.5), threading.Event()  # enough for a busy machine to begin the job
-    thread, said = ask(inbox, lambda: str(answered.wait(10)))
+def test_a_timeout_during_execution_is_reported_as_still_executing():
+    inbox, may_answer = Inbox(timeout=0.5), threading.Event()  # s, long enough to start the job on a busy machine
+    thread, outcomes = ask(inbox, lambda: str(may_answer.wait(10)))
     inbox.wait(10)
     worker = threading.Thread(target=inbox.run_jobs)
     worker.start()
     thread.join(10)
-    answered.set()
+    may_answer.set()
     worker.join(10)
-    assert "still being executed" in str(said[0])
+    assert "still being executed" in str(outcomes[0])
 
 
-def test_where_others_are_heard_meanwhile_a_job_wakes_their_sleep():
-    slept, woken = [], []
-    inbox = Inbox(sleep=slept.append, wake=lambda: woken.append(True))
+def test_a_new_job_wakes_the_custom_sleep():
+    sleeps, wake_calls = [], []
+    inbox = Inbox(sleep=sleeps.append, wake=lambda: wake_calls.append(True))
     inbox.wait(3.0)
-    assert slept == [3.0]
-    inbox.put(lambda: slept.append(0.0))
+    assert sleeps == [3.0]
+    inbox.put(lambda: sleeps.append(0.0))
     inbox.run_jobs()
-    assert woken == [True] and slept == [3.0, 0.0]
+    assert wake_calls == [True] and sleeps == [3.0, 0.0]
 
 
-def test_a_job_that_fails_ends_nothing_and_leaves_a_traceback(caplog):
+def test_a_failing_job_is_logged_and_the_next_job_runs(caplog):
     inbox, done = Inbox(), []
     inbox.put(lambda: done.append(1 / 0))
     inbox.put(lambda: done.append("next"))

@@ -1,4 +1,4 @@
-"""What somebody outside does to the world beyond flying is said: once in a flight, with who and how."""
+"""Interventions from outside beyond flying are reported once per flight, with sender and call."""
 
 from contextlib import closing, suppress
 from types import SimpleNamespace
@@ -38,7 +38,7 @@ SET_POSITION, CUBOID = 0x101B, CONSTANTS["primitiveshape_cuboid"]
 OUTSIDE = "by a client of the remote API"
 
 
-class Stage:
+class NodeStub:
     def __init__(self, monkeypatch):
         self.said, self.callbacks = [], {}
         topic = mock.MagicMock()
@@ -48,8 +48,8 @@ class Stage:
             monkeypatch.setattr(rospy, kind, self.listen)
         for name in ("get_param", "set_param", "delete_param"):
             monkeypatch.setattr(rospy, name, lambda *_: None)
-        given = {"vehicles": {"drone": {}, "other": {"position": [1, 1, 0.8]}}, "scene": {"objects": [CRATE]}}
-        self.simulation = Simulation(parameters.load(given))
+        overrides = {"vehicles": {"drone": {}, "other": {"position": [1, 1, 0.8]}}, "scene": {"objects": [CRATE]}}
+        self.simulation = Simulation(parameters.load(overrides))
         self.player = Player(self.simulation, lambda _: None, simulated_time=False)
         self.interventions = interventions.Interventions(self.simulation)
         self.inbox = Inbox(on_intervention=self.interventions.publish)
@@ -59,8 +59,8 @@ class Stage:
         self.callbacks[name] = callback
         return mock.MagicMock()
 
-    def hear(self, name, message, sender="/flyer"):
-        """Take a message, or a request, of a node."""
+    def deliver(self, name, message, sender="/flyer"):
+        """Deliver a message or request from the node `sender`."""
         message._connection_header = {"callerid": sender}
         with mock.patch.object(self.inbox, "ask", self.inbox.put):
             self.callbacks[name](message)
@@ -74,7 +74,7 @@ class Stage:
 
 @pytest.fixture(name="stage")
 def _stage(monkeypatch):
-    stage = Stage(monkeypatch)
+    stage = NodeStub(monkeypatch)
     yield stage
     stage.simulation.close()
 
@@ -87,7 +87,7 @@ def _client(stage):
         client.vanish()
 
 
-def test_a_client_that_flies_does_nothing_else(stage, client):
+def test_normal_flying_by_a_client_is_no_intervention(stage, client):
     drone, wheel = (client.sim("getObject", f"/{name}") for name in ("Drone", "Quadricopter_propeller_respondable1"))
     script = client.sim("getScriptAssociatedWithObject", wheel)
     client.sim("setScriptSimulationParameter", script, "particleVelocity", 5.0)
@@ -125,23 +125,23 @@ def test_a_client_that_flies_does_nothing_else(stage, client):
             "",
             (-4, "Kzref", 1.0),
             "change the scene",
-        ),  # of the drone's, not the client's
+        ),  # a parameter of the drone's script, not of the client
     ],
 )
-def test_what_a_client_does_beyond_that_is_said_once(stage, client, function, of, arguments, said):
+def test_other_calls_of_a_client_are_reported_once(stage, client, function, of, arguments, said):
     handle = [client.sim("getObject", f"/{of}")] if of else []
     for _ in range(3):
-        with suppress(Refusal):  # it has tried
+        with suppress(Refusal):  # a refused call counts too
             client.sim(function, *handle, *arguments)
     assert stage.lines()[0] == f"{said} at 0.05 s (sim.{function}, {OUTSIDE})"
     assert not [one for one in stage.said if one.startswith(said)]
 
 
-def test_a_flood_is_few_lines_and_hides_nothing_of_another_kind(stage, client):
+def test_the_number_of_lines_is_limited_per_kind_of_intervention(stage, client):
     for _ in range(50):
         client.sim("setObjectPosition", client.sim("createPrimitiveShape", CUBOID, [0.1] * 3), -1, [5, 5, 5])
     lines = stage.lines()
-    assert len(lines) == 21 and len(set(lines)) == 21  # the shapes are one line, each that is moved another
+    assert len(lines) == 21 and len(set(lines)) == 21  # one line for all shapes, and one for each moved shape
     client.sim("addForce", client.sim("getObject", "/Drone"), [0, 0, 0], [0, 0, 0.1])
     assert [one.split(" at ")[0] for one in stage.lines()] == ["push Drone"]
     stage.simulation.start()
@@ -149,7 +149,7 @@ def test_a_flood_is_few_lines_and_hides_nothing_of_another_kind(stage, client):
     assert stage.lines() == [f"push Drone at 0.00 s (sim.addForce, {OUTSIDE})"]
 
 
-def test_a_client_of_the_legacy_api_is_told_of_too(stage):
+def test_calls_of_a_legacy_api_client_are_reported(stage):
     objects = stage.simulation.context.objects
     with closing(LegacyServer(stage.player, "127.0.0.1", 0, watched=stage.interventions.watched)) as server:
         client = LegacyClient(server.port, server.wait)
@@ -160,13 +160,13 @@ def test_a_client_of_the_legacy_api_is_told_of_too(stage):
     assert stage.lines() == [f"move Crate at 0.05 s (sim.setObjectPosition, {OUTSIDE})"]
 
 
-def test_messages_are_told_with_their_sender(stage):
+def test_intervening_messages_are_reported_with_their_sender(stage):
     own = stage.simulation.vehicles["other"].parameters
     inputs.VehicleInputs(stage.simulation, own, stage.inbox)
     for sender in ("/flyer", "/flyer", "/other\n"):
-        stage.hear("other/push", WrenchStamped(), sender)
-    stage.hear("other/weather", KeyValue("wind", "[1, 0, 0]"))
-    stage.hear("other/weather", KeyValue("winds", "[1, 0, 0]"))  # refused
+        stage.deliver("other/push", WrenchStamped(), sender)
+    stage.deliver("other/weather", KeyValue("wind", "[1, 0, 0]"))
+    stage.deliver("other/weather", KeyValue("winds", "[1, 0, 0]"))  # refused
     assert stage.lines() == [
         "push other at 0.05 s (/other/push, by /flyer)",
         "push other at 0.05 s (/other/push, by /other?)",
@@ -174,19 +174,19 @@ def test_messages_are_told_with_their_sender(stage):
     ]
 
 
-def test_tuning_is_told_and_what_stays_of_it_at_every_start(stage):
+def test_tuning_is_reported_and_again_at_every_start(stage):
     tuning = stage.simulation.child_scripts["drone"].tuning
     tuning_server.TuningServer("/drone", tuning, stage.inbox)
     pacer = Pacer(0.05)
     tuning_server.TuningServer("/drone_sim", Pace(stage.simulation, pacer), stage.inbox)
 
-    def asked(name, value):
+    def config_request(name, value):
         return SimpleNamespace(config=Config(doubles=[DoubleParameter(name, value)]))
 
-    stage.hear("/drone_sim/set_parameters", asked("real_time_factor", 2.0))
-    stage.hear("/drone/set_parameters", SimpleNamespace(config=Config()))
-    stage.lines()  # what holds
-    stage.hear("/drone/set_parameters", asked("Kzref", 4.0))
+    stage.deliver("/drone_sim/set_parameters", config_request("real_time_factor", 2.0))
+    stage.deliver("/drone/set_parameters", SimpleNamespace(config=Config()))
+    stage.lines()  # discards the lines of the first values
+    stage.deliver("/drone/set_parameters", config_request("Kzref", 4.0))
     assert "change drone at 0.05 s (/drone/set_parameters, by /flyer)" in stage.lines()
     stage.player.restart()
     stage.interventions.update()
@@ -195,30 +195,30 @@ def test_tuning_is_told_and_what_stays_of_it_at_every_start(stage):
     assert stage.lines() == []
 
 
-def test_services_are_told_but_a_snapshot(stage):
+def test_service_calls_except_snapshot_are_reported(stage):
     services.Services(stage.player, SimpleNamespace(summary=""), stage.inbox, lambda: None)
     for name in ("snapshot", "restore", "pause"):
-        stage.hear(f"~{name}", SimpleNamespace(data=True))
+        stage.deliver(f"~{name}", SimpleNamespace(data=True))
     said = [(one.split(" (")[0], one.rpartition("/")[0].rpartition("/")[2]) for one in stage.lines()]
     assert said == [("change the scene at 0.05 s", "restore, by "), ("change the scene at 0.05 s", "pause, by ")]
 
 
 def test_a_plan_lists_the_functions_that_a_client_may_call(stage):
     rules = LiveRules(SimpleNamespace(allowed=["change"], calls=["shine"]), "/drone_sim")
-    hear = stage.callbacks["/drone_sim/interventions"]
+    deliver = stage.callbacks["/drone_sim/interventions"]
     for line in ("call shine of the script of Lamp at 1 s (x)", "change Lamp at 1 s (x)", "run a text in a script"):
-        hear(String(line))
-    hear(String("call sysCall_init of the script of Lamp at 1 s (x)"))
+        deliver(String(line))
+    deliver(String("call sysCall_init of the script of Lamp at 1 s (x)"))
     assert [one.split()[2:4] for one in rules.tried] == [["run", "a"], ["call", "sysCall_init"]]
 
 
 @pytest.mark.parametrize("lost, missed", [([], 0), ([3], 1), ([0, 1, 5, 6], 2)])
-def test_steps_that_were_not_heard_are_counted(lost, missed):
+def test_missed_steps_are_counted(lost, missed):
     times = np.delete(np.arange(2, 12) * 0.05, lost)
     assert missed_steps(times, 0.05) == missed
 
 
-def test_odometry_of_another_node_is_no_flight(stage, tmp_path):
+def test_odometry_from_another_node_is_ignored_and_reported_as_forged(stage, tmp_path):
     (tmp_path / "plan.yaml").write_text("duration: 1\ncriteria: [{kind: stays, of: z, at_least: 1}]")
     plan = plans.read(tmp_path / "plan.yaml")
     listener = FlightListener(plan, plan.parameters(), "/drone_sim", lambda _: None)

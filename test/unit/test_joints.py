@@ -1,4 +1,4 @@
-"""Joints in the dynamics, against closed forms; and the script functions on them."""
+"""Joint dynamics against closed forms, and the script functions for joints."""
 
 import itertools
 import math
@@ -52,7 +52,7 @@ def _simulation(new_simulation):
     return new_simulation({"drone": {"position": [-5, 0, 1]}}, scene=SCENE)
 
 
-def found(simulation, name):
+def find(simulation, name):
     objects = simulation.context.objects
     return objects[objects.handle(name)]
 
@@ -62,46 +62,46 @@ def sim_of(simulation):
 
 
 def run(simulation, seconds):
-    """Run, and return the joints' positions after each step, by name."""
-    joints = {name: found(simulation, name) for name in ("Pivot", "Lift", "Axle", "Left", "Right")}
-    told = {name: [] for name in joints}
+    """Run for `seconds` and return {joint: [position after each step]}."""
+    joints = {name: find(simulation, name) for name in ("Pivot", "Lift", "Axle", "Left", "Right")}
+    history = {name: [] for name in joints}
     for _ in range(round(seconds / 0.05)):
         simulation.step()
         for name, joint in joints.items():
-            told[name].append(joint.value)
-    return told
+            history[name].append(joint.value)
+    return history
 
 
 def zeros(values, step):
-    """Return when values cross 0 upwards."""
+    """Return the times of the upward zero crossings, linearly interpolated."""
     pairs = itertools.pairwise(values)
     return [
         step * (index + before / (before - after)) for index, (before, after) in enumerate(pairs) if before < 0 <= after
     ]
 
 
-def test_joints_move_as_mechanics_says(simulation):
-    assert found(simulation, "Axle").velocity_along == 0
-    told = run(simulation, 2)
-    rolling = found(simulation, "Cart").matrix()[3]
+def test_joints_move_as_in_closed_forms(simulation):
+    assert find(simulation, "Axle").velocity_along == 0
+    history = run(simulation, 2)
+    rolling = find(simulation, "Cart").matrix()[3]
     for name, positions in run(simulation, 4).items():
-        told[name] += positions
-    first, *_, last = crossings = zeros(told["Pivot"], 0.05)
+        history[name] += positions
+    first, *_, last = crossings = zeros(history["Pivot"], 0.05)
     period = 2 * math.pi * math.sqrt((2 * 1 + 0.1) / (2 * 9.81)) * (1 + 0.1**2 / 16)
-    assert (last - first) / (len(crossings) - 1) == pytest.approx(period, rel=0.002), "a physical pendulum"
-    assert told["Lift"][-1] == pytest.approx(0.5, abs=1e-6), "held against gravity"
-    assert found(simulation, "Lift").drive.state()[2] == pytest.approx(3 * 9.81, rel=1e-3)
-    assert found(simulation, "Axle").velocity_along == pytest.approx(0.5 * 6 / 1.0, rel=1e-6), "0.5 N m on 1 kg m2"
-    assert found(simulation, "Left").velocity_along == pytest.approx(2, abs=0.01)
-    assert found(simulation, "Cart").matrix()[3] - rolling == pytest.approx(4 * 2 * 0.2, rel=0.02), "it rolls, nodding"
-    assert found(simulation, "Loose").matrix()[11] < 0.1, "the tree does not weld"
-    wheel, lamp = (found(simulation, name).matrix()[3::4] for name in ("LeftWheel", "Lamp"))
-    assert math.dist(wheel, lamp) == pytest.approx(0.2), "what hangs on it turns with it"
-    force, torque = found(simulation, "Gauge").read()
-    assert force == pytest.approx((0, 0, -2 * 9.81), abs=1e-6), "a weight"
-    assert torque == pytest.approx((0, 0.3 * 2 * 9.81, 0), abs=1e-6), "at its arm"
-    assert found(simulation, "Shelf").matrix()[3::4] == pytest.approx((20.4, 0, 2)), "it holds"
-    _, turning = found(simulation, "LeftWheel").velocity()
+    assert (last - first) / (len(crossings) - 1) == pytest.approx(period, rel=0.002), "physical pendulum"
+    assert history["Lift"][-1] == pytest.approx(0.5, abs=1e-6), "the motor holds it against gravity"
+    assert find(simulation, "Lift").drive.state()[2] == pytest.approx(3 * 9.81, rel=1e-3)
+    assert find(simulation, "Axle").velocity_along == pytest.approx(0.5 * 6 / 1.0, rel=1e-6), "0.5 N m on 1 kg m2"
+    assert find(simulation, "Left").velocity_along == pytest.approx(2, abs=0.01)
+    assert find(simulation, "Cart").matrix()[3] - rolling == pytest.approx(4 * 2 * 0.2, rel=0.02), "the cart rolls"
+    assert find(simulation, "Loose").matrix()[11] < 0.1, "a dynamic child falls by itself"
+    wheel, lamp = (find(simulation, name).matrix()[3::4] for name in ("LeftWheel", "Lamp"))
+    assert math.dist(wheel, lamp) == pytest.approx(0.2), "a child of the wheel turns with it"
+    force, torque = find(simulation, "Gauge").read()
+    assert force == pytest.approx((0, 0, -2 * 9.81), abs=1e-6), "the weight"
+    assert torque == pytest.approx((0, 0.3 * 2 * 9.81, 0), abs=1e-6), "weight times lever arm"
+    assert find(simulation, "Shelf").matrix()[3::4] == pytest.approx((20.4, 0, 2)), "the sensor holds it"
+    _, turning = find(simulation, "LeftWheel").velocity()
     assert turning[1] == pytest.approx(2, abs=0.2)
 
 
@@ -118,15 +118,15 @@ def test_scripts_command_joints(simulation):
     run(simulation, 3)
     assert sim.getJointPosition(lift) == pytest.approx(1.5, abs=1e-3)
     assert sim.getJointVelocity(axle) == pytest.approx(-0.75, rel=1e-6)
-    assert sim.getJointPosition(pivot) == pytest.approx(0.7, abs=1e-3), "held where it was put"
+    assert sim.getJointPosition(pivot) == pytest.approx(0.7, abs=1e-3), "it stays where it was set"
     assert sim.getJointForce(lift) == pytest.approx(3 * 9.81, rel=1e-2)
     sim.setJointMaxForce(lift, 20)
     sim.setJointInterval(lift, False, [0.2, 1.8])
     sim.setJointMode(pivot, 5)
     run(simulation, 3)
     assert sim.getJointTargetPosition(lift) == 1.5 and sim.getJointMaxForce(lift) == 20
-    assert sim.getJointPosition(lift) == pytest.approx(0.2, abs=0.01), "too weak, it lies on its new lower end"
-    assert abs(sim.getJointPosition(pivot) - 0.7) > 0.01, "free again"
+    assert sim.getJointPosition(lift) == pytest.approx(0.2, abs=0.01), "the weak lift rests on its new lower limit"
+    assert abs(sim.getJointPosition(pivot) - 0.7) > 0.01, "the pendulum swings again"
     with pytest.raises(ValueError, match=r"'Cabin' is held by 'Lift'"):
         sim.setObjectPosition(handle("Cabin"), -1, [0, 0, 0])
     with pytest.raises(TypeError, match="'Cabin' is not a joint of the scene; there are: Pivot, Lift"):
@@ -135,58 +135,58 @@ def test_scripts_command_joints(simulation):
         sim.setJointTargetVelocity(axle, math.inf)
     blades = handle("Quadricopter_propeller_joint1")
     sim.setJointPosition(blades, 0.5)
-    assert sim.getJointPosition(blades) == 0.5, "looks only"
+    assert sim.getJointPosition(blades) == 0.5, "blades are only visual"
 
 
-def test_parameters_of_joints_and_shapes(simulation):
+def test_scripts_read_and_set_parameters_of_joints_and_shapes(simulation):
     sim, handle = sim_of(simulation), simulation.context.objects.handle
     left, cabin, loose = handle("Left"), handle("Cabin"), handle("Loose")
     motor, control, static = (sim.jointintparam_motor_enabled, sim.jointintparam_ctrl_enabled, sim.shapeintparam_static)
     assert [sim.getObjectInt32Param(left, one) for one in (motor, control)] == [1, 0]
     sim.setObjectInt32Param(left, control, 1)
-    assert found(simulation, "Left").control.mode == "position"
+    assert find(simulation, "Left").control.mode == "position"
     sim.setObjectInt32Param(left, control, 0)
     sim.setObjectInt32Param(left, motor, 0)
-    assert found(simulation, "Left").control.mode == "passive"
+    assert find(simulation, "Left").control.mode == "passive"
     sim.setObjectInt32Param(left, motor, 1)
-    assert found(simulation, "Left").control.mode == "velocity"
+    assert find(simulation, "Left").control.mode == "velocity"
     assert (sim.getShapeMass(cabin), sim.getShapeMass(loose), sim.getShapeMass(handle("Beam"))) == (3, 1, 0)
     sim.setObjectInt32Param(loose, static, 1)
-    assert sim.getObjectInt32Param(loose, static) == 1 and found(simulation, "Loose").is_static
+    assert sim.getObjectInt32Param(loose, static) == 1 and find(simulation, "Loose").is_static
     sim.setObjectInt32Param(loose, static, 0)
     sim.resetDynamicObject(sim.handle_all)
 
 
-def test_it_goes_on_from_a_snapshot_and_begins_anew_to_the_last_bit(simulation):
+def test_snapshots_and_restarts_repeat_joint_motion_exactly(simulation):
     first = run(simulation, 1)
     sim, handle = sim_of(simulation), simulation.context.objects.handle
     snapshot = simulation.snapshot()
-    then = run(simulation, 1)
+    second_run = run(simulation, 1)
     sim.setJointTargetVelocity(handle("Left"), -5)
     sim.setJointMode(handle("Axle"), 0)
     sim.setJointInterval(handle("Lift"), False, [0, 0.1])
     run(simulation, 0.5)
     simulation.restore(snapshot)
-    assert run(simulation, 1) == then
+    assert run(simulation, 1) == second_run
     sim.setJointInterval(handle("Lift"), False, [0, 0.1])
     simulation.start()
     assert run(simulation, 1) == first
 
 
-def test_moving_the_root_takes_all_along(simulation):
+def test_moving_the_root_moves_the_whole_tree(simulation):
     sim, handle = sim_of(simulation), simulation.context.objects.handle
-    before = [found(simulation, name).matrix()[3::4] for name in ("Bob", "LeftWheel", "Loose")]
+    before = [find(simulation, name).matrix()[3::4] for name in ("Bob", "LeftWheel", "Loose")]
     for name in ("Beam", "Cart"):
         x, y, z = sim.getObjectPosition(handle(name), -1)
         sim.setObjectPosition(handle(name), -1, [x, y + 2, z])
-    after = [found(simulation, name).matrix()[3::4] for name in ("Bob", "LeftWheel", "Loose")]
+    after = [find(simulation, name).matrix()[3::4] for name in ("Bob", "LeftWheel", "Loose")]
     for (x, y, z), there in zip(before, after):
         assert there == pytest.approx((x, y + 2, z), abs=1e-6)
 
 
-def test_a_load_is_taken_up_and_let_go(simulation):
-    """Static, it is carried by its new parent; dynamic again, it falls, with the mass that it had."""
-    loose, tree, drone = found(simulation, "Loose"), simulation.context.objects, simulation.drone
+def test_a_load_can_be_attached_to_a_drone_and_released(simulation):
+    """A static object moves with its new parent. Made dynamic again, it falls with its former mass."""
+    loose, tree, drone = find(simulation, "Loose"), simulation.context.objects, simulation.drone
     loose.put(frames.from_rpy((-5, 0, 0.9), (0, 0, 0)))
     loose.set_static(True)
     tree.set_parent(tree.handle("Loose"), tree.handle("Drone"), keep_in_place=True)
@@ -202,12 +202,12 @@ def test_a_load_is_taken_up_and_let_go(simulation):
     simulation.restore(snapshot)
     assert loose.is_static and loose.parent.name == "Drone" and loose.matrix() == there
     simulation.start()
-    assert not found(simulation, "Loose").is_static
+    assert not find(simulation, "Loose").is_static
     with pytest.raises(ValueError, match="'Beam' has no mass in the scene file"):
-        found(simulation, "Beam").set_static(False)
+        find(simulation, "Beam").set_static(False)
 
 
-def test_what_hangs_on_a_chain_that_a_vehicle_carries_goes_with_it(new_simulation):
+def test_shapes_on_a_joint_chain_of_a_vehicle_move_with_it(new_simulation):
     simulation = new_simulation(
         scene="""
 objects:
@@ -230,7 +230,7 @@ objects:
 
 
 def caterpillar(count):
-    """Rings of ten joints each around a body, one of them a force sensor."""
+    """Yield a body with `count` joints and links in chains of ten; the first of each chain is a force sensor."""
     yield {"name": "Body", "shape": "box", "size": [0.1, 0.1, 0.1], "position": [0, 0, 1], "mass": 1}
     for number in range(count):
         above = f"Link{number - 1}" if number % 10 else "Body"
@@ -240,7 +240,7 @@ def caterpillar(count):
         yield {"name": f"Link{number}", **link, "position": [0, 0, 0]}
 
 
-def test_as_many_joints_hang_together_as_pybullet_counts(new_simulation):
+def test_a_chain_may_have_at_most_127_joints_and_force_sensors(new_simulation):
     simulation = new_simulation({"scene": {"objects": list(caterpillar(127))}})
     simulation.step()
     with pytest.raises(ParameterError, match="128 joints and force sensors in a chain from 'Body': at most 127"):

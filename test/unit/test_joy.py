@@ -1,4 +1,4 @@
-"""A gamepad's events, fed through a FIFO in place of a device; what they command; what joy.yaml may say."""
+"""Gamepad input: events read through a FIFO instead of a device, the resulting commands, and values of joy.yaml."""
 
 import os
 import struct
@@ -32,7 +32,7 @@ def _pad(device):
     pad.close()
 
 
-def test_events_tell_how_it_stands_with_the_signs_of_the_joy_node(device, pad):
+def test_events_give_the_state_with_the_signs_of_the_joy_node(device, pad):
     with open(device, "wb", buffering=0) as kernel:
         assert list(pad.read()) == []
         kernel.write(event(BUTTON | INITIAL, 1, 0) + event(AXIS | INITIAL, 2, 0))
@@ -42,11 +42,11 @@ def test_events_tell_how_it_stands_with_the_signs_of_the_joy_node(device, pad):
         pressed = event(BUTTON, 1, 1)
         kernel.write(pressed[:3])
         assert list(pad.read()) == []
-        kernel.write(pressed[3:] + event(9, 0, 7))  # of a kind that nobody knows
+        kernel.write(pressed[3:] + event(9, 0, 7))  # an event of an unknown kind
         assert [one.buttons for one in pad.read()] == [(False, True)] * 2
 
 
-def test_a_gamepad_that_is_unplugged_is_told(device, pad):
+def test_reading_an_unplugged_gamepad_raises_oserror(device, pad):
     with open(device, "wb", buffering=0) as kernel:
         kernel.write(event(BUTTON, 0, 1))
         assert len(list(pad.read())) == 1
@@ -54,13 +54,13 @@ def test_a_gamepad_that_is_unplugged_is_told(device, pad):
         list(pad.read())
 
 
-def test_gamepads_are_found_in_the_order_of_their_numbers(monkeypatch):
-    there = ["/dev/input/js10", "/dev/input/js2", "/dev/input/js-keys"]
-    monkeypatch.setattr(gamepad.glob, "glob", lambda _: there)
+def test_gamepads_are_listed_in_the_order_of_their_numbers(monkeypatch):
+    paths = ["/dev/input/js10", "/dev/input/js2", "/dev/input/js-keys"]
+    monkeypatch.setattr(gamepad.glob, "glob", lambda _: paths)
     assert gamepad.list_devices() == ["/dev/input/js2", "/dev/input/js10"]
 
 
-# ---- what is commanded
+# ---- commands
 
 
 @pytest.fixture(name="pilot")
@@ -68,60 +68,60 @@ def _pilot():
     return JoyCommands(load_joy({"axes": {"vy": {"scale": -2.0}}}))
 
 
-def stands(*buttons, **axes):
+def joy_state(*buttons, **axes):
     numbers = {"vx": 4, "vy": 3, "vz": 1, "wz": 0}
     values = {numbers[name]: value for name, value in axes.items()}
     return JoyState(tuple(values.get(number, 0.0) for number in range(6)), tuple(one in buttons for one in range(8)))
 
 
-def test_sticks_command_while_the_dead_mans_button_is_held(pilot):
+def test_sticks_give_commands_only_while_the_dead_man_button_is_held(pilot):
     assert pilot.command is None
-    assert pilot.update(stands(vx=1.0)) == []
+    assert pilot.update(joy_state(vx=1.0)) == []
     assert pilot.command is None
-    pilot.update(stands(LB, vx=1.0, vy=0.55, vz=-0.55, wz=0.05))
+    pilot.update(joy_state(LB, vx=1.0, vy=0.55, vz=-0.55, wz=0.05))
     assert pilot.command == pytest.approx(Command(1.0, -1.0, -0.5, 0.0))
-    pilot.update(stands(LB))
+    pilot.update(joy_state(LB))
     assert pilot.command == Command()
-    pilot.update(stands(vx=1.0))
+    pilot.update(joy_state(vx=1.0))
     assert pilot.command is None
 
 
-def test_a_gamepad_that_comes_back_with_the_button_pressed_commands_nothing(pilot):
-    pilot.update(stands(LB, vx=1.0))
+def test_a_reconnected_gamepad_with_pressed_button_gives_no_command(pilot):
+    pilot.update(joy_state(LB, vx=1.0))
     pilot.disconnect()
     assert pilot.command is None
-    assert pilot.update(stands(LB, A, vx=1.0)) == []
+    assert pilot.update(joy_state(LB, A, vx=1.0)) == []
     assert pilot.command is None
-    pilot.update(stands(vx=1.0))
-    pilot.update(stands(LB, vx=1.0))
+    pilot.update(joy_state(vx=1.0))
+    pilot.update(joy_state(LB, vx=1.0))
     assert pilot.command == Command(vx=1.0)
 
 
-def test_buttons_ask_once_and_take_off_needs_the_dead_mans(pilot):
-    assert pilot.update(stands(Y)) == []  # it may have been pressed for long
-    assert pilot.update(stands()) == []
-    assert pilot.update(stands(Y)) == []
-    assert pilot.update(stands(LB)) == []
-    assert pilot.update(stands(LB, Y)) == ["takeoff"]
-    assert pilot.update(stands(LB, Y)) == []
-    assert pilot.update(stands(A, BACK)) == ["land", "reset"]
+def test_a_pressed_button_requests_once_and_takeoff_needs_the_dead_man_button(pilot):
+    assert pilot.update(joy_state(Y)) == []  # the button may have been pressed before the start
+    assert pilot.update(joy_state()) == []
+    assert pilot.update(joy_state(Y)) == []
+    assert pilot.update(joy_state(LB)) == []
+    assert pilot.update(joy_state(LB, Y)) == ["takeoff"]
+    assert pilot.update(joy_state(LB, Y)) == []
+    assert pilot.update(joy_state(A, BACK)) == ["land", "reset"]
 
 
-def test_axes_and_buttons_that_it_does_not_have_are_nothing(pilot):
+def test_missing_axes_are_zero_and_missing_buttons_are_not_pressed(pilot):
     pilot.update(JoyState((1.0,), (False,) * 4 + (True,)))
     assert pilot.command == Command(wz=1.0)
     assert pilot.update(JoyState()) == []
     assert pilot.command is None
-    less = JoyCommands(load_joy({"axes": {"wz": {"axis": -1}}, "buttons": {"land": -1}}))
-    less.update(stands())
-    assert less.update(stands(LB, *range(8), wz=1.0)) == ["reset", "takeoff"]
-    assert less.command == Command()
+    limited = JoyCommands(load_joy({"axes": {"wz": {"axis": -1}}, "buttons": {"land": -1}}))
+    limited.update(joy_state())
+    assert limited.update(joy_state(LB, *range(8), wz=1.0)) == ["reset", "takeoff"]
+    assert limited.command == Command()
 
 
 # ---- joy.yaml
 
 
-def test_a_file_and_then_parameters_are_laid_over_joy_yaml(tmp_path):
+def test_a_config_file_and_then_parameters_override_joy_yaml(tmp_path):
     (tmp_path / "my.yaml").write_text("dead_man: 5\naxes: {vx: {scale: 3.0}}\n")
     parameters = load_joy({"config": str(tmp_path / "my.yaml"), "axes": {"vx": {"axis": 1}}})
     assert (parameters.dead_man, parameters.axes.vx.axis, parameters.axes.vx.scale) == (5, 1, 3.0)
@@ -140,13 +140,13 @@ def test_a_file_and_then_parameters_are_laid_over_joy_yaml(tmp_path):
         ({"config": 3}, "parameter config = 3: must be the name of a file"),
     ],
 )
-def test_a_wrong_value_is_told_in_one_line(given, said):
+def test_the_error_for_a_wrong_value_names_the_parameter(given, said):
     with pytest.raises(ParameterError) as error:
         load_joy(given)
     assert str(error.value).startswith(said)
 
 
-def test_a_wrong_value_in_a_file_is_told_with_its_line(tmp_path):
+def test_the_error_for_a_wrong_value_in_a_file_names_its_line(tmp_path):
     path = tmp_path / "my.yaml"
     path.write_text("dead_man: 5\nbuttons: {land: 999}\n")
     with pytest.raises(ParameterError, match=r"my\.yaml: line 2: parameter buttons/land = 999"):

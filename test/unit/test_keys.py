@@ -1,4 +1,4 @@
-"""What a terminal sends, in one piece and in several, and which keys it was."""
+"""Decoding of the key sequences that a terminal sends, in one piece and in several."""
 
 import pytest
 
@@ -33,7 +33,7 @@ SEQUENCES = [
     (b"\x1bOP", [UNKNOWN]),
     (b"\x1b[?1;2c", [UNKNOWN]),
     (b"\x1bq", [UNKNOWN]),
-    (b"\x1b[\x1b[A", [UNKNOWN, UP]),  # one that was cut off
+    (b"\x1b[\x1b[A", [UNKNOWN, UP]),  # an incomplete sequence, then Up
     ("é".encode(), [UNKNOWN]),
     (b"\x00\x01", [UNKNOWN, UNKNOWN]),
     (b"\x7f\x08", [BACKSPACE, BACKSPACE]),
@@ -43,23 +43,23 @@ SEQUENCES = [
 
 
 @pytest.mark.parametrize(("sent", "keys"), SEQUENCES)
-def test_sequences_at_once(decoder, sent, keys):
+def test_sequences_that_arrive_in_one_piece_are_decoded(decoder, sent, keys):
     assert decoder.feed(sent) == keys
 
 
 @pytest.mark.parametrize(("sent", "keys"), [pair for pair in SEQUENCES if pair[0][:1] != b"\xc3"])
-def test_sequences_in_single_bytes_from_a_slow_line(decoder, clock, sent, keys):
-    came = []
+def test_sequences_that_arrive_byte_by_byte_are_decoded(decoder, clock, sent, keys):
+    decoded = []
     for byte in sent:
-        came += decoder.feed(bytes([byte]))
+        decoded += decoder.feed(bytes([byte]))
         clock.now += 0.4 * KEY_PATIENCE
-        came += decoder.feed(b"")
+        decoded += decoder.feed(b"")
         clock.now += 0.4 * KEY_PATIENCE
-        came += decoder.feed(b"")
-    assert came == keys
+        decoded += decoder.feed(b"")
+    assert decoded == keys
 
 
-def test_only_an_escape_that_nothing_follows_is_the_key(decoder, clock):
+def test_an_escape_byte_without_a_successor_is_the_escape_key(decoder, clock):
     assert decoder.feed(b"\x1b") == []
     clock.now += 0.9 * KEY_PATIENCE
     assert decoder.feed(b"") == []
@@ -68,7 +68,7 @@ def test_only_an_escape_that_nothing_follows_is_the_key(decoder, clock):
     assert decoder.feed(b"[A") == ["[", "A"]
 
 
-def test_a_sequence_that_does_not_go_on_is_dropped(decoder, clock):
+def test_an_incomplete_sequence_becomes_an_unknown_key_after_a_timeout(decoder, clock):
     assert decoder.feed(b"\x1b[1;") == []
     clock.now += KEY_PATIENCE
     assert decoder.feed(b"") == [UNKNOWN]

@@ -1,4 +1,4 @@
-"""roslaunch's command line: a wrong argument of drone.launch is told, and nothing else is touched."""
+"""Check of roslaunch's command line for unknown arguments of drone.launch; relative file names of the shell."""
 
 import pytest
 
@@ -23,7 +23,7 @@ ROSLAUNCH = ["/usr/bin/python3", "/usr/bin/roslaunch"]
         ["roslaunch", "../launch/drone.launch", "scrpt:=x.py"],
     ],
 )
-def test_a_wrong_argument_is_told_with_near_names(command):
+def test_the_error_for_an_unknown_argument_suggests_near_names(command):
     with pytest.raises(ParameterError, match=r"scrpt:=x.py: drone.launch has no argument scrpt; near names are script"):
         check(command, LAUNCH)
 
@@ -42,21 +42,21 @@ def test_a_wrong_argument_is_told_with_near_names(command):
         [""],
     ],
 )
-def test_everything_else_is_left_alone(command, tmp_path):
+def test_other_command_lines_pass_the_check(command, tmp_path):
     check(command, tmp_path)
 
 
-# ---- files are found from the user's folder
+# ---- relative file names start at the user's folder
 
 
 @pytest.mark.parametrize("name", ["", "target", "/a/b.py", "~/a.py", "package://drone_sim/a.yaml"])
-def test_what_is_not_relative_stays(name, monkeypatch):
+def test_names_that_are_not_relative_paths_stay_unchanged(name, monkeypatch):
     monkeypatch.setenv("PWD", "/home/somebody")
     assert from_shell(name) == name
 
 
 @pytest.mark.parametrize("name", ["a.lua", "./a.lua", "folder/a.yaml", "../a.yaml"])
-def test_relative_to_the_shell_and_not_to_the_process(name, monkeypatch, tmp_path):
+def test_relative_paths_start_at_the_folder_of_the_shell(name, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PWD", "/home/somebody")
     assert from_shell(name) == f"/home/somebody/{name.replace('./', '') if name.startswith('./') else name}"

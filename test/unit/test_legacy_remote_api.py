@@ -1,4 +1,4 @@
-"""V-REP's legacy remote API (`simxStart`): what a client sends, and what comes back."""
+"""V-REP's legacy remote API (`simxStart`): requests of a client and the replies of the server."""
 
 import logging
 import socket
@@ -59,7 +59,7 @@ WORLD = -1
 
 
 class Stage:
-    """A stopped simulation, its server, and clients."""
+    """A stopped simulation, its server and its clients."""
 
     def __init__(self, script):
         values = {
@@ -82,8 +82,8 @@ class Stage:
         self.clients.append(Client(port or self.server.port, self.server.wait))
         return self.clients[-1]
 
-    def go(self, steps=1):
-        """Take so many steps, as far as clients let it; return how many were taken."""
+    def run_steps(self, steps=1):
+        """Run up to `steps` steps, as far as the clients permit; return the number of steps run."""
         before = self.simulation.steps
         for _ in range(steps):
             self.server.serve()
@@ -91,7 +91,7 @@ class Stage:
                 self.player.step()
         return self.simulation.steps - before
 
-    def settled(self, condition):
+    def wait_until(self, condition):
         end = time.monotonic() + 60
         while time.monotonic() < end:
             if condition():
@@ -123,7 +123,7 @@ def _stage(theatre):
     for client in theatre.clients:
         client.vanish()
     theatre.clients.clear()
-    assert theatre.settled(lambda: not theatre.server._guests)
+    assert theatre.wait_until(lambda: not theatre.server._guests)
     theatre.player.stop()
     theatre.server.serve()  # closes the ports of the script
     theatre.simulation.context.signals.clear()
@@ -152,24 +152,24 @@ def test_commands_of_a_message_are_answered_together_in_order(stage):
     assert reply.answers[GET_FLOAT | BLOCKING, text("a")] == floats(1.5)
 
 
-def test_a_message_of_many_packets_and_an_answer_of_many(stage):
+def test_messages_and_replies_may_consist_of_many_packets(stage):
     client, long = stage.client(), bytes(range(256)) * 400
     client.send_bytes(packets(message(0, command(SET_STRING, text("long"), long)), piece=200))
     assert client.received().answers == {(SET_STRING, text("long")): b""}
     assert client.call(GET_STRING, text("long")) == long
 
 
-def test_who_sends_check_sums_as_clients_of_3_1_did_gets_them_in_small_packets():
+def test_clients_of_v_rep_3_1_get_small_packets_with_check_sums():
     wire, content = Packets(), bytes(2) + b"123456789"
     assert wire.of(content)[PACKET.size :] == content
     wire.add(packets(b"\xc3\x31" + message(0)[2:]) + packets(message(1)))
-    assert wire.take() and wire.take(), "also one whose check sum happens to be 0"
-    assert wire.of(content)[PACKET.size :] == b"\xc3\x31123456789", "CRC-16/XMODEM's own check value"
+    assert wire.take() and wire.take(), "a message whose check sum happens to be 0 is accepted, too"
+    assert wire.of(content)[PACKET.size :] == b"\xc3\x31123456789", "the check value of CRC-16/XMODEM"
     sizes = struct.unpack_from("<hhh", wire.of(bytes(1000)))
-    assert sizes == (1, 244, 4), "their buffers have 250 bytes"
+    assert sizes == (1, 244, 4), "these clients have buffers of 250 bytes"
 
 
-def test_a_command_that_comes_in_pieces_is_carried_out_when_it_is_whole(stage):
+def test_a_split_command_is_executed_when_its_last_piece_arrives(stage):
     client, key = stage.client(), text("split")
     code = (SET_STRING | SPLIT, 100)
     assert not client.ask(command(code, key, b"abc", 0, 7)).answers
@@ -179,29 +179,29 @@ def test_a_command_that_comes_in_pieces_is_carried_out_when_it_is_whole(stage):
     assert client.call(GET_STRING, key) == b"abcdefg"
 
 
-def test_the_time_of_a_command_is_the_simulations_in_milliseconds(stage):
+def test_replies_carry_the_simulation_time_in_milliseconds(stage):
     client = stage.client()
     assert client.ask(command(HANDLE, text("Floor"))).times == [0]
     client.call(*START)
-    stage.go(3)
+    stage.run_steps(3)
     assert client.ask(command(HANDLE, text("Floor"))).times == [150]
 
 
 # ---- modes
 
 
-def test_a_stream_is_answered_once_for_every_step(stage):
+def test_a_stream_sends_one_value_per_step(stage):
     client, key = stage.client(), ints(stage.client().handle("Quadricopter"), WORLD)
     streams = POSITION | STREAMING
     client.call(*START)
     assert client.ask(command(streams, key)).answers == {(streams, key): floats(0, 0, 0.8)}
     assert not client.ask().answers
-    stage.go()
+    stage.run_steps()
     assert list(client.ask().answers) == [(streams, key)]
     assert not client.ask().answers
 
 
-def test_a_stream_goes_on_while_the_simulation_stands_but_not_with_every_message(stage):
+def test_a_stream_continues_at_intervals_while_the_simulation_is_stopped(stage):
     client, key = stage.client(), text("a")
     client.call(SET_FLOAT, key, floats(1))
     client.ask(command(GET_FLOAT | STREAMING, key))
@@ -211,7 +211,7 @@ def test_a_stream_goes_on_while_the_simulation_stands_but_not_with_every_message
     assert client.ask().answers == {(GET_FLOAT | STREAMING, key): floats(2)}
 
 
-def test_a_stream_with_a_delay_waits_for_it(stage):
+def test_a_stream_with_a_delay_sends_once_per_delay(stage):
     client, key = stage.client(), text("a")
     client.call(SET_FLOAT, key, floats(1))
     assert client.ask(command((GET_FLOAT | STREAMING, 500), key)).answers
@@ -221,7 +221,7 @@ def test_a_stream_with_a_delay_waits_for_it(stage):
     assert client.ask().answers
 
 
-def test_discontinue_ends_a_stream_and_is_answered_as_that(stage):
+def test_discontinue_ends_a_stream_and_is_acknowledged(stage):
     client, key = stage.client(), text("a")
     client.ask(command(GET_FLOAT | STREAMING, key))
     assert client.ask(command(GET_FLOAT | DISCONTINUE, key)).answers == {(GET_FLOAT | DISCONTINUE, key): b""}
@@ -229,7 +229,7 @@ def test_discontinue_ends_a_stream_and_is_answered_as_that(stage):
     assert not client.ask().answers
 
 
-def test_what_sets_something_may_stream(stage):
+def test_a_setter_may_stream(stage):
     client, target = stage.client(), ints(stage.client().handle("Quadricopter_target"))
     client.ask(command(SET_POSITION | STREAMING, target, ints(WORLD) + floats(1, 0, 1)))
     client.call(SET_POSITION, target, ints(WORLD) + floats(0, 0, 0))
@@ -238,20 +238,20 @@ def test_what_sets_something_may_stream(stage):
     assert client.numbers("3f", POSITION, target + ints(WORLD)) == (1, 0, 1)
 
 
-def test_a_stream_of_an_object_that_goes_is_an_error(stage):
+def test_a_stream_of_a_removed_object_reports_an_error(stage):
     client = stage.client()
     client.call(*START)
     key = ints(*client.numbers("i", 0x0009, data=floats(0.1) + bytes(13)), WORLD)
     assert client.ask(command(POSITION | STREAMING, key)).answers[POSITION | STREAMING, key] == floats(0, 0, 0)
     assert client.call(0x1028, key[:4]) == b""
-    stage.go()
+    stage.run_steps()
     assert client.ask().answers == {(POSITION | STREAMING, key): FAILED}
     assert client.errors() == [
         f"simxGetObjectPosition: there is no object with the handle {struct.unpack_from('<i', key)[0]}"
     ]
 
 
-def test_there_is_an_end_to_what_streams(stage):
+def test_a_client_has_at_most_1000_streams(stage):
     client = stage.client()
     for count in range(11):
         client.ask(*(command(GET_FLOAT | STREAMING, text(f"{100 * count + one}")) for one in range(100)))
@@ -265,23 +265,23 @@ def test_there_is_an_end_to_what_streams(stage):
 def test_a_synchronous_client_triggers_exactly_one_step_with_each_call(stage):
     client = stage.client()
     assert client.call(SYNCHRONOUS) == b"" and client.call(*START) == b""
-    assert stage.go(5) == 0
+    assert stage.run_steps(5) == 0
     for steps in range(1, 6):
         client.send(command(TRIGGER | BLOCKING))
         assert client.received(looks=20) is None
-        assert stage.go(3) == 1
+        assert stage.run_steps(3) == 1
         reply = client.received()
         assert reply.answers == {(TRIGGER | BLOCKING, b""): b""} and reply.times == [50 * steps]
     assert client.call(FREE) == b""
-    assert stage.go(5) == 5
+    assert stage.run_steps(5) == 5
 
 
-def test_what_streams_comes_with_the_answer_to_the_trigger(stage):
+def test_streamed_values_arrive_with_the_reply_to_the_trigger(stage):
     client, key = stage.client(), ints(stage.client().handle("Quadricopter"), WORLD)
     client.ask(command(SYNCHRONOUS), command(*START), command(POSITION | STREAMING, key))
     client.send(command(TRIGGER | BLOCKING))
-    assert stage.settled(lambda: not stage.server.holds)
-    stage.go()
+    assert stage.wait_until(lambda: not stage.server.holds)
+    stage.run_steps()
     assert list(client.received().answers) == [(TRIGGER | BLOCKING, b""), (POSITION | STREAMING, key)]
 
 
@@ -292,10 +292,10 @@ def test_the_simulation_waits_for_every_synchronous_client(stage):
     third.call(*START)
     one.send(command(TRIGGER | BLOCKING))
     assert one.received(looks=20) is None
-    assert stage.go(3) == 0
+    assert stage.run_steps(3) == 0
     other.send(command(TRIGGER | BLOCKING))
     assert other.received(looks=20) is None
-    assert stage.go(3) == 1
+    assert stage.run_steps(3) == 1
     assert one.received() and other.received()
     assert third.ask(command(HANDLE, text("Floor"))).times == [50]
 
@@ -305,10 +305,10 @@ def test_a_client_stays_synchronous_through_stop_and_start(stage):
     client.ask(command(SYNCHRONOUS), command(*START))
     client.call(*STOP)
     client.call(*START)
-    assert stage.go(3) == 0
+    assert stage.run_steps(3) == 0
 
 
-def test_a_trigger_while_nothing_plays_is_answered_at_once(stage):
+def test_a_trigger_while_stopped_or_paused_is_answered_at_once(stage):
     client = stage.client()
     client.call(SYNCHRONOUS)
     assert client.call(TRIGGER) == b""
@@ -316,7 +316,7 @@ def test_a_trigger_while_nothing_plays_is_answered_at_once(stage):
     assert client.call(TRIGGER) == b""
 
 
-def test_who_triggers_is_answered_when_another_stops_the_simulation(stage):
+def test_a_pending_trigger_is_answered_when_another_client_stops_the_simulation(stage):
     client, other = stage.client(), stage.client()
     client.ask(command(SYNCHRONOUS), command(*START))
     client.send(command(TRIGGER | BLOCKING))
@@ -326,7 +326,7 @@ def test_who_triggers_is_answered_when_another_stops_the_simulation(stage):
 
 
 @pytest.mark.parametrize("how", ["vanish", "goodbye", "silence", "amid a trigger"])
-def test_who_has_gone_holds_nothing(stage, how):
+def test_a_disconnected_client_does_not_hold_the_simulation(stage, how):
     client = stage.client()
     client.ask(command(SYNCHRONOUS), command(*START))
     assert stage.server.holds
@@ -340,8 +340,8 @@ def test_who_has_gone_holds_nothing(stage, how):
             client.send(command(TRIGGER | BLOCKING))
             assert client.received(looks=20) is None
         client.vanish()
-    assert stage.settled(lambda: not stage.server._guests)
-    assert stage.go(3) == 3
+    assert stage.wait_until(lambda: not stage.server._guests)
+    assert stage.run_steps(3) == 3
 
 
 # ---- functions
@@ -398,14 +398,14 @@ def test_signals(stage):
         assert client.call(get, key) == data
         assert client.call(clear, key) == b""
         assert client.call(get, key) == FAILED
-    assert client.errors() == []  # what is not set is nothing to speak of
+    assert client.errors() == []  # reading an unset signal logs no error
     client.call(SET_STRING, key, b"abc")
     client.call(APPEND, key, b"\xff")
     assert client.call(TAKE, key) == b"abc\xff"
     assert client.call(TAKE, key) == FAILED
 
 
-def test_a_stream_that_takes_a_signal_ends_with_it(stage):
+def test_a_stream_that_takes_a_signal_ends_after_the_first_value(stage):
     client, key = stage.client(), text("a")
     client.ask(command(TAKE | STREAMING, key))
     client.call(SET_STRING, key, b"first")
@@ -416,7 +416,7 @@ def test_a_stream_that_takes_a_signal_ends_with_it(stage):
     assert not client.ask().answers
 
 
-def test_a_stream_of_a_string_says_nothing_where_there_is_nothing_new(stage):
+def test_a_string_stream_sends_only_new_parts(stage):
     client, key = stage.client(), text("a")
     assert not client.ask(command(READ_STREAM | STREAMING, key)).answers
     for part in (b"one", b"two"):
@@ -427,7 +427,7 @@ def test_a_stream_of_a_string_says_nothing_where_there_is_nothing_new(stage):
         assert not client.ask().answers
 
 
-def test_pictures(stage):
+def test_vision_sensor_images(stage):
     client = stage.client()
     sensor = ints(client.handle("FloorVision"))
     colors, greys, depths = (client.call(code, sensor) for code in (0x1004, 0x1003, 0x1017))
@@ -462,20 +462,20 @@ def test_distances_and_collisions(stage):
         (0, 19, (0, 6, 0)),
     ],
 )
-def test_one_thing_about_all_objects_of_a_kind(stage, kind, what, counts):
+def test_group_data_of_all_objects_of_a_kind(stage, kind, what, counts):
     answer = stage.client().call(0x200C, ints(kind, what))
-    handles, *found = struct.unpack_from("<4i", answer)
-    assert handles and tuple(found) == tuple(one * handles for one in counts)
+    handles, *value_counts = struct.unpack_from("<4i", answer)
+    assert handles and tuple(value_counts) == tuple(one * handles for one in counts)
     if what == 0:
         assert b"Quadricopter_base\0" in answer
     else:
-        assert len(answer) == 16 + 4 * (handles + sum(found))
+        assert len(answer) == 16 + 4 * (handles + sum(value_counts))
 
 
-def test_the_simulation_as_a_whole(stage):
+def test_simulation_parameters_and_scene_files(stage):
     client = stage.client()
     assert client.numbers("f", 0x1023, ints(1)) == pytest.approx((0.05,))  # sim_floatparam_simulation_time_step
-    assert client.numbers("i", 0x1021, ints(1)) == (40600,)  # simxGetPingTime asks for that
+    assert client.numbers("i", 0x1021, ints(1)) == (40600,)  # simxGetPingTime reads this parameter
     assert client.numbers("3f", 0x101D, ints(0)) == pytest.approx((0, 0, -9.81))
     assert client.numbers("i", 0x101F, ints(16)) == (0,)  # sim_boolparam_display_enabled
     assert client.call(0x1020, ints(16), ints(1)) == client.call(0x1022, ints(8), ints(0)) == b""
@@ -488,7 +488,7 @@ def test_the_simulation_as_a_whole(stage):
     assert "files are not transferred" in client.errors()[-1]
 
 
-def test_what_is_for_a_person_to_look_at(stage, caplog):
+def test_status_texts_consoles_dialogs_and_uis(stage, caplog):
     client = stage.client()
     assert client.call(0x3008, text("hello")) == b""
     looks = ints(50, 0, 98765, 0, 98765, 0) + floats(-10, 0, 0, -10, 0, 0)
@@ -501,18 +501,18 @@ def test_what_is_for_a_person_to_look_at(stage, caplog):
     assert client.call(0x102C, ints(handle)) == b"\0"
     assert client.call(0x102B, ints(handle)) == b"" and client.call(0x102B, ints(handle)) == FAILED
     ui = ints(*client.numbers("i", 0x3007, text("UI")))
-    assert client.numbers("4i", 0x2003, ui)[1:] == (-1, 0, 0)  # the first is lost on clients
+    assert client.numbers("4i", 0x2003, ui)[1:] == (-1, 0, 0)  # clients drop the first value
     assert client.call(0x2002, ui + ints(3), ints(500)) == b"" and client.call(0x3005, text("ui.ttb")) == FAILED
     assert all(f in caplog.text for f in ("hello", "a line", "a dialog: how?"))
 
 
-def test_a_function_of_a_script_is_called(stage):
+def test_a_client_calls_functions_of_scripts(stage):
     client = stage.client()
     client.call(*START)
-    given = ints(2, 1, 2, 3) + ints(1, 2) + floats(1.5) + text("ab") + text("c") + b"\xff\0x"
+    inputs = ints(2, 1, 2, 3) + ints(1, 2) + floats(1.5) + text("ab") + text("c") + b"\xff\0x"
     key = ints(1) + text("Quadricopter") + text("turned")
-    assert client.call(0x3401, key, given) == ints(2, 1, 2, 3, 2, 1) + floats(3) + text("AB") + text("C") + b"\xff\0x"
-    assert client.call(0x3401, ints(6) + text("Crate") + text("same"), given) == given
+    assert client.call(0x3401, key, inputs) == ints(2, 1, 2, 3, 2, 1) + floats(3) + text("AB") + text("C") + b"\xff\0x"
+    assert client.call(0x3401, ints(6) + text("Crate") + text("same"), inputs) == inputs
     nothing = ints(0, 0, 0, 0)
     for wrong, data in (
         (ints(3) + text("Quadricopter") + text("turned"), nothing),
@@ -524,13 +524,13 @@ def test_a_function_of_a_script_is_called(stage):
         (key, b"abc"),
     ):
         assert client.call(0x3401, wrong, data) == FAILED
-    said = client.errors()
-    assert "must be sim_scripttype_childscript" in said[0] and "returned something else" in said[2]
-    assert "no customization script is attached to 'Drone'" in said[1]
-    assert len(said) == 7 and not any("\n" in one for one in said)
+    error_lines = client.errors()
+    assert "must be sim_scripttype_childscript" in error_lines[0] and "returned something else" in error_lines[2]
+    assert "no customization script is attached to 'Drone'" in error_lines[1]
+    assert len(error_lines) == 7 and not any("\n" in one for one in error_lines)
 
 
-def test_a_mistake_is_an_error_and_one_line_in_the_log(stage, caplog):
+def test_an_error_fails_the_command_and_is_logged_once(stage, caplog):
     client = stage.client()
     for _ in range(3):
         assert client.call(HANDLE, text("Quadricoptr")) == FAILED
@@ -545,26 +545,26 @@ def test_a_mistake_is_an_error_and_one_line_in_the_log(stage, caplog):
     assert client.errors() == []
 
 
-def test_a_script_that_fails_stops_the_simulation_and_clients_are_heard(stage):
+def test_a_failing_script_stops_the_simulation_and_clients_are_still_answered(stage):
     client = stage.client()
     client.ask(command(SYNCHRONOUS), command(*START), command(0x3014, text("fail"), ints(1)))
     client.send(command(TRIGGER | BLOCKING))
     assert client.received(looks=20) is None
-    stage.go()
+    stage.run_steps()
     assert client.received() and client.ask().state & 1 == 0
 
 
-def test_signals_that_are_set_before_the_start_are_there_in_flight_and_gone_after_it(stage):
+def test_signals_set_before_the_start_last_until_the_stop(stage):
     client, key = stage.client(), text("speed")
     client.call(SET_FLOAT, key, floats(5))
     client.call(*START)
-    stage.go()
+    stage.run_steps()
     assert client.numbers("f", GET_FLOAT, key) == (5,)
     client.call(*STOP)
     assert client.call(GET_FLOAT, key) == FAILED
 
 
-def test_there_is_an_end_to_an_answer(stage, monkeypatch):
+def test_the_size_of_a_reply_is_limited(stage, monkeypatch):
     monkeypatch.setattr(session, "_MAX_REPLY_SIZE", 100_000)
     client = stage.client()
     client.call(SET_STRING, text("long"), bytes(60_000))
@@ -583,10 +583,10 @@ def test_a_script_opens_a_port_while_the_simulation_runs(stage):
     stage.server.serve()
     third = stage.client(stage.ports[0])
     assert third.handle("Floor") == client.handle("Floor")
-    stage.go(2)
+    stage.run_steps(2)
     assert client.numbers("i", 0x3011, text("status")) == (1,)
     client.call(0x3014, text("close"), ints(1))
-    stage.go()
+    stage.run_steps()
     assert third.is_let_go()
     assert stage.simulation.running
     client.call(*STOP)
@@ -595,18 +595,18 @@ def test_a_script_opens_a_port_while_the_simulation_runs(stage):
         stage.client(stage.ports[1])
 
 
-def test_a_port_may_begin_synchronous(stage):
+def test_clients_of_a_port_may_start_synchronous(stage):
     stage.client().call(*START)
-    assert stage.go(2) == 2
+    assert stage.run_steps(2) == 2
     client = stage.client(stage.ports[1])
     client.ask()
-    assert stage.go(2) == 0
+    assert stage.run_steps(2) == 0
     client.send(command(TRIGGER | BLOCKING))
     assert client.received(looks=20) is None
-    assert stage.go(2) == 1
+    assert stage.run_steps(2) == 1
 
 
-# ---- wicked clients
+# ---- malformed messages and clients that misbehave
 
 
 def packet(size, left=0, first=1, content=None):
@@ -614,7 +614,7 @@ def packet(size, left=0, first=1, content=None):
 
 
 HEAD = message(0)
-WICKED = [
+MALFORMED = [
     b"GET / HTTP/1.1\r\nHost: 127.0.0.1:19997\r\n\r\n",
     b"\x16\3\1\2\0\1\0\1\xfc\3\3" + bytes(512),
     packet(10, first=256),
@@ -641,49 +641,49 @@ WICKED = [
 ]
 
 
-@pytest.mark.parametrize("sent", WICKED, ids=range(len(WICKED)))
-def test_rubbish_is_let_go_with_one_line_and_the_flight_goes_on(stage, sent, caplog):
+@pytest.mark.parametrize("sent", MALFORMED, ids=range(len(MALFORMED)))
+def test_a_client_that_sends_garbage_is_disconnected_and_the_simulation_continues(stage, sent, caplog):
     stage.now += 10
-    good = stage.client()
-    good.call(*START)
+    other_client = stage.client()
+    other_client.call(*START)
     caplog.clear()
     client = stage.client()
     try:
         client.send_bytes(sent)
         assert client.is_let_go()
-    except OSError:  # it was let go before it had said all
+    except OSError:  # it was disconnected before it had sent everything
         pass
-    assert stage.settled(lambda: len(stage.server._guests) == 1)
+    assert stage.wait_until(lambda: len(stage.server._guests) == 1)
     (line,) = [one.getMessage() for one in caplog.records if "is disconnected" in one.getMessage()]
     assert line.isprintable()
-    assert stage.go(3) == 3
-    assert good.handle("Floor") >= 0
+    assert stage.run_steps(3) == 3
+    assert other_client.handle("Floor") >= 0
 
 
-def test_half_a_message_hinders_nobody(stage):
-    half, good = stage.client(), stage.client()
-    half.send_bytes(packets(message(0, command(HANDLE, text("Floor"))))[:-3])
-    assert half.received(looks=20) is None
-    assert good.handle("Floor") >= 0
-    half.send_bytes(packets(message(0, command(HANDLE, text("Floor"))))[-3:])
-    assert half.received() is not None
+def test_an_incomplete_message_does_not_block_other_clients(stage):
+    slow_client, other_client = stage.client(), stage.client()
+    slow_client.send_bytes(packets(message(0, command(HANDLE, text("Floor"))))[:-3])
+    assert slow_client.received(looks=20) is None
+    assert other_client.handle("Floor") >= 0
+    slow_client.send_bytes(packets(message(0, command(HANDLE, text("Floor"))))[-3:])
+    assert slow_client.received() is not None
 
 
-def test_a_client_that_never_reads_hinders_nobody(stage):
-    deaf, good = stage.client(), stage.client()
-    good.call(SET_STRING, text("long"), bytes(4_000_000))
+def test_a_client_that_never_reads_does_not_block_other_clients(stage):
+    stalled_client, other_client = stage.client(), stage.client()
+    other_client.call(SET_STRING, text("long"), bytes(4_000_000))
     ask = packets(message(0, command(GET_STRING | BLOCKING, text("long"))))
     for _ in range(10):
-        deaf.peer.send(ask)
-    good.call(*START)
-    assert stage.go(3) == 3
+        stalled_client.peer.send(ask)
+    other_client.call(*START)
+    assert stage.run_steps(3) == 3
     (guest,) = [one for one in stage.server._guests.values() if one.connection.has_to_write]
     assert len(guest.connection._out) <= 4_100_000
-    answers = [deaf.received() for _ in range(10)]
+    answers = [stalled_client.received() for _ in range(10)]
     assert all(isinstance(one, Reply) and len(one.answers) == 1 for one in answers)
 
 
-def test_of_two_hundred_connections_those_that_speak_are_heard(stage, caplog):
+def test_silent_connections_make_room_for_a_client_that_sends(stage, caplog):
     stage.now += 10
     for _ in range(200):
         stage.client()
@@ -694,26 +694,26 @@ def test_of_two_hundred_connections_those_that_speak_are_heard(stage, caplog):
     assert len([one for one in caplog.records if "clients are connected" in one.getMessage()]) == 1
 
 
-def test_a_hundred_clients_that_have_spoken_are_the_most(stage):
-    spoken = [stage.client() for _ in range(100)]
-    for one in spoken:
+def test_at_most_100_active_clients_are_served(stage):
+    active_clients = [stage.client() for _ in range(100)]
+    for one in active_clients:
         one.ask()
     assert stage.client().is_let_go()
-    assert spoken[0].handle("Floor") >= 0
+    assert active_clients[0].handle("Floor") >= 0
 
 
-def test_much_at_once_is_spread_over_several_steps(stage):
+def test_many_requests_are_spread_over_several_steps(stage):
     busy = [stage.client() for _ in range(20)]
     stage.player.start()
-    began, stage.server._clock = stage.now, iter(range(10**9)).__next__  # a clock that says: late already
+    start_time, stage.server._clock = stage.now, iter(range(10**9)).__next__  # a clock that is always late
     try:
         for one in busy:
             one.send(command(HANDLE, text("Floor")))
-        assert stage.settled(lambda: stage.server.has_work)
+        assert stage.wait_until(lambda: stage.server.has_work)
         assert all(one.received() for one in busy)
     finally:
         stage.server._clock = lambda: stage.now
-    assert began == stage.now
+    assert start_time == stage.now
 
 
 # ---- both servers
@@ -733,7 +733,7 @@ def test_both_remote_apis_are_served_at_once(stage):
         new.sim("setStepping", True)
         old.call(FREE)
         assert servers.holds
-        assert old.call(*STOP) == b""  # ends everybody's stepping
+        assert old.call(*STOP) == b""  # ends stepping for all clients
         old.call(*START)
         assert not servers.holds
         old.vanish()
@@ -742,29 +742,29 @@ def test_both_remote_apis_are_served_at_once(stage):
         servers.close()
 
 
-def test_a_port_that_is_taken_is_one_line(stage):
-    taken = {"serve": True, "port": 0, "legacy_port": stage.server.port}
+def test_the_error_names_an_address_that_cannot_be_opened(stage):
+    settings = {"serve": True, "port": 0, "legacy_port": stage.server.port}
     with pytest.raises(OSError, match=f"remote_api: cannot listen on 127.0.0.1:{stage.server.port}: "):
-        start_server(parameters.load({"remote_api": taken}).remote_api, stage.player)
+        start_server(parameters.load({"remote_api": settings}).remote_api, stage.player)
     with pytest.raises(OSError, match=r"remote_api: cannot listen on nowhere\.invalid:0: "):
         LegacyServer(stage.player, "nowhere.invalid", 0)
     assert LegacyServer(stage.player, "*", 0).close() is None
 
 
-def test_nobody_beyond_this_machine_is_let_in_unless_told(stage):
+def test_the_server_listens_on_localhost_by_default(stage):
     assert parameters.load().remote_api.address == "127.0.0.1"
     stage.server.serve()
-    (door,) = stage.server._listeners._listeners.values()
-    assert door.getsockname()[0] == "127.0.0.1"
+    (listener,) = stage.server._listeners._listeners.values()
+    assert listener.getsockname()[0] == "127.0.0.1"
 
 
-def test_the_modes_of_oneshot_and_blocking_differ_on_the_clients_side_alone(stage):
+def test_oneshot_and_blocking_commands_get_the_same_reply(stage):
     client, key = stage.client(), text("Floor")
     (one,) = client.ask(command(HANDLE | ONESHOT, key)).answers.values()
     assert one == client.call(HANDLE, key)
 
 
-def test_a_fault_of_our_own_leaves_a_traceback_at_debug_level(stage, monkeypatch, caplog):
+def test_an_internal_error_logs_a_traceback_at_debug_level(stage, monkeypatch, caplog):
     for name in ("server", "session"):
         caplog.set_level(logging.DEBUG, f"drone_sim.remote.legacy.{name}")
     client = stage.client()

@@ -1,4 +1,4 @@
-"""Lenses: what they do against OpenCV's models, and what OpenCV's calibration makes of pictures taken through them."""
+"""Lens models, compared with OpenCV's projections and with OpenCV's calibration from rendered pictures."""
 
 import dataclasses
 from dataclasses import replace
@@ -39,8 +39,8 @@ def camera_matrix(lens):
     return np.reshape(lens.K, (3, 3))
 
 
-def by_opencv(lens, points, matrix=None, coefficients=None):
-    """Return the pixels of points in the optical frame."""
+def project_with_opencv(lens, points, matrix=None, coefficients=None):
+    """Return the pixels onto which OpenCV projects points of the optical frame."""
     matrix = camera_matrix(lens) if matrix is None else matrix
     coefficients = np.array(lens.D if coefficients is None else coefficients).ravel()
     project = cv2.fisheye.projectPoints if lens.is_fisheye else cv2.projectPoints
@@ -49,14 +49,14 @@ def by_opencv(lens, points, matrix=None, coefficients=None):
 
 
 @LENSES
-def test_pixels_are_where_opencv_has_them_and_rays_lead_back(lens):
+def test_projected_pixels_equal_those_of_opencv_and_rays_invert_the_projection(lens):
     points = np.random.RandomState(1).uniform((-1, -1, 1.5), (1, 1, 3), (200, 3))
-    np.testing.assert_allclose(lens.project(points), by_opencv(lens, points), atol=1e-9)
-    sees = np.isfinite(lens.rays[..., 0])
-    np.testing.assert_allclose(lens.project(2 * lens.rays[sees]), lens.pixels[sees], atol=1e-5)
+    np.testing.assert_allclose(lens.project(points), project_with_opencv(lens, points), atol=1e-9)
+    has_ray = np.isfinite(lens.rays[..., 0])
+    np.testing.assert_allclose(lens.project(2 * lens.rays[has_ray]), lens.pixels[has_ray], atol=1e-5)
 
 
-def test_a_fisheye_sees_what_is_behind_it_and_no_farther_than_it_can():
+def test_a_fisheye_has_rays_behind_the_camera_and_none_beyond_its_limit():
     lens = Distorted(640, 480, np.radians(220), 0.02, 50.0, "equidistant")
     np.testing.assert_allclose(lens.rays[240, 0], (-np.cos(0.34), 0, -np.sin(0.34)), atol=0.01)
     assert np.isnan(lens.rays[0, 0]).all()
@@ -64,10 +64,10 @@ def test_a_fisheye_sees_what_is_behind_it_and_no_farther_than_it_can():
 
 
 @pytest.mark.parametrize("width", [64, 4096])
-def test_the_widest_fisheye_is_as_wide_as_the_docs_say(width):
+def test_the_widest_fisheye_spans_the_documented_angle(width):
     front = {"width": width, "height": 2, "horizontal_fov": 3.84, "lens": {"model": "equidistant"}}
     lens = parameters.load({"cameras": {"front": front}}).cameras["front"].intrinsics()
-    angle = 1.92 * (1 - 1 / width)  # of the middle of the last pixel from the axis
+    angle = 1.92 * (1 - 1 / width)  # from the axis to the middle of the last pixel
     assert np.arccos(lens.rays[0, -1, 2]) == pytest.approx(np.hypot(angle, 0.5 / lens.fx), abs=1e-9)
     with pytest.raises(ParameterError, match=r"horizontal_fov.*3\.84"):
         parameters.load({"cameras": {"front": {**front, "horizontal_fov": 3.85}}})
@@ -81,13 +81,13 @@ def test_the_widest_fisheye_is_as_wide_as_the_docs_say(width):
         (("barrel", ()), "model 'barrel'"),
     ],
 )
-def test_what_is_no_lens_is_refused(given, said):
+def test_invalid_lens_parameters_are_refused(given, said):
     with pytest.raises(ValueError, match=said):
         Distorted(64, 48, 1.8, 0.02, 50.0, *given)
 
 
 def board():
-    """Return the visuals of a board, and their poses in its frame, whose z is its normal and whose origin a corner."""
+    """Return the visuals of a chessboard and their poses in its frame: origin at a corner, z along the normal."""
     wide, high = (COLUMNS + 1) * SQUARE, (ROWS + 1) * SQUARE
     middle = np.array((wide / 2 - SQUARE, high / 2 - SQUARE))
     visuals, poses = [box("paper", (wide + SQUARE, high + SQUARE, 0.01), WHITE)], [at(*middle, -0.005)]
@@ -99,8 +99,8 @@ def board():
     return visuals, np.array(poses)
 
 
-def views(lens):
-    """Return poses of the board in the camera's optical frame, spread over what the lens sees."""
+def board_poses(lens):
+    """Return poses of the board in the camera's optical frame, spread over the field of view."""
     far = 0.62 if lens.is_fisheye else 1.35
     grid = [(u, v) for v in (0.3, 0.5, 0.7) for u in (0.25, 0.42, 0.58, 0.75)]
     random = np.random.RandomState(3)
@@ -117,41 +117,41 @@ def views(lens):
 
 
 def corners(renderer, lens):
-    """Return the corners on the board, m, and where they are found in pictures of it, px."""
+    """Return the corners on the board (m) and the pixels at which OpenCV finds them in rendered pictures."""
     visuals, local = board()
     renderer.set_visuals(visuals)
     flat = np.array([(SQUARE * n, SQUARE * m, 0) for m in range(ROWS) for n in range(COLUMNS)])
-    found = []
-    for pose in views(lens):
+    grids = []
+    for pose in board_poses(lens):
         picture = renderer.render(lens, AHEAD, AHEAD @ pose @ local)
         grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
-        is_there, places = cv2.findChessboardCornersSB(grey, (COLUMNS, ROWS))
-        if is_there:
-            found.append(places.reshape(-1, 2))
-    return flat.astype(np.float32), found
+        is_detected, places = cv2.findChessboardCornersSB(grey, (COLUMNS, ROWS))
+        if is_detected:
+            grids.append(places.reshape(-1, 2))
+    return flat.astype(np.float32), grids
 
 
 @LENSES
-def test_calibration_gives_the_lens_back(smooth, lens):
-    flat, found = corners(smooth, lens)
-    assert len(found) >= 8
+def test_opencv_calibration_recovers_the_lens(smooth, lens):
+    flat, grids = corners(smooth, lens)
+    assert len(grids) >= 8
     size = lens.width, lens.height
     if lens.is_fisheye:
         flags = cv2.fisheye.CALIB_RECOMPUTE_EXTRINSIC | cv2.fisheye.CALIB_FIX_SKEW
-        given = [flat[None].astype(np.float64)] * len(found), [one[None].astype(np.float64) for one in found]
+        given = [flat[None].astype(np.float64)] * len(grids), [one[None].astype(np.float64) for one in grids]
         _, matrix, coefficients, *_ = cv2.fisheye.calibrate(*given, size, None, None, flags=flags)
     else:
         flags = cv2.CALIB_RATIONAL_MODEL if lens.model == "rational_polynomial" else 0
-        _, matrix, coefficients, *_ = cv2.calibrateCamera([flat] * len(found), found, size, None, None, flags=flags)
-    wanted = camera_matrix(lens)
+        _, matrix, coefficients, *_ = cv2.calibrateCamera([flat] * len(grids), grids, size, None, None, flags=flags)
+    expected = camera_matrix(lens)
     np.testing.assert_allclose((matrix[0, 0], matrix[1, 1]), lens.fx, rtol=0.002)
-    np.testing.assert_allclose(matrix[:2, 2], wanted[:2, 2], atol=0.005 * lens.width)
+    np.testing.assert_allclose(matrix[:2, 2], expected[:2, 2], atol=0.005 * lens.width)
     across = lens.rays[40:-40:40, 40:-40:40].reshape(-1, 3)
-    missed = by_opencv(lens, across, matrix, coefficients) - lens.project(across)
-    assert np.abs(missed).max() < 1.0
+    errors = project_with_opencv(lens, across, matrix, coefficients) - lens.project(across)
+    assert np.abs(errors).max() < 1.0
 
 
-def test_undistorted_straight_lines_are_straight(smooth):
+def test_straight_lines_are_straight_after_undistortion(smooth):
     smooth.set_visuals([box("wall", (0.1, 20.0, 20.0), WHITE), box("beam", (0.1, 20.0, 0.5), BLACK)])
     picture = smooth.render(WIDE, AHEAD, np.array([at(3, 0, 1), at(2.9, 0, 1.6)]))
     bent = edge(picture)
@@ -161,7 +161,7 @@ def test_undistorted_straight_lines_are_straight(smooth):
 
 
 def edge(picture):
-    """Return how far the upper edge of what is dark is off the straight line through it, px, for each column."""
+    """Return for each column the distance of the dark area's upper edge from its fitted straight line, px."""
     grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY).astype(float)
     columns = np.arange(60, picture.shape[1] - 60)
     rows = []
@@ -174,7 +174,7 @@ def edge(picture):
 
 
 @LENSES
-def test_masks_and_depths_through_a_lens_are_what_rays_meet(renderer, lens):
+def test_masks_and_depths_through_a_lens_equal_ray_casts(renderer, lens):
     lens = dataclasses.replace(lens, width=320, height=240)
     visuals, poses, client = random_scene(np.random.RandomState(4))
     eye = looking((0, 0, 1), (4, 0.2, 1.1))
@@ -183,13 +183,13 @@ def test_masks_and_depths_through_a_lens_are_what_rays_meet(renderer, lens):
     renderer.set_visuals(visuals)
     numbers = np.arange(1, len(visuals) + 1)
     drawn = renderer.render_outputs(("depth", "instance"), lens, eye, poses, instances=numbers)
-    sure = inner(bodies) & inner(drawn["instance"]) & np.isfinite(lens.rays[..., 0])
-    assert (drawn["instance"][sure] != bodies[sure]).mean() < 1e-3
-    there = sure & (bodies > 0) & (drawn["instance"] == bodies)
-    away = points - eye[:3, 3]
-    depth = np.linalg.norm(away, axis=-1) if lens.is_fisheye else away @ eye[:3, 2]
-    assert there.sum() > 4_000
-    assert np.percentile(np.abs(drawn["depth"] - depth)[there], 99) < 0.01
+    interior = inner(bodies) & inner(drawn["instance"]) & np.isfinite(lens.rays[..., 0])
+    assert (drawn["instance"][interior] != bodies[interior]).mean() < 1e-3
+    compared = interior & (bodies > 0) & (drawn["instance"] == bodies)
+    offsets = points - eye[:3, 3]
+    depth = np.linalg.norm(offsets, axis=-1) if lens.is_fisheye else offsets @ eye[:3, 2]
+    assert compared.sum() > 4_000
+    assert np.percentile(np.abs(drawn["depth"] - depth)[compared], 99) < 0.01
 
 
 # ---- pinhole cameras: K, P and OpenGL's matrix
@@ -200,7 +200,7 @@ POINTS = [(0.0, 0.0, 1.0), (0.3, -0.2, 1.5), (-2.0, 1.0, 7.0), (0.01, 0.02, 0.05
 
 
 def window(camera, point):
-    """Pixel and depth (-1..1) to which OpenGL sends a point of the optical frame, rows counted as it reads them."""
+    """Return the pixel (rows in OpenGL's read order) and depth (-1..1) of a point in the optical frame."""
     clip = camera.projection() @ np.append(point, 1.0)
     x, y, depth = clip[:3] / clip[3]
     return (x + 1.0) * camera.width / 2.0 - 0.5, (y + 1.0) * camera.height / 2.0 - 0.5, depth
@@ -215,7 +215,7 @@ def test_the_field_of_view_spans_the_picture():
 
 
 @pytest.mark.parametrize("point", POINTS)
-def test_matrices_agree_on_the_pixel(point):
+def test_k_p_and_the_projection_matrix_give_the_same_pixel(point):
     u, v = pixel(CAMERA, point)
     by_k = np.reshape(CAMERA.K, (3, 3)) @ point
     by_p = np.reshape(CAMERA.P, (3, 4)) @ np.append(point, 1.0)
@@ -253,10 +253,10 @@ def test_impossible_cameras_are_refused(wrong):
         Intrinsics(**{**values, **wrong})
 
 
-def test_the_right_camera_of_a_pair_says_how_far_apart_they_are():
+def test_p_of_the_right_stereo_camera_contains_the_baseline():
     pytest.importorskip("rospy", reason="needs ROS")
     from drone_sim.ros.core.message_conversion import camera_info
 
-    left, right = (camera_info(replace(CAMERA, baseline=way), "left_optical") for way in (0.0, 0.12))
+    left, right = (camera_info(replace(CAMERA, baseline=distance), "left_optical") for distance in (0.0, 0.12))
     assert left.P[3] == 0 and right.P[3] == pytest.approx(-CAMERA.fx * 0.12)
     assert (*left.P[:3], *left.P[4:]) == (*right.P[:3], *right.P[4:])

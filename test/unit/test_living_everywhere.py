@@ -1,6 +1,6 @@
-"""Each kind of object, changed in every way, running and stopped, by a child script and by CoppeliaSim's own client.
+"""All changes of all kinds of objects, running and stopped, by a child script and by CoppeliaSim's own client.
 
-DRONE_SIM_TIMES=100 does it so often, and then looks at memory, too.
+DRONE_SIM_TIMES=100 repeats the changes 100 times and checks memory use, too.
 """
 
 import concurrent.futures
@@ -20,9 +20,9 @@ from drone_sim.run.player import Player
 from drone_sim.run.simulation import give_back_memory
 
 TIMES = int(os.environ.get("DRONE_SIM_TIMES", "2"))
-OFTEN = 50  # from where on memory is flat
-ROOM = 20e6  # bytes, by which it may grow for all that: PyBullet keeps 1 to 3 kB of each of 4000 bodies that were there
-# The same for a child script and for a client: `sim` is all that it knows.
+MEMORY_CHECK_TIMES = 50  # repetitions after which memory use no longer grows
+MEMORY_LIMIT = 20e6  # bytes; PyBullet keeps 1 to 3 kB of each of the 4000 removed bodies
+# Shared by the child script and the client, therefore it uses nothing but `sim`.
 CHANGES = """
 CORNERS, TRIANGLES = [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1], [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]
 
@@ -81,13 +81,13 @@ def sysCall_actuation():
             change(sim, kind)
         sim.removeObject(sim.getObject("/Sign"))
 """
-given = {}
-exec(CHANGES, given)  # what the client does
+client_functions = {}
+exec(CHANGES, client_functions)  # the client's copy of the functions
 
 
 @pytest.fixture(name="simulation")
 def _simulation(tmp_path, monkeypatch, new_simulation):
-    """Give a stopped simulation of a scene with one object of each kind, flown by a script that changes them."""
+    """Return a stopped simulation of a scene with one object of each kind and a script that changes them."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "changes.py").write_text(SCRIPT, encoding="utf-8")
     (tmp_path / "gate.py").write_text("def sysCall_init(): pass\n", encoding="utf-8")
@@ -99,32 +99,32 @@ def _simulation(tmp_path, monkeypatch, new_simulation):
     scene = {**gate, "objects": [*SCENE["objects"], *gate["objects"], {"name": "Way", **KINDS["path"]}]}
     (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene), encoding="utf-8")
     values = {"scene_file": str(tmp_path / "scene.yaml"), "drone": {"position": [0, 0, 2]}, "script_time_limit": 0.0}
-    made = new_simulation(values, script=str(tmp_path / "changes.py"), started=False)
-    return made
+    created = new_simulation(values, script=str(tmp_path / "changes.py"), started=False)
+    return created
 
 
 def resources():
-    """Return the process's memory (bytes) and how many descriptors it has."""
-    gc.collect()  # clients of earlier tests let go of their sockets
+    """Return the process's memory (bytes) and its number of open file descriptors."""
+    gc.collect()  # closes the sockets of earlier tests' clients
     give_back_memory()
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE"), len(os.listdir("/proc/self/fd"))
 
 
-def hold_flat(do, simulation):
-    """Do something often, after once, and see that there is as much of everything as before."""
+def assert_no_growth(do, simulation):
+    """Call `do` for one repetition, then for TIMES, and assert that the second call leaves nothing behind."""
     do(1)
     before, (memory, descriptors) = sizes(simulation), resources()
     do(TIMES)
     assert sizes(simulation) == before
     after, after_descriptors = resources()
-    assert after_descriptors <= descriptors  # tests before may have left some, which are closed by and by
+    assert after_descriptors <= descriptors  # descriptors of earlier tests may be closed meanwhile
     print(f"{TIMES} times: {(after - memory) / 1e6:.2f} MB more, of {memory / 1e6:.0f}")
-    assert TIMES < OFTEN or after - memory < ROOM
+    assert TIMES < MEMORY_CHECK_TIMES or after - memory < MEMORY_LIMIT
 
 
-def same(one, other):
-    """Hold one picture of a scene against another, whose handles and folder of meshes may be others."""
+def assert_same_picture(one, other):
+    """Assert that two pictures of a scene are equal, apart from handles and the folder of meshes."""
     assert sorted(map(repr, one[0].values())) == sorted(map(repr, other[0].values()))
     looks, other_looks = (
         sorted(re.sub("file='.*/", "file='", repr(look)) for look in each[1]) for each in (one, other)
@@ -132,7 +132,7 @@ def same(one, other):
     assert looks == other_looks
 
 
-def test_a_child_script_changes_everything(simulation):
+def test_changes_by_a_child_script_leave_nothing_behind(simulation):
     before = picture(simulation)
     simulation.start()
 
@@ -142,7 +142,7 @@ def test_a_child_script_changes_everything(simulation):
         simulation.context.signals.set(int, "times", 0)
         simulation.step()
 
-    hold_flat(do, simulation)
+    assert_no_growth(do, simulation)
     simulation.context.signals.set(int, "keep", 1)
     simulation.step()
     assert "Sign" not in simulation.context.objects and len(picture(simulation)[0]) > len(before[0]) + 15
@@ -151,7 +151,7 @@ def test_a_child_script_changes_everything(simulation):
 
 
 class Served:
-    """The official client in a thread of its own, while the simulation is served, and stepped, in this one."""
+    """The official client in another thread, while this thread serves and steps the simulation."""
 
     def __init__(self, simulation):
         self.player = Player(simulation, lambda _state: None, simulated_time=False)
@@ -160,7 +160,7 @@ class Served:
         self.sim = self._wait_for(lambda: official_client(self.server.port).require("sim"))
 
     def do(self, action):
-        """Return what an action with the client's `sim` does."""
+        """Return the result of an action with the client's `sim`."""
         return self._wait_for(lambda: action(self.sim))
 
     def _wait_for(self, action):
@@ -177,7 +177,7 @@ class Served:
 
 
 @pytest.mark.parametrize("running", [True, False], ids=["running", "stopped"])
-def test_a_client_changes_everything(simulation, tmp_path, running):
+def test_changes_by_a_client_leave_nothing_behind(simulation, tmp_path, running):
     before = picture(simulation)
     served = Served(simulation)
 
@@ -186,26 +186,26 @@ def test_a_client_changes_everything(simulation, tmp_path, running):
             served.do(lambda sim: sim.startSimulation())
 
         def do(times):
-            served.do(lambda sim: [given["change_all"](sim) for _ in range(times)])
+            served.do(lambda sim: [client_functions["change_all"](sim) for _ in range(times)])
 
-        hold_flat(do, simulation)
-        served.do(lambda sim: [given["change"](sim, kind) for kind in given["MAKE"]])
-        made = picture(simulation)
-        assert len(made[0]) > len(before[0]) + 15
+        assert_no_growth(do, simulation)
+        served.do(lambda sim: [client_functions["change"](sim, kind) for kind in client_functions["MAKE"]])
+        created = picture(simulation)
+        assert len(created[0]) > len(before[0]) + 15
         if not running:
             served.do(lambda sim: sim.startSimulation())
         served.do(lambda sim: sim.stopSimulation())
-        assert picture(simulation) == (before if running else made)
+        assert picture(simulation) == (before if running else created)
         if not running:
             simulation.save_scene(tmp_path / "saved" / "scene.yaml")
             simulation.load_scene(str(tmp_path / "saved" / "scene.yaml"))
-            same(picture(simulation), made)
+            assert_same_picture(picture(simulation), created)
     finally:
         served.close()
 
 
 @pytest.mark.parametrize("running", [True, False], ids=["running", "stopped"])
-def test_a_window_a_client_and_a_program_write_the_same_bytes(simulation, tmp_path, running):
+def test_the_editor_a_client_and_a_program_save_the_same_bytes(simulation, tmp_path, running):
     program, client = tmp_path / "program.yaml", tmp_path / "client.yaml"
     served = Served(simulation)
     try:

@@ -1,4 +1,4 @@
-"""Objects of a scene that come, go and change while it runs and while it is stopped: nothing leaks, stop restores."""
+"""Objects that are added, removed and changed while the simulation runs or is stopped: no leaks, stop restores them."""
 
 import math
 
@@ -12,10 +12,10 @@ TIMES = 20
 
 
 def simulate_with(build):
-    """Return what builds the scene, flown by a script that does nothing."""
+    """Return a function that builds the scene with a script that does nothing."""
     values = {"drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}
-    still = "def sysCall_init(): pass\n"
-    return lambda **options: build(values, scene=yaml.safe_dump(SCENE), python=still, **options)
+    idle_script = "def sysCall_init(): pass\n"
+    return lambda **options: build(values, scene=yaml.safe_dump(SCENE), python=idle_script, **options)
 
 
 @pytest.fixture
@@ -28,8 +28,8 @@ def _simulation(new_shared_simulation):
     return simulate_with(new_shared_simulation)(started=False)
 
 
-def do_all(operations, tree, kind):
-    """Add an object, and do to it all that can be done; return the handles to remove."""
+def apply_all_operations(operations, tree, kind):
+    """Add an object and apply every operation to it; return the handles to remove."""
     (handle,) = operations.add([{"name": "New", "position": [8.0, 0.0, 3.0], **kind}])
     operations.rename(handle, "Renamed")
     operations.set_alias(handle, "alias")
@@ -50,13 +50,13 @@ def test_nothing_leaks(simulate, started):
     before = sizes(simulation)
     for kind in KINDS.values():
         for _ in range(TIMES // (1 if "shape" not in kind else 4)):
-            operations.remove(do_all(operations, tree, kind))
+            operations.remove(apply_all_operations(operations, tree, kind))
         assert sizes(simulation) == before, kind
         if started:
             simulation.step()
 
 
-def test_reading_a_moved_object_does_not_make_its_place_the_initial_one(simulate):
+def test_reading_a_moved_object_does_not_change_its_initial_pose(simulate):
     simulation = simulate(started=False)
     before = picture(simulation)
     simulation.load_scripts()
@@ -68,13 +68,13 @@ def test_reading_a_moved_object_does_not_make_its_place_the_initial_one(simulate
     assert picture(simulation) == before
 
 
-def test_stop_undoes_what_was_done_in_flight(simulate):
+def test_stop_undoes_changes_made_while_running(simulate):
     simulation = simulate(started=False)
     before = picture(simulation)
     simulation.load_scripts()
     operations, tree = simulation.operations, simulation.context.objects
     for kind in KINDS.values():
-        do_all(operations, tree, kind)
+        apply_all_operations(operations, tree, kind)
         operations.rename(tree.handle("Renamed"), f"Kept{len(list(tree))}")
         simulation.step()
     operations.remove([tree.handle("Ball"), tree.handle("Hinge")])
@@ -87,10 +87,10 @@ def test_stop_undoes_what_was_done_in_flight(simulate):
     assert picture(simulation) == before
 
 
-def test_what_was_done_while_stopped_stays_and_is_saved(simulate, tmp_path):
+def test_changes_made_while_stopped_stay_and_are_saved(simulate, tmp_path):
     simulation = simulate(started=False)
     operations, tree = simulation.operations, simulation.context.objects
-    made, _ = do_all(operations, tree, KINDS["free"])
+    created, _ = apply_all_operations(operations, tree, KINDS["free"])
     operations.remove([tree.handle("Sign")])
     operations.paint(tree.handle("Ball"), (0.0, 1.0, 0.0, 1.0))
     operations.rename(tree.handle("Rod"), "Stick")
@@ -101,15 +101,15 @@ def test_what_was_done_while_stopped_stays_and_is_saved(simulate, tmp_path):
         simulation.step()
     assert picture(simulation) != before
     simulation.stop()
-    assert picture(simulation) == before and made in list(simulation.context.objects)
+    assert picture(simulation) == before and created in list(simulation.context.objects)
     simulation.save_scene(tmp_path / "saved.yaml")
     simulation.start(str(tmp_path / "saved.yaml"))
-    again = picture(simulation)
-    assert list(again[0].values()) == list(before[0].values()) and again[1] == before[1]
-    assert np.allclose(again[2], before[2], atol=1e-6) and np.allclose(again[3], before[3], atol=1e-5)
+    reloaded = picture(simulation)
+    assert list(reloaded[0].values()) == list(before[0].values()) and reloaded[1] == before[1]
+    assert np.allclose(reloaded[2], before[2], atol=1e-6) and np.allclose(reloaded[3], before[3], atol=1e-5)
 
 
-def test_joints_hold_what_is_hung_on_them_and_let_go(simulate):
+def test_a_joint_holds_its_child_until_the_child_is_detached(simulate):
     simulation = simulate()
     operations, tree = simulation.operations, simulation.context.objects
     hinge, rod = tree.handle("Hinge"), tree.handle("Rod")
@@ -119,19 +119,19 @@ def test_joints_hold_what_is_hung_on_them_and_let_go(simulate):
     assert abs(speed) > 0.1
     operations.change(rod, mass=2.0)
     assert (tree[hinge].value, tree[hinge].velocity_along) == pytest.approx((angle, speed), abs=1e-6)
-    place, motion = tree[rod].matrix(), tree[rod].body.state[2:]
+    pose, motion = tree[rod].matrix(), tree[rod].body.state[2:]
     operations.set_parent(rod, -1, True)
-    assert tree[rod].matrix() == pytest.approx(place, abs=1e-6) and tree[hinge].drive is None
+    assert tree[rod].matrix() == pytest.approx(pose, abs=1e-6) and tree[hinge].drive is None
     assert np.allclose(tree[rod].body.state[2:], motion, atol=1e-5)
     simulation.step()
-    assert tree[rod].matrix()[11] < place[11], "it falls"
+    assert tree[rod].matrix()[11] < pose[11], "the rod falls"
     operations.set_parent(rod, hinge, True)
     assert tree[hinge].drive is not None and tree[rod].is_held
     operations.remove([hinge])
     assert tree[rod].parent is None and not tree[rod].is_held
 
 
-def test_shapes_without_a_name_come_with_a_model(simulate, tmp_path):
+def test_unnamed_shapes_of_a_model_get_free_names(simulate, tmp_path):
     simulation = simulate(started=False)
     operations, tree = simulation.operations, simulation.context.objects
     box = {"shape": "box", "size": [0.1, 0.1, 0.1], "position": [0, 0, 1]}
@@ -139,12 +139,12 @@ def test_shapes_without_a_name_come_with_a_model(simulate, tmp_path):
     assert [tree[operations.load_model("boxes.yaml")].name for _ in range(2)] == [
         "Cuboid#0",
         "Cuboid#1",
-    ]  # the scene has one
-    assert {"Cuboid0#0", "Cuboid0#1"} <= set(tree.names), "a model's names have one suffix"
+    ]  # the scene has a Cuboid
+    assert {"Cuboid0#0", "Cuboid0#1"} <= set(tree.names), "all names of a model have the same suffix"
     assert tree[tree.handle("Cuboid0#0")].alias == "Cuboid"
 
 
-def test_shapes_are_grouped_and_parted(simulate, tmp_path):
+def test_shapes_are_grouped_and_ungrouped(simulate, tmp_path):
     simulation = simulate(started=False)
     operations, tree = simulation.operations, simulation.context.objects
     ball, sign = tree.handle("Ball"), tree.handle("Sign")
@@ -158,7 +158,7 @@ def test_shapes_are_grouped_and_parted(simulate, tmp_path):
     file = "model.yaml"
     operations.save_model(tree.handle("Post"), file)
     top = operations.load_model(file)
-    names = [tree[one].name for one in operations.model(top)]
+    names = [tree[part].name for part in operations.model(top)]
     assert names == ["Post#0", "Hinge#0", "Rod#0"] and tree[tree.handle("Hinge#0")].drive is not None
     operations.save_model(top, file)
     with pytest.raises(ValueError, match=r"scene\.yaml: is not overwritten"):
@@ -188,7 +188,7 @@ def test_shapes_are_grouped_and_parted(simulate, tmp_path):
         (lambda do, tree: do.add_mesh("x", [0, 0, 0], [0, 1, 2]), "indices: each must be from 0 to 0"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line_and_nothing_is_done(simulation, call, words):
+def test_a_refused_operation_gives_a_one_line_error_and_changes_nothing(simulation, call, words):
     before = picture(simulation), sizes(simulation)
     with pytest.raises(ValueError, match=words) as refused:
         call(simulation.operations, simulation.context.objects)
@@ -228,7 +228,7 @@ def sysCall_sensing():
 """
 
 
-def test_a_script_makes_and_changes_objects(tmp_path, caplog, monkeypatch, new_simulation):
+def test_a_script_creates_and_changes_objects(tmp_path, caplog, monkeypatch, new_simulation):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     caplog.set_level("INFO")
     simulation = new_simulation({"drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}, python=SCRIPT)

@@ -1,4 +1,4 @@
-"""Lockstep without a master: which message is an answer, and when time stands."""
+"""Lockstep without a ROS master: which message counts as an answer, and when simulation time waits."""
 
 from types import SimpleNamespace
 
@@ -18,20 +18,20 @@ SETTLED = 2.0  # s, longer than connections take to settle
 
 
 class Connections:
-    """What rospy would know: one node publishes cmd_vel and is connected to all triggers."""
+    """A substitute for rospy's connections: one node publishes cmd_vel and is connected to all triggers."""
 
     def __init__(self):
-        self.sent, self.received, self.is_there, self.others = {}, ["/drone/cmd_vel"], True, set()
+        self.sent, self.received, self.is_connected, self.other_connections = {}, ["/drone/cmd_vel"], True, set()
         self.opened = []
 
     def publishers_of(self, _topic):
-        if not self.is_there:
+        if not self.is_connected:
             return []
         self.opened.append(SimpleNamespace(callerid_pub=NODE, done=False, socket=1))
         return self.opened[-1:]
 
     def subscribers_of(self, _topic):
-        return [SimpleNamespace(endpoint_id=NODE)] if self.is_there else []
+        return [SimpleNamespace(endpoint_id=NODE)] if self.is_connected else []
 
     def received_topics(self):
         return self.received
@@ -40,29 +40,29 @@ class Connections:
         return self.sent.get(topic, 0)
 
     def all_connections(self):
-        return {("/drone/cmd_vel", NODE), *self.others}
+        return {("/drone/cmd_vel", NODE), *self.other_connections}
 
     def has_queued(self, _connection):
         return False
 
 
 class Stage:
-    """A lockstep on a simulation that only counts steps, at a time that a test sets."""
+    """A lockstep with a simulation that only counts steps and a clock that the test sets."""
 
-    def __init__(self, monkeypatch, **given):
-        self.now, self.taken = 0.0, []
+    def __init__(self, monkeypatch, **overrides):
+        self.now, self.executed = 0.0, []
         self.connections = Connections()
         monkeypatch.setattr(lockstep_module, "connections", self.connections)
         clock = Clock(0.05)
         self.simulation = SimpleNamespace(run=1, steps=0, time=0.0, topology_version=1, clock=clock)
         self.set_cameras("front")
         self.inbox = Inbox()
-        values = parameters.load({"lockstep": {"wait_for": ["cmd_vel"], **given}}).lockstep
+        values = parameters.load({"lockstep": {"wait_for": ["cmd_vel"], **overrides}}).lockstep
         self.lockstep = Lockstep(values, self.simulation, self.inbox, clock=lambda: self.now)
-        self.receive = self.lockstep.gate("drone/cmd_vel", self.taken.append)
+        self.receive = self.lockstep.gate("drone/cmd_vel", self.executed.append)
 
     def set_cameras(self, *names):
-        """Give the vehicle other cameras, as another scene does."""
+        """Replace the cameras of the vehicle, as another scene does."""
         self.camera = SimpleNamespace(image=None, age=0.0)
         owned = SimpleNamespace(cameras={name: SimpleNamespace(topic=name) for name in names})
         cameras = dict.fromkeys(names, self.camera)
@@ -75,7 +75,7 @@ class Stage:
             self.connections.sent[topic] = self.connections.sent_count(topic) + 1
 
     def close_connections(self):
-        self.connections.is_there = False
+        self.connections.is_connected = False
         for each in self.connections.opened:
             each.done = True
 
@@ -84,7 +84,7 @@ class Stage:
         self.receive(SimpleNamespace(_connection_header={"callerid": NODE}, text=text))
 
     def step(self, during=lambda: None):
-        """Run a step; a script does `during`."""
+        """Run a step, in which a script calls `during`."""
         self.lockstep.begin_waits()
         self.simulation.steps += 1
         self.simulation.time = self.simulation.steps * 0.05
@@ -107,7 +107,7 @@ class Stage:
 
     @property
     def texts(self):
-        return [message.text for message in self.taken]
+        return [message.text for message in self.executed]
 
     @property
     def ignored(self):
@@ -116,212 +116,212 @@ class Stage:
 
 @pytest.fixture(name="stage")
 def _stage(monkeypatch):
-    return lambda **given: Stage(monkeypatch, **given)
+    return lambda **overrides: Stage(monkeypatch, **overrides)
 
 
 @pytest.mark.parametrize("trigger", ["step", "odom", "4 steps"])
-def test_the_answer_lets_the_next_step_begin(stage, trigger):
-    one = stage(trigger=trigger).connect()
+def test_the_answer_releases_the_next_step(stage, trigger):
+    setup = stage(trigger=trigger).connect()
     for number in range(8):
-        one.step()
+        setup.step()
         if trigger != "4 steps" or number in (3, 7):
-            assert not one.is_ready()
-            one.answer(number)
-        assert one.is_ready()
-    assert one.texts == ([3, 7] if trigger == "4 steps" else list(range(8)))
+            assert not setup.is_ready()
+            setup.answer(number)
+        assert setup.is_ready()
+    assert setup.texts == ([3, 7] if trigger == "4 steps" else list(range(8)))
 
 
-def test_a_script_that_sends_the_clock_within_the_step_is_answered_at_once(stage):
-    one = stage(trigger="step").connect()
+def test_an_answer_to_a_clock_message_sent_within_the_step_counts(stage):
+    setup = stage(trigger="step").connect()
 
     def sense():
-        one.send("/clock")
-        one.answer("early bird")
+        setup.send("/clock")
+        setup.answer("early bird")
 
-    one.step(sense)
-    assert one.is_ready()
-    assert one.texts == ["early bird"]
-
-
-def test_a_script_that_sends_the_clock_does_not_make_later_answers_early(stage):
-    one = stage(trigger="step").connect()
-    one.lockstep.begin_waits()
-    one.simulation.steps += 1
-    one.send("/clock")  # by the script; the node publishes no second one for the same time
-    one.lockstep.begin_late_waits()
-    one.answer("an answer")
-    assert one.is_ready()
+    setup.step(sense)
+    assert setup.is_ready()
+    assert setup.texts == ["early bird"]
 
 
-def test_an_answer_to_odometry_needs_odometry(stage):
-    one = stage(trigger="odom").connect()
-    one.step(lambda: one.answer("to something else"))
-    assert not one.is_ready()
-    one.answer("to the odometry")
-    assert one.is_ready()
-    assert (one.texts, one.ignored) == (["to the odometry"], "1 early")
+def test_a_clock_message_of_a_script_does_not_make_later_answers_early(stage):
+    setup = stage(trigger="step").connect()
+    setup.lockstep.begin_waits()
+    setup.simulation.steps += 1
+    setup.send("/clock")  # by the script; the simulator publishes no second clock message for the same time
+    setup.lockstep.begin_late_waits()
+    setup.answer("an answer")
+    assert setup.is_ready()
 
 
-def test_a_step_without_a_picture_is_not_awaited(stage):
-    one = stage(trigger="front").connect()
-    one.step()
-    assert one.is_ready()
+def test_an_answer_before_the_odometry_is_ignored(stage):
+    setup = stage(trigger="odom").connect()
+    setup.step(lambda: setup.answer("to something else"))
+    assert not setup.is_ready()
+    setup.answer("to the odometry")
+    assert setup.is_ready()
+    assert (setup.texts, setup.ignored) == (["to the odometry"], "1 early")
+
+
+def test_a_step_without_a_picture_needs_no_answer(stage):
+    setup = stage(trigger="front").connect()
+    setup.step()
+    assert setup.is_ready()
 
     def look():
-        one.camera.image = "a picture"
+        setup.camera.image = "a picture"
 
-    one.step(look)
-    assert not one.is_ready()
-    one.answer("to the picture")
-    assert one.is_ready()
+    setup.step(look)
+    assert not setup.is_ready()
+    setup.answer("to the picture")
+    assert setup.is_ready()
 
 
-def test_an_answer_whose_execution_fails_is_still_an_answer(stage, caplog):
-    one = stage().connect()
+def test_an_answer_counts_even_if_its_execution_fails(stage, caplog):
+    setup = stage().connect()
 
     def fail(_message):
         raise KeyError("a fault of our own")
 
-    one.receive = one.lockstep.gate("drone/cmd_vel", fail)
-    one.step()
-    one.answer("anything")
-    assert one.is_ready()
+    setup.receive = setup.lockstep.gate("drone/cmd_vel", fail)
+    setup.step()
+    setup.answer("anything")
+    assert setup.is_ready()
     assert "a fault of our own" in caplog.text
 
 
-def test_time_stands_until_the_nodes_are_connected_and_says_why(stage, caplog):
-    one = stage()
-    one.connections.is_there = False
-    one.step()
-    one.now += SETTLED
-    assert not one.is_ready()
-    assert "time stands at 0.05 s until there is a publisher of /drone/cmd_vel" in one.lockstep.finding().message
-    one.connections.is_there = True
-    one.connections.others = {("/drone/odom", NODE)}  # the node has just connected
-    assert not one.is_ready()
-    assert one.lockstep.finding().message == "time stands at 0.05 s until connections have settled"
-    one.now += SETTLED
-    assert one.is_ready()
+def test_time_waits_until_the_nodes_are_connected_and_the_reason_is_reported(stage, caplog):
+    setup = stage()
+    setup.connections.is_connected = False
+    setup.step()
+    setup.now += SETTLED
+    assert not setup.is_ready()
+    assert "time stands at 0.05 s until there is a publisher of /drone/cmd_vel" in setup.lockstep.finding().message
+    setup.connections.is_connected = True
+    setup.connections.other_connections = {("/drone/odom", NODE)}  # the node has just connected
+    assert not setup.is_ready()
+    assert setup.lockstep.finding().message == "time stands at 0.05 s until connections have settled"
+    setup.now += SETTLED
+    assert setup.is_ready()
 
 
 @pytest.mark.parametrize("is_before_the_step", [False, True])
-def test_a_node_that_has_gone_is_named_and_a_new_one_is_taken(stage, caplog, is_before_the_step):
-    one = stage().connect()
-    one.step()
-    one.answer("an answer")
-    assert one.is_ready()
-    one.connections.is_there = not is_before_the_step
-    one.step()
+def test_a_lost_node_is_named_and_a_new_node_is_accepted(stage, caplog, is_before_the_step):
+    setup = stage().connect()
+    setup.step()
+    setup.answer("an answer")
+    assert setup.is_ready()
+    setup.connections.is_connected = not is_before_the_step
+    setup.step()
     if not is_before_the_step:
-        one.close_connections()
-    assert not one.is_ready()
+        setup.close_connections()
+    assert not setup.is_ready()
     assert "/drone/cmd_vel: /flyer has gone (the stamp is 0.15 s); waiting for a new one" in caplog.text
-    one.now += SETTLED
-    assert not one.is_ready()
-    one.connections.is_there = True
-    one.is_ready()
-    one.now += SETTLED
-    assert one.is_ready()
+    setup.now += SETTLED
+    assert not setup.is_ready()
+    setup.connections.is_connected = True
+    setup.is_ready()
+    setup.now += SETTLED
+    assert setup.is_ready()
 
 
-def test_nodes_that_have_nothing_to_do_with_the_flight_do_not_delay_it(stage):
-    one = stage()
-    one.step()
-    for number in range(10):  # rostopic, again and again
-        one.connections.others = {("/clock", f"/rostopic_{number}"), ("/tf", f"/rostopic_{number}")}
-        one.is_ready()
-        one.now += 0.4
-    assert one.is_ready()
+def test_unrelated_nodes_do_not_delay_the_flight(stage):
+    setup = stage()
+    setup.step()
+    for number in range(10):  # rostopic is started repeatedly
+        setup.connections.other_connections = {("/clock", f"/rostopic_{number}"), ("/tf", f"/rostopic_{number}")}
+        setup.is_ready()
+        setup.now += 0.4
+    assert setup.is_ready()
 
 
 def test_start_timeout_does_not_count_a_pause(stage):
-    one = stage(on_timeout="end", start_timeout=5.0)
-    one.connections.is_there = False
-    one.step()
-    assert not one.is_ready()
+    setup = stage(on_timeout="end", start_timeout=5.0)
+    setup.connections.is_connected = False
+    setup.step()
+    assert not setup.is_ready()
     for _ in range(10):  # paused
-        one.now += 1.0
-        one.lockstep.skip_pause()
-    assert not one.is_ready()
-    one.now += 6.0
+        setup.now += 1.0
+        setup.lockstep.skip_pause()
+    assert not setup.is_ready()
+    setup.now += 6.0
     with pytest.raises(NoAnswer, match="did not come within 5 s"):
-        one.is_ready()
+        setup.is_ready()
 
 
 def test_timeout_does_not_count_a_pause(stage):
-    one = stage(on_timeout="end", timeout=2.0).connect()
-    one.step()
-    one.now += 100.0
-    one.lockstep.skip_pause()
-    assert not one.is_ready()
-    one.now += 3.0
+    setup = stage(on_timeout="end", timeout=2.0).connect()
+    setup.step()
+    setup.now += 100.0
+    setup.lockstep.skip_pause()
+    assert not setup.is_ready()
+    setup.now += 3.0
     with pytest.raises(NoAnswer, match="/drone/cmd_vel: /flyer has not answered within 2 s"):
-        one.is_ready()
+        setup.is_ready()
 
 
-def test_an_unknown_trigger_is_an_error_at_startup_and_lets_time_stand_in_another_scene(stage):
+def test_an_unknown_trigger_is_a_startup_error_and_stops_time_later(stage):
     with pytest.raises(ParameterError, match="no such trigger; near names are front"):
         stage(trigger="fronnt")
-    one = stage(trigger="front").connect()
-    one.set_cameras("back")
-    one.step()
-    one.now += SETTLED
-    assert not one.is_ready()
-    assert "no such trigger" in one.lockstep.finding().message
-    one.set_cameras("front")
-    one.is_ready()
-    one.now += SETTLED
-    assert one.is_ready()
+    setup = stage(trigger="front").connect()
+    setup.set_cameras("back")
+    setup.step()
+    setup.now += SETTLED
+    assert not setup.is_ready()
+    assert "no such trigger" in setup.lockstep.finding().message
+    setup.set_cameras("front")
+    setup.is_ready()
+    setup.now += SETTLED
+    assert setup.is_ready()
 
 
-def test_a_topic_without_a_listener_is_an_error_at_startup_and_lets_time_stand_later(stage):
-    one = stage()
-    one.connections.received = []
-    one.step()
+def test_a_topic_without_subscriber_is_a_startup_error_and_stops_time_later(stage):
+    setup = stage()
+    setup.connections.received = []
+    setup.step()
     with pytest.raises(ParameterError, match="nothing listens to /drone/cmd_vel"):
-        one.is_ready()
-    one.connections.received = ["/drone/cmd_vel"]
-    one.now += SETTLED
-    assert one.is_ready()
-    one.connections.received = []  # another scene
-    one.simulation.topology_version += 1
-    one.simulation.run, one.simulation.steps = 2, 0
-    one.step()
-    one.now += SETTLED
-    assert not one.is_ready()
-    assert "nothing listens to /drone/cmd_vel" in one.lockstep.finding().message
+        setup.is_ready()
+    setup.connections.received = ["/drone/cmd_vel"]
+    setup.now += SETTLED
+    assert setup.is_ready()
+    setup.connections.received = []  # another scene
+    setup.simulation.topology_version += 1
+    setup.simulation.run, setup.simulation.steps = 2, 0
+    setup.step()
+    setup.now += SETTLED
+    assert not setup.is_ready()
+    assert "nothing listens to /drone/cmd_vel" in setup.lockstep.finding().message
 
 
-def test_a_step_that_failed_before_it_was_published_leaves_nothing_to_ignore(stage):
-    one = stage(timeout=1000.0).connect()
-    one.lockstep.begin_waits()  # then a script fails
-    one.simulation.run, one.simulation.steps = 2, 0
-    one.step()
-    assert not one.is_ready()
-    one.now += SETTLED
-    assert one.is_ready()
+def test_a_step_that_fails_before_publishing_leaves_no_answer_to_ignore(stage):
+    setup = stage(timeout=1000.0).connect()
+    setup.lockstep.begin_waits()  # then a script fails
+    setup.simulation.run, setup.simulation.steps = 2, 0
+    setup.step()
+    assert not setup.is_ready()
+    setup.now += SETTLED
+    assert setup.is_ready()
 
 
 @pytest.mark.parametrize("is_restored", [False, True])
-def test_an_answer_from_before_a_start_or_a_restore_is_ignored(stage, is_restored):
-    one = stage(every=2).connect()
-    one.step()
-    one.step()
-    assert not one.is_ready()
+def test_an_answer_to_a_step_before_a_start_or_restore_is_ignored(stage, is_restored):
+    setup = stage(every=2).connect()
+    setup.step()
+    setup.step()
+    assert not setup.is_ready()
     if is_restored:
-        one.lockstep.reset()
+        setup.lockstep.reset()
     else:
-        one.simulation.run, one.simulation.steps = 2, 0
-        one.step()
-    one.now += 0.2
-    assert not one.is_ready()
-    one.answer("too late")
-    assert not one.texts
-    one.now += SETTLED
-    assert one.is_ready()
-    one.step()
-    assert one.is_ready()
-    one.step()
-    one.answer("in time")
-    assert one.is_ready()
-    assert (one.texts, one.ignored) == (["in time"], "1 of the last run")
+        setup.simulation.run, setup.simulation.steps = 2, 0
+        setup.step()
+    setup.now += 0.2
+    assert not setup.is_ready()
+    setup.answer("too late")
+    assert not setup.texts
+    setup.now += SETTLED
+    assert setup.is_ready()
+    setup.step()
+    assert setup.is_ready()
+    setup.step()
+    setup.answer("in time")
+    assert setup.is_ready()
+    assert (setup.texts, setup.ignored) == (["in time"], "1 of the last run")

@@ -1,11 +1,11 @@
-"""Dummies that scripts make: found by name, carried, taken away, gone after the run, and never too many."""
+"""Dummies that scripts create: names, parents, removal, deletion after the run, and their maximum number."""
 
 import pytest
 
 from drone_sim.scene import operations
 from drone_sim.scripting.errors import ScriptError
 
-MADE = """
+SCRIPT = """
 def sysCall_init():
     self.first, self.second = sim.createDummy(0.01), sim.createDummy(0.01, [1, 0, 0])
     print(sim.getObjectName(self.first), sim.getObjectName(self.second), sim.getObjectAlias(self.second))
@@ -22,9 +22,9 @@ def sysCall_actuation():
 VALUES = {"gravity": 0.0, "drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}
 
 
-def test_a_script_makes_dummies_and_takes_them_away(new_simulation, caplog):
+def test_a_script_creates_and_removes_dummies(new_simulation, caplog):
     caplog.set_level("INFO")
-    simulation = new_simulation(VALUES, python=MADE)
+    simulation = new_simulation(VALUES, python=SCRIPT)
     assert "Dummy0" in simulation.context.objects
     simulation.step()
     assert "Dummy0" not in simulation.context.objects and "Dummy" in simulation.context.objects
@@ -43,7 +43,7 @@ def test_a_script_makes_dummies_and_takes_them_away(new_simulation, caplog):
         ("sim.createPureShape(3, 0, [1, 1, 1], 1)", "primitiveType = 3: must be one of"),
     ],
 )
-def test_what_is_refused(new_simulation, monkeypatch, call, words):
+def test_invalid_calls_that_create_or_remove_objects_are_refused(new_simulation, monkeypatch, call, words):
     monkeypatch.setattr(operations, "MAX_OBJECTS", 20)
     with pytest.raises(ScriptError, match=words):
         new_simulation(VALUES, python=f"def sysCall_init():\n    {call}\n")

@@ -1,4 +1,4 @@
-"""Shapes and mesh files become triangles with the right size, normals and materials."""
+"""Triangles of shapes and mesh files: size, normals and materials."""
 
 import cv2
 import numpy as np
@@ -49,7 +49,7 @@ def test_primitives_have_their_size_are_centred_and_face_outwards(shape, expecte
     assert mesh.vertices.dtype == mesh.normals.dtype == np.float32 and mesh.faces.dtype == np.uint32
 
 
-def test_a_box_is_flat_a_sphere_smooth_and_a_cylinder_both():
+def test_box_normals_are_flat_sphere_normals_smooth_and_cylinder_normals_both():
     (box,) = load(visual(Box((1.0, 1.0, 1.0))))
     assert len(box.vertices) == 24 and (np.abs(box.normals).max(axis=1) == 1.0).all()
     (sphere,) = load(visual(Sphere((1.0,))))
@@ -61,7 +61,7 @@ def test_a_box_is_flat_a_sphere_smooth_and_a_cylinder_both():
     np.testing.assert_allclose(cylinder.normals[~caps], radial / np.linalg.norm(radial, axis=1)[:, None], atol=1e-5)
 
 
-def test_a_plane_is_level_and_has_one_texture_to_the_metre(tmp_path):
+def test_a_plane_is_level_and_repeats_its_texture_every_metre(tmp_path):
     cv2.imwrite(str(tmp_path / "tile.png"), np.zeros((4, 4, 3), np.uint8))
     (plane,) = load(visual(Plane(), tmp_path / "tile.png"))
     assert (plane.vertices[:, 2] == 0).all() and (plane.normals == [0, 0, 1]).all() and not plane.closed
@@ -89,7 +89,7 @@ def test_an_obj_file_with_two_materials_gives_two_parts(tmp_path):
     np.testing.assert_allclose(extents(picture), (2.0, 3.0, 0.0), atol=1e-6)
 
 
-def test_a_texture_given_replaces_that_of_the_file(tmp_path):
+def test_a_texture_parameter_replaces_the_texture_of_the_file(tmp_path):
     cv2.imwrite(str(tmp_path / "other.png"), np.full((2, 2, 4), (1, 2, 3, 128), np.uint8))
     parts = load(mesh_visual(write_two_materials(tmp_path), texture=tmp_path / "other.png"))
     (picture,) = [part for part in parts if part.texture is not None]
@@ -97,7 +97,7 @@ def test_a_texture_given_replaces_that_of_the_file(tmp_path):
     assert picture.transparent
 
 
-def test_an_stl_file_is_white_keeps_its_edges_and_mirrors_inside_in(tmp_path):
+def test_an_stl_file_is_white_with_sharp_edges_and_outward_normals(tmp_path):
     trimesh.creation.box().export(str(tmp_path / "box.stl"))
     for scale in ((1.0, 1.0, 1.0), (-1.0, 2.0, 1.0)):
         (mesh,) = load(mesh_visual(tmp_path / "box.stl", scale))
@@ -110,7 +110,7 @@ def test_a_collada_file_has_its_own_unit_and_colour(tmp_path):
     box = trimesh.creation.box((10, 20, 30))
     material = trimesh.visual.material.PBRMaterial(baseColorFactor=(255, 0, 0, 255))
     box.visual = trimesh.visual.TextureVisuals(material=material)
-    box.vertex_normals = np.zeros_like(box.vertices)  # what is not asked for: trimesh would want scipy for them
+    box.vertex_normals = np.zeros_like(box.vertices)  # otherwise trimesh computes them with scipy
     text = trimesh.exchange.dae.export_collada(box).decode()
     (tmp_path / "box.dae").write_text(text.replace("<up_axis>", '<unit name="centimeter" meter="0.01"/><up_axis>'))
     (mesh,) = load(mesh_visual(tmp_path / "box.dae"))
@@ -119,7 +119,7 @@ def test_a_collada_file_has_its_own_unit_and_colour(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["missing.obj", "garbage.stl", "empty.obj", "picture.png", "broken.dae"])
-def test_a_file_that_cannot_be_read_is_named_in_one_line(tmp_path, name):
+def test_the_error_for_an_unreadable_file_names_it_in_one_line(tmp_path, name):
     if name != "missing.obj":
         (tmp_path / name).write_text("" if name == "empty.obj" else "this is no mesh\n" * 20)
     with pytest.raises(ValueError, match=name) as caught:

@@ -1,4 +1,4 @@
-"""Objects of a scene that somebody holds, and drags about while everything goes on."""
+"""Objects of a scene that are held and dragged while the simulation runs."""
 
 import math
 
@@ -30,7 +30,7 @@ def _simulation(new_shared_simulation):
 
 
 @pytest.fixture(name="drag")
-def _grip(simulation):
+def _drag(simulation):
     simulation.stop()
     simulation.load_scripts()
     return simulation.scene.drag
@@ -53,7 +53,7 @@ def near(place, tolerance=1e-6):
     return pytest.approx(place, abs=tolerance)
 
 
-def test_what_is_held_stands_still_and_falls_when_it_is_let_go(simulation, drag):
+def test_a_held_object_stands_still_and_falls_when_released(simulation, drag):
     for name in ("Ball", "Cuboid"):
         drag.hold(name)
         drag.put(name, at(2, 2, 1.5, yaw=0.5))
@@ -65,17 +65,17 @@ def test_what_is_held_stands_still_and_falls_when_it_is_let_go(simulation, drag)
         assert place(simulation, name)[2] == near(1.5 - 9.81 * 0.25**2 / 2, 0.03)
 
 
-def test_what_hangs_on_it_goes_along(simulation, drag):
+def test_children_move_with_a_dragged_object(simulation, drag):
     drag.put("Table", at(1, 4, 0.6, yaw=math.pi / 2))
     assert place(simulation, "Mark") == near((1, 4, 1.6))
     assert place(simulation, "Foot") == near((1, 4, 0.3))
     run(simulation, 2)
     assert place(simulation, "Foot") == near((1, 4, 0.3))
     drag.put("Foot", at(1, 4, 0.2))
-    assert place(simulation, "Table") == near((1, 4, 0.6)), "but not what it hangs on"
+    assert place(simulation, "Table") == near((1, 4, 0.6)), "the parent stays where it is"
 
 
-def test_what_a_joint_holds_takes_along_what_it_is_held_to(simulation, drag):
+def test_a_dragged_shape_pulls_the_shape_connected_by_its_joint(simulation, drag):
     x, y, z = place(simulation, "Rod")
     drag.hold("Rod")
     drag.put("Rod", at(x + 1, y, z + 1, yaw=0))
@@ -87,7 +87,7 @@ def test_what_a_joint_holds_takes_along_what_it_is_held_to(simulation, drag):
         drag.put("Sign", at(5, 5, 1))
 
 
-def test_a_drone_that_hovers_is_hit(simulation, drag):
+def test_a_dragged_object_pushes_a_hovering_drone(simulation, drag):
     run(simulation, 20)
     before = simulation.drone.body.state.position
     for count in range(20):
@@ -107,14 +107,14 @@ def test_a_drone_that_hovers_is_hit(simulation, drag):
         ("Bal", (0, 0, 1), "no object named 'Bal'; near names are Ball"),
     ],
 )
-def test_bad_places_are_refused(simulation, drag, name, position, words):
+def test_dragging_to_an_invalid_position_is_refused(simulation, drag, name, position, words):
     before = place(simulation, "Ball")
     with pytest.raises(ValueError, match=words):
         drag.put(name, at(*position))
     assert place(simulation, "Ball") == before
 
 
-def test_snapshots_and_a_stop_open_the_hand(simulation, drag):
+def test_restoring_a_snapshot_and_stopping_release_a_held_object(simulation, drag):
     snapshot = simulation.snapshot()
     run(simulation, 3)
     expected = place(simulation, "Ball"), simulation.drone.body.state
@@ -129,10 +129,10 @@ def test_snapshots_and_a_stop_open_the_hand(simulation, drag):
     assert not drag.held and place(simulation, "Ball") == near((3, 0, 0.15))
     drag.put("Ball", at(0, 5, 3))
     run(simulation, 3)
-    assert place(simulation, "Ball")[2] < 2.95, "it has its mass"
+    assert place(simulation, "Ball")[2] < 2.95, "the ball has its mass again"
 
 
-def test_what_a_script_has_made_static_stays_so(simulation, drag):
+def test_an_object_made_static_by_a_script_stays_static(simulation, drag):
     ball = simulation.scene.things()["Ball"]
     drag.hold("Ball")
     ball.set_static(True)
@@ -148,10 +148,10 @@ def test_what_a_script_has_made_static_stays_so(simulation, drag):
     drag.hold("Ball")
     drag.let_go("Ball")
     run(simulation, 3)
-    assert place(simulation, "Ball")[2] < 2.7, "held twice, let go once"
+    assert place(simulation, "Ball")[2] < 2.7, "held twice and released once, the ball is free"
 
 
-def test_every_visual_has_the_name_of_a_thing(simulation):
+def test_every_visual_belongs_to_a_named_object(simulation):
     names = simulation.scene.visual_names()
     assert len(names) == len(simulation.scene.visuals()[0])
     assert {*names} == simulation.scene.things().keys() - {"Mark"}

@@ -1,4 +1,4 @@
-"""The tree of objects when models come and go."""
+"""The tree of objects when models are added and removed."""
 
 import pytest
 
@@ -44,13 +44,13 @@ def test_copies_share_aliases(objects):
     assert [objects.is_copied(name) for name in ("Drone", "base", "Floor", "Drone#0")] == [True, True, False, False]
 
 
-def test_a_name_is_given_once(objects):
+def test_a_name_cannot_be_used_twice(objects):
     with pytest.raises(ValueError, match="Floor"):
         objects.add("Ceiling", also=("Floor",))
     assert names(objects) == ["Floor"] and "Ceiling" not in objects
 
 
-def test_a_name_is_free_again_but_no_handle(objects):
+def test_removal_frees_the_names_but_not_the_handles(objects):
     first, second, third = (add_model(objects, suffix) for suffix in ("", "#0", "#1"))
     objects.remove(second)
     assert names(objects) == ["Floor", "Drone", "base", "target", "Drone#1", "base#1", "target#1"]
@@ -62,7 +62,7 @@ def test_a_name_is_free_again_but_no_handle(objects):
     assert objects.is_copied("base")
 
 
-def test_what_hangs_on_what_goes_stays_where_it_is(objects):
+def test_children_of_a_removed_object_stay_where_they_are(objects):
     model, stone = add_model(objects), objects.add("stone", None, at(5, 0, 0))
     objects.set_parent(model[2], WORLD, True)
     objects.set_parent(stone, model[1], True)
@@ -72,21 +72,21 @@ def test_what_hangs_on_what_goes_stays_where_it_is(objects):
     assert objects[stone].parent is None and frames.position(objects.matrix(stone)) == (5, 2, 0)
 
 
-def test_a_body_that_hangs_on_what_goes_flies_on(objects):
-    class Flying:
+def test_removing_the_parent_of_a_body_does_not_move_the_body(objects):
+    class MovingBody:
         matrix = at(1, 2, 3)
 
         def move(self, pose):
             raise AssertionError("it was stopped")
 
-    model, ball = add_model(objects), objects.add("ball", body=Flying())
+    model, ball = add_model(objects), objects.add("ball", body=MovingBody())
     objects.set_parent(ball, model[0], True)
     objects.remove(model)
     assert frames.position(objects.matrix(ball)) == (1, 2, 3)
 
 
-def test_what_is_put_in_its_own_frame_again_and_again_stays_in_shape(objects):
-    """Rounding errors of its rotation must not grow from one time to the next."""
+def test_repeated_moves_in_its_own_frame_do_not_distort_an_object(objects):
+    """Rounding errors of the rotation must not accumulate."""
     ball = objects.add("ball", None, frames.from_euler((0, 0, 0), (0.3, -0.7, 1.1)))
     ahead = frames.rotate(objects.matrix(ball), (0.01, 0, 0))
     for _ in range(200):
@@ -96,7 +96,7 @@ def test_what_is_put_in_its_own_frame_again_and_again_stays_in_shape(objects):
     assert turn == pytest.approx(at(0, 0, 0), abs=1e-9)
 
 
-def test_a_place_in_another_frame(objects):
+def test_a_position_set_in_another_frame_keeps_the_orientation(objects):
     drone, base, _ = add_model(objects)
     objects.set_matrix(drone, WORLD, frames.from_euler((1, 0, 0), (0, 0, 1.5)))
     turn = frames.to_euler(objects.turn(base))
@@ -105,14 +105,14 @@ def test_a_place_in_another_frame(objects):
     assert frames.position(objects.matrix(base, drone)) == pytest.approx((0, 2, 0), abs=1e-12)
 
 
-def test_a_part_stays_a_part_whatever_it_hangs_on(objects):
+def test_a_part_of_a_model_stays_a_part_under_any_parent(objects):
     root, base, target = add_model(objects)
     objects.set_parent(target, WORLD, True)
     objects.set_parent(objects.handle("Floor"), root, True)
     assert [objects[one].is_part_of(objects[root]) for one in (root, base, target, 0)] == [True, True, True, False]
 
 
-def test_what_came_or_went_since_is_no_part_of_what_is_remembered(objects):
+def test_restoring_a_state_ignores_objects_added_or_removed_since(objects):
     (first, *_), second = add_model(objects), add_model(objects, "#0")
     stone = objects.add("stone", None, at(5, 0, 0))
     objects.set_parent(stone, second[0], True)

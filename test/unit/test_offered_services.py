@@ -1,4 +1,4 @@
-"""Services that a script offers: answered in its turn, refused where it has none any more."""
+"""Services that a script offers: answered at the beginning of a step, refused when the script has ended."""
 
 import logging
 import threading
@@ -19,7 +19,7 @@ end
 function sysCall_actuation() steps = (steps or 0) + 1 end
 function counted(request)
   if request.data then count = count + 1 end
-  return {success = request.data, message = 'step ' .. (steps or 0)}
+  return {success = request.data, message = 'step ' .. (steps or 0) .. ', count ' .. count}
 end
 function number() return 7 end
 function broken() error('no') end
@@ -35,7 +35,7 @@ def sysCall_actuation():
     self.steps += 1
 def counted(request):
     self.count += request['data']
-    return {'success': request['data'], 'message': f'step {self.steps}'}
+    return {'success': request['data'], 'message': f'step {self.steps}, count {self.count}'}
 def number(_request):
     return 7
 def broken(_request):
@@ -47,17 +47,17 @@ class Ros:
     """A backend that offers services to this process."""
 
     def __init__(self):
-        self.asks, self.made = {}, []
+        self.callbacks = {}
 
     def serve(self, name, kind, ask):
         if kind == "no/Type":
             raise ValueError("service type 'no/Type' is not installed")
-        self.asks[name] = ask
-        return lambda: self.asks.pop(name)
+        self.callbacks[name] = ask
+        return lambda: self.callbacks.pop(name)
 
-    def asking(self, name, request=None):
-        """Ask in a thread of its own, as rospy does; return what the answer, or why there is none, comes in."""
-        answers, ask = [], self.asks[name]
+    def call_service(self, name, request=None):
+        """Call a service in another thread, as rospy does; return the thread and a list for the answer or error."""
+        answers, ask = [], self.callbacks[name]
 
         def run():
             try:
@@ -73,7 +73,7 @@ class Ros:
 
 
 @pytest.fixture
-def flying(new_simulation):
+def run_script(new_simulation):
     def fly(**script):
         ros = Ros()
         simulation = new_simulation(**script, backend=ros)
@@ -84,13 +84,13 @@ def flying(new_simulation):
 
 
 @pytest.fixture(name="served", params=[{"lua": LUA}, {"python": PYTHON}], ids=["lua", "python"])
-def _served(request, flying):
-    return flying(**request.param)
+def _served(request, run_script):
+    return run_script(**request.param)
 
 
-def answer_of(simulation, asked):
-    thread, answers = asked
-    assert not answers, "the script is asked in its turn"
+def answer_of(simulation, pending_call):
+    thread, answers = pending_call
+    assert not answers, "the script answers at the beginning of a step"
     try:
         simulation.step()
     finally:
@@ -101,51 +101,52 @@ def answer_of(simulation, asked):
 def test_a_request_is_answered_at_the_beginning_of_the_next_step(served):
     simulation, ros = served
     simulation.step()
-    answer = answer_of(simulation, ros.asking("/drone/count", {"data": True}))
-    assert answer == {"success": True, "message": "step 1"}
-    assert answer_of(simulation, ros.asking("/mute")) == {}, "every field keeps its default"
+    answer = answer_of(simulation, ros.call_service("/drone/count", {"data": True}))
+    assert answer == {"success": True, "message": "step 1, count 1"}
+    assert answer_of(simulation, ros.call_service("/mute")) == {}, "every field keeps its default"
 
 
-def test_a_snapshot_keeps_the_request_that_waits(served):
+def test_a_snapshot_with_a_waiting_request_can_be_restored(served):
     simulation, ros = served
-    asked = ros.asking("/drone/count", {"data": True})
-    kept = simulation.snapshot()
-    assert answer_of(simulation, asked)["message"] == "step 0"
-    simulation.restore(kept)
+    pending_call = ros.call_service("/drone/count", {"data": True})
+    saved_state = simulation.snapshot()
+    assert answer_of(simulation, pending_call)["message"] == "step 0, count 1"
+    simulation.restore(saved_state)
     simulation.step()
-    assert answer_of(simulation, ros.asking("/drone/count", {"data": True}))["message"] == "step 1"
+    # The restored script has answered the waiting request once more.
+    assert answer_of(simulation, ros.call_service("/drone/count", {"data": True}))["message"] == "step 1, count 2"
 
 
-def test_what_is_no_response_is_refused_and_said(served, caplog):
+def test_an_invalid_response_is_refused_and_logged(served, caplog):
     simulation, ros = served
     with caplog.at_level(logging.ERROR):
-        answer = answer_of(simulation, ros.asking("/drone/number"))
+        answer = answer_of(simulation, ros.call_service("/drone/number"))
     assert (
         answer == caplog.messages[-1] == "the callback of a service must return a table of the response's fields, not 7"
     )
     simulation.step()
 
 
-def test_a_callback_that_fails_ends_the_script_and_refuses_who_asked(served):
+def test_a_failing_callback_ends_the_script_and_refuses_the_request(served):
     simulation, ros = served
-    asked = ros.asking("/drone/broken")
+    pending_call = ros.call_service("/drone/broken")
     with pytest.raises(ScriptError, match=r"\[broken\] .*no"):
-        answer_of(simulation, asked)
-    assert asked[1][0].startswith("[broken] ") and asked[1][0].endswith("no")
+        answer_of(simulation, pending_call)
+    assert pending_call[1][0].startswith("[broken] ") and pending_call[1][0].endswith("no")
 
 
-def test_who_waits_is_refused_when_the_simulation_stops(served):
+def test_a_waiting_request_is_refused_when_the_simulation_stops(served):
     simulation, ros = served
-    thread, answers = ros.asking("/drone/count", {"data": True})
-    ask = ros.asks["/drone/count"]
+    thread, answers = ros.call_service("/drone/count", {"data": True})
+    ask = ros.callbacks["/drone/count"]
     simulation.stop()
     thread.join(10)
-    assert answers == ["the script ended before it answered"] and not ros.asks
+    assert answers == ["the script ended before it answered"] and not ros.callbacks
     with pytest.raises(Unanswered, match="no longer"):
         ask(None, dict)
 
 
-def test_who_waits_in_vain_is_refused_and_the_script_is_not_asked_later():
+def test_a_request_that_times_out_is_refused_and_abandoned():
     waiting = []
     server = ServiceServer(waiting.append, patience=0.0)
     with pytest.raises(Unanswered, match="no answer within 0 s: the simulation is paused, or steps too slowly"):
@@ -163,13 +164,13 @@ def test_who_waits_in_vain_is_refused_and_the_script_is_not_asked_later():
         ("'count', 'std_srvs/Trigger'", "wrong number of values"),
     ],
 )
-def test_a_wrong_service_is_one_line(flying, arguments, said):
+def test_invalid_arguments_of_advertise_service_are_refused(run_script, arguments, said):
     text = f"function sysCall_init() simROS.advertiseService({arguments}) end function counted() end"
     with pytest.raises(ScriptError, match=said):
-        flying(lua=text)
+        run_script(lua=text)
 
 
-def test_a_handle_of_a_service_is_no_subscription_and_ends_once(flying):
+def test_a_service_handle_is_shut_down_once_and_only_as_a_service(run_script):
     text = """function sysCall_init()
       server = simROS.advertiseService('a', 'std_srvs/Empty', 'f')
       assert(not pcall(simROS.shutdownSubscriber, server))
@@ -178,5 +179,5 @@ def test_a_handle_of_a_service_is_no_subscription_and_ends_once(flying):
       simROS.advertiseService('a', 'std_srvs/Empty', 'f')
     end
     function f() end"""
-    _, ros = flying(lua=text)
-    assert set(ros.asks) == {"/drone/a"}
+    _, ros = run_script(lua=text)
+    assert set(ros.callbacks) == {"/drone/a"}

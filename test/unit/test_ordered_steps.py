@@ -16,7 +16,7 @@ def sysCall_sensing():
 
 @pytest.fixture(name="begin")
 def _begin(tmp_path, new_simulation):
-    """Return a function that makes a paused player; its script is in script.py."""
+    """Return a function that creates a paused player and returns it with the path of its script."""
 
     def begin(text="", step=None):
         path = tmp_path / "script.py"
@@ -41,7 +41,7 @@ def test_orders_are_executed_one_after_the_other(begin):
     assert not player.is_step_due and player.paused
 
 
-def test_steps_cannot_be_ordered_while_it_flies_or_is_stopped(begin):
+def test_steps_cannot_be_ordered_while_running_or_stopped(begin):
     player, _ = begin()
     player.pause(False)
     with pytest.raises(ValueError, match="not paused"):
@@ -53,7 +53,7 @@ def test_steps_cannot_be_ordered_while_it_flies_or_is_stopped(begin):
 
 
 @pytest.mark.parametrize("interrupt", [Player.stop, Player.start, Player.restart, lambda player: player.pause(False)])
-def test_what_ends_the_pause_interrupts_all_orders(begin, interrupt):
+def test_ending_the_pause_interrupts_all_orders(begin, interrupt):
     player, _ = begin()
     orders = [player.order_steps(3), player.order_steps(4)]
     player.step()
@@ -73,14 +73,14 @@ def test_a_breakpoint_ends_all_orders(begin):
     assert not player.is_step_due
 
 
-def test_a_failing_script_is_the_answer_to_all_orders(begin):
+def test_a_failing_script_fails_all_orders(begin):
     player, _ = begin("def sysCall_sensing():\n    1 / 0\n")
     orders = [player.order_steps(3), player.order_steps(1)]
     assert not player.step()
     assert all(isinstance(order.exception(0), ScriptError) for order in orders)
 
 
-def test_divergence_is_the_answer_too(begin):
+def test_divergence_fails_an_order(begin):
     def diverge():
         raise Diverged("the simulation has diverged")
 

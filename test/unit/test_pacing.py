@@ -1,4 +1,4 @@
-"""Pacing against a clock that the test turns."""
+"""Pacing against a clock that the test advances."""
 
 import pytest
 
@@ -34,7 +34,7 @@ def passes(pacer, clock, works):
     return times
 
 
-def make(period=0.05):
+def make_pacer(period=0.05):
     clock = Clock()
     return Pacer(period, clock, clock.sleep), clock
 
@@ -43,20 +43,20 @@ def make(period=0.05):
     "period, works, times, overruns",
     [
         (0.05, [0.01] * 4, [0.05, 0.1, 0.15, 0.2], 0),
-        (0.0, [0.01] * 4, [0.0, 0.01, 0.02, 0.03], 0),  # as fast as it can
+        (0.0, [0.01] * 4, [0.0, 0.01, 0.02, 0.03], 0),  # as fast as possible
         (0.05, [0.01, 0.06, 0.045, 0.01, 0.01], [0.05, 0.1, 0.16, 0.205, 0.25], 2),  # 10 and 5 ms late
         (0.05, [0.01, 0.4, *[0.01] * 5], [0.05, 0.1, 0.5, 0.51, 0.52, 0.53, 0.54], 5),  # 0.2 of 0.35 s are caught up
         (0.05, [0.07] * 4, [0.05, 0.12, 0.19, 0.26], 3),  # always too slow
     ],
 )
 def test_one_pass_per_period_and_a_short_delay_is_caught_up(period, works, times, overruns):
-    pacer, clock = make(period)
+    pacer, clock = make_pacer(period)
     assert passes(pacer, clock, works) == times
     assert pacer.overruns == overruns
 
 
-def test_a_period_is_late_if_it_began_late_without_an_excuse():
-    pacer, clock = make()
+def test_a_period_is_late_if_it_began_late_and_is_not_excused():
+    pacer, clock = make_pacer()
     late = []
     for work in (0.01, 0.07, 0.01, 0.07, 0.01):
         late.append(round(pacer.wait(), 9))
@@ -68,18 +68,18 @@ def test_a_period_is_late_if_it_began_late_without_an_excuse():
     pacer.wait()
     assert pacer.is_late
     pacer.excuse()
-    assert not pacer.is_late, "as in a pause"
+    assert not pacer.is_late, "as after a pause"
 
 
-def test_late_wake_ups_do_not_add_up():
-    pacer, clock = make()
+def test_late_wake_ups_do_not_accumulate():
+    pacer, clock = make_pacer()
     clock.late_by = 0.003
     assert passes(pacer, clock, [0.01] * 100)[-1] == round(100 * 0.05 + 0.003, 9)
     assert pacer.overruns == 0
 
 
-def test_a_step_that_others_held_up_is_not_late():
-    pacer, clock = make()
+def test_an_excused_step_is_not_late():
+    pacer, clock = make_pacer()
     passes(pacer, clock, [0.12])
     pacer.excuse()
     assert pacer.wait() == 0.0 and pacer.overruns == 0
@@ -88,7 +88,7 @@ def test_a_step_that_others_held_up_is_not_late():
 
 
 def test_a_long_sleep_ends_when_interrupted():
-    pacer, clock = make(period=60.0)
+    pacer, clock = make_pacer(period=60.0)
     pacer.wait(lambda: clock.now > 101.0)
     assert 101.0 < clock.now < 101.2
 
@@ -96,14 +96,14 @@ def test_a_long_sleep_ends_when_interrupted():
 def test_a_throttle_passes_once_a_period():
     clock = Clock()
     throttle = Throttle(0.25, clock)
-    passed = []
+    results = []
     for _ in range(9):
-        passed.append(throttle.passes())
+        results.append(throttle.passes())
         clock.work(0.125)
-    assert passed == [True, False] * 4 + [True]
+    assert results == [True, False] * 4 + [True]
 
 
-def test_a_beat_is_soon_after_a_change_and_seldom_without_one():
+def test_a_beat_comes_sooner_after_a_change():
     clock = Clock()
     beat = Beat(0.25, 1.0, clock)
     assert (beat.left(changed=True), beat.left(changed=False)) == (0.25, 1.0)
@@ -113,19 +113,19 @@ def test_a_beat_is_soon_after_a_change_and_seldom_without_one():
     assert (beat.left(changed=True), beat.left(changed=False)) == (0.25, 1.0)
 
 
-def test_another_period_holds_for_the_step_that_is_waited_for():
-    pacer, clock = make(50.0)
+def test_a_changed_period_applies_to_the_current_wait():
+    pacer, clock = make_pacer(50.0)
     assert pacer.is_far
     clock.work(1.0)
     pacer.change(0.05)
     assert not pacer.is_far and passes(pacer, clock, [0.01] * 3) == [1.0, 1.05, 1.1]
-    assert pacer.overruns == 0, "nobody was late"
+    assert pacer.overruns == 0, "no step was late"
     pacer.change(0.2)
     assert passes(pacer, clock, [0.01] * 2) == [1.3, 1.5]
 
 
-def test_a_pace_without_an_end_begins_and_ends():
-    pacer, clock = make()
+def test_changing_to_an_unlimited_pace_and_back():
+    pacer, clock = make_pacer()
     pacer.change(0.0)
     assert passes(pacer, clock, [0.01] * 3) == [0.0, 0.01, 0.02]
     pacer.change(0.05)
@@ -133,7 +133,7 @@ def test_a_pace_without_an_end_begins_and_ends():
     assert pacer.overruns == 0
 
 
-# ---- the real-time factor in flight
+# ---- changes of the real-time factor while running
 
 
 @pytest.fixture(name="simulation", scope="module")
@@ -151,7 +151,7 @@ def _pace(simulation, pacer):
     return Pace(simulation, pacer)
 
 
-def test_a_factor_holds_through_every_start(pace, simulation):
+def test_a_changed_real_time_factor_survives_every_start(pace, simulation):
     for factor in (4.0, 0.0, 0.5):
         pace.change({"real_time_factor": factor})
         simulation.start()
@@ -160,7 +160,7 @@ def test_a_factor_holds_through_every_start(pace, simulation):
     assert simulation.parameters.with_vehicles({"one": {}}).real_time_factor == 0.5
 
 
-def test_the_next_steps_come_as_it_says(pace, pacer):
+def test_a_changed_real_time_factor_applies_to_the_next_steps(pace, pacer):
     pace.change({"real_time_factor": 0.01})
     assert pacer.is_far
     pace.change({"real_time_factor": 0})
@@ -184,7 +184,7 @@ def test_a_wrong_factor_changes_nothing(pace, changes, said):
     assert pace.values() == {"real_time_factor": 3.0}
 
 
-def test_a_pace_is_not_blamed_for_the_one_before(pace, pacer, simulation):
+def test_a_finding_does_not_span_a_change_of_pace(pace, pacer, simulation):
     player = Player(simulation, lambda _state: None, simulated_time=False)
     pace.change({"real_time_factor": 1.0})
     before = count(player, pacer, 0.0)

@@ -1,4 +1,4 @@
-"""What is imported is declared: in package.xml for rosdep, in requirements*.txt for pip; what is there is installed."""
+"""Imports are declared in package.xml (rosdep) and requirements*.txt (pip), and all files are installed."""
 
 import ast
 import os
@@ -19,7 +19,7 @@ from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 
 ROOT = package_path()
 SOURCE = ROOT / "src"
-# Where the key of rosdep, or the name that pip knows, is not that of the module.
+# Modules whose rosdep key or pip name differs from the name of the module.
 KEYS = {
     "PIL": "python3-pil",
     "annotated_types": "python3-pydantic-pip",
@@ -38,23 +38,23 @@ KEYS = {
     "trimesh": "python3-trimesh-pip",
     "websockets": "python3-websockets-pip",
 }
-# Imported by name, by trimesh, and what the launch file starts.
+# Imported by name or by trimesh, or started by the launch file.
 INDIRECT = {"python3-lupa-pip", "python3-pycollada-pip", "rviz"}
-# Used where they are: Debian has no package of the first, and JupyterHub starts what needs the others.
+# Used if installed: Debian has no package of the first, and JupyterHub itself starts the code for the others.
 OPTIONAL = {"vision_msgs", "jupyterhub", "tornado"}
 
 
 def imported():
-    """Return the modules of others that the package imports."""
+    """Return the third-party modules that the package imports."""
     files = [*(ROOT / "src").rglob("*.py"), *(one for one in (ROOT / "scripts").iterdir() if one.is_file())]
-    found = set()
+    imports = set()
     for file in files:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             names = [one.name for one in node.names] if isinstance(node, ast.Import) else []
             names += [node.module] if isinstance(node, ast.ImportFrom) and node.level == 0 else []
-            found |= {name.partition(".")[0] for name in names}
-    beside = {file.stem for file in (SOURCE / "drone_sim/child_scripts").glob("*.py")}  # of each other
-    return found - set(sys.stdlib_module_names) - beside - {"drone_sim"} | (found & {"tkinter"})
+            imports |= {name.partition(".")[0] for name in names}
+    child_scripts = {file.stem for file in (SOURCE / "drone_sim/child_scripts").glob("*.py")}  # they import each other
+    return imports - set(sys.stdlib_module_names) - child_scripts - {"drone_sim"} | (imports & {"tkinter"})
 
 
 def test_every_module_has_its_key_in_package_xml():
@@ -76,7 +76,7 @@ def test_rosdep_and_pip_take_the_same_versions():
 
 
 def test_the_version_is_the_same_everywhere():
-    """package.xml has it; the changelog's newest section and the citation say the same, with one date."""
+    """package.xml, the changelog's newest section and the citation agree; the last two also in the date."""
     changelog = (ROOT / "CHANGELOG.rst").read_text(encoding="utf-8")
     newest = re.search(r"^(\d+\.\d+\.\d+) \((\d{4}-\d\d-\d\d)\)\n-+$", changelog, re.MULTILINE).groups()
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
@@ -85,7 +85,7 @@ def test_the_version_is_the_same_everywhere():
 
 
 @pytest.mark.ros
-def test_the_node_imports_neither_what_takes_long_nor_what_setup_leaves_out():
+def test_the_node_imports_neither_slow_modules_nor_packages_left_out_of_setup():
     program = (
         "import sys, drone_sim.ros.node.node\n"
         "from drone_sim.run import parameters, simulation\n"
@@ -96,7 +96,7 @@ def test_the_node_imports_neither_what_takes_long_nor_what_setup_leaves_out():
         "flown.close()\n"
     )
     ours = {"PYTHONPATH": python_path(os.environ.get("PYTHONPATH", ""))}
-    done = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-c", program],
         env=os.environ | ours,
         stdout=subprocess.PIPE,
@@ -104,30 +104,30 @@ def test_the_node_imports_neither_what_takes_long_nor_what_setup_leaves_out():
         check=True,
         timeout=100,
     )
-    imported_by_then = {name.partition(".")[0] for name in done.stdout.split()}
+    imported_by_then = {name.partition(".")[0] for name in result.stdout.split()}
     assert "pybullet" in imported_by_then
     slow = {"collada", "lxml", "manifold3d", "trimesh", "cbor2", "zmq"}
     assert not imported_by_then & {*slow, *SEPARATE, "tkinter"}
-    assert "drone_sim.importing.scene_folder" not in done.stdout.split()
+    assert "drone_sim.importing.scene_folder" not in result.stdout.split()
 
 
 def test_every_file_of_the_package_is_installed():
-    """Modules are found by themselves; whatever else lies among them is named in setup.py."""
+    """Modules are found automatically; setup.py must name all other files among them."""
     (data,) = (
         ast.literal_eval(one.value)
         for node in ast.walk(ast.parse((ROOT / "setup.py").read_text(encoding="utf-8")))
         for one in getattr(node, "keywords", ())
         if one.arg == "package_data"
     )
-    named = {
+    listed_files = {
         path for name, globs in data.items() for one in globs for path in (SOURCE / name.replace(".", "/")).glob(one)
     }
     files = [path for path in (SOURCE / "drone_sim").rglob("*") if path.is_file()]
-    there = {path for path in files if path.suffix not in (".py", ".pyc")}
-    assert there and there == named
+    other_files = {path for path in files if path.suffix not in (".py", ".pyc")}
+    assert other_files and other_files == listed_files
 
 
-def test_what_pip_installs_flies_without_ros_and_checkout(tmp_path):
+def test_a_pip_installation_flies_without_ros_and_checkout(tmp_path):
     pytest.importorskip("setuptools")
     egg_info, build = ("egg_info", "--egg-base", str(tmp_path)), ("build", "--build-base", str(tmp_path / "build"))
     command = ["setup.py", *egg_info, *build, "install", "--root", str(tmp_path / "root"), "--prefix", "/usr"]
@@ -146,7 +146,7 @@ def test_what_pip_installs_flies_without_ros_and_checkout(tmp_path):
         "sys.argv[1:] = ['fly', '--duration', '0.1']\n"
         "runpy.run_module('drone_sim', run_name='__main__')\n"
     )
-    done = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-c", program],
         cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": str(module.parents[1])},
@@ -155,15 +155,15 @@ def test_what_pip_installs_flies_without_ros_and_checkout(tmp_path):
         check=True,
         timeout=100,
     )
-    place, summary = done.stdout.splitlines()
+    place, summary = result.stdout.splitlines()
     assert place == str(module) and summary.startswith("flew 0.10 s")
 
 
-def test_an_unknown_command_of_the_module_is_one_line():
+def test_an_unknown_command_of_the_module_gives_a_one_line_error():
     command = [sys.executable, "-m", "drone_sim", "flyy"]
-    done = subprocess.run(command, env=os.environ | {"PYTHONPATH": python_path()}, capture_output=True, timeout=100)
-    assert done.returncode == 1
-    assert done.stderr.count(b"\n") == 1 and b"fly, grade, sweep, import_scene" in done.stderr
+    result = subprocess.run(command, env=os.environ | {"PYTHONPATH": python_path()}, capture_output=True, timeout=100)
+    assert result.returncode == 1
+    assert result.stderr.count(b"\n") == 1 and b"fly, grade, sweep, import_scene" in result.stderr
 
 
 def test_every_script_that_the_editor_offers_is_installed(tmp_path):
@@ -180,8 +180,8 @@ def test_other_processes_find_our_environment_before_the_system():
     assert (first, second, others) == (sysconfig.get_path("purelib"), str(SOURCE), "/others")
 
 
-def test_a_package_that_is_nowhere_near_is_named(monkeypatch):
-    """From a checkout directly below /, too, which has no share/ above it."""
+def test_the_error_for_a_missing_package_folder_names_the_searched_folder(monkeypatch):
+    """The checkout may be directly below /, without a share/ above it."""
     monkeypatch.setattr(resources, "_HERE", Path("/no_drone_sim/src/drone_sim/files/resources.py"))
     with pytest.raises(FileNotFoundError, match="near /no_drone_sim/src/drone_sim/files"):
         package_path()

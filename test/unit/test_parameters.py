@@ -1,4 +1,4 @@
-"""Parameters: checked when read, one line for a mistake."""
+"""Parameters are checked when they are read; an error has one line."""
 
 from typing import Annotated, Literal
 
@@ -86,7 +86,7 @@ BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
         ({"script": "a\nb.py"}, "must be printable"),
     ],
 )
-def test_a_mistake_gets_one_line(overrides, message):
+def test_an_invalid_parameter_raises_a_one_line_error(overrides, message):
     with pytest.raises(parameters.ParameterError) as refused:
         parameters.load(overrides)
     assert message in str(refused.value)
@@ -131,7 +131,7 @@ def test_every_wrong_key_of_a_config_file_is_named_with_its_line(tmp_path):
         ("- 1", "must hold `key: value` lines"),
     ],
 )
-def test_a_mistake_in_a_config_file_has_its_line(tmp_path, text, words):
+def test_an_error_in_a_config_file_names_its_line(tmp_path, text, words):
     file = tmp_path / "my.yaml"
     file.write_text(text)
     with pytest.raises(parameters.ParameterError) as refused:
@@ -139,7 +139,7 @@ def test_a_mistake_in_a_config_file_has_its_line(tmp_path, text, words):
     assert str(refused.value).startswith(f"{file}: {words}") and "\n" not in str(refused.value)
 
 
-def test_all_mistakes_of_a_command_line_are_named():
+def test_all_errors_of_a_command_line_are_reported():
     with pytest.raises(parameters.ParameterError) as refused:
         parameters.load({"gravity": "down", "control": {"Kzreff": 3}})
     assert str(refused.value) == (
@@ -160,7 +160,7 @@ def test_no_limits_can_be_written_as_a_word(word):
 
 
 @pytest.mark.parametrize("topics, wanted", [("none", []), ("", []), ("goto, cmd_vel", ["goto", "cmd_vel"])])
-def test_topics_of_lockstep_can_be_a_text(topics, wanted):
+def test_lockstep_topics_can_be_given_as_a_string(topics, wanted):
     assert [each.topic for each in parameters.load({"lockstep": {"wait_for": topics}}).lockstep.wait_for] == wanted
 
 
@@ -169,7 +169,7 @@ def test_parameters_are_frozen():
         parameters.load().control.Kzref = 1.0
 
 
-def test_a_deep_value_is_cut_before_it_is_shown():
+def test_a_deeply_nested_value_is_shortened_in_the_error():
     deep = value = {}
     for _ in range(50_000):
         value["a"] = value = {}
@@ -178,17 +178,17 @@ def test_a_deep_value_is_cut_before_it_is_shown():
     assert len(str(refused.value)) < 200
 
 
-def test_what_yaml_1_1_takes_for_a_text_is_a_number():
+def test_a_number_that_yaml_1_1_reads_as_a_string_is_accepted():
     assert parameters.load({"gravity": "1e1"}).gravity == 10.0
 
 
 @pytest.mark.parametrize("name", ["Floor", "Drone", "target", "Track_base"])
-def test_a_camera_is_not_called_like_an_object_that_there_is(name):
+def test_a_camera_cannot_have_the_name_of_an_existing_object(name):
     with pytest.raises(parameters.ParameterError, match=f"an object named '{name}' already exists"):
         Simulation(parameters.load({"cameras": {"front": {"object": name}}}))
 
 
-def test_a_config_file_lies_between_the_defaults_and_what_is_given(tmp_path):
+def test_a_config_file_overrides_defaults_and_arguments_override_the_config_file(tmp_path):
     config = tmp_path / "config.yaml"
     config.write_text("gravity: -1\ncontrol: {Kzref: 1, Dzref: 2}")
     loaded = parameters.load({"config": str(config), "control": {"Kzref": 4}})
@@ -196,7 +196,7 @@ def test_a_config_file_lies_between_the_defaults_and_what_is_given(tmp_path):
     assert loaded.in_scene("").gravity == -1.0
 
 
-def test_the_files_that_a_config_file_names_lie_beside_it(tmp_path):
+def test_file_names_in_a_config_file_are_relative_to_it(tmp_path):
     (tmp_path / "own.urdf").write_text((package_path() / "urdf" / "drone.urdf").read_text())
     (tmp_path / "room.yaml").write_text("floor: {size: 7}")
     config = tmp_path / "config.yaml"
@@ -209,7 +209,7 @@ def test_the_files_that_a_config_file_names_lie_beside_it(tmp_path):
     assert parameters.load({"config": str(config)}).script == "target"
 
 
-# ---- choices by one word of a YAML file
+# ---- models that the key `kind` selects
 
 
 class Ranger(Checked):
@@ -250,7 +250,7 @@ class Sensors(Checked):
         ({"sensors": {}, "places": [{}]}, "places/0/kind: missing; must be one of 'ultrasonic', 'laser', 'scale'"),
     ],
 )
-def test_a_wrong_choice_gets_one_line(given, told):
+def test_an_invalid_kind_or_field_gives_one_error(given, told):
     with pytest.raises(ValidationError) as refused:
         Sensors.model_validate(given)
     (problem,) = problems(refused.value, Sensors)

@@ -1,4 +1,4 @@
-"""simOMPL: paths around obstacles in Lua and Python, without a trace in the flight."""
+"""simOMPL: paths around obstacles in Lua and Python, planned without any effect on the flight."""
 
 import threading
 
@@ -61,7 +61,7 @@ def is_free(state):
 def sysCall_actuation():
     pass
 """
-FLAT = """
+V_REP_3 = """
 if sim_call_type == sim_childscriptcall_initialization then
     local probe = simGetObjectHandle('Probe')
     local t = simExtOMPL_createTask('t')
@@ -79,14 +79,14 @@ end
 
 @pytest.fixture(name="fly")
 def _fly(tmp_path, new_simulation):
-    """Return a function that flies some steps with a script on the dummy, and returns the simulation."""
+    """Return a function that runs some steps with a script on the dummy and returns the simulation."""
 
     def fly(text, steps=3, **overrides):
         path = tmp_path / ("own.py" if "def sysCall" in text else "own.lua")
         path.write_text(text)
         scripts = [{"object": "Way", "script": str(path)}] if text else []
-        flown = {"drone": {"position": [-1.0, 0.0, 0.5]}, "scene": {**SCENE, "scripts": scripts}, **overrides}
-        simulation = new_simulation(flown)
+        settings = {"drone": {"position": [-1.0, 0.0, 0.5]}, "scene": {**SCENE, "scripts": scripts}, **overrides}
+        simulation = new_simulation(settings)
         for _ in range(steps):
             simulation.step()
         return simulation
@@ -95,9 +95,9 @@ def _fly(tmp_path, new_simulation):
 
 
 def planned(simulation, size):
-    """Return whether a path was found, its states, and the third value that the script told."""
-    solved, path, told = Packing().unpackTable(simulation.context.signals.get(str, "path"))
-    return solved, [path[index : index + size] for index in range(0, len(path), size)], told
+    """Return whether a path was found, its states, and the third value that the script stored."""
+    solved, path, third_value = Packing().unpackTable(simulation.context.signals.get(str, "path"))
+    return solved, [path[index : index + size] for index in range(0, len(path), size)], third_value
 
 
 def crosses(states):
@@ -108,7 +108,7 @@ def crosses(states):
 @pytest.mark.parametrize(
     ("robot", "kind", "size"), [("Probe", "position3d", 3), ("Ball", "pose3d", 7), ("Quadcopter", "pose3d", 7)]
 )
-def test_a_path_leads_around_the_wall_and_leaves_no_trace(fly, robot, kind, size):
+def test_planning_finds_a_path_around_the_wall_and_changes_no_state(fly, robot, kind, size):
     text = LUA.replace("ROBOT", robot).replace("KIND", kind)
     if robot != "Probe":
         text = text.replace("sysCall_init", "plan").replace(
@@ -124,9 +124,9 @@ def test_a_path_leads_around_the_wall_and_leaves_no_trace(fly, robot, kind, size
     assert simulation.drone.body.teleports == plain.drone.body.teleports
 
 
-def test_a_python_scripts_function_decides_which_states_are_valid(fly):
-    solved, states, was_asked = planned(fly(PYTHON), 3)
-    assert solved and was_asked and not crosses(states) and states[-1] == pytest.approx([1, 0, 1])
+def test_a_python_callback_decides_which_states_are_valid(fly):
+    solved, states, was_called = planned(fly(PYTHON), 3)
+    assert solved and was_called and not crosses(states) and states[-1] == pytest.approx([1, 0, 1])
 
 
 THREADS = {
@@ -173,13 +173,13 @@ end
 
 
 @pytest.mark.parametrize("language", THREADS)
-def test_a_thread_is_not_switched_while_its_function_checks_states(fly, language):
+def test_a_thread_is_not_switched_while_its_callback_checks_states(fly, language):
     solved, states, different_times = planned(fly(THREADS[language], 20), 3)
     assert solved and not crosses(states) and different_times == 1
 
 
-def test_the_names_and_numbers_of_v_rep_3_serve_old_scripts(fly, caplog):
-    solved, states, _ = planned(fly(FLAT), 3)
+def test_names_and_constants_of_v_rep_3_are_supported(fly, caplog):
+    solved, states, _ = planned(fly(V_REP_3), 3)
     assert solved and not crosses(states)
     assert "simExtOMPL_setAlgorithm: the package ompl has no BiTRRT, RRTConnect plans instead" in caplog.text
 
@@ -256,13 +256,13 @@ def sysCall_actuation(): pass
          "PRM cannot call a function of the script"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_one_line(fly, caplog, call, said):
+def test_the_error_of_a_wrong_call_is_logged(fly, caplog, call, said):
     fly(CALLS.replace("CALL", call).replace("BODY", "1 / 0"))
     assert said in caplog.text
 
 
 @pytest.mark.parametrize("algorithm", [30007, 30016, 30018])
-def test_a_function_that_hangs_is_stopped(fly, caplog, algorithm):
+def test_a_hanging_validation_callback_is_stopped(fly, caplog, algorithm):
     call = f"simOMPL.setAlgorithm(task, {algorithm}); simOMPL.setStateValidationCallback(task, is_free)"
     call += "; simOMPL.solve(task, 60)"
     simulation = fly(CALLS.replace("CALL", call).replace("BODY", "while True: pass"), script_time_limit=0.2)
@@ -270,18 +270,18 @@ def test_a_function_that_hangs_is_stopped(fly, caplog, algorithm):
     assert simulation.context.objects.named("Probe").matrix()[3] == -1
 
 
-def test_a_remote_client_plans_with_coppeliasims_own_library():
-    over, listening, found = threading.Event(), threading.Event(), []
+def test_a_remote_client_plans_through_coppeliasims_client_library():
+    finished, listening, ports = threading.Event(), threading.Event(), []
 
     def serve():
         values = {"real_time_factor": 0, "remote_api": {"serve": True, "port": 0}, "scene": SCENE}
-        play(parameters.load(values), over.is_set, lambda server: (found.append(server.port), listening.set()))
+        play(parameters.load(values), finished.is_set, lambda server: (ports.append(server.port), listening.set()))
 
     thread = threading.Thread(target=serve)
     thread.start()
     try:
         assert listening.wait(60)
-        client = official_client(found[0])
+        client = official_client(ports[0])
         sim, planner = client.require("sim"), client.require("simOMPL")
         probe, task = sim.getObject("/Probe"), planner.createTask("t")
         space = planner.createStateSpace("p", planner.StateSpaceType.position3d, probe, [-2, -2, 0], [2, 2, 3])
@@ -296,5 +296,5 @@ def test_a_remote_client_plans_with_coppeliasims_own_library():
         with pytest.raises(Exception, match="a remote client has no functions that simOMPL can call"):
             planner.solve(task, 60)
     finally:
-        over.set()
+        finished.set()
         thread.join()

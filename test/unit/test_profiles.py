@@ -1,4 +1,4 @@
-"""Profiles of drivers: what is read, what is refused in one line, and what a Twist means."""
+"""Profiles of drone drivers: loading, one-line errors, and the meaning of a Twist."""
 
 import math
 
@@ -11,15 +11,15 @@ from drone_sim.run.profiles import command_topics, profile_cure, profiles
 NAMES = ["ardrone", "bebop", "hector", "sjtu", "tello"]
 
 
-def loaded(tmp_path, text, **others):
+def load_first_vehicle(tmp_path, text, **overrides):
     file = tmp_path / "mine.yaml"
     file.write_text(text)
-    return parameters.load({"profile": str(file), **others}).first
+    return parameters.load({"profile": str(file), **overrides}).first
 
 
-def refusal(tmp_path, text):
+def error_message(tmp_path, text):
     with pytest.raises(ParameterError) as error:
-        loaded(tmp_path, text)
+        load_first_vehicle(tmp_path, text)
     assert "\n" not in str(error.value)
     return str(error.value)
 
@@ -31,11 +31,11 @@ def test_every_profile_is_read(name):
     assert any(topic.takes == "cmd_vel" for topic in vehicle.topics.values())
 
 
-def test_these_are_all():
+def test_the_list_of_profiles_is_complete():
     assert sorted(profiles()) == NAMES
 
 
-def test_config_and_arguments_count_more(tmp_path):
+def test_config_file_and_arguments_override_the_profile(tmp_path):
     config = tmp_path / "config.yaml"
     config.write_text("cmd_vel_timeout: 3.0\ncmd_vel_meaning: {forward: {one: 0.1}}\n")
     vehicle = parameters.load({"profile": "bebop", "config": str(config), "start": "flying"}).first
@@ -44,7 +44,7 @@ def test_config_and_arguments_count_more(tmp_path):
     assert vehicle.cmd_vel_meaning.forward.largest == 1.0  # still the profile's
 
 
-def test_an_unknown_profile_is_named():
+def test_the_error_for_an_unknown_profile_suggests_near_names():
     with pytest.raises(ParameterError, match="profile = 'bebob': no such profile; near names are bebop;"):
         parameters.load({"profile": "bebob"})
 
@@ -65,34 +65,34 @@ def test_an_unknown_profile_is_named():
         ("profile: bebop", "must not have the key `profile`"),
     ],
 )
-def test_a_wrong_key_or_value_is_one_line(tmp_path, text, said):
-    assert said in refusal(tmp_path, text)
+def test_a_wrong_key_or_value_gives_a_one_line_error(tmp_path, text, said):
+    assert said in error_message(tmp_path, text)
 
 
-def test_a_tilt_is_roll_and_pitch():
+def test_a_tilt_command_becomes_roll_and_pitch():
     meaning = parameters.load({"profile": "bebop"}).first.cmd_vel_meaning
     linear, angular = meaning.converted((0.5, 1.0, -2.0), (9.0, 9.0, 1.0))
-    assert linear == (0.0, 0.0, -1.0)  # cut, and 1 m/s for 1
+    assert linear == (0.0, 0.0, -1.0)  # clipped to 1, which means 1 m/s
     assert angular == pytest.approx((-0.349, 0.5 * 0.349, 1.745))  # to the left is a negative roll
 
 
-def test_sticks_have_other_axes():
+def test_stick_commands_have_other_axes():
     meaning = parameters.load({"profile": "tello"}).first.cmd_vel_meaning
     assert meaning.converted((1.0, 0.5, 0.0), (0.0, 0.0, 1.0)) == ((1.0, -2.0, 0.0), (0.0, 0.0, -0.87))
 
 
-def test_without_a_profile_a_twist_is_itself():
+def test_without_a_profile_a_twist_is_unchanged():
     meaning = parameters.load().first.cmd_vel_meaning
     linear, angular = (30.0, 1.0, 2.0), (0.1, 0.2, 0.3)
     assert meaning.is_ours and meaning.converted(linear, angular) == (linear, angular)
 
 
-def test_nan_is_not_cut():
+def test_nan_is_not_clipped():
     meaning = parameters.load({"profile": "bebop"}).first.cmd_vel_meaning
     assert math.isnan(meaning.converted((0.0, 0.0, math.nan), (0.0, 0.0, 0.0))[0][2])
 
 
-def test_unheard_topics_name_their_profile():
+def test_the_advice_for_an_unheard_topic_names_its_profile():
     assert profile_cure("/bebop/takeoff") == "start with profile:=bebop"
     assert profile_cure("/cmd_vel") == "start with profile:=ardrone or hector or sjtu"
     assert profile_cure("/drone/cmd_vel") == "" and "/drone/takeoff" not in command_topics()

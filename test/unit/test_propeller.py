@@ -82,7 +82,7 @@ def test_wrench_is_the_sum_of_forces_at_points_that_turn_with_the_body(forces, a
 
 @given(st.lists(st.tuples(vectors, vectors, vectors), min_size=1, max_size=3), st.tuples(*[st.floats(-3, 3)] * 3))
 @settings(max_examples=20, deadline=None)
-def test_the_world_turns_a_body_as_the_wrench_says(forces, angles):
+def test_the_angular_velocity_of_a_body_follows_from_the_wrench(forces, angles):
     """A cube of 1 kg and 1 m, from rest, through one sub-step: its moment of inertia is 1/6 kg m² about any axis."""
     wrench = Wrench()
     for one in forces:

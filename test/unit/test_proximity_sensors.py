@@ -1,4 +1,4 @@
-"""Proximity sensors of a scene: what is nearest in their volumes."""
+"""Proximity sensors of a scene: the nearest points in their volumes."""
 
 import math
 
@@ -37,7 +37,7 @@ def _sim(simulation):
     return make_sim(simulation.child_scripts["drone"], SceneServices(operations=simulation.operations))
 
 
-def test_a_ray_is_exact(simulation, sim):
+def test_a_ray_sensor_measures_exactly(simulation, sim):
     handle = simulation.context.objects.handle
     state, distance, point, met, normal = sim.readProximitySensor(handle("Ray"))
     assert (state, met) == (1, handle("RayBox"))
@@ -45,9 +45,9 @@ def test_a_ray_is_exact(simulation, sim):
     assert normal == pytest.approx([0, 0, -1], abs=1e-3)
 
 
-def test_a_collection_is_looked_for_as_one(sim):
+def test_a_sensor_detects_the_objects_of_a_collection(sim):
     ray, boxes = sim.getObject("/Ray"), sim.createCollection(0)
-    assert sim.checkProximitySensor(ray, boxes)[0] == 0, "nothing is in it"
+    assert sim.checkProximitySensor(ray, boxes)[0] == 0, "the collection is empty"
     sim.addItemToCollection(boxes, sim.handle_all, -1, 0)
     assert sim.checkProximitySensor(ray, boxes) == sim.readProximitySensor(ray)
     sim.addItemToCollection(boxes, sim.handle_single, sim.getObject("/RayBox"), 1)
@@ -55,7 +55,7 @@ def test_a_collection_is_looked_for_as_one(sim):
     assert (state, met) == (1, sim.getObject("/Floor")) and distance == pytest.approx(3, abs=1e-3)
 
 
-def test_a_sensor_looks_for_the_entity_that_is_set(simulation, sim):
+def test_a_sensor_detects_only_the_entity_that_is_set(simulation, sim):
     ray, obstacles = sim.getObject("/Ray"), sim.createCollection(0)
     assert sim.getObjectInt32Param(ray, sim.proxintparam_entity_to_detect) == sim.handle_all
     sim.addItemToCollection(obstacles, sim.handle_all, -1, 0)
@@ -64,15 +64,15 @@ def test_a_sensor_looks_for_the_entity_that_is_set(simulation, sim):
     sim.setObjectInt32Param(ray, sim.proxintparam_entity_to_detect, obstacles)
     assert sim.getObjectInt32Param(ray, sim.proxintparam_entity_to_detect) == obstacles
     assert sim.readProximitySensor(ray)[3] == sim.handleProximitySensor(ray)[3] == sim.getObject("/Floor")
-    assert sim.checkProximitySensor(ray, sim.handle_all)[3] == sim.getObject("/RayBox"), "what is asked for counts"
+    assert sim.checkProximitySensor(ray, sim.handle_all)[3] == sim.getObject("/RayBox"), "the argument has priority"
     with pytest.raises(ValueError, match="no object with the handle 4711"):
         sim.setObjectInt32Param(ray, sim.proxintparam_entity_to_detect, 4711)
     simulation.restore(before)
     assert sim.readProximitySensor(ray)[3] == sim.getObject("/RayBox")
 
 
-def nearest(x, y, z):
-    """Return how near a ball of 0.2 m radius is to a sensor, and which of its points."""
+def nearest_on_ball(x, y, z):
+    """Return distance and position of the point nearest to the sensor on a ball of 0.2 m radius at x, y, z."""
     length = math.hypot(x, y, z)
     return length - 0.2, [one * (length - 0.2) / length for one in (x, y, z)]
 
@@ -81,29 +81,29 @@ def nearest(x, y, z):
     "name, centre, tolerance",
     [("Cone", (0.5, -0.3, 1.5), 1e-3), ("Pyramid", (0.4, -0.4, 1.5), 1e-3), ("Cylinder", (0.3, -0.3, 1.5), 1e-3)],
 )
-def test_the_nearest_point_in_a_volume(simulation, sim, name, centre, tolerance):
+def test_a_volume_sensor_returns_the_nearest_point(simulation, sim, name, centre, tolerance):
     handle = simulation.context.objects.handle
     state, distance, point, met, _ = sim.readProximitySensor(handle(name))
-    expected, there = nearest(*centre)
+    expected, expected_point = nearest_on_ball(*centre)
     assert (state, met) == (1, handle(f"{name}Ball"))
-    assert distance == pytest.approx(expected, abs=tolerance) and point == pytest.approx(there, abs=0.01)
+    assert distance == pytest.approx(expected, abs=tolerance) and point == pytest.approx(expected_point, abs=0.01)
 
 
-def test_a_fan_has_no_thickness(simulation, sim):
+def test_a_disc_sensor_has_no_thickness(simulation, sim):
     state, distance, point, *_ = sim.readProximitySensor(simulation.context.objects.handle("Disc"))
-    radius = math.sqrt(0.2**2 - 0.1**2)  # of the ball where the fan cuts it
+    radius = math.sqrt(0.2**2 - 0.1**2)  # of the ball's section in the plane of the disc
     assert state == 1 and point[1] == pytest.approx(0, abs=1e-6)
     assert distance == pytest.approx(math.hypot(0.3, 1.5) - radius, abs=1e-3)
 
 
-def test_what_is_thinner_than_the_gaps_between_rays(simulation, sim):
+def test_an_object_thinner_than_the_gaps_between_rays_is_detected(simulation, sim):
     handle = simulation.context.objects.handle
     state, distance, _, met, _ = sim.readProximitySensor(handle("Thin"))
     assert (state, met) == (1, handle("Needle"))
     assert distance == pytest.approx(math.hypot(0.17, 0.13, 1.8) - 0.003, abs=1e-3)
 
 
-def test_one_object_alone_and_beyond_a_threshold(simulation, sim):
+def test_a_check_for_one_object_and_with_a_distance_threshold(simulation, sim):
     handle = simulation.context.objects.handle
     ray, box = handle("Ray"), handle("RayBox")
     assert sim.checkProximitySensor(ray, handle("Floor"))[:2] == (1, pytest.approx(3, abs=1e-3))
@@ -117,7 +117,7 @@ def test_one_object_alone_and_beyond_a_threshold(simulation, sim):
         sim.readProximitySensor(handle("Floor"))
 
 
-def test_it_does_not_see_what_carries_it(simulation, sim):
+def test_a_sensor_does_not_detect_its_own_vehicle(simulation, sim):
     handle = simulation.context.objects.handle
     state, distance, _, met, _ = sim.readProximitySensor(handle("Under"))
     assert (state, met) == (1, handle("Floor"))

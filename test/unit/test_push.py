@@ -1,4 +1,4 @@
-"""A push: the impulse it gives, how long it lasts, what ends it."""
+"""The impulse and the duration of a push, and how it ends."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 @pytest.fixture(name="floating")
 def _floating(new_simulation):
-    """Give a drone at rest without weight and with its propellers off."""
+    """Return a simulation without gravity whose drone is at rest with its propellers off."""
     return new_simulation({"gravity": 0.0, "drone": {"position": [0, 0, 5]}}, python="def sysCall_init(): pass\n")
 
 
@@ -19,7 +19,7 @@ def step(simulation, count):
         simulation.step()
 
 
-def test_force_gives_its_impulse(floating):
+def test_a_force_changes_the_velocity_by_its_impulse(floating):
     drone = floating.drone
     drone.pushes.add(Push((1.0, -2.0, 0.5), ZERO, 0.2))
     step(floating, 20)
@@ -29,7 +29,7 @@ def test_force_gives_its_impulse(floating):
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_torque_gives_its_angular_impulse(floating, axis):
+def test_a_torque_changes_the_angular_velocity_by_its_impulse(floating, axis):
     drone, torque = floating.drone, np.zeros(3)
     torque[axis] = 2e-4
     drone.pushes.add(Push(ZERO, torque.tolist(), 0.1))
@@ -42,7 +42,7 @@ def test_torque_gives_its_angular_impulse(floating, axis):
 
 
 @pytest.mark.parametrize("duration, steps", [(0.2, 4), (0.15, 3), (0.001, 1), (0.06, 1), (0.09, 2)])
-def test_it_lasts_whole_steps(floating, duration, steps):
+def test_a_push_lasts_whole_steps(floating, duration, steps):
     floating.drone.pushes.add(Push((1.0, 0.0, 0.0), ZERO, duration))
     gained, before = [], 0.0
     for _ in range(8):
@@ -62,7 +62,7 @@ def test_pushes_add_up(floating):
     assert floating.drone.body.state.linear_velocity[0] == pytest.approx(0.2 / floating.drone.body.mass, abs=1e-12)
 
 
-def test_reset_ends_it(floating):
+def test_reset_ends_a_push(floating):
     floating.drone.pushes.add(Push((1.0, 0.0, 0.0), (0.0, 0.0, 0.1), 10.0))
     floating.drone.reset()
     step(floating, 5)
@@ -92,15 +92,15 @@ def sysCall_actuation():
 """
 
 
-def test_scripts_push_shapes_of_the_scene_and_take_it_back(new_simulation):
-    """A sphere of 2 kg and 0.1 m has 0.008 kg m²; what is pushed in one step is not pushed in the next."""
+def test_forces_of_scripts_act_on_shapes_and_can_be_reset(new_simulation):
+    """A force lasts one step, so that the velocities grow in proportion to the steps."""
     simulation = new_simulation({"gravity": 0.0}, scene=SCENE, python=PUSHES)
     things, drone = simulation.scene.things(), simulation.drone
     for count in (1, 2):
         simulation.step()
         ball, rod = things["Ball"].velocity(), things["Rod"].velocity()
         assert ball[0] == pytest.approx((count * 2 / 2 * 0.05, 0, 0), abs=1e-9)
-        assert ball[1] == pytest.approx((0, 0, 0), abs=1e-9), "0.1 N m from the force, -0.1 as a torque"
+        assert ball[1] == pytest.approx((0, 0, 0), abs=1e-9), "-0.1 N m from the force and 0.1 N m as a torque"
         assert rod[1] == pytest.approx((0, 0, count * 0.1 / INERTIA * 0.05), rel=1e-3)
         assert drone.body.state.linear_velocity[0] == pytest.approx(count * 0.52 / drone.body.mass * 0.05, rel=0.05)
         assert drone.body.state.angular_velocity[2] > 0

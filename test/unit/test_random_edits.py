@@ -1,4 +1,4 @@
-"""Edits that a person could make, in any order: everything that shows the scene agrees, and nothing is left behind."""
+"""Random edits of a scene: all representations of the scene agree, and nothing is left behind."""
 
 import contextlib
 import gc
@@ -19,30 +19,30 @@ from drone_sim.editing.changes import change_between
 
 pytestmark = pytest.mark.long
 
-EDITS = int(os.environ.get("DRONE_SIM_EDITS", "20"))  # in a row: 500 by hand
+EDITS = int(os.environ.get("DRONE_SIM_EDITS", "20"))  # in a row; 500 for a long manual run
 OPENGL = (moderngl.Buffer, moderngl.Framebuffer, moderngl.Program, moderngl.Texture, moderngl.VertexArray)
-LEAK = 25 * 30_000  # bytes that 25 edits may add to the process
+MEMORY_LIMIT = 25 * 30_000  # bytes that 25 edits may add to the process
 
 
 class RandomEdits:
-    """Edits that a person could make, one after another."""
+    """A random sequence of edits that a user of the editor could make."""
 
     def __init__(self, editor, seed):
-        self.editor, self.dice = editor, random.Random(seed)
+        self.editor, self.rng = editor, random.Random(seed)
 
     def step(self):
-        """Make an edit, or undo or redo some; what cannot be is refused."""
-        word = self.dice.choice(["edit"] * 7 + ["undo"] * 2 + ["redo"])
+        """Make an edit, or undo or redo one; impossible edits are refused."""
+        word = self.rng.choice(["edit"] * 7 + ["undo"] * 2 + ["redo"])
         try:
             self.editor.answer({"edit": [self.operation()]} if word == "edit" else {word: True})
         except ValueError:
-            assert word != "undo" or not self.editor.history.undo_name, "what was done can be undone"
+            assert word != "undo" or not self.editor.history.undo_name, "every edit can be undone"
 
     def operation(self):
-        choose, tree = self.dice.choice, self.editor.simulation.context.objects
+        choose, tree = self.rng.choice, self.editor.simulation.context.objects
         own = [one.name for one in self.editor.simulation.scene.entries.values()]
         one, other = choose(own or ["Drone"]), choose([*own, "Drone", "Quadricopter_base"])
-        place = [round(self.dice.uniform(-4, 4), 1) for _ in range(2)] + [round(self.dice.uniform(0.5, 3), 2)]
+        place = [round(self.rng.uniform(-4, 4), 1) for _ in range(2)] + [round(self.rng.uniform(0.5, 3), 2)]
         kind = choose([*KINDS.values()])
         operations = [
             {"do": "add", "objects": [{"name": choose(["A", "B"]), **kind}], "position": place},
@@ -50,7 +50,7 @@ class RandomEdits:
                 "do": "move",
                 "object": choose([one, "Drone"]),
                 "position": place,
-                "rpy": [0, 0, round(self.dice.uniform(-3, 3), 2)],
+                "rpy": [0, 0, round(self.rng.uniform(-3, 3), 2)],
             },
             {"do": "move", "object": one, "position": place, "relative_to": "parent"},
             {"do": "rename", "object": one, "name": choose(["C", "D", "E"])},
@@ -60,11 +60,11 @@ class RandomEdits:
                 "object": one,
                 "values": choose([{"mass": 2}, {"color": [1, 0, 0]}, {"alias": "x"}, {"size": [0.3]}]),
             },
-            {"do": "set", "object": "Floor", "values": {"size": self.dice.randint(8, 12)}},
+            {"do": "set", "object": "Floor", "values": {"size": self.rng.randint(8, 12)}},
             {"do": "copy", "objects": [one], "counts": [2, 1, 1], "steps": [0, 0.5, 0]},
             {"do": "scale", "objects": [one], "factors": [1.5, 1.5, 1.5]},
             {"do": "remove", "objects": [one]}
-            if len(own) > 12 or self.dice.random() < 0.3
+            if len(own) > 12 or self.rng.random() < 0.3
             else {"do": "detach_script", "object": one},
             {"do": "group", "objects": [one], "name": "Model"},
             self.vehicle_operation(place),
@@ -72,7 +72,7 @@ class RandomEdits:
         return choose([entry for entry in operations if tree is not None])
 
     def vehicle_operation(self, place):
-        choose = self.dice.choice
+        choose = self.rng.choice
         others = [one.object_name for one in self.editor.simulation.vehicles.values()][1:]
         if not others:
             return {"do": "add_vehicle", "name": choose(["guest", "visitor"]), "position": place}
@@ -88,7 +88,7 @@ class RandomEdits:
 
 
 def assert_agree(editor, folder):
-    """Let tree, bodies and the saved file say the same."""
+    """Assert that the tree, the bodies and the saved file agree."""
     simulation = editor.simulation
     scene = simulation.scene
     simulation.context.carried.follow()
@@ -101,15 +101,15 @@ def assert_agree(editor, folder):
             assert np.allclose(simulation.world.state(number).matrix, one.matrix(), atol=1e-6), one.name
     file = folder / "saved.yaml"
     editor.answer({"save": str(file)})
-    again = editor_of({"scene_file": str(file)})
-    difference = change_between(by_name(editor), by_name(again))
+    reloaded = editor_of({"scene_file": str(file)})
+    difference = change_between(by_name(editor), by_name(reloaded))
     assert not difference.entries, difference.entries
     assert not difference.scripts
-    assert sizes(simulation) == sizes(again.simulation)  # nothing is left of what has gone
-    assert set(simulation.vehicles) == set(again.simulation.vehicles)
-    seen = [seen_by_camera(one.simulation) for one in (editor, again)]
-    assert seen[0] is None or np.abs(seen[0].astype(int) - seen[1]).mean() < 0.5
-    again.simulation.close()
+    assert sizes(simulation) == sizes(reloaded.simulation)  # removed objects leave nothing behind
+    assert set(simulation.vehicles) == set(reloaded.simulation.vehicles)
+    pictures = [seen_by_camera(one.simulation) for one in (editor, reloaded)]
+    assert pictures[0] is None or np.abs(pictures[0].astype(int) - pictures[1]).mean() < 0.5
+    reloaded.simulation.close()
 
 
 def by_name(editor):
@@ -126,8 +126,8 @@ def rounded_entry(entry):
 
 
 @contextlib.contextmanager
-def watched(simulation):
-    """Give what looks whether rviz shows what there is; without ROS there is none."""
+def rviz_check(simulation):
+    """Yield a function that asserts that rviz shows the scene; without ROS it does nothing."""
     if find_spec("visualization_msgs") is None:
         yield lambda: None
         return
@@ -136,7 +136,7 @@ def watched(simulation):
     with rviz_of(simulation) as (rviz, update):
 
         def look():
-            simulation.context.carried.follow()  # as before every look of the node
+            simulation.context.carried.follow()  # as the node does before each update
             update()
             rviz.assert_agrees(simulation)
 
@@ -152,11 +152,11 @@ def seen_by_camera(simulation):
 
 @settings(max_examples=1)
 @given(st.integers(0, 2**32))
-def test_random_edits_agree_in_flight_too_and_stop_undoes_them(tmp_path_factory, seed):
+def test_representations_agree_after_random_edits_in_flight_and_stop_undoes_them(tmp_path_factory, seed):
     folder = Path(tmp_path_factory.mktemp("edits"))
     editor = editor_of({"scene": SCENE, "drone": {"position": [0.0, 0.0, 2.0]}})
     simulation = editor.simulation
-    began, before, text = sizes(simulation), state(simulation), text_of(editor)
+    initial_sizes, before, text = sizes(simulation), state(simulation), text_of(editor)
     edits = RandomEdits(editor, seed)
     simulation.start()
     for number in range(EDITS):
@@ -167,18 +167,18 @@ def test_random_edits_agree_in_flight_too_and_stop_undoes_them(tmp_path_factory,
     simulation.stop()
     editor.follow()
     assert_same(state(simulation), before)
-    assert (sizes(simulation), text_of(editor)) == (began, text)
+    assert (sizes(simulation), text_of(editor)) == (initial_sizes, text)
     simulation.close()
 
 
 @settings(max_examples=1)
 @given(st.integers(0, 2**32))
-def test_random_edits_agree_everywhere_and_leave_nothing(tmp_path_factory, seed):
+def test_representations_agree_after_random_edits_and_undo_leaves_nothing(tmp_path_factory, seed):
     folder = Path(tmp_path_factory.mktemp("edits"))
     editor = editor_of({"scene": SCENE, "drone": {"position": [0.0, 0.0, 2.0]}})
-    began, before = sizes(editor.simulation), state(editor.simulation)
+    initial_sizes, before = sizes(editor.simulation), state(editor.simulation)
     edits = RandomEdits(editor, seed)
-    with watched(editor.simulation) as look:
+    with rviz_check(editor.simulation) as look:
         for number in range(EDITS):
             edits.step()
             look()
@@ -189,20 +189,20 @@ def test_random_edits_agree_everywhere_and_leave_nothing(tmp_path_factory, seed)
             look()
     if EDITS <= 100:
         assert_same(state(editor.simulation), before)
-        assert sizes(editor.simulation) == began
+        assert sizes(editor.simulation) == initial_sizes
     editor.simulation.close()
 
 
-def held():
+def used_resources():
     """Return resident memory (bytes), and the numbers of open files and of OpenGL's objects."""
     gc.collect()
     with open("/proc/self/statm", encoding="ascii") as file:
         resident = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    drawn = sum(isinstance(one, OPENGL) for one in gc.get_objects())
-    return resident, len(os.listdir("/proc/self/fd")), drawn
+    opengl_objects = sum(isinstance(one, OPENGL) for one in gc.get_objects())
+    return resident, len(os.listdir("/proc/self/fd")), opengl_objects
 
 
-def test_edits_that_are_taken_back_leave_nothing_in_the_process():
+def test_undone_edits_leak_no_memory_files_or_opengl_objects():
     editor = editor_of({"scene": SCENE, "drone": {"position": [0.0, 0.0, 2.0]}})
     measured = []
     for _ in range(6):
@@ -213,10 +213,10 @@ def test_edits_that_are_taken_back_leave_nothing_in_the_process():
         while editor.history.undo_name:
             editor.answer({"undo": True})
         seen_by_camera(editor.simulation)
-        measured.append(held())
-    caches, *measured = measured  # which are filled by the first
-    assert {drawn for _, _, drawn in measured} == {caches[2]}
-    # What leaks does so again and again; what else the process holds, of the tests before, may move once.
-    assert min(after[0] - before[0] for before, after in pairwise(measured)) < LEAK
+        measured.append(used_resources())
+    caches, *measured = measured  # the first round fills caches
+    assert {opengl_objects for _, _, opengl_objects in measured} == {caches[2]}
+    # A leak grows in every round; other memory, of earlier tests, may change once.
+    assert min(after[0] - before[0] for before, after in pairwise(measured)) < MEMORY_LIMIT
     assert measured[-1][1] - caches[1] <= 1
     editor.simulation.close()

@@ -1,4 +1,4 @@
-"""CoppeliaSim's ZeroMQ remote API: what a client sends, and what comes back."""
+"""CoppeliaSim's ZeroMQ remote API: requests of a client and the replies of the server."""
 
 import logging
 import math
@@ -35,22 +35,22 @@ def sysCall_actuation():
 
 
 class Radio:
-    """A backend that hands over whatever the test sends."""
+    """A ROS backend whose messages and service requests come from the test."""
 
     def __init__(self):
-        self.heard = {}
+        self.callbacks = {}
 
     def subscribe(self, topic, kind, take):
-        self.heard[topic] = take
-        return lambda: self.heard.pop(topic)
+        self.callbacks[topic] = take
+        return lambda: self.callbacks.pop(topic)
 
     def serve(self, name, kind, ask):
-        self.heard[name] = ask
-        return lambda: self.heard.pop(name)
+        self.callbacks[name] = ask
+        return lambda: self.callbacks.pop(name)
 
 
 class Stage:
-    """A stopped simulation, its server, and clients."""
+    """A stopped simulation, its server and its clients."""
 
     def __init__(self, script):
         self.radio = Radio()
@@ -66,20 +66,20 @@ class Stage:
         self.clients.append(Client(self.server, *arguments, **fields))
         return self.clients[-1]
 
-    def go(self, steps=1):
-        """Take so many steps, as far as clients let it."""
+    def run_steps(self, steps=1):
+        """Run up to `steps` steps, as far as the clients permit."""
         for _ in range(steps):
             if self.player.playing and not self.server.holds:
                 self.player.step()
 
-    def waits(self, client, function, *arguments):
-        """Let a client ask for something that is not answered at once."""
+    def send_and_wait(self, client, function, *arguments):
+        """Send a request that is not answered at once, and serve until it waits."""
         before = len(self.server._waiting)
         client.send(function, *arguments)
-        assert self.settled(lambda: len(self.server._waiting) > before)
+        assert self.wait_until(lambda: len(self.server._waiting) > before)
 
-    def settled(self, condition):
-        """Serve until it is so."""
+    def wait_until(self, condition):
+        """Serve until the condition holds; return whether it does."""
         for _ in range(5000):
             if condition():
                 return True
@@ -103,15 +103,15 @@ def _stage(theatre):
     for client in theatre.clients:
         client.vanish()
     theatre.clients.clear()
-    assert theatre.settled(lambda: not theatre.server._clients)
-    theatre.player.start()  # so that the stop also resets what was moved while it was stopped
+    assert theatre.wait_until(lambda: not theatre.server._clients)
+    theatre.player.start()  # so that the stop also resets objects that were moved while stopped
     theatre.player.stop()
 
 
 # ---- calls
 
 
-def test_a_client_learns_functions_and_constants(stage):
+def test_info_lists_functions_and_constants(stage):
     client = stage.client()
     assert client.call("zmqRemoteApi.require", "sim") is None
     known = client.call("zmqRemoteApi.info", "sim")
@@ -129,7 +129,7 @@ def test_functions_return_nothing_one_or_several_values(stage):
     assert client.sim("getObjectPosition", drone, None) == [0, 0, 1]
 
 
-def test_relative_paths_begin_at_the_root_as_nobody_asks(stage):
+def test_relative_paths_of_a_client_begin_at_the_root(stage):
     client = stage.client()
     floor, other = client.sim("getObject", "/Floor"), client.sim("getObject", "Quadricopter#0")
     assert client.sim("getObject", ":/Floor") == client.sim("getObject", "./Floor") == floor
@@ -156,7 +156,7 @@ def test_collections(stage):
     client.sim("destroyCollection", whole)
 
 
-def test_the_objects_of_every_vehicle_are_there(stage):
+def test_the_objects_of_every_vehicle_are_accessible(stage):
     client = stage.client()
     other = client.sim("getObject", "Quadricopter#0")
     assert client.sim("getObjectPosition", other) == pytest.approx([1, 1, 0.8])
@@ -190,13 +190,13 @@ def test_the_objects_of_every_vehicle_are_there(stage):
         ("_*executed*_", [1], "no call of this client waits"),
     ],
 )
-def test_a_mistake_is_one_line(stage, function, arguments, said):
+def test_an_error_is_returned_in_one_line(stage, function, arguments, said):
     reply = stage.client().ask(function, *arguments)
     assert said in reply["err"] and "\n" not in reply["err"]
     assert reply["success"] is False and reply["error"] == reply["err"]
 
 
-def test_a_fault_of_our_own_leaves_a_traceback_at_debug_level(stage, monkeypatch, caplog):
+def test_an_internal_error_logs_a_traceback_at_debug_level(stage, monkeypatch, caplog):
     caplog.set_level(logging.DEBUG, "drone_sim.remote.server")
     client = stage.client()
     monkeypatch.setattr(stage.simulation.context.objects, "path", lambda *_: 1 // 0)
@@ -225,21 +225,21 @@ def test_a_fault_of_our_own_leaves_a_traceback_at_debug_level(stage, monkeypatch
         cbor2.dumps({"func": "sim.getObject", "args": [{(1, 2): 3}]}),
     ],
 )
-def test_what_is_no_request_gets_an_answer_and_changes_nothing(stage, payload):
+def test_an_invalid_request_gets_an_error_reply_and_changes_nothing(stage, payload):
     client = stage.client()
     client.send_bytes(payload)
     assert "\n" not in client.reply()["err"]
     assert client.sim("getSimulationState") == 0
 
 
-def test_a_message_without_a_way_back_and_a_huge_one_do_no_harm(stage):
+def test_a_huge_message_and_one_without_return_path_do_no_harm(stage):
     stage.client(zmq.DEALER).send_bytes(b"\x00" * (9 * 1024 * 1024))
     stage.client(zmq.PUSH).send_bytes(b"?")
     assert stage.client().sim("getSimulationTime") == 0.0
 
 
 START = cbor2.dumps({"func": "sim.startSimulation", "args": []})
-UNVERSIONED = b"\1\0" + b"\1\0" + bytes([1 + len(START), 0]) + START  # ZMTP 1.0: no name, no way back, a request
+UNVERSIONED = b"\1\0" + b"\1\0" + bytes([1 + len(START), 0]) + START  # ZMTP 1.0: no identity, no return path, a request
 SIGNATURE = b"\xff" + bytes(8) + b"\x7f"
 GREETING = SIGNATURE + b"\3\1NULL" + bytes(16 + 1 + 31)
 READY = b"\4\x26\5READY\x0bSocket-Type\0\0\0\3REQ\x08Identity\0\0\0\0"
@@ -247,7 +247,7 @@ CONVERSATION = GREETING + READY + b"\1\0" + bytes([0, len(START)]) + START
 BROWSER = b"Host: 127.0.0.1:23000\r\nUser-Agent: Mozilla/5.0 (X11; Linux x86_64; rv:128.0) Firefox/128.0\r\n"
 
 
-def closed(peer):
+def is_closed(peer):
     """Return whether the server has ended a connection."""
     try:
         return peer.recv(4096) == b""
@@ -273,23 +273,23 @@ def closed(peer):
         GREETING[:12] + b"PLAIN" + bytes(15 + 1 + 31),
     ],
 )
-def test_who_does_not_speak_zmtp_3_is_dropped_and_never_served(stage, sent):
+def test_a_peer_that_does_not_speak_zmtp_3_is_disconnected(stage, sent):
     with socket.create_connection(("127.0.0.1", stage.server.port), timeout=60) as peer:
         peer.sendall(sent)
         peer.setblocking(False)
-        assert stage.settled(lambda: closed(peer))
+        assert stage.wait_until(lambda: is_closed(peer))
     assert not stage.server._clients
     assert stage.client().sim("getSimulationState") == 0
 
 
-def test_what_version_1_sends_and_reads(stage):
+def test_the_message_format_of_version_1_is_supported(stage):
     client = stage.client()
     client.fields = {}
     assert client.ask("sim.getSimulationTime") == {"success": True, "ret": [0.0]}
     assert client.ask("sim.nothing")["error"].startswith("sim has no 'nothing'")
 
 
-def test_numbers_and_buffers_keep_their_kinds(stage):
+def test_numbers_and_buffers_keep_their_types(stage):
     client = stage.client()
     floats = struct.pack("<2f", 1.0, 2.5)
     client.sim("setStringSignal", "buffer", floats)
@@ -302,13 +302,13 @@ def test_numbers_and_buffers_keep_their_kinds(stage):
     assert client.sim("getObjectPosition", drone) == [1, 2, 3]
 
 
-def test_a_picture_is_bytes_with_its_size(stage):
+def test_an_image_is_returned_as_bytes_with_its_size(stage):
     client = stage.client()
     image, size = client.sim("getVisionSensorImg", client.sim("getObject", "FloorVision#0"))
     assert size == [256, 256] and isinstance(image, bytes) and len(image) == 256 * 256 * 3
 
 
-# ---- start, stop, and what was moved before
+# ---- start, stop, and objects moved before the start
 
 
 def test_start_pause_and_stop(stage):
@@ -320,7 +320,7 @@ def test_start_pause_and_stop(stage):
     assert states == [0, 17, 8, 17, 17, 0]
 
 
-def test_what_was_moved_while_it_was_stopped_begins_there(stage):
+def test_objects_moved_while_stopped_start_at_their_new_positions(stage):
     client = stage.client()
     drone, target = client.sim("getObject", "/Quadcopter"), client.sim("getObject", "/target")
     client.sim("setObjectPosition", drone, -1, [0.5, 0, 2])
@@ -334,20 +334,20 @@ def test_what_was_moved_while_it_was_stopped_begins_there(stage):
     assert client.sim("getObjectPosition", drone) == pytest.approx([0, 0, 0.8])
 
 
-def test_a_script_that_fails_is_an_exception_where_the_client_steps(stage):
+def test_the_step_call_of_a_client_raises_the_error_of_a_script(stage):
     client = stage.client()
     client.sim("setStepping", True)
     client.sim("startSimulation")
     client.sim("setInt32Signal", "fail", 1)
-    stage.waits(client, "sim.step")
-    stage.go()
+    stage.send_and_wait(client, "sim.step")
+    stage.run_steps()
     reply = client.reply()
     assert reply["err"].startswith("[actuation]") and reply["err"].endswith("as it was told")
     assert client.sim("getSimulationState") == 0
     assert client.sim("step") is None  # stopped: there is nothing to wait for
 
 
-def test_a_scene_that_cannot_be_started_is_an_exception(stage, monkeypatch):
+def test_start_simulation_raises_an_error_if_the_scene_cannot_be_started(stage, monkeypatch):
     def fail(*_):
         raise ParameterError("scene/objects: it is not there")
 
@@ -359,38 +359,38 @@ def test_a_scene_that_cannot_be_started_is_an_exception(stage, monkeypatch):
 # ---- steps
 
 
-def test_a_stepping_client_is_asked_before_every_step(stage):
+def test_every_step_waits_for_the_stepping_client(stage):
     client = stage.client()
     assert client.sim("setStepping", True) == 0
     client.sim("startSimulation")
-    stage.go(3)
+    stage.run_steps(3)
     assert client.sim("getSimulationTime") == 0
     for count in (1, 2, 3):
-        stage.waits(client, "sim.step", True)
-        stage.go(5)
+        stage.send_and_wait(client, "sim.step", True)
+        stage.run_steps(5)
         assert client.reply()["ret"] == []
         assert client.sim("getSimulationTime") == pytest.approx(0.05 * count)
 
 
-def test_the_simulation_steps_when_every_stepping_client_has_asked(stage):
+def test_a_step_waits_for_all_stepping_clients(stage):
     first, second, reader = stage.client(), stage.client(), stage.client()
     first.sim("setStepping", True)
     second.sim("setStepping", True)
     first.sim("startSimulation")
-    stage.waits(first, "sim.step")
-    stage.go()
+    stage.send_and_wait(first, "sim.step")
+    stage.run_steps()
     assert reader.sim("getSimulationTime") == 0
-    stage.waits(second, "sim.step")
-    stage.go()
+    stage.send_and_wait(second, "sim.step")
+    stage.run_steps()
     assert first.reply()["ret"] == second.reply()["ret"] == []
     assert reader.sim("getSimulationTime") == pytest.approx(0.05)
     second.sim("setStepping", False)
-    stage.waits(first, "sim.step")
-    stage.go()
+    stage.send_and_wait(first, "sim.step")
+    stage.run_steps()
     assert first.answered()
 
 
-def test_stepping_counts_its_levels_and_stopping_ends_it_for_all(stage):
+def test_stepping_levels_are_counted_and_a_stop_ends_stepping_for_all_clients(stage):
     client, other = stage.client(), stage.client()
     client.sim("setStepping", True)
     assert client.sim("setStepping", True) == 1
@@ -406,22 +406,22 @@ def test_a_lock_holds_the_simulation(stage):
     client = stage.client()
     client.sim("startSimulation")
     client.sim("acquireLock")
-    stage.go()
+    stage.run_steps()
     assert client.sim("getSimulationTime") == 0
     client.sim("releaseLock")
-    stage.go()
+    stage.run_steps()
     assert client.sim("getSimulationTime") == pytest.approx(0.05)
 
 
-def test_waiting_for_simulated_time_steps(stage):
+def test_waiting_for_simulation_time_runs_the_steps(stage):
     client = stage.client()
     client.sim("setStepping", True)
     client.sim("startSimulation")
-    stage.waits(client, "sim.wait", 0.1)
-    stage.go(4)
+    stage.send_and_wait(client, "sim.wait", 0.1)
+    stage.run_steps(4)
     assert client.reply()["ret"] == [0.1]
     assert client.sim("getSimulationTime") == pytest.approx(0.1)
-    stage.waits(client, "sim.wait", 5, False)  # of real time
+    stage.send_and_wait(client, "sim.wait", 5, False)  # seconds of real time
     stage.now += 5.0
     assert client.reply()["ret"] == [5]
 
@@ -436,7 +436,7 @@ def test_waiting_for_a_signal(stage):
 
 
 @pytest.mark.parametrize("how", ["vanish", "goodbye", "silence"])
-def test_who_has_gone_holds_nothing(stage, how):
+def test_a_disconnected_client_does_not_hold_the_simulation(stage, how):
     client = stage.client(timeout=60.0)
     client.sim("setStepping", True)
     client.sim("startSimulation")
@@ -448,44 +448,44 @@ def test_who_has_gone_holds_nothing(stage, how):
         assert client.ask("_*end*_") == {"success": True, "ret": []}
     else:
         stage.now += 61.0
-    assert stage.settled(lambda: not stage.server.holds)
-    stage.go(2)
+    assert stage.wait_until(lambda: not stage.server.holds)
+    stage.run_steps(2)
     assert stage.simulation.steps == 2
 
 
-# ---- functions of the client's
+# ---- callbacks of the client
 
 
-def test_a_function_of_the_client_is_called_and_may_call(stage):
+def test_a_callback_of_the_client_may_make_requests(stage):
     client = stage.client()
-    asked = client.ask("sim.testCB", "a", "mine@func", "b", 1)
-    assert asked == {"func": "mine", "args": ["a", "b"]}
-    assert client.sim("getSimulationTime") == 0.0  # within it
-    assert client.ask("_*executed*_", 1) == asked
+    callback_request = client.ask("sim.testCB", "a", "mine@func", "b", 1)
+    assert callback_request == {"func": "mine", "args": ["a", "b"]}
+    assert client.sim("getSimulationTime") == 0.0  # during the callback
+    assert client.ask("_*executed*_", 1) == callback_request
     assert client.ask("_*executed*_", 1, 2)["ret"] == [1, 2]
 
 
-def test_a_motion_calls_a_function_of_the_client_in_every_step(stage):
+def test_a_motion_calls_the_callback_of_the_client_in_every_step(stage):
     client = stage.client()
     client.sim("startSimulation")
-    most = {"maxVel": [1.0], "maxAccel": [2.0], "maxJerk": [10.0]}
-    reply = client.ask("sim.moveToConfig", {"pos": [0.0], "targetPos": [1.0], **most, "callback": "moved@func"})
-    seen, waiting = [], stage.server._waiting
+    limits = {"maxVel": [1.0], "maxAccel": [2.0], "maxJerk": [10.0]}
+    reply = client.ask("sim.moveToConfig", {"pos": [0.0], "targetPos": [1.0], **limits, "callback": "moved@func"})
+    positions, waiting = [], stage.server._waiting
     while "func" in reply:
         assert reply["func"] == "moved"
-        seen.append((stage.simulation.time, reply["args"][0]["pos"][0]))
+        positions.append((stage.simulation.time, reply["args"][0]["pos"][0]))
         client.send("_*executed*_", False)
-        assert stage.settled(lambda: waiting)
-        stage.go()
+        assert stage.wait_until(lambda: waiting)
+        stage.run_steps()
         reply = client.reply()
-    assert [time for time, _ in seen] == pytest.approx([0.05 * step for step in range(34)])
-    assert seen[-1][1] == reply["ret"][0]["pos"][0] == 1.0
+    assert [time for time, _ in positions] == pytest.approx([0.05 * step for step in range(34)])
+    assert positions[-1][1] == reply["ret"][0]["pos"][0] == 1.0
 
 
-def test_a_motion_while_the_simulation_is_stopped_is_made_at_once(stage):
+def test_a_motion_while_stopped_is_executed_at_once(stage):
     client = stage.client()
-    most = [[1.0], [2.0], [10.0]]
-    reply = client.ask("sim.moveToConfig", -1, [0.0], None, None, *most, [1.0], None, "moved@func")
+    limits = [[1.0], [2.0], [10.0]]
+    reply = client.ask("sim.moveToConfig", -1, [0.0], None, None, *limits, [1.0], None, "moved@func")
     calls = 0
     while "func" in reply:
         calls, (position, _, _, _) = calls + 1, reply["args"]
@@ -494,37 +494,37 @@ def test_a_motion_while_the_simulation_is_stopped_is_made_at_once(stage):
     assert reply["ret"][0] == position == [1.0]
 
 
-def test_an_endless_motion_while_the_simulation_is_stopped_is_refused(stage):
+def test_a_motion_of_too_many_steps_while_stopped_is_refused(stage):
     slow = {"pos": [0.0], "targetPos": [1.0], "maxVel": [1e-6], "maxAccel": [1.0], "maxJerk": [1.0]}
     reply = stage.client().ask("sim.moveToConfig", slow)
     assert "sim.moveToConfig: more than 10000 steps: start the simulation first" in reply["err"]
 
 
-def test_a_function_of_the_client_that_fails_leaves_it_as_it_was(stage):
+def test_a_failed_callback_leaves_the_client_usable(stage):
     client = stage.client()
     for _ in range(40):
         assert "func" in client.ask("sim.testCB", "a", "mine@func", "b")
     assert client.sim("getSimulationTime") == 0.0
 
 
-def test_messages_are_handed_over_before_an_answer(stage):
+def test_ros_messages_are_delivered_before_a_reply(stage):
     client = stage.client()
     client.sim("startSimulation")
     handle = client.call("simROS.subscribe", "/gate", "std_msgs/Float64", "on_gate@func", 2)
     for value in (1.0, 2.0, 3.0):
-        stage.radio.heard["/gate"](SimpleNamespace(__slots__=["data"], data=value))
+        stage.radio.callbacks["/gate"](SimpleNamespace(__slots__=["data"], data=value))
     assert client.ask("sim.getSimulationTime") == {"func": "on_gate", "args": [{"data": 2.0}]}
     assert client.ask("_*executed*_") == {"func": "on_gate", "args": [{"data": 3.0}]}
     assert client.ask("_*executed*_")["ret"] == [0.0]
     client.call("simROS.shutdownSubscriber", handle)
-    assert "/gate" not in stage.radio.heard
+    assert "/gate" not in stage.radio.callbacks
 
 
-def test_a_service_of_a_client_is_answered_by_its_function(stage):
+def test_a_ros_service_of_a_client_is_answered_by_its_callback(stage):
     client, answers = stage.client(), []
     client.sim("startSimulation")
     client.call("simROS.advertiseService", "/gate", "std_srvs/Trigger", "on_gate@func")
-    ask = stage.radio.heard["/gate"]
+    ask = stage.radio.callbacks["/gate"]
     thread = threading.Thread(target=lambda: answers.append(ask({"data": 1}, dict)))
     thread.start()
     while client.ask("sim.getSimulationTime") != {"func": "on_gate", "args": [{"data": 1}]}:
@@ -535,24 +535,24 @@ def test_a_service_of_a_client_is_answered_by_its_function(stage):
 
 
 @pytest.mark.parametrize("how", ["stop", "vanish"])
-def test_what_a_client_leaves_behind_is_removed(stage, how):
+def test_subscriptions_and_drawings_of_a_client_are_removed(stage, how):
     client, other = stage.client(), stage.client()
     other.sim("startSimulation")
     client.call("simROS.subscribe", "/gate", "std_msgs/Float64", "on_gate@func")
     client.sim("addDrawingObject", 0, 5, 0, -1, 10)
-    kept = other.sim("addDrawingObject", 0, 5, 0, -1, 10)
+    remaining = other.sim("addDrawingObject", 0, 5, 0, -1, 10)
     if how == "vanish":
         client.vanish()
         stage.clients.remove(client)
-        assert stage.settled(lambda: list(stage.drawings.objects) == [kept])
+        assert stage.wait_until(lambda: list(stage.drawings.objects) == [remaining])
     else:
         other.sim("stopSimulation")
         assert not stage.drawings.objects
         client.sim("getSimulationState")
-    assert not stage.radio.heard
+    assert not stage.radio.callbacks
 
 
-def test_a_function_of_the_drones_script_is_called(stage):
+def test_a_client_calls_a_function_of_the_drones_script(stage):
     client = stage.client()
     client.sim("startSimulation")
     script = client.sim("getScript", 1, client.sim("getObject", "/Quadcopter"))
@@ -564,7 +564,7 @@ def test_a_function_of_the_drones_script_is_called(stage):
 # ---- parameters, and the official client
 
 
-def test_nobody_is_let_in_unless_told():
+def test_no_server_is_started_by_default():
     assert type(start_server(parameters.load().remote_api, None)) is RemoteApi
 
 
@@ -577,30 +577,30 @@ def test_nobody_is_let_in_unless_told():
         ("addres", "127.0.0.1", "address"),
     ],
 )
-def test_a_wrong_parameter_is_one_line(key, value, said):
+def test_a_wrong_parameter_gives_a_one_line_error(key, value, said):
     with pytest.raises(ParameterError, match=said) as caught:
         parameters.load({"remote_api": {key: value}})
     assert "\n" not in str(caught.value)
 
 
-def test_a_port_that_is_taken_and_an_address_that_is_none(stage):
+def test_the_error_names_an_address_that_cannot_be_opened(stage):
     for address, port in (("127.0.0.1", stage.server.port), ("nowhere.invalid", 0)):
         with pytest.raises(OSError, match=f"remote_api: cannot listen on {address}:{port}: "):
             RemoteApiServer(stage.player, address, port)
 
 
-def test_the_official_client_flies_by_its_own_calls():
-    over, listening, found = threading.Event(), threading.Event(), []
+def test_the_official_client_controls_a_flight():
+    finished, listening, ports = threading.Event(), threading.Event(), []
 
     def serve():
         values = {"script": "target", "real_time_factor": 0, "remote_api": {"serve": True, "port": 0}}
-        play(parameters.load(values), over.is_set, lambda server: (found.append(server.port), listening.set()))
+        play(parameters.load(values), finished.is_set, lambda server: (ports.append(server.port), listening.set()))
 
     thread = threading.Thread(target=serve)
     thread.start()
     try:
         assert listening.wait(60)
-        sim = official_client(found[0]).require("sim")
+        sim = official_client(ports[0]).require("sim")
         assert sim.getSimulationState() == sim.simulation_stopped
         sim.setStepping(True)
         sim.startSimulation()
@@ -614,10 +614,10 @@ def test_the_official_client_flies_by_its_own_calls():
         assert sim.unpackFloatTable(sim.packFloatTable([1.0, 2.5])) == [1.0, 2.5]
         with pytest.raises(Exception, match="near names are /Quadcopter"):
             sim.getObject("/Quadcoptr")
-        made = sim.createPureShape(0, 8, [0.2, 0.2, 0.2], 1.0)
+        created = sim.createPureShape(0, 8, [0.2, 0.2, 0.2], 1.0)
         sim.stopSimulation()
         assert sim.getSimulationState() == sim.simulation_stopped
-        assert not sim.isHandle(made)
+        assert not sim.isHandle(created)
         box = sim.createPureShape(0, 8, [0.2, 0.2, 0.2], 1.0)
         sim.setObjectPosition(box, [4.0, 0.0, 3.0])
         sim.setShapeColor(box, "", sim.colorcomponent_ambient_diffuse, [1, 0, 0])
@@ -631,7 +631,7 @@ def test_the_official_client_flies_by_its_own_calls():
         with pytest.raises(Exception, match="no object with the handle"):
             sim.removeObjects([box])
     finally:
-        over.set()
+        finished.set()
         thread.join()
 
 
@@ -639,7 +639,7 @@ def test_the_official_client_flies_by_its_own_calls():
 
 
 def test_a_scene_of_coppeliasim_is_loaded_from_the_folder_of_scenes(tmp_path):
-    """As CoppeliaSim's example pController does; nobody flies there."""
+    """As in CoppeliaSim's example pController, whose scene has no vehicle."""
     (tmp_path / "messaging").mkdir()
     motor = integers("Jtt", 10) + numbers("_mp", "Dmp", 0, 100) + chunk("Va9", b"\x11") + integers("Jmd", 5)
     arm = shape(2, "Arm", mesh(size=(1, 0.1, 0.1)), parent=1, at=(0.5, 0, 0.2), dynamic=True)
@@ -678,13 +678,13 @@ def test_a_scene_of_coppeliasim_is_loaded_from_the_folder_of_scenes(tmp_path):
         simulation.close()
 
 
-def test_what_is_made_while_stopped_stays_through_start_and_stop(stage):
+def test_objects_created_while_stopped_stay_through_start_and_stop(stage):
     client = stage.client()
-    made = client.sim("createDummy", 0.01)
-    client.sim("setObjectPosition", made, -1, [0.1, 0.2, 0.3])
+    created = client.sim("createDummy", 0.01)
+    client.sim("setObjectPosition", created, -1, [0.1, 0.2, 0.3])
     client.sim("startSimulation")
-    stage.go(2)
-    client.sim("setObjectPosition", made, -1, [5, 5, 5])
+    stage.run_steps(2)
+    client.sim("setObjectPosition", created, -1, [5, 5, 5])
     client.sim("stopSimulation")
-    assert client.sim("getObjectPosition", made, -1) == pytest.approx([0.1, 0.2, 0.3])
-    client.sim("removeObject", made)
+    assert client.sim("getObjectPosition", created, -1) == pytest.approx([0.1, 0.2, 0.3])
+    client.sim("removeObject", created)

@@ -1,4 +1,4 @@
-"""What the renderer draws, and where."""
+"""Pictures and depths of the renderer: geometry, shadows, textures, and silhouettes compared with PyBullet."""
 
 import threading
 
@@ -24,18 +24,18 @@ from drone_sim.shapes.visual import Visual
 
 
 def test_a_cube_covers_the_predicted_pixels(renderer):
-    """Its front face, 4.8 m ahead, is a square of known edges; its middle is at no special pixel."""
+    """The front face, 4.8 m ahead, is a square with known edges, away from the middle of the picture."""
     picture = draw(renderer, [box("cube", (0.4, 0.4, 0.4))], [at(5.0, 0.7, 1.5)])
     rows, columns = np.nonzero(reddish(picture))
     left, top = pixel(CAMERA, (-0.9, -0.7, 4.8))
     right, bottom = pixel(CAMERA, (-0.5, -0.3, 4.8))
-    # Of the sides that face away from the axis nothing is seen, those towards it recede to 5.2 m.
+    # Sides that face away from the axis are invisible; those that face it extend to 5.2 m.
     assert abs(columns.min() - 0.5 - left) < 0.5 + 1e-6 and abs(rows.min() - 0.5 - top) < 0.5 + 1e-6
     right, bottom = (max(right, pixel(CAMERA, (-0.5, -0.3, 5.2))[0]), max(bottom, pixel(CAMERA, (-0.5, -0.3, 5.2))[1]))
     assert abs(columns.max() + 0.5 - right) < 0.5 + 1e-6 and abs(rows.max() + 0.5 - bottom) < 0.5 + 1e-6
 
 
-def test_a_small_cubes_centroid_is_where_k_says(renderer):
+def test_the_centroid_of_a_ball_is_where_k_projects_it(renderer):
     for y, z in ((0.0, 1.0), (1.1, 1.6), (-1.3, 0.3)):
         picture = draw(renderer, [Visual("ball", Sphere((0.15,)), RED)], [at(4.0, y, z)])
         rows, columns = np.nonzero(reddish(picture))
@@ -48,7 +48,7 @@ def test_up_is_up_and_left_is_left(renderer):
     picture = draw(renderer, cubes, [at(4.0, 0.0, 2.0), at(4.0, 1.0, 1.0)])
     assert np.nonzero(reddish(picture))[0].mean() < 60
     assert np.nonzero((picture[:, :, 2] > 100) & (picture[:, :, 0] < 40))[1].mean() < 100
-    assert picture[0].mean() < picture[100].mean()  # the sky is deeper above than at the horizon
+    assert picture[0].mean() < picture[100].mean()  # the sky is darker above than at the horizon
 
 
 @pytest.mark.parametrize(
@@ -56,14 +56,14 @@ def test_up_is_up_and_left_is_left(renderer):
     [CAMERA, Orthographic(160, 120, 4.0, 0.1, 20.0), Distorted(160, 120, 2.6, 0.02, 50.0, "equidistant")],
     ids=["pinhole", "orthographic", "fisheye"],
 )
-def test_what_is_outside_the_view_is_not_drawn_and_the_picture_is_the_same(renderer, monkeypatch, camera):
-    """Every picture, with its outputs, equals that for which everything is drawn, to the last bit."""
-    random, drawn = np.random.default_rng(7), []
+def test_culling_skips_visuals_outside_the_view_without_changing_the_picture(renderer, monkeypatch, camera):
+    """Pictures and outputs with culling equal those without culling, to the last bit."""
+    random, masks = np.random.default_rng(7), []
     monkeypatch.setattr(batches, "MANY_VERTICES", 0)
 
-    def recorded(*arguments):
-        drawn.append(culling.in_view(*arguments))
-        return drawn[-1]
+    def in_view_recorded(*arguments):
+        masks.append(culling.in_view(*arguments))
+        return masks[-1]
 
     names = ["color", "depth", "instance", "before"]
     for _ in range(20):
@@ -75,17 +75,17 @@ def test_what_is_outside_the_view_is_not_drawn_and_the_picture_is_the_same(rende
         before = FrameState(AHEAD, poses + random.normal(0.0, 0.05))
         view = looking(random.uniform((-3, -3, 0.5), (3, 3, 3)), random.uniform(-3, 3, 3))
         images = []
-        for in_view in (recorded, lambda centres, *_: np.ones(len(centres), dtype=bool)):
+        for in_view in (in_view_recorded, lambda centres, *_: np.ones(len(centres), dtype=bool)):
             monkeypatch.setattr(batches, "in_view", in_view)
             images.append(
                 renderer.render_outputs(names, camera, view, poses, instances=np.arange(1, 42), before=before)
             )
         for name in names:
             np.testing.assert_array_equal(images[0][name], images[1][name])
-    assert 0.1 < np.mean(drawn) < 0.9
+    assert 0.1 < np.mean(masks) < 0.9
 
 
-def test_a_shadow_is_seen_without_the_thing_that_casts_it(renderer, monkeypatch):
+def test_an_object_outside_the_view_casts_a_shadow_into_it(renderer, monkeypatch):
     """The ball is 3 m above the picture's upper edge; its shadow is in the middle."""
     monkeypatch.setattr(batches, "MANY_VERTICES", 0)
     view = looking((0.0, 0.0, 2.0), (0.0, 0.1, 0.0))
@@ -95,7 +95,7 @@ def test_a_shadow_is_seen_without_the_thing_that_casts_it(renderer, monkeypatch)
     assert not reddish(with_shadow).any() and with_shadow[120, 160].mean() < 0.6 * without[120, 160].mean()
 
 
-def test_visuals_come_change_and_go(renderer):
+def test_visuals_are_added_changed_and_removed(renderer):
     first, second = box("a", (0.5, 0.5, 0.5)), box("b", (0.5, 0.5, 0.5), BLUE)
     poses = [at(4.0, -1.0, 1.0), at(4.0, 1.0, 1.0)]
     empty = draw(renderer, [], [])
@@ -117,7 +117,7 @@ def test_an_unreadable_mesh_leaves_the_scene_as_it_was(renderer):
     np.testing.assert_array_equal(renderer.render(CAMERA, AHEAD, at(4, 0, 1)[None]), before)
 
 
-def test_parallel_rays_show_a_cube_as_large_as_it_is_however_far_it_is(renderer):
+def test_an_orthographic_camera_shows_the_same_size_at_any_distance(renderer):
     camera = Orthographic(160, 120, 4.0, 0.1, 20.0)
     for distance in (2.0, 8.0):
         cubes, poses = [box("cube", (0.4, 0.4, 0.4))], np.array([at(distance, 0.7, 1.5)])
@@ -129,10 +129,10 @@ def test_parallel_rays_show_a_cube_as_large_as_it_is_however_far_it_is(renderer)
         depth = renderer.render_depth(camera, AHEAD, poses)
         assert np.isfinite(depth).sum() == 16 * 16 and depth[40, 52] == pytest.approx(distance - 0.2, abs=1e-5)
     u, v = (round(one) for one in pixel(CAMERA, (-0.7, -0.5, 7.8)))
-    assert renderer.render_depth(CAMERA, AHEAD, poses)[v, u] == pytest.approx(7.8, abs=1e-3), "in perspective again"
+    assert renderer.render_depth(CAMERA, AHEAD, poses)[v, u] == pytest.approx(7.8, abs=1e-3), "a perspective camera"
 
 
-def test_depth_is_metric_and_empty_where_nothing_is(renderer):
+def test_depth_is_in_metres_and_nan_where_nothing_is_hit(renderer):
     renderer.set_visuals([box("wall", (1.0, 2.0, 2.0)), box("distant", (1.0, 40.0, 1000.0))])
     poses = np.array([at(5.5, 0.0, 1.0), at(105.0, 0.0, 1.0)])
     depth = renderer.render_depth(CAMERA, AHEAD, poses)
@@ -145,13 +145,13 @@ def test_depth_is_metric_and_empty_where_nothing_is(renderer):
     assert np.nanmax(renderer.render_depth(farther, AHEAD, poses)) == pytest.approx(104.5, abs=0.01)
 
 
-def test_depth_is_as_good_far_from_the_origin(renderer):
+def test_depth_is_precise_far_from_the_origin(renderer):
     renderer.set_visuals([box("wall", (1.0, 2.0, 2.0))])
     depth = renderer.render_depth(CAMERA, at(1e5, 3e5, 0) @ AHEAD, at(1e5 + 5.5, 3e5, 1.0)[None])
     np.testing.assert_allclose(depth[120, 160], 5.0, atol=0.001)
 
 
-def test_the_depth_of_a_pixel_is_that_of_the_nearest_visual_there(renderer):
+def test_the_depth_of_a_pixel_is_that_of_the_nearest_visual(renderer):
     visuals, poses = (
         [box("a", (0.5, 0.5, 0.5)), FLOOR, box("b", (0.5, 0.5, 0.5))],
         [at(4, 1, 1), at(0, 0, 0), at(4, -1, 1)],
@@ -166,17 +166,17 @@ def test_the_depth_of_a_pixel_is_that_of_the_nearest_visual_there(renderer):
         np.testing.assert_array_equal(depth[labels == index], alone[labels == index])
 
 
-def test_glass_lets_through_what_is_behind_it(renderer):
+def test_transparent_visuals_are_blended_with_the_visuals_behind_them(renderer):
     wall, panes = box("wall", (0.1, 9.0, 9.0), BLUE), []
     poses = [at(6, 0, 1), at(4, 0, 1), at(5, 0, 1)]
-    only = draw(renderer, [wall], poses[:1])[120, 160].astype(float)
+    wall_color = draw(renderer, [wall], poses[:1])[120, 160].astype(float)
     for key, rgba in (("near", (1.0, 0.0, 0.0, 0.5)), ("far", (0.0, 1.0, 0.0, 0.5))):
         panes.append(box(key, (0.1, 1.0, 1.0), rgba))
-    solid = [
+    pane_colors = [
         draw(renderer, [box("p", (0.1, 1.0, 1.0), (*pane.rgba[:3], 1.0))], [pose])[120, 160]
         for pane, pose in zip(panes, poses[1:])
     ]
-    expected = 0.5 * solid[0] + 0.25 * solid[1] + 0.25 * only
+    expected = 0.5 * pane_colors[0] + 0.25 * pane_colors[1] + 0.25 * wall_color
     for order in ([wall, *panes], [panes[1], wall, panes[0]]):
         placed = [poses[[wall, *panes].index(visual)] for visual in order]
         np.testing.assert_allclose(draw(renderer, order, placed)[120, 160], expected, atol=2.0)
@@ -185,7 +185,7 @@ def test_glass_lets_through_what_is_behind_it(renderer):
 DOWN = looking((-4.0, 0.0, 5.0), (0.0, 0.0, 0.0))
 
 
-def test_a_shadow_darkens_the_floor_under_a_thing_and_nothing_else(renderer):
+def test_a_shadow_darkens_the_floor_under_an_object_and_nothing_else(renderer):
     poses = [at(0, 0, 0), at(0, 0, 1.5)]
     bare = draw(renderer, [FLOOR], poses[:1], DOWN).astype(int)
     picture = draw(renderer, [FLOOR, box("a", (1.0, 1.0, 0.2))], poses, DOWN).astype(int)
@@ -205,7 +205,7 @@ def test_shadows_do_not_add_up(renderer):
     both = draw(renderer, visuals, [at(0, 0, 0), at(0, 0, 1.5), at(0, 0, 2.0)], DOWN)
     labels = seen(renderer, visuals, [at(0, 0, 0), at(0, 0, 1.5), at(0, 0, 2.0)], DOWN)
     floor = both[labels == 0]
-    assert len(np.unique(floor[:, 0])) == 2  # lit or not, nothing darker
+    assert len(np.unique(floor[:, 0])) == 2  # lit or in shadow, nothing darker
     assert floor[:, 0].min() == alone[:, :, 0][renderer_floor(alone)].min()
 
 
@@ -239,7 +239,7 @@ def test_multisampling_smooths_edges_and_only_edges():
 
 
 def quarters(path):
-    """A picture with red, blue in its upper row and green, white in its lower."""
+    """Write a picture with red and blue in the upper row, green and white in the lower; return its path."""
     image = np.zeros((64, 64, 3), np.uint8)
     image[:32, :32], image[:32, 32:], image[32:, :32], image[32:][:, 32:] = (0, 0, 255), (255, 0, 0), (0, 255, 0), 255
     cv2.imwrite(str(path), image)
@@ -274,7 +274,7 @@ def test_textures_repeat(renderer, tmp_path):
     assert np.ptp(picture[:, :, 0]) > 150
 
 
-def test_the_same_again_is_the_same_to_the_last_bit_whatever_was_drawn_between(renderer):
+def test_the_same_scene_gives_the_same_picture_after_other_renderings(renderer):
     visuals = [FLOOR, box("a", (1, 1, 1)), Visual("g", Sphere((0.4,)), (0, 1, 0, 0.4))]
     poses = np.array([at(0, 0, 0), at(5, 1, 0.5), at(3, 0, 1)])
     first = draw(renderer, visuals, poses)
@@ -298,7 +298,7 @@ def test_wrong_arguments_are_refused(renderer):
         Renderer(samples=3)
 
 
-def test_a_closed_renderer_says_so_and_closes_again():
+def test_a_closed_renderer_refuses_use_and_can_be_closed_again():
     renderer = Renderer()
     renderer.set_visuals([FLOOR])
     renderer.close()
@@ -307,7 +307,7 @@ def test_a_closed_renderer_says_so_and_closes_again():
         renderer.set_visuals([])
 
 
-def test_another_thread_is_refused(renderer):
+def test_use_from_another_thread_is_refused(renderer):
     caught = []
 
     def use():
@@ -322,7 +322,7 @@ def test_another_thread_is_refused(renderer):
     assert caught and "thread" in caught[0]
 
 
-def test_without_egl_it_says_in_one_line_what_is_missing(monkeypatch):
+def test_without_egl_a_one_line_error_names_the_missing_library(monkeypatch):
     monkeypatch.setattr(context, "LIBEGL", "libNoSuchEGL.so.1")
     with pytest.raises(context.RendererUnavailable, match="libegl1") as caught:
         Renderer()
@@ -340,7 +340,7 @@ def bullet():
 
 
 def bullet_mask(client, camera_pose, intrinsics):
-    """What TinyRenderer takes for the first body, seen by the same camera."""
+    """Return a mask of the pixels that show the first body in TinyRenderer's picture of the same camera."""
     eye_from_world = np.diag([1.0, -1.0, -1.0, 1.0]) @ np.linalg.inv(camera_pose)
     upright = intrinsics.projection() @ np.diag([1.0, -1.0, -1.0, 1.0])
     upright[1] *= -1.0
@@ -367,7 +367,7 @@ def overlap(renderer, visual, pose, theirs, intrinsics):
 
 
 def place(client, **shapes):
-    """The pose of a new body in front of the camera."""
+    """Create a body in front of the camera and return its pose."""
     body = pybullet.createMultiBody(
         0, basePosition=(2.2, 0.1, 0.9), baseOrientation=TURN, physicsClientId=client, **shapes
     )
@@ -378,7 +378,7 @@ def place(client, **shapes):
 
 
 @pytest.mark.parametrize("word", ["box", "sphere", "cylinder", "capsule", "mesh"])
-def test_the_silhouette_is_that_of_pybullets_picture(renderer, bullet, tmp_path, word):
+def test_the_silhouette_equals_that_of_pybullets_picture(renderer, bullet, tmp_path, word):
     """Round shapes go to PyBullet as fine meshes: its own are hulls of 42 directions, a sphere 8 % too small."""
     path = str(tmp_path / "theirs.obj")
     shape, theirs = {
@@ -407,7 +407,7 @@ def test_the_silhouette_is_that_of_pybullets_picture(renderer, bullet, tmp_path,
     ],
     ids=["box", "sphere", "cylinder", "capsule"],
 )
-def test_the_silhouette_is_that_of_the_body_the_physics_hits(renderer, bullet, shape, kind, arguments):
+def test_the_silhouette_equals_that_of_ray_casts_against_the_body(renderer, bullet, shape, kind, arguments):
     """A ray through each pixel's centre, against Bullet's exact shapes."""
     form = pybullet.createCollisionShape(kind, physicsClientId=bullet, **arguments)
     pose = place(bullet, baseCollisionShapeIndex=form)

@@ -1,4 +1,4 @@
-"""Callbacks run in rospy's threads: they read nothing of the simulation, check, and leave a job for its thread."""
+"""Callbacks in rospy's threads: they check messages without the simulation and leave jobs for its thread."""
 
 import math
 import threading
@@ -28,7 +28,7 @@ from drone_sim.vehicles.commands import EMPTY, REQUESTS
 
 
 class OwnThreadOnly:
-    """A simulation that no other thread may look at."""
+    """A proxy of a simulation that fails when another thread reads it."""
 
     def __init__(self, simulation):
         self._simulation, self._owner = simulation, threading.get_ident()
@@ -46,34 +46,34 @@ def simulation(new_simulation):
 
 @pytest.fixture
 def callbacks(monkeypatch):
-    """Return what has been subscribed, by topic."""
-    found = {}
+    """Return the subscribed callbacks, by topic."""
+    callbacks_by_topic = {}
 
     def subscriber(topic, _kind, callback, **_):
-        found[topic] = callback
+        callbacks_by_topic[topic] = callback
         return mock.MagicMock()
 
     monkeypatch.setattr(rospy, "Subscriber", subscriber)
     monkeypatch.setattr(handles, "MarkerServer", mock.MagicMock())
-    return found
+    return callbacks_by_topic
 
 
 def in_another_thread(callback, message):
-    failed = []
+    failures = []
 
     def run():
         try:
             callback(message)
         except BaseException as error:
-            failed.append(error)
+            failures.append(error)
 
     thread = threading.Thread(target=run)
     thread.start()
     thread.join()
-    assert not failed, failed[0]
+    assert not failures, failures[0]
 
 
-def placed(message, x=1.0):
+def at_position(message, x=1.0):
     pose = getattr(message.pose, "pose", message.pose)
     pose.position.x, pose.position.z, pose.orientation.w = x, 1.0, 1.0
     return message
@@ -82,11 +82,11 @@ def placed(message, x=1.0):
 MESSAGES = {
     "cmd_vel": Twist(),
     "cmd_vel_stamped": TwistStamped(),
-    "goto": placed(PoseStamped()),
+    "goto": at_position(PoseStamped()),
     **{topic: Empty() for topic, kind in REQUESTS.items() if kind == EMPTY},
-    "set_pose": placed(PoseStamped(), 2.0),
-    "initialpose": placed(PoseWithCovarianceStamped(), 3.0),
-    "target_pose": placed(PoseStamped()),
+    "set_pose": at_position(PoseStamped(), 2.0),
+    "initialpose": at_position(PoseWithCovarianceStamped(), 3.0),
+    "target_pose": at_position(PoseStamped()),
     "push": WrenchStamped(),
     "set_wind": Vector3Stamped(),
     "weather": KeyValue("wind", "[1, 0, 0]"),
@@ -94,7 +94,7 @@ MESSAGES = {
 }
 
 
-def test_what_a_vehicle_listens_to_is_checked_without_the_simulation(simulation, callbacks):
+def test_messages_for_a_vehicle_are_checked_without_reading_the_simulation(simulation, callbacks):
     inbox = Inbox()
     inputs = VehicleInputs(simulation, simulation.drone.parameters, inbox)
     assert callbacks.keys() == {f"drone/{topic}" for topic in MESSAGES}
@@ -105,7 +105,7 @@ def test_what_a_vehicle_listens_to_is_checked_without_the_simulation(simulation,
     assert simulation.drone.body.state.position[0] == pytest.approx(3.0)
 
 
-def test_a_command_is_checked_against_what_has_been_tuned(simulation, callbacks):
+def test_a_command_is_checked_against_the_tuned_limits(simulation, callbacks):
     inputs = VehicleInputs(simulation, simulation.drone.parameters, Inbox())
     fast = Twist()
     fast.linear.x = simulation.drone.parameters.cmd_vel_limits.linear + 1
@@ -127,7 +127,7 @@ def test_a_refusal_names_the_topic_of_the_command(simulation, callbacks, caplog,
 
 
 @pytest.mark.parametrize("made", [handles.VehicleHandles, handles.ObjectHandles])
-def test_a_handle_is_dragged_without_the_simulation(simulation, callbacks, made):
+def test_the_callback_of_a_dragged_handle_does_not_read_the_simulation(simulation, callbacks, made):
     inbox = Inbox()
     shown = made(simulation, inbox)
     for event in ("MOUSE_DOWN", "POSE_UPDATE", "MOUSE_UP"):
@@ -140,7 +140,7 @@ def test_a_handle_is_dragged_without_the_simulation(simulation, callbacks, made)
     assert simulation.drone.body.state.position[0] == pytest.approx(2.0 if is_moved else 0.0, abs=1e-3)
 
 
-def test_faults_checked_for_a_vehicle_that_was_replaced_are_refused_in_one_line(callbacks, caplog, new_simulation):
+def test_faults_for_a_replaced_vehicle_are_refused_in_one_line(callbacks, caplog, new_simulation):
     simulation = new_simulation({"vehicles": {"drone": {"sensors": {"imu": {"kind": "imu", "rate": 20}}}}})
     inbox = Inbox()
     inputs = VehicleInputs(simulation, simulation.drone.parameters, inbox)
@@ -153,7 +153,7 @@ def test_faults_checked_for_a_vehicle_that_was_replaced_are_refused_in_one_line(
     assert not [one for one in caplog.records if one.exc_info]
 
 
-def test_every_propeller_of_a_hexacopter_may_fail_by_a_message(callbacks, new_simulation):
+def test_a_message_may_fail_any_propeller_of_a_hexacopter(callbacks, new_simulation):
     simulation = new_simulation({"config": "package://drone_sim/config/hexacopter.yaml"})
     inbox = Inbox()
     inputs = VehicleInputs(simulation, simulation.drone.parameters, inbox)
@@ -164,7 +164,7 @@ def test_every_propeller_of_a_hexacopter_may_fail_by_a_message(callbacks, new_si
     assert inputs.log.is_refusing("faults")
 
 
-def test_a_picture_that_cannot_be_encoded_does_not_end_the_encoder(monkeypatch):
+def test_a_picture_that_cannot_be_encoded_does_not_stop_the_encoder(monkeypatch):
     published, errors = Queue(), []
     monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
     monkeypatch.setattr(rospy, "Publisher", mock.MagicMock())
@@ -181,7 +181,7 @@ def test_a_picture_that_cannot_be_encoded_does_not_end_the_encoder(monkeypatch):
     output.unregister()
 
 
-def test_twists_without_a_subscriber_are_found_by_asking_the_master(monkeypatch):
+def test_twist_topics_without_a_subscriber_are_found_through_the_master(monkeypatch):
     answers = {
         "getSystemState": [
             [["/cmd_vel", ["/teleop"]], ["/own", ["/drone_sim"]], ["/heard", ["/teleop"]], ["/text", ["/teleop"]]],
@@ -200,7 +200,7 @@ def test_twists_without_a_subscriber_are_found_by_asking_the_master(monkeypatch)
     assert diagnostics.unheard_commands() == {}
 
 
-def test_a_type_whose_code_was_never_generated_is_told_from_one_that_is_not_there(monkeypatch, tmp_path):
+def test_a_type_without_generated_code_is_distinguished_from_a_missing_type(monkeypatch, tmp_path):
     for ending in ("msg", "srv"):
         (tmp_path / "course_msgs" / ending).mkdir(parents=True)
         (tmp_path / "course_msgs" / ending / f"Gate.{ending}").touch()
@@ -214,7 +214,7 @@ def test_a_type_whose_code_was_never_generated_is_told_from_one_that_is_not_ther
 
 
 @pytest.mark.parametrize("look", [message_conversion.message_class, message_conversion.service_class])
-def test_a_type_of_a_package_that_ros_cannot_read_is_refused_with_the_reason(look, monkeypatch, tmp_path):
+def test_a_type_of_an_unreadable_package_is_refused_with_the_reason(look, monkeypatch, tmp_path):
     (tmp_path / "a_msgs/msg").mkdir(parents=True)
     person = "<maintainer email='nobody'>N</maintainer><version>1.0.0</version><license>x</license>"
     text = f"<package format='2'><name>a_msgs</name><description>x</description>{person}</package>"
@@ -224,7 +224,7 @@ def test_a_type_of_a_package_that_ros_cannot_read_is_refused_with_the_reason(loo
         look("a_msgs/Gate")
 
 
-def test_to_resume_what_is_not_paused_says_how_to_pause(simulation, monkeypatch):
+def test_resuming_a_simulation_that_is_not_paused_explains_how_to_pause(simulation, monkeypatch):
     player = mock.Mock(playing=True, pause=lambda on: "paused" if on else "resumed")
     warnings = []
     monkeypatch.setattr(services, "VehiclesParameter", mock.Mock())
@@ -239,7 +239,7 @@ def test_to_resume_what_is_not_paused_says_how_to_pause(simulation, monkeypatch)
     assert offered.pause(False) == "resumed" and len(warnings) == 1
 
 
-def test_half_a_character_in_an_answer_of_the_editor_is_written_out(monkeypatch):
-    asked = mock.Mock(ask=mock.Mock(side_effect=ValueError("no file \ud800.yaml")))
-    done, said = scene_editing.SceneEditing._attempt(mock.Mock(_inbox=asked), str, "", None)
-    assert not done and said.encode("utf-8") == rb"no file \ud800.yaml"
+def test_a_lone_surrogate_in_a_reply_of_the_editor_is_escaped(monkeypatch):
+    editor_inbox = mock.Mock(ask=mock.Mock(side_effect=ValueError("no file \ud800.yaml")))
+    success, reply = scene_editing.SceneEditing._attempt(mock.Mock(_inbox=editor_inbox), str, "", None)
+    assert not success and reply.encode("utf-8") == rb"no file \ud800.yaml"

@@ -1,4 +1,4 @@
-"""The same flight to the last bit, and the same picture, on every Debian."""
+"""The same flight to the last bit and the same picture on every supported Debian release."""
 
 import hashlib
 import struct
@@ -19,29 +19,29 @@ PICTURE = Path(__file__).parent / "front_camera.png"  # made by Mesa 22.3 with L
 
 def test_the_tutorials_flight_is_the_same_to_the_last_bit(new_simulation):
     simulation = new_simulation()
-    flown = hashlib.sha256()
+    digest = hashlib.sha256()
     for step in range(STEPS):
         if step == 20:
             simulation.drone.commands.receive(Twist(Vector3(0.8, -0.4, 0.1), Vector3(0, 0, 0.5)))
         if step == 300:
             simulation.drone.commands.receive(Twist())
         simulation.step()
-        flown.update(struct.pack("13d", *(number for part in simulation.drone.body.state for number in part)))
-    assert flown.hexdigest() == FLIGHT
+        digest.update(struct.pack("13d", *(number for part in simulation.drone.body.state for number in part)))
+    assert digest.hexdigest() == FLIGHT
 
 
-def test_a_picture_is_the_same(new_simulation):
+def test_a_picture_equals_the_stored_one(new_simulation):
     size = {"width": 160, "height": 120}
     simulation = new_simulation({"cameras": {"front": size}})
-    shown = simulation.drone.cameras["front"].look().astype(int)
+    rendered = simulation.drone.cameras["front"].look().astype(int)
     expected = cv2.cvtColor(cv2.imread(str(PICTURE)), cv2.COLOR_BGR2RGB).astype(int)
-    differences = np.abs(shown - expected)
-    # Exact where llvmpipe draws with the vectors that it drew with. Others filter the floor in their own way: on arm64,
-    # llvmpipe's picture differs by 7 at most, 1.2 on average.
+    differences = np.abs(rendered - expected)
+    # Exact where llvmpipe uses 256-bit vectors, as for the stored picture. Others filter the floor differently: on
+    # arm64, llvmpipe's picture differs by 7 at most, 1.2 on average.
     assert differences.max() == 0 if "256 bits" in renderer() else differences.mean() < 2
 
 
 def renderer():
-    one = Renderer()
-    one.close()
-    return one.description
+    instance = Renderer()
+    instance.close()
+    return instance.description

@@ -1,4 +1,4 @@
-"""A scene that is saved: nothing is lost, and what was written can be loaded."""
+"""Saved scenes: nothing is lost, and the file can be loaded."""
 
 import os
 
@@ -44,14 +44,14 @@ def files(path):
     return [content["floor"]["texture"], first["file"], first["texture"], second["texture"], content["drone"]["urdf"]]
 
 
-def test_files_keep_the_names_that_they_were_given(simulation, scene):
+def test_file_names_are_saved_as_written(simulation, scene):
     before = files(scene)
     simulation.save_scene(scene)
     assert files(scene) == before
     assert yaml.safe_load(scene.read_text(encoding="utf-8"))["objects"][0]["name"] == "Å"
 
 
-def test_what_its_author_wrote_stays_and_another_file_stays_beside_it(simulation, scene):
+def test_saving_keeps_the_authors_text_and_backs_up_another_file(simulation, scene):
     simulation.save_scene(scene)
     assert scene.read_text(encoding="utf-8") == SCENE.replace("ABSOLUTE", str(scene.parent / "pictures" / "tile.png"))
     other = scene.with_name("other.yaml")
@@ -62,7 +62,7 @@ def test_what_its_author_wrote_stays_and_another_file_stays_beside_it(simulation
     assert not scene.with_name("scene.yaml.bak").exists()
 
 
-def test_what_was_taken_off_and_put_upright_is_so_when_it_is_loaded(tmp_path, new_simulation):
+def test_a_removed_parent_and_a_zero_rotation_are_saved(tmp_path, new_simulation):
     above = {"name": "Above", "kind": "dummy", "position": [0, 0, 1]}
     below = {"name": "Below", "kind": "dummy", "position": [0, 0, 1], "rpy": [0, 0, 1], "parent": "Above"}
     simulation = new_simulation({"scene": {"objects": [above, below]}})
@@ -70,38 +70,38 @@ def test_what_was_taken_off_and_put_upright_is_so_when_it_is_loaded(tmp_path, ne
     one.parent = None
     one.put(frames.from_rpy((1, 2, 3), (0, 0, 0)))
     simulation.save_scene(tmp_path / "saved.yaml")
-    again = parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.objects[1]
-    assert (again.parent, again.position, again.rpy) == ("", (1, 2, 3), (0, 0, 0))
+    reloaded = parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.objects[1]
+    assert (reloaded.parent, reloaded.position, reloaded.rpy) == ("", (1, 2, 3), (0, 0, 0))
 
 
-def test_saved_elsewhere_they_are_found_all_the_same(simulation, scene, tmp_path):
-    there = tmp_path / "there" / "scene.yaml"
-    simulation.save_scene(there)
-    texture, ball, *others = files(there)
+def test_a_scene_saved_in_another_folder_still_finds_its_files(simulation, scene, tmp_path):
+    other_path = tmp_path / "there" / "scene.yaml"
+    simulation.save_scene(other_path)
+    texture, ball, *others = files(other_path)
     assert (texture, ball) == (str(tmp_path / "pictures" / "tile.png"), str(tmp_path / "ball.stl"))
     assert others == files(scene)[2:]
-    assert parameters.load({"scene_file": str(there)}).scene == parameters.load({"scene_file": str(scene)}).scene
+    assert parameters.load({"scene_file": str(other_path)}).scene == parameters.load({"scene_file": str(scene)}).scene
 
 
-def test_names_given_beside_a_file_are_found_from_another_folder(tmp_path, monkeypatch, scene, new_simulation):
+def test_file_names_given_without_a_scene_file_are_saved_absolute(tmp_path, monkeypatch, scene, new_simulation):
     monkeypatch.chdir(tmp_path)
     ball = {"shape": "mesh", "file": "ball.stl", "position": [3, 0, 1]}
     simulation = new_simulation({"scene": {"objects": [ball]}})
     simulation.save_scene(tmp_path / "there" / "scene.yaml")
     monkeypatch.chdir("/")
-    (again,) = parameters.load({"scene_file": str(tmp_path / "there" / "scene.yaml")}).scene.objects
-    assert again.file == str(tmp_path / "ball.stl")
+    (reloaded,) = parameters.load({"scene_file": str(tmp_path / "there" / "scene.yaml")}).scene.objects
+    assert reloaded.file == str(tmp_path / "ball.stl")
 
 
 @pytest.mark.parametrize("yaw", [0.0, 1.0, -3.0])
-def test_yaw_is_the_heading_however_the_drone_leans(simulation, scene, yaw):
+def test_the_heading_of_a_tilted_drone_is_saved_as_yaw(simulation, scene, yaw):
     leaning = frames.from_rpy((0, 0, 2), (0.7, -0.6, yaw))
     simulation.drone.body.move(Pose((0, 0, 2), frames.to_quaternion(leaning)))
     simulation.save_scene(scene)
     assert parameters.load({"scene_file": str(scene)}).drone.yaw == pytest.approx(yaw)
 
 
-def test_what_could_not_be_loaded_is_not_saved(simulation, scene):
+def test_a_scene_that_could_not_be_loaded_is_not_saved(simulation, scene):
     before = scene.read_text(encoding="utf-8")
     simulation.drone.body.move(Pose((0, 0, -0.5)))
     with pytest.raises(ParameterError, match=r"cannot be saved: .*drone/position/2 = -0\.5") as refused:
@@ -110,7 +110,7 @@ def test_what_could_not_be_loaded_is_not_saved(simulation, scene):
     assert scene.read_text(encoding="utf-8") == before
 
 
-def test_a_full_disk_leaves_the_last_scene(simulation, scene, monkeypatch):
+def test_a_full_disk_leaves_the_previous_scene_unchanged(simulation, scene, monkeypatch):
     before = scene.read_text(encoding="utf-8")
 
     def full(_):

@@ -1,4 +1,4 @@
-"""Objects of a scene that are no shapes, and how they hang together: found, moved, saved, refused."""
+"""Joints, dummies, paths, sensors and compounds of a scene: hierarchy, motion, saving and errors."""
 
 import math
 import re
@@ -48,7 +48,7 @@ def _simulate(new_simulation):
     return lambda text: new_simulation(scene=text)
 
 
-def found(simulation, name):
+def named(simulation, name):
     objects = simulation.context.objects
     return objects[objects.handle(name)]
 
@@ -58,10 +58,10 @@ def sim_of(simulation):
 
 
 def place(simulation, name):
-    return frames.position(found(simulation, name).matrix())
+    return frames.position(named(simulation, name).matrix())
 
 
-def test_the_motion_of_joints_composes(simulate):
+def test_the_motions_of_joints_in_a_chain_compose(simulate):
     simulation = simulate(SCENE)
     sim, objects = sim_of(simulation), simulation.context.objects
     slide, elbow, hand = (objects.handle(name) for name in ("Slide", "Elbow", "Hand"))
@@ -70,37 +70,37 @@ def test_the_motion_of_joints_composes(simulate):
     sim.setJointPosition(elbow, math.pi / 2)
     assert place(simulation, "Hand") == pytest.approx((5, -2.5, 1))
     assert sim.getObjectPosition(elbow, PARENT) == pytest.approx([0, 0, 1])
-    assert sim.getObjectPosition(elbow, slide) == pytest.approx([0, 0, 1]), "relative to what the joint moves"
+    assert sim.getObjectPosition(elbow, slide) == pytest.approx([0, 0, 1]), "relative to the moving side of the joint"
     sim.setJointPosition(slide, 9)
-    assert sim.getJointPosition(slide) == 2, "as far as its limits let it"
+    assert sim.getJointPosition(slide) == 2, "clipped to the limit of the joint"
     sim.setObjectPosition(hand, WORLD, [5, 0, 0])
     assert sim.getObjectPosition(hand, WORLD) == pytest.approx([5, 0, 0])
     sim.setJointPosition(elbow, 100)
-    assert sim.getJointPosition(elbow) == pytest.approx(100 - 32 * math.pi), "one without end, within half a turn"
+    assert sim.getJointPosition(elbow) == pytest.approx(100 - 32 * math.pi), "without limits, within half a turn"
 
 
-def test_a_body_without_mass_goes_where_its_parent_goes(simulate):
+def test_a_shape_without_mass_moves_with_its_parent(simulate):
     simulation = simulate(SCENE)
-    flag = found(simulation, "Flag")
+    flag = named(simulation, "Flag")
     simulation.drone.commands.receive(Twist(Vector3(0.5, 0, 0.3)))
     for _ in range(20):
         simulation.step()
     above = frames.transform(simulation.drone.body.matrix, (0, 0, 0.29))
     assert simulation.drone.body.state.position[0] > 0.05
     assert simulation.world.state(flag.number).position == pytest.approx(above)
-    finger, sim = found(simulation, "Finger"), sim_of(simulation)
+    finger, sim = named(simulation, "Finger"), sim_of(simulation)
     sim.setJointPosition(simulation.context.objects.handle("Slide"), 2)
     simulation.step()
     assert simulation.world.state(finger.number).position == pytest.approx(frames.position(finger.matrix()))
     tree = simulation.context.objects
     tree.set_parent(tree.handle("Flag"), WORLD, keep_in_place=True)
-    there = flag.matrix()
+    detached_pose = flag.matrix()
     for _ in range(5):
         simulation.step()
-    assert flag.matrix() == there, "let go, it stays"
+    assert flag.matrix() == detached_pose, "a detached shape stays"
 
 
-def test_a_spherical_joint_turns_any_way(simulate):
+def test_a_spherical_joint_accepts_any_rotation(simulate):
     simulation = simulate(SCENE)
     sim, joint = sim_of(simulation), simulation.context.objects.handle("Ball")
     sim.setSphericalJointMatrix(joint, list(frames.from_rpy((0, 0, 0), (math.pi / 2, 0, 0))))
@@ -115,36 +115,36 @@ def test_a_spherical_joint_turns_any_way(simulate):
 def test_kinds_aliases_and_paths_from_the_root(simulate):
     simulation = simulate(SCENE)
     objects, sim = simulation.context.objects, sim_of(simulation)
-    kinds = {name: found(simulation, name).kind for name in ("Hand", "Elbow", "Finger", "Table", "Way", "Eye", "Floor")}
+    kinds = {name: named(simulation, name).kind for name in ("Hand", "Elbow", "Finger", "Table", "Way", "Eye", "Floor")}
     assert list(kinds.values()) == ["dummy", "joint", "shape", "shape", "path", "vision_sensor", "shape"]
-    assert found(simulation, "Drone").kind == "shape" and found(simulation, "FrontVision").kind == "vision_sensor"
-    assert found(simulation, "Quadricopter_propeller_joint1").kind == "joint"
+    assert named(simulation, "Drone").kind == "shape" and named(simulation, "FrontVision").kind == "vision_sensor"
+    assert named(simulation, "Quadricopter_propeller_joint1").kind == "joint"
     assert sim.getObject("/Quadcopter/cloth") == objects.handle("Flag")
     assert sim.getObject("/Ball/cloth") == objects.handle("Under")
     assert objects.path(objects.handle("Finger")) == "/Slide/Elbow/Hand/Finger"
 
 
-def test_what_nothing_meets_and_what_nobody_sees(simulate):
+def test_non_respondable_and_invisible_shapes(simulate):
     simulation = simulate(SCENE)
     world, visuals = simulation.world, simulation.scene.visuals()[0]
     assert world.queries.ray((0, -6, 3), (0, -6, 0.1)) is None
     assert world.queries.ray((0, -9, 3), (0, -9, 0.1)).distance == pytest.approx(2, abs=1e-3)
     shown = {visual.key[0] for visual in visuals}
-    assert found(simulation, "Ghost").number in shown and found(simulation, "Unseen").number not in shown
+    assert named(simulation, "Ghost").number in shown and named(simulation, "Unseen").number not in shown
     simulation.drone.body.move(Pose((0, -6, 0.5)))
     for _ in range(5):
         simulation.step()
-    assert simulation.drone.body.state.position == pytest.approx((0, -6, 0.5), abs=0.06), "it flies inside"
+    assert simulation.drone.body.state.position == pytest.approx((0, -6, 0.5), abs=0.06), "the drone flies inside"
 
 
 def test_a_compound_is_one_rigid_body(simulate):
     simulation = simulate(SCENE)
-    looks = [one for one in simulation.scene.visuals()[0] if one.rgba[:3] == (0, 0, 1)]
-    assert len(looks) == 1, "a part of its own color"
+    blue_visuals = [one for one in simulation.scene.visuals()[0] if one.rgba[:3] == (0, 0, 1)]
+    assert len(blue_visuals) == 1, "one part has its own color"
     for _ in range(40):
         simulation.step()
-    assert place(simulation, "Table") == pytest.approx((0, 9, 0.85), abs=0.005), "it stands on its foot"
-    body = found(simulation, "Table").body
+    assert place(simulation, "Table") == pytest.approx((0, 9, 0.85), abs=0.005), "the table stands on its foot"
+    body = named(simulation, "Table").body
     centre = frames.position(simulation.world.inertial_frame(body.number))
     volumes, heights = np.array([0.1, math.pi * 0.05**2 * 0.8, 0.0072]), np.array([0, -0.45, -0.84])
     assert centre == pytest.approx((0, 0, volumes @ heights / volumes.sum()), abs=1e-3)
@@ -159,7 +159,7 @@ def test_paths(simulate):
     sim.setPathPosition(way, sim.getPathPosition(way) + 2)
     assert sim.getPathPosition(way) == 2
     half = math.sqrt(0.5)
-    table = found(simulation, "Way").table
+    table = named(simulation, "Way").table
     assert table == pytest.approx([0, 0, 0, 0, 0, 0, 1, 3, 0, 0, 0, 0, half, half, 3, 4, 0, 0, 0, half, half])
     assert sim.unpackDoubleTable(sim.readCustomDataBlock(way, "PATH")) == table
     flat = [0, 0, 0, 0, 0, 0, 1, 2, 0, 0, 0, 0, 1, 0]
@@ -171,34 +171,34 @@ def test_paths(simulate):
             call()
 
 
-def test_a_vision_sensor_of_the_scene_sees(simulate):
+def test_images_and_depths_of_a_vision_sensor(simulate):
     simulation = simulate(SCENE)
     sim, eye = sim_of(simulation), simulation.context.objects.handle("Eye")
     image, width, height = sim.getVisionSensorCharImage(eye)
     assert (width, height, len(image)) == (32, 24, 32 * 24 * 3)
     middle = np.frombuffer(image, np.uint8).reshape(24, 32, 3)[12, 16].astype(int)
-    assert middle[0] > middle[1] + 50, "the red finger, 1.5 m below it"
-    assert found(simulation, "Eye").picture("depth")[12, 16] == pytest.approx(1.45, abs=0.01)
-    plan = found(simulation, "Plan").picture("depth")
+    assert middle[0] > middle[1] + 50, "the red finger, 1.5 m below the sensor"
+    assert named(simulation, "Eye").picture("depth")[12, 16] == pytest.approx(1.45, abs=0.01)
+    plan = named(simulation, "Plan").picture("depth")
     assert plan.shape == (32, 24) and plan[16, 12] == pytest.approx(1.45, abs=0.01)
-    assert (abs(plan - 1.45) < 0.01).sum() == 4, "0.1 m at 20 px/m, of the larger side"
+    assert (abs(plan - 1.45) < 0.01).sum() == 4, "0.1 m at 20 px/m along the larger side"
 
 
-def test_a_vision_sensor_sees_one_entity_alone_or_handles(simulate):
+def test_a_vision_sensor_renders_a_single_entity_or_handles(simulate):
     simulation = simulate(SCENE)
     sim, objects = sim_of(simulation), simulation.context.objects
     eye, finger, floor = (objects.handle(name) for name in ("Eye", "Finger", "Floor"))
     depths = np.reshape(sim.checkVisionSensorEx(eye, finger, False), (24, 32))
-    whole = found(simulation, "Eye").picture("depth")[::-1]
+    whole = named(simulation, "Eye").picture("depth")[::-1]
     assert (depths < 1).sum() == 4 and whole[depths < 1] == pytest.approx(1.45, abs=0.01)
     result, statistics, _ = sim.checkVisionSensor(eye, finger)
     assert result == 1 and statistics[6] > 0.5 and statistics[14] == pytest.approx(depths.mean())
-    assert sim.checkVisionSensor(eye, objects.handle("Quadricopter_base"))[0] == 0, "it is elsewhere"
+    assert sim.checkVisionSensor(eye, objects.handle("Quadricopter_base"))[0] == 0, "not in view"
 
     sim.setObjectInt32Param(eye, sim.visionintparam_render_mode, 2)
     image = np.frombuffer(sim.getVisionSensorImg(eye)[0], np.uint8).reshape(24, 32, 3).astype(int) @ (1, 256, 65536)
     assert ((image == finger) == (depths < 1)).all() and {*np.unique(image)} == {finger, floor, 0xFFFFFF}, (
-        "white: nothing"
+        "white where there is no object"
     )
     assert sim.readVisionSensor(eye) == (0, sorted([finger, floor]), ())
     sim.setObjectInt32Param(eye, sim.visionintparam_entity_to_render, finger)
@@ -206,30 +206,30 @@ def test_a_vision_sensor_sees_one_entity_alone_or_handles(simulate):
     assert sim.getObjectInt32Param(eye, sim.visionintparam_entity_to_render) == finger
 
 
-def test_it_begins_anew_is_saved_and_comes_back_with_a_snapshot(simulate, tmp_path, new_simulation):
+def test_joints_and_parents_are_saved_restored_and_reset(simulate, tmp_path, new_simulation):
     simulation = simulate(SCENE)
     sim, objects = sim_of(simulation), simulation.context.objects
     sim.setJointPosition(objects.handle("Slide"), 1)
     sim.setObjectParent(objects.handle("Finger"), objects.handle("Quadricopter_base"), True)
     simulation.step()
     simulation.save_scene(tmp_path / "saved.yaml")
-    again = new_simulation({"scene_file": str(tmp_path / "saved.yaml")})
+    reloaded = new_simulation({"scene_file": str(tmp_path / "saved.yaml")})
     for handle in objects:
         name = objects[handle].name
-        assert found(again, name).matrix() == pytest.approx(objects[handle].matrix(), abs=1e-6), name
+        assert named(reloaded, name).matrix() == pytest.approx(objects[handle].matrix(), abs=1e-6), name
     snapshot, before = simulation.snapshot(), place(simulation, "Finger")
     sim.setJointPosition(objects.handle("Slide"), 0)
     sim.setObjectPosition(objects.handle("Finger"), WORLD, [0, 0, 9])
     simulation.restore(snapshot)
-    assert place(simulation, "Finger") == before and found(simulation, "Slide").value == 1
-    finger = found(simulation, "Finger")
+    assert place(simulation, "Finger") == before and named(simulation, "Slide").value == 1
+    finger = named(simulation, "Finger")
     assert simulation.world.state(finger.number).position == pytest.approx(before)
     simulation.start()
-    assert found(simulation, "Slide").value == 0
-    assert found(simulation, "Finger").parent.name == "Hand"
+    assert named(simulation, "Slide").value == 0
+    assert named(simulation, "Finger").parent.name == "Hand"
 
 
-ONE = "kind: dummy, position: [0, 0, 0]"
+DUMMY = "kind: dummy, position: [0, 0, 0]"
 
 
 @pytest.mark.parametrize(
@@ -238,18 +238,18 @@ ONE = "kind: dummy, position: [0, 0, 0]"
         ("{kind: dummy}", "scene.yaml: line 2: parameter objects/0/name: missing"),
         ("{kind: cone}", "line 2: parameter objects/0/kind = 'cone': must be one of 'dummy', 'joint', 'pro"),
         ("{name: A, kind: dummy, mass: 1}", "line 2: parameter objects/0/mass: unknown key"),
-        (f"{{name: A, {ONE}}}\n  - {{name: A, {ONE}}}", "line 3: parameter objects/1/name = 'A': is used twice"),
-        (f"{{name: A, parent: A, {ONE}}}", "line 2: parameter objects/0/parent = 'A': 'A' would be its own ancestor"),
+        (f"{{name: A, {DUMMY}}}\n  - {{name: A, {DUMMY}}}", "line 3: parameter objects/1/name = 'A': is used twice"),
+        (f"{{name: A, parent: A, {DUMMY}}}", "line 2: parameter objects/0/parent = 'A': 'A' would be its own ancestor"),
         (
-            f"{{name: A, parent: B, {ONE}}}\n  - {{name: B, parent: A, {ONE}}}",
+            f"{{name: A, parent: B, {DUMMY}}}\n  - {{name: B, parent: A, {DUMMY}}}",
             "line 2: parameter objects/0/parent = 'B': 'A' would be its own ancestor",
         ),
         (
-            "\n  - ".join(f"{{name: o{i}, parent: {f'o{i - 1}' if i else ''!r}, {ONE}}}" for i in range(999)),
+            "\n  - ".join(f"{{name: o{i}, parent: {f'o{i - 1}' if i else ''!r}, {DUMMY}}}" for i in range(999)),
             "line 203: parameter objects/201/parent = 'o200': 'o201' has more than 200 ancestors",
         ),
         (
-            f"{{name: A, parent: Quadricopter_bas, {ONE}}}",
+            f"{{name: A, parent: Quadricopter_bas, {DUMMY}}}",
             "line 2: no object is named 'Quadricopter_bas', the parent of 'A'; near names are Quadricopter_base",
         ),
         (
@@ -297,14 +297,14 @@ ONE = "kind: dummy, position: [0, 0, 0]"
         ),
     ],
 )
-def test_a_wrong_entry_gets_one_line(simulate, entry, words):
+def test_an_invalid_entry_gives_a_one_line_error(simulate, entry, words):
     with pytest.raises(ParameterError) as refused:
         simulate(f"objects:\n  - {entry}\n")
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
 
 
-def test_a_joint_that_the_dynamics_cannot_move_is_told_of_once(simulate, caplog):
+def test_joints_that_the_dynamics_cannot_move_are_logged_once(simulate, caplog):
     simulate(
         """
 objects:
@@ -329,7 +329,7 @@ def test_rviz_shows_dummies_as_balls_and_paths_as_lines(simulate):
     np.testing.assert_allclose(points, [(0, 9, 1.85), (3, 9, 1.85), (3, 13, 1.85)])
 
 
-def test_what_hung_on_a_vehicle_that_has_gone_stays_where_it_was(new_simulation):
+def test_a_child_of_a_removed_vehicle_stays_where_it_was(new_simulation):
     two = {"a": {"position": [0, 0, 1]}, "b": {"position": [2, 0, 1]}}
     flag = "{name: Flag, shape: box, size: [0.1, 0.1, 0.1], parent: Drone#0, position: [0, 0, 0.3]}"
     simulation = new_simulation({"vehicles": two}, scene=f"objects: [{flag}]")
@@ -347,9 +347,9 @@ DOCS = (Path(__file__).parents[2] / "docs/scenes.md").read_text(encoding="utf-8"
 def test_the_examples_of_the_docs_load(simulate):
     examples = re.findall(r"^```yaml\n(.*?)^```", DOCS, re.S | re.M)
     entries = ["".join(line for line in one.splitlines(True) if "file:" not in line) for one in examples]
-    said = [yaml.safe_load(one) for one in entries]
-    objects = [entry for one in said for entry in one.get("objects", [])]
-    vehicles = next(one["vehicles"] for one in said if "vehicles" in one)
+    contents = [yaml.safe_load(one) for one in entries]
+    objects = [entry for one in contents for entry in one.get("objects", [])]
+    vehicles = next(one["vehicles"] for one in contents if "vehicles" in one)
     simulation = simulate(yaml.safe_dump({"objects": objects, "vehicles": vehicles}))
     names = set(simulation.context.objects.names)
     assert {"Crate", "Hinge", "Gauge", "Sonar", "Watch", "Way", "Ball", "Door", "Aim"} <= names

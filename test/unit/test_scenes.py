@@ -1,4 +1,4 @@
-"""Scene files: every shape is read, drawn and hit; saved and loaded again; wrong ones get one line."""
+"""Scene files: all shapes, saving and loading, and one-line errors."""
 
 import re
 
@@ -37,7 +37,7 @@ SHAPES = {
 
 @pytest.fixture(name="write")
 def _write(tmp_path):
-    """Give a function that writes a scene file, with meshes beside and below it; it returns the file's name."""
+    """Return a function that writes a scene file, with meshes beside and below it, and returns its name."""
     block = trimesh.creation.box((0.6, 0.6, 0.6))
     (tmp_path / "parts").mkdir()
     for name in ("block.obj", "block.stl", "parts/block.stl", "parts/block.dae"):
@@ -63,7 +63,7 @@ def _simulate(new_simulation):
 
 @pytest.mark.parametrize("mass", [0, 2])
 @pytest.mark.parametrize("shape", SHAPES)
-def test_every_shape_is_read_drawn_and_hit(write, simulate, renderer, shape, mass):
+def test_every_shape_is_loaded_drawn_and_collides(write, simulate, renderer, shape, mass):
     simulation = simulate(write(f"drone: {{position: [1, 0, 3]}}\nobjects: [{SHAPES[shape] % (1, mass)}]"))
     view = looking((-3, 0, 1.5), (1, 0, 0.3))
     labels = seen(renderer, simulation.world.pictures.visuals(), simulation.world.pictures.visual_poses(), view)
@@ -71,10 +71,10 @@ def test_every_shape_is_read_drawn_and_hit(write, simulate, renderer, shape, mas
     assert np.isin(labels, things).sum() > 500
     ball = simulation.world.add_object(Sphere((0.05,)), Pose((1.0, 0, 0.7)), mass=0.1)
     simulation.world.advance({}, 100)
-    assert simulation.world.state(ball).position[2] == pytest.approx(0.65, abs=0.03), "it lies on top of it"
+    assert simulation.world.state(ball).position[2] == pytest.approx(0.65, abs=0.03), "the ball lies on top"
 
 
-def test_what_rebounds_and_what_slides(write, simulate):
+def test_restitution_and_friction_of_objects(write, simulate):
     ball = "shape: sphere, size: [0.1], mass: 1"
     box = "shape: box, size: [0.2, 0.2, 0.2], mass: 1"
     simulation = simulate(
@@ -98,7 +98,7 @@ def test_what_rebounds_and_what_slides(write, simulate):
     assert places[-1]["Stops"][3] < 0.1
 
 
-def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
+def test_a_saved_and_reloaded_scene_is_the_same(write, simulate, tmp_path):
     objects = "\n".join(f"  - {SHAPES[shape] % (2 * n, n % 2)}" for n, shape in enumerate(SHAPES, start=1))
     look = "{name: A, shape: box, size: [1, 2, 3], position: [1, -9, 2], rpy: [0.1, 0.2, 0.3], color: [1, 0, 0, 0.5]}"
     simulation = simulate(write(f"floor: {{size: 33}}\ndrone: {{yaw: 0.3}}\nobjects:\n{objects}\n  - {look}"))
@@ -112,7 +112,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
     for ours, theirs in zip(simulation.parameters.scene.objects, loaded.parameters.scene.objects):
         assert ours.model_dump(exclude={"position", "rpy"}) == theirs.model_dump(exclude={"position", "rpy"})
     assert loaded.parameters.scene.floor == simulation.parameters.scene.floor
-    # The body's own number does not count, nor does where a propeller's blades stand.
+    # Body numbers and the angles of the propeller blades may differ.
     np.testing.assert_allclose(
         loaded.world.pictures.visual_poses()[:10], simulation.world.pictures.visual_poses()[:10], rtol=0, atol=1e-9
     )
@@ -177,7 +177,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
     ],
 )
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
-def test_a_wrong_scene_gets_one_line(write, text, words):
+def test_an_invalid_scene_gives_a_one_line_error(write, text, words):
     file = write(text)
     with pytest.raises(ParameterError) as refused:
         Simulation(parameters.load({"scene_file": file})).close()
@@ -217,7 +217,7 @@ objects:
     ]
 
 
-def test_a_wrong_key_behind_a_merge_is_told_where_it_is_merged(write):
+def test_an_error_in_a_yaml_merge_names_the_line_of_the_merge(write):
     thing = "&a {shape: box, name: A, size: [1, 1, 1], position: [0, 0, 1]}"
     file = write(f"objects:\n  - {thing}\n  -\n    <<: *a\n")
     with pytest.raises(ParameterError) as refused:
@@ -225,7 +225,7 @@ def test_a_wrong_key_behind_a_merge_is_told_where_it_is_merged(write):
     assert str(refused.value).startswith(f"{file}: line 4: parameter objects/1/name = 'A': ")
 
 
-def test_what_is_not_the_scene_files_has_no_line_of_it(write):
+def test_errors_outside_the_scene_file_name_no_line_of_it(write):
     file = write("drone: {yaw: 1}\nfloor: {size: 3}")
     with pytest.raises(ParameterError) as refused:
         parameters.load({"scene_file": file, "drone": {"position": 5}, "floor": 3})
@@ -242,7 +242,7 @@ def test_a_color_of_three_numbers_is_opaque(write):
 
 
 @pytest.mark.parametrize("file", ["no.yaml", "/no/such.yaml", "package://drone_sim/config/scenes/no.yaml", "/tmp"])
-def test_a_scene_that_is_not_there_gets_one_line(file):
+def test_a_missing_scene_file_gives_a_one_line_error(file):
     with pytest.raises(ParameterError, match=f"parameter scene_file = '{file}': no such file") as refused:
         parameters.load({"scene_file": file})
     assert "\n" not in str(refused.value)
@@ -267,7 +267,7 @@ def test_the_drone_flies_through_the_first_gate(simulate):
     assert x > 4.0 and abs(y) < 1e-6
 
 
-def test_pictures_follow_what_is_added_painted_moved_and_removed(renderer):
+def test_pictures_follow_added_painted_moved_and_removed_objects(renderer):
     world = World(0.005, -9.81)
     view = looking((-3, 0, 1), (1, 0, 1))
 
@@ -295,8 +295,8 @@ def test_pictures_follow_what_is_added_painted_moved_and_removed(renderer):
     world.close()
 
 
-def test_a_mesh_written_anew_is_seen_anew(tmp_path, new_simulation):
-    """Its file is the same; what is in it is another thing after the next start."""
+def test_a_changed_mesh_file_is_reloaded_by_the_next_start(tmp_path, new_simulation):
+    """The name of the file stays the same; only its content changes."""
     mesh, scene = tmp_path / "thing.stl", tmp_path / "scene.yaml"
     scene.write_text("objects: [{shape: mesh, file: thing.stl, position: [2, 0, 0.8], color: [1, 0, 0, 1]}]\n")
     trimesh.creation.box((0.2, 0.2, 0.2)).export(mesh)
@@ -312,14 +312,14 @@ def test_a_mesh_written_anew_is_seen_anew(tmp_path, new_simulation):
     assert red() > 8 * small > 0
 
 
-def test_a_heap_that_would_take_seconds_a_step_is_refused():
+def test_a_scene_with_too_many_overlapping_objects_is_refused():
     box = {"shape": "box", "size": [1, 1, 1], "position": [0, 0, 5], "mass": 1}
     assert len(Simulation(parameters.load({"scene": {"objects": [box] * 10}})).world.queries.overlaps()) == 45
-    wall = [{**box, "position": [x, 0, z + 0.5]} for x in range(10) for z in range(5)]  # which touch
+    wall = [{**box, "position": [x, 0, z + 0.5]} for x in range(10) for z in range(5)]  # the boxes touch
     Simulation(parameters.load({"scene": {"objects": wall}})).close()
-    ghosts = [{**box, "respondable": False}] * 31  # they collide with nothing
+    ghosts = [{**box, "respondable": False}] * 31  # without collisions
     Simulation(parameters.load({"scene": {"objects": ghosts}})).close()
-    Simulation(parameters.load({"scene": {"objects": [{**box, "mass": 0}] * 100}})).close()  # what stands may
+    Simulation(parameters.load({"scene": {"objects": [{**box, "mass": 0}] * 100}})).close()  # static objects
     with pytest.raises(ParameterError, match="4950 pairs of moving objects"):
         Simulation(parameters.load({"scene": {"objects": [box] * 100}}))
     disc = {"shape": "cylinder", "size": [1, 0.2], "position": [0, 0, 5], "rpy": [-4.9, 0, -6.7], "mass": 2}
@@ -347,7 +347,7 @@ def position_of(simulation, name):
     return list(simulation.tree.matrix(simulation.tree.handle(name))[3::4])
 
 
-def test_an_operation_that_fails_in_flight_does_not_move_where_objects_start(monkeypatch, new_simulation):
+def test_an_operation_that_fails_in_flight_does_not_change_start_positions(monkeypatch, new_simulation):
     simulation = new_simulation({"scene": {"objects": CHAIN}})
     simulation.start()
     mark = simulation.tree.handle("Mark")

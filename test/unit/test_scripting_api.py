@@ -1,4 +1,4 @@
-"""What the functions of `sim` do."""
+"""Functions of `sim`: objects, signals, forces, images and drawings."""
 
 import logging
 
@@ -77,8 +77,8 @@ def test_names(sim, base):
     )
     assert sim.getObjectParent(base) == sim.getObject("/Quadcopter")
     assert sim.getObject("/nothing", {"noError": True}) == -1
-    found = [sim.getNameSuffix(name) for name in ("Drone", "Drone#", "Drone#2", None)]
-    assert found == [(-1, "Drone"), (-1, "Drone"), (2, "Drone"), -1]
+    suffixes = [sim.getNameSuffix(name) for name in ("Drone", "Drone#", "Drone#2", None)]
+    assert suffixes == [(-1, "Drone"), (-1, "Drone"), (2, "Drone"), -1]
     assert sim.getObjectSizeFactor(base) == 1
 
 
@@ -140,14 +140,14 @@ def test_add_force_is_given_in_the_frame_of_the_body(simulation, sim):
     assert y == pytest.approx(0.05, rel=0.05) and abs(x) < 1e-6
 
 
-def test_forces_act_on_bodies_alone(sim):
+def test_forces_on_static_shapes_are_refused(sim):
     with pytest.raises(ValueError, match="'Floor' is not a dynamic shape"):
         sim.addForceAndTorque(sim.getObject("/Floor"), [0, 0, 1], [0, 0, 0])
     with pytest.raises(ValueError, match="is not a joint"):
         sim.setJointPosition(sim.getObject("/Floor"), 1)
 
 
-def test_the_velocity_that_the_dynamics_has_reached(simulation, sim, base):
+def test_get_velocity_returns_the_velocity_of_the_dynamics(simulation, sim, base):
     sim.addForceAndTorque(sim.getObject("."), [0, 0.1, 0], [0, 0, 0.001])
     simulation.step()
     linear, angular = sim.getVelocity(base)
@@ -168,15 +168,15 @@ def test_images_come_with_the_bottom_row_first(sim):
         sim.getVisionSensorCharImage(sim.getObject("."))
 
 
-def test_what_cannot_be_drawn_is_said_once(sim, caplog):
+def test_calls_that_cannot_draw_are_logged_once(sim, caplog):
     with caplog.at_level(logging.DEBUG, "drone_sim.script"):
         first = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 10)
         second = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 10)
         for _ in range(3):
             assert sim.addDrawingObjectItem(first, [0, 0, 0]) is None
     assert first != second
-    said = [record.getMessage() for record in caplog.records]
-    assert [line.partition(":")[0] for line in said] == ["sim.addDrawingObject", "sim.addDrawingObjectItem"]
+    messages = [record.getMessage() for record in caplog.records]
+    assert [line.partition(":")[0] for line in messages] == ["sim.addDrawingObject", "sim.addDrawingObjectItem"]
 
 
 @pytest.fixture(name="drawings")
@@ -185,18 +185,18 @@ def _drawings(simulation):
     return simulation.context.drawings
 
 
-def test_what_is_drawn_is_kept(drawings, sim, caplog):
+def test_drawing_objects_store_items_up_to_their_maximum(drawings, sim, caplog):
     path = sim.addDrawingObject(sim.drawing_linestrip + sim.drawing_50percenttransparency, 2, 0, -1, 3, [1, 0, 0])
     for x in range(5):
         sim.addDrawingObjectItem(path, [x, 0, 1])
     assert drawings.objects[path].kind == "linestrip" and drawings.objects[path].rgba == (1, 0, 0, 0.5)
-    assert list(drawings.objects[path].items) == [(0, 0, 1), (1, 0, 1), (2, 0, 1)], "full is full"
+    assert list(drawings.objects[path].items) == [(0, 0, 1), (1, 0, 1), (2, 0, 1)], "a full object drops new items"
     sim.addDrawingObjectItem(path, None)
     assert not drawings.objects[path].items
     last = sim.addDrawingObject(sim.drawing_discpoints | sim.drawing_cyclic | sim.drawing_itemsizes, 0.2, 0.1, -1, 2)
     for x in (0, 0.01, 1, 2):
         sim.addDrawingObjectItem(last, [x, 0, 0.002, 0, 0, 1, 0.2])
-    assert list(drawings.objects[last].items) == [(1, 0, 0.002, 0, 0, 1), (2, 0, 0.002, 0, 0, 1)], "the oldest goes"
+    assert list(drawings.objects[last].items) == [(1, 0, 0.002, 0, 0, 1), (2, 0, 0.002, 0, 0, 1)], "drops the oldest"
     sim.removeDrawingObject(path)
     assert list(drawings.objects) == [last]
     assert not caplog.records
@@ -206,7 +206,7 @@ def test_what_is_drawn_is_kept(drawings, sim, caplog):
     assert "accepted and ignored" in caplog.text
 
 
-def test_what_cannot_be_drawn_is_refused(drawings, sim):
+def test_invalid_drawing_calls_are_refused(drawings, sim):
     lines = sim.addDrawingObject(sim.drawing_lines, 1, 0, -1, 10)
     with pytest.raises(ValueError, match="an item of lines must have 6 numbers, not 3"):
         sim.addDrawingObjectItem(lines, [1, 2, 3])
@@ -218,7 +218,7 @@ def test_what_cannot_be_drawn_is_refused(drawings, sim):
         sim.addDrawingObject(31, 1)
 
 
-def test_the_next_run_begins_with_nothing_drawn(new_simulation):
+def test_a_stop_removes_all_drawings(new_simulation):
     drawings = Drawings()
     draw = "sim.addDrawingObjectItem(sim.addDrawingObject(sim.drawing_points, 1), [1, 2, 3])"
     simulation = new_simulation(python=f"def sysCall_init(): {draw}", drawings=drawings)
@@ -233,14 +233,14 @@ def test_unknown_functions_and_constants_list_the_near_ones(sim):
     assert not hasattr(sim, "nothing_of_the_kind")
 
 
-def test_a_script_sees_each_step_once(new_simulation):
+def test_a_camera_takes_one_picture_per_step_for_a_script(new_simulation):
     look = "sim.getVisionSensorCharImage(sim.getObject('/FrontVision'))"
     simulation = new_simulation({"cameras": SMALL}, python=f"def sysCall_sensing():\n    assert {look} == {look}")
-    camera, taken = simulation.drone.cameras["front"], []
+    camera, picture_steps = simulation.drone.cameras["front"], []
     take = camera.take
-    camera.take = lambda *kind: taken.append(simulation.steps) or take(*kind)
+    camera.take = lambda *kind: picture_steps.append(simulation.steps) or take(*kind)
     simulation.step()
     simulation.step()
     camera.viewers.add(lambda: True)
     simulation.step()
-    assert taken == [1, 2, 3]
+    assert picture_steps == [1, 2, 3]

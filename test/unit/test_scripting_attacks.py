@@ -1,6 +1,6 @@
-"""No script ends or blocks the process, however it tries: each attack runs in a process of its own.
+"""Attacks by scripts, each in a fork of its own: no script ends or blocks its process.
 
-After it the simulation is in hand: the attack got one line at most, and the next start works.
+After an attack the simulation still works: the error has at most one line, and the next start succeeds.
 """
 
 import re
@@ -11,7 +11,7 @@ import pytest
 from attacks import HANGS, SOURCE, Attacker
 
 STOPPED = "without returning (script_time_limit)"
-QUICK = {STOPPED: 0.2, "": 0.2, "which cannot be shown": 2.0}  # s, the time limits of those that use all of it
+TIME_LIMITS = {STOPPED: 0.2, "": 0.2, "which cannot be shown": 2.0}  # s, time limits of the attacks that use all of it
 PHASE = {".lua": "\nfunction sysCall_cleanup() end", ".py": "\ndef sysCall_cleanup(): pass"}
 PROLOGUE = {"5.1": "local _ = function() simGetSimulationTime() end\n", "newest": "local _ = sim.getSimulationTime\n"}
 
@@ -21,20 +21,20 @@ def _attack():
     attacker = Attacker()
 
     def attack(path, source, words, where="main"):
-        """Fly the source; its message has to hold the words. What is not stopped may take its time."""
+        """Run the source and assert that its error contains the words, within the words' time limit."""
         path.write_text(source + PHASE[path.suffix], encoding="utf-8")
-        found = attacker.fly(path, QUICK.get(words, HANGS / 2), where)
-        assert found["second"] == [], "the next start works"
-        assert found["lines"] < 5000 and found["bytes"] < 5_000_000
-        assert len(found["first"]) <= 1 and all("\n" not in line and len(line) < 1000 for line in found["first"])
-        assert words in (found["first"] or [""])[0]
+        result = attacker.fly(path, TIME_LIMITS.get(words, HANGS / 2), where)
+        assert result["second"] == [], "the next start works"
+        assert result["lines"] < 5000 and result["bytes"] < 5_000_000
+        assert len(result["first"]) <= 1 and all("\n" not in line and len(line) < 1000 for line in result["first"])
+        assert words in (result["first"] or [""])[0]
 
     yield attack
     attacker.close()
 
 
 IN_LUA = [
-    # loops in C: the thread is left behind
+    # loops in C: the thread is abandoned
     ("string.find(('x'):rep(250000), '.-.-.-.-.-y')", STOPPED),
     ("function sysCall_sensing() string.find(('x'):rep(250000), '.-.-.-.-.-y') end", STOPPED),
     (
@@ -49,20 +49,20 @@ IN_LUA = [
     ("string.find(('a'):rep(3000000), ('a?'):rep(3000000))", "pattern too"),
     ("while true do pcall(string.find, ('x'):rep(250000), '.-.-.-.-.-y') end", STOPPED),
     ("coroutine.wrap(function() string.find(('x'):rep(250000), '.-.-.-.-.-y') end)()", STOPPED),
-    # what could loop in C is not there for a script that does not name it
+    # functions that could loop in C are missing unless the script names them
     ("string['fi' .. 'nd'](('x'):rep(250000), '.-.-.-.-.-y')", "attempt to call"),
     ("(''):rep(1e15)", ""),
     ("table.insert(setmetatable({}, {['__l' .. 'en'] = function() return 2^52 end}), 1, 1)", ""),
     ("x = 'x' while #x < 1e8 do x = x .. x end y = x .. '' while true do local z = x == y end", ""),
     ("x = {} for i = 1, 1e6 do x[i] = i end for i = 1, 1e6 do x[i] = nil end while true do next(x) end", ""),
-    # the globals, and what hangs on them
+    # globals and metatables
     ("setmetatable(_G, {__index = function(_, n) error(n) end}) function sysCall_sensing() x() end", ": x"),
     ("setmetatable(_G, {__newindex = function() error('no') end}) y = 1", ": no"),
     ("for k in pairs(_G) do _G[k] = nil end", ""),
     ("for k in pairs(getmetatable('').__index) do getmetatable('').__index[k] = nil end error('x')", ": x"),
     ("getmetatable('').__index = function() while true do end end print(('x').y)", STOPPED),
     ("sysCall_sensing = setmetatable({}, {__call = function() end})", ""),
-    # calls that branch, down to where the stack leaves no room for a hook, or in coroutines too short for one
+    # branching recursion, until the stack has no room for a hook, or in coroutines too short for a hook
     ("local function f() return f() end f()", STOPPED),
     ("local function f() f() end f()", "stack overflow"),
     ("local function f() coroutine.wrap(f)() end f()", "C stack overflow"),
@@ -139,26 +139,26 @@ CROSSING = [
     ("while true do sim.addStatusbarMessage('x') end", STOPPED),
     ("error(setmetatable({}, {__tostring = function() while true do end end}))", "an error that is a table"),
     ("error()", "error"),
-    ("local t = {} for _ = 1, 1e5 do t = {t} end x = t", ""),  # snapshots walk it
+    ("local t = {} for _ = 1, 1e5 do t = {t} end x = t", ""),  # snapshots traverse it
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("dialect", PROLOGUE)
 @pytest.mark.parametrize("source, words", IN_LUA, ids=[source[:90] for source, _ in IN_LUA])
-def test_lua_stays_in_hand(attack, tmp_path, dialect, source, words):
+def test_lua_attacks_are_contained(attack, tmp_path, dialect, source, words):
     attack(tmp_path / "script.lua", PROLOGUE[dialect] + source, words)
 
 
 @pytest.mark.parametrize("source, words", CROSSING, ids=[source[:90] for source, _ in CROSSING])
-def test_what_crosses_from_lua_stays_in_hand(attack, tmp_path, source, words):
+def test_attacks_with_values_from_lua_are_contained(attack, tmp_path, source, words):
     attack(tmp_path / "script.lua", PROLOGUE["newest"] + source, words)
 
 
-OF_INTERPRETER = [case for case in CROSSING if re.search("coroutine|pcall|nested", " ".join(case))]  # depends on it
+LUA_5_1_CASES = [case for case in CROSSING if re.search("coroutine|pcall|nested", " ".join(case))]  # dialects differ
 
 
-@pytest.mark.parametrize("source, words", OF_INTERPRETER, ids=[source[:90] for source, _ in OF_INTERPRETER])
-def test_what_crosses_from_lua_5_1_stays_in_hand(attack, tmp_path, source, words):
+@pytest.mark.parametrize("source, words", LUA_5_1_CASES, ids=[source[:90] for source, _ in LUA_5_1_CASES])
+def test_attacks_with_values_from_lua_5_1_are_contained(attack, tmp_path, source, words):
     attack(tmp_path / "script.lua", PROLOGUE["5.1"] + source, words)
 
 
@@ -190,7 +190,7 @@ IN_PYTHON = [
     ("import contextlib\nwhile True:\n    with contextlib.suppress(BaseException):\n        while True: pass", STOPPED),
     ("import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\nimport time\ntime.sleep(100)", STOPPED),
     ("import sys\nsys.settrace(lambda *_: None)\nwhile True: pass", STOPPED),
-    # the alarm is kept from scripts, and what traces does so within the script's time
+    # scripts cannot use the alarm, and trace functions count towards the time of the script
     ("import signal\nsignal.signal(signal.SIGALRM, signal.SIG_IGN)", "(script_time_limit) uses this alarm"),
     ("import signal\nsignal.setitimer(signal.ITIMER_REAL, 0)", "(script_time_limit) uses this alarm"),
     ("import signal\nsignal.alarm(0)", "(script_time_limit) uses this alarm"),
@@ -233,7 +233,7 @@ IN_PYTHON = [
 
 
 @pytest.mark.parametrize("source, words", IN_PYTHON, ids=[source[:60] for source, _ in IN_PYTHON])
-def test_python_stays_in_hand(attack, tmp_path, source, words):
+def test_python_attacks_are_contained(attack, tmp_path, source, words):
     attack(tmp_path / "script.py", source, words)
 
 
@@ -247,7 +247,7 @@ THREADS = [
 
 
 @pytest.mark.parametrize("ending, source, words", THREADS, ids=[source[:60] for _, source, _ in THREADS])
-def test_threads_stay_in_hand(attack, tmp_path, ending, source, words):
+def test_attacks_from_threads_are_contained(attack, tmp_path, ending, source, words):
     attack(tmp_path / f"script.{ending}", source, words)
 
 
@@ -261,12 +261,12 @@ def test_threads_stay_in_hand(attack, tmp_path, ending, source, words):
         ("py", "raise KeyboardInterrupt", "KeyboardInterrupt"),
     ],
 )
-def test_a_simulation_in_another_thread_stays_in_hand(attack, tmp_path, ending, source, words):
+def test_attacks_on_a_simulation_in_another_thread_are_contained(attack, tmp_path, ending, source, words):
     attack(tmp_path / f"script.{ending}", source, words, "thread")
 
 
 def test_ctrl_c_ends_the_wait_for_lua(tmp_path):
-    """KeyboardInterrupt leaves the simulation's call while Lua hangs, and nothing of the script goes on."""
+    """KeyboardInterrupt leaves the call of the simulation while Lua hangs, and the script does not continue."""
     path = tmp_path / "script.lua"
     path.write_text("while true do end", encoding="utf-8")
     child = (
@@ -279,8 +279,8 @@ def test_ctrl_c_ends_the_wait_for_lua(tmp_path):
         "except KeyboardInterrupt:\n"
         "    print('interrupted')\n"
     )
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", child, str(path)], capture_output=True, text=True, timeout=HANGS, check=False,
         env={"PYTHONPATH": str(SOURCE), "PATH": "/usr/bin:/bin"},
     )  # fmt: skip
-    assert (done.returncode, done.stdout) == (0, "interrupted\n"), done.stderr[-500:]
+    assert (completed.returncode, completed.stdout) == (0, "interrupted\n"), completed.stderr[-500:]

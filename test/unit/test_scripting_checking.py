@@ -1,4 +1,4 @@
-"""What is said of a script's text while somebody types: syntax, unknown names, misspelt phases, and nothing is run."""
+"""Checks of a script's text while it is typed: syntax, unknown names and misspelt phases; no script is run."""
 
 import pytest
 
@@ -34,7 +34,7 @@ def said(found):
         ("x = " + "-" * 100_000 + "1", (1, 1), ""),
     ],
 )
-def test_python(check, text, place, words):
+def test_errors_in_python_are_found(check, text, place, words):
     (found,) = check(text, False)
     assert (found.line, found.column) == place and words in found.said
 
@@ -51,7 +51,7 @@ def test_python(check, text, place, words):
         "match sim.getSimulationTime():\n    case float() as t:\n        print(t)\n",
     ],
 )
-def test_what_is_right_in_python(check, text):
+def test_valid_python_gives_no_findings(check, text):
     assert check(text, False) == []
 
 
@@ -71,7 +71,7 @@ def test_what_is_right_in_python(check, text):
         ),
     ],
 )
-def test_lua(check, text, place, words):
+def test_errors_in_lua_are_found(check, text, place, words):
     (found,) = check(text, True)
     assert (found.line, found.column) == place and words in found.said
 
@@ -87,7 +87,7 @@ def test_lua(check, text, place, words):
         "x = 3 // 2 | 1\n",
     ],
 )
-def test_what_is_right_in_lua(check, text):
+def test_valid_lua_gives_no_findings(check, text):
     assert check(text, True) == []
 
 
@@ -104,20 +104,20 @@ def test_what_is_right_in_lua(check, text):
     ),
     ids=lambda path: str(path.relative_to(PACKAGE)),
 )
-def test_nothing_is_said_of_what_flies(check, script):
+def test_the_scripts_of_the_package_give_no_findings(check, script):
     assert said(check(script.read_text(encoding="utf-8"), script.suffix == ".lua")) == []
 
 
-def test_nothing_is_run(check, tmp_path):
-    made = tmp_path / "made"
-    assert check(f"open({str(made)!r}, 'w')\n__import__('os').mkdir({str(made)!r})\n", False) == []
-    assert check(f"io.open('{made}', 'w')\n", True) == [] and not made.exists()
+def test_checking_a_script_does_not_run_it(check, tmp_path):
+    marker = tmp_path / "made"
+    assert check(f"open({str(marker)!r}, 'w')\n__import__('os').mkdir({str(marker)!r})\n", False) == []
+    assert check(f"io.open('{marker}', 'w')\n", True) == [] and not marker.exists()
 
 
-# ---- in the cockpit, by a process of its own
+# ---- in the cockpit, by a separate process
 
 
-def test_a_process_checks_and_one_that_does_not_answer_is_replaced():
+def test_a_checking_process_that_does_not_answer_is_replaced():
     pytest.importorskip("rospy", reason="needs ROS")
     from drone_sim.ros.cockpit.editor.checks import LARGEST, TextChecker
 
@@ -126,7 +126,7 @@ def test_a_process_checks_and_one_that_does_not_answer_is_replaced():
     assert found["line"] == 1 and "getFoo" in found["said"]
     assert "bytes" in checker.check("#" * (LARGEST + 1), False)["unchecked"]
     process = checker._process
-    process.kill()  # as where it takes too long
+    process.kill()  # as the checker does after a timeout
     process.wait()
     assert "too long" in checker.check("x = 1", False)["unchecked"]
     assert checker.check("x = = 1", True)["found"][0]["line"] == 1

@@ -1,4 +1,4 @@
-"""What a script asks of the simulation, and what it leaves and finds there."""
+"""Scripts that control the simulation, draw, store data and use ROS."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_sim_ros
 
-ASKS = """
+CONTROL_SCRIPT = """
 sim = require 'sim'
 function sysCall_init() states = {sim.getSimulationState()} end
 function sysCall_sensing()
@@ -26,39 +26,39 @@ end
 
 
 @pytest.fixture
-def played(new_simulation):
+def play_script(new_simulation):
     def play(text):
-        simulation, told = new_simulation(lua=text), []
-        player = Player(simulation, told.append, simulated_time=False)
+        simulation, states = new_simulation(lua=text), []
+        player = Player(simulation, states.append, simulated_time=False)
         while player.playing and simulation.steps < 10:
             player.step()
-        return simulation, told
+        return simulation, states
 
     return play
 
 
-def test_a_script_stops_the_simulation(played, caplog):
-    simulation, told = played(ASKS % "stopSimulation")
-    assert told == ["flying", "stopped"] and not simulation.running
+def test_a_script_stops_the_simulation(play_script, caplog):
+    simulation, states = play_script(CONTROL_SCRIPT % "stopSimulation")
+    assert states == ["flying", "stopped"] and not simulation.running
     assert "16 17 17 17 22 true" in caplog.messages, "first after stop, running, last before stop"
     assert simulation.context.control.asked == ""
 
 
-def test_a_script_pauses_the_simulation(played):
-    simulation, told = played(ASKS % "pauseSimulation")
-    assert told == ["flying", "paused"] and simulation.steps == 3
+def test_a_script_pauses_the_simulation(play_script):
+    simulation, states = play_script(CONTROL_SCRIPT % "pauseSimulation")
+    assert states == ["flying", "paused"] and simulation.steps == 3
 
 
-def test_an_error_that_follows_in_cleanup_does_not_hide_the_first(played, caplog):
-    """Who shows the last error of the log, as the cockpit does, shows the cause."""
+def test_an_error_in_cleanup_does_not_hide_the_first_error(play_script, caplog):
+    """The cockpit shows the last error of the log; that must be the cause."""
     fails = "function sysCall_actuation() x.y = 1 end function sysCall_cleanup() z.y = 1 end"
-    simulation, _ = played(fails)
-    said = {record.levelname: record.getMessage() for record in caplog.records if "script error" in record.getMessage()}
-    assert "[actuation]" in said["ERROR"] and "[cleanup]" in said["WARNING"]
+    simulation, _ = play_script(fails)
+    logs = {record.levelname: record.getMessage() for record in caplog.records if "script error" in record.getMessage()}
+    assert "[actuation]" in logs["ERROR"] and "[cleanup]" in logs["WARNING"]
     assert simulation.running is False
 
 
-LEAVES = """
+DRAWING_SCRIPT = """
 def sysCall_init():
     self.drawn = sim.addDrawingObject(sim.drawing_discpts, 0.1, 0, sim.getObject('/target'), 5)
     self.local_one = sim.addDrawingObject(sim.drawing_points + sim.drawing_local, 1, 0, sim.getObject('/target'), 5)
@@ -76,10 +76,10 @@ def sysCall_sensing():
 
 @pytest.fixture(name="simulation")
 def _simulation(new_simulation):
-    return new_simulation({"gravity": 0.0}, python=LEAVES, drawings=Drawings())
+    return new_simulation({"gravity": 0.0}, python=DRAWING_SCRIPT, drawings=Drawings())
 
 
-def test_a_parent_carries_what_is_drawn(simulation):
+def test_drawings_move_with_their_parent(simulation):
     turned, local = simulation._drawings.objects.values()
     x, y, z = simulation.drone.body.state.position
     assert turned.in_world() == [pytest.approx((1, 0, 0, 0, 0, 1))], "a quaternion becomes a normal"
@@ -90,14 +90,14 @@ def test_a_parent_carries_what_is_drawn(simulation):
     assert simulation._drawings.carried
 
 
-def test_custom_data_and_tubes_are_of_a_snapshot_and_of_a_run(simulation):
+def test_custom_data_and_tubes_are_in_snapshots_and_end_with_the_run(simulation):
     data = simulation.context
     simulation.step()
-    kept = simulation.snapshot()
+    saved_state = simulation.snapshot()
     for _ in range(2):
         simulation.step()
     assert list(data.data.values.values()) == ["3"] and simulation.context.signals.get(float, "waiting") == 3
-    simulation.restore(kept)
+    simulation.restore(saved_state)
     simulation.step()
     assert list(data.data.values.values()) == ["2"] and simulation.context.signals.get(float, "waiting") == 2
     simulation.stop()
@@ -133,7 +133,7 @@ def test_ros_is_reached_through_the_backend():
     sim_ros = make_sim_ros(bus, Clock(0.05))
     assert sim_ros.getTime() == 12.5
     assert sim_ros.getParamInt("gain") == (True, 2) and sim_ros.getParamDouble("gain") == (True, 2.0)
-    assert sim_ros.getParamString("gain", "none") == (False, "none"), "of another type"
+    assert sim_ros.getParamString("gain", "none") == (False, "none"), "the parameter has another type"
     sim_ros.setParamString("/who", "x")
     assert ros.parameters["/who"] == "x" and sim_ros.searchParam("who") == (True, "/who")
     sim_ros.deleteParam("/who")

@@ -1,4 +1,4 @@
-"""A broken script gives one line: phase, file, line, message. The next start works."""
+"""Errors in a script are reported in one line with phase, file, line and message, and the next start works."""
 
 import logging
 import time
@@ -13,13 +13,13 @@ from drone_sim.scripting.api.constants import PHASES
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.time_limit import ScriptStopped, TimeLimit
 
-LIMIT = 0.5  # s, of a script that does not return; what else fails does so at once, or later on a busy machine
+LIMIT = 0.5  # s, for scripts that never return; the others get a long limit, since the machine may be busy
 STOPPED = "stopped after {} s without returning (script_time_limit)"
 
 
 def run(path, steps=3, limit=60.0):
-    """Fly a script, with a command; return the messages of what it raised."""
-    said = []
+    """Run a script with a velocity command; return the messages of the ScriptErrors that it raised."""
+    output = []
     simulation = None
     try:
         simulation = Simulation(parameters.load({"script_time_limit": limit}), script=str(path))
@@ -27,13 +27,13 @@ def run(path, steps=3, limit=60.0):
         for _ in range(steps):
             simulation.step()
     except ScriptError as error:
-        said.append(str(error))
+        output.append(str(error))
     try:
         if simulation is not None:
             simulation.close()
     except ScriptError as error:
-        said.append(str(error))
-    return said
+        output.append(str(error))
+    return output
 
 
 @pytest.fixture(name="fails")
@@ -41,11 +41,11 @@ def _fails(tmp_path):
     def check(ending, source, phase, line, *words, limit=60.0):
         path = tmp_path / f"script.{ending}"
         path.write_text(source, encoding="utf-8")
-        said = run(path, limit=limit)
-        assert len(said) == 1 and "\n" not in said[0]
-        assert said[0].startswith(f"[{phase}] {path}:{line}: ")
+        output = run(path, limit=limit)
+        assert len(output) == 1 and "\n" not in output[0]
+        assert output[0].startswith(f"[{phase}] {path}:{line}: ")
         for word in words:
-            assert word in said[0]
+            assert word in output[0]
         path.write_text("", encoding="utf-8")
         assert run(path) == [], "the next start works"
 
@@ -109,19 +109,19 @@ def _fails(tmp_path):
         ("\nrequire'foo'", "load", 2, ["no module 'foo'"]),
     ],
 )
-def test_lua(fails, source, phase, line, words):
+def test_lua_error_is_reported_with_phase_file_and_line(fails, source, phase, line, words):
     fails("lua", source, phase, line, *words)
 
 
-def test_lua_may_give_more_values_than_a_function_takes(tmp_path, caplog):
-    """As in V-REP, where scripts of old give a value to what returns one."""
+def test_lua_may_pass_more_arguments_than_a_function_takes(tmp_path, caplog):
+    """As in V-REP, where old scripts pass a value to functions that only return one."""
     caplog.set_level(logging.INFO)
     script = tmp_path / "lavish.lua"
     call = "local result, mass = simGetObjectFloatParameter(simGetObjectHandle('Drone'), 3005, 1.5, {})"
     script.write_text(f"function sysCall_actuation()\n  {call}\n  print(result, mass)\nend")
     run(script)
-    said = [one for one in caplog.messages if "Object" in one or "0.12" in one]
-    assert said == ["simGetObjectFloatParameter: got 4 values and uses 2: the others are ignored", *["1\t0.12"] * 3]
+    output = [message for message in caplog.messages if "Object" in message or "0.12" in message]
+    assert output == ["simGetObjectFloatParameter: got 4 values and uses 2: the others are ignored", *["1\t0.12"] * 3]
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_lua_may_give_more_values_than_a_function_takes(tmp_path, caplog):
         ("import no_such_module_", "load", 1, ["ModuleNotFoundError"]),
     ],
 )
-def test_python(fails, source, phase, line, words):
+def test_python_error_is_reported_with_phase_file_and_line(fails, source, phase, line, words):
     fails("py", source, phase, line, *words)
 
 
@@ -194,13 +194,13 @@ def test_endless_python_is_stopped(fails, source, phase, line):
     fails("py", source, phase, line, STOPPED.format(LIMIT), limit=LIMIT)
 
 
-def test_endless_python_is_stopped_though_somebody_switched_the_timer_off(fails):
-    off = "import _signal, time\n_signal.setitimer(_signal.ITIMER_REAL, 0)\ntime.sleep(0.3)\n"  # past what a script may
+def test_endless_python_is_stopped_even_if_the_script_disables_the_timer(fails):
+    off = "import _signal, time\n_signal.setitimer(_signal.ITIMER_REAL, 0)\ntime.sleep(0.3)\n"  # defeats the limit
     later = "def sysCall_init():\n    time.sleep(0.3)\ndef sysCall_actuation():\n    while True: pass"
     fails("py", off + later, "actuation", 7, STOPPED.format(0.5), limit=0.5)
 
 
-def test_a_callback_that_does_not_exist_is_named(tmp_path):
+def test_missing_callback_function_is_reported_by_name(tmp_path):
     for ending in ("py", "lua"):
         path = tmp_path / f"script.{ending}"
         path.write_text("simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'on_twst')", encoding="utf-8")
@@ -217,30 +217,30 @@ def test_a_callback_that_does_not_exist_is_named(tmp_path):
         pytest.param("package://no_such_package_/x.lua", "no ROS package", marks=pytest.mark.ros),
     ],
 )
-def test_a_wrong_file(name, words, tmp_path, monkeypatch):
+def test_invalid_script_path_is_reported(name, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "script.txt").write_text("", encoding="utf-8")
-    (said,) = run(name)
-    assert said.startswith(f"[load] {name}: ") and words in said
+    (output,) = run(name)
+    assert output.startswith(f"[load] {name}: ") and words in output
 
 
 def test_memory_is_limited(tmp_path):
     path = tmp_path / "script.lua"
     path.write_text("x = string.rep('x', 1e9)", encoding="utf-8")
-    (said,) = run(path)
-    assert "not enough memory" in said
+    (output,) = run(path)
+    assert "not enough memory" in output
 
 
-def test_the_limit_can_be_switched_off(new_simulation):
+def test_time_limit_of_zero_disables_the_limit(new_simulation):
     new_simulation({"script_time_limit": 0}, python="import time\ntime.sleep(0.3)\ndef sysCall_init(): pass")
 
 
-def test_drawing_a_picture_is_not_the_scripts_time(monkeypatch):
+def test_paused_time_does_not_count_against_the_time_limit(monkeypatch):
     now = time.monotonic()
     monkeypatch.setattr(time_limit, "monotonic", lambda: now)
     limit = TimeLimit(60.0)
 
-    def look():
+    def work():
         nonlocal now
         with limit.paused():
             now += 100.0
@@ -248,11 +248,11 @@ def test_drawing_a_picture_is_not_the_scripts_time(monkeypatch):
         now += 61.0
         assert limit.exceeded()
 
-    limit.run(look)
+    limit.run(work)
 
 
-def test_a_limit_that_passes_during_a_call_of_the_simulator_holds_after_it():
-    def look():
+def test_time_limit_that_expires_while_paused_stops_the_script_afterwards():
+    def work():
         with limit.paused():
             while time.monotonic() < end:
                 pass
@@ -261,26 +261,26 @@ def test_a_limit_that_passes_during_a_call_of_the_simulator_holds_after_it():
 
     limit, end = TimeLimit(0.2), time.monotonic() + 0.5
     with pytest.raises(ScriptStopped):
-        limit.run(look)
+        limit.run(work)
 
 
-def test_a_limit_that_passes_while_it_is_looked_at_holds():
+def test_time_limit_that_expires_during_its_own_check_stops_the_script():
     class Slow(TimeLimit):
-        looks = 0
+        checks = 0
 
         def exceeded(self):
-            self.looks += 1
-            return self.looks > 1 and super().exceeded()
+            self.checks += 1
+            return self.checks > 1 and super().exceeded()
 
         def left(self):
-            return super().left() - 1.0  # the process had to wait for its turn
+            return super().left() - 1.0  # as if the process had not been scheduled for a second
 
     with pytest.raises(ScriptStopped):
         Slow(0.05).run(time.sleep, 10)
 
 
-def test_a_late_stop_never_leaves_the_script():
-    """What is raised for a script that returns at the last moment does not strike the simulator."""
+def test_late_stop_is_never_raised_outside_the_script():
+    """The exception for a script that returns at the last moment must not reach the simulator."""
     limit = TimeLimit(0.02)
     for wait in range(40):
         try:

@@ -1,4 +1,4 @@
-"""Frames and velocities against what they are by definition."""
+"""Frame conversions and velocities, compared with their definitions."""
 
 import math
 
@@ -17,7 +17,7 @@ ANGLES = st.tuples(ANGLE, ANGLE, ANGLE)
 
 
 def rotation_about(axis, angle):
-    """The rotation by Rodrigues' formula, independent of any Euler convention."""
+    """Return the rotation matrix by Rodrigues' formula, independent of any Euler convention."""
     x, y, z = axis
     c, s, v = math.cos(angle), math.sin(angle), 1 - math.cos(angle)
     return (
@@ -28,7 +28,7 @@ def rotation_about(axis, angle):
 
 
 @given(POINT, ANGLES)
-def test_euler_angles_turn_about_x_then_y_then_z_of_the_body(position, angles):
+def test_euler_angles_rotate_about_body_x_then_y_then_z(position, angles):
     x, y, z = (rotation_about(axis, angle) for axis, angle in zip(((1, 0, 0), (0, 1, 0), (0, 0, 1)), angles))
     expected = list(frames.multiply(frames.multiply(x, y), z))
     expected[3], expected[7], expected[11] = position
@@ -36,22 +36,22 @@ def test_euler_angles_turn_about_x_then_y_then_z_of_the_body(position, angles):
 
 
 @given(ANGLE, st.floats(-1.5, 1.5), ANGLE)
-def test_euler_angles_come_back(alpha, beta, gamma):
-    found = frames.to_euler(frames.from_euler((0, 0, 0), (alpha, beta, gamma)))
-    for ours, theirs in zip(found, (alpha, beta, gamma)):
+def test_euler_angles_survive_the_round_trip_through_a_matrix(alpha, beta, gamma):
+    result = frames.to_euler(frames.from_euler((0, 0, 0), (alpha, beta, gamma)))
+    for ours, theirs in zip(result, (alpha, beta, gamma)):
         assert math.remainder(ours - theirs, 2 * math.pi) == pytest.approx(0, abs=1e-9)
 
 
 @given(ANGLE, st.sampled_from([-math.pi / 2, math.pi / 2]), ANGLE)
-def test_at_the_singularity_the_rotation_comes_back(alpha, beta, gamma):
+def test_rotation_survives_the_round_trip_at_the_euler_singularity(alpha, beta, gamma):
     turned = frames.from_euler((0, 0, 0), (alpha, beta, gamma))
-    found = frames.to_euler(turned)
-    assert found[2] == 0
-    assert frames.from_euler((0, 0, 0), found) == pytest.approx(turned, abs=1e-9)
+    result = frames.to_euler(turned)
+    assert result[2] == 0
+    assert frames.from_euler((0, 0, 0), result) == pytest.approx(turned, abs=1e-9)
 
 
 @given(POINT, ANGLES)
-def test_quaternions_come_back(position, angles):
+def test_pose_survives_the_round_trip_through_a_quaternion(position, angles):
     m = frames.from_euler(position, angles)
     quaternion = frames.to_quaternion(m)
     assert math.hypot(*quaternion) == pytest.approx(1) and quaternion[3] >= 0
@@ -66,14 +66,14 @@ def test_products_of_quaternions_are_products_of_rotations(a, b):
 
 
 @given(POINT, ANGLES, POINT)
-def test_an_inverse_undoes(position, angles, point):
+def test_inverse_undoes_the_transform(position, angles, point):
     m = frames.from_euler(position, angles)
     assert frames.multiply(frames.invert(m), m) == pytest.approx(frames.IDENTITY, abs=1e-11)
     assert frames.transform(frames.invert(m), frames.transform(m, point)) == pytest.approx(point, abs=1e-10)
 
 
 class Turning:
-    """A body that turns about the world's z axis at its own place."""
+    """A moving body that rotates about the vertical axis through its origin."""
 
     def __init__(self, position, velocity, rate):
         self.state = State(position, (0.0, 0.0, 0.0, 1.0), velocity, (0.0, 0.0, rate))
@@ -81,7 +81,7 @@ class Turning:
 
 
 @given(POINT, POINT, LENGTH, POINT)
-def test_a_carried_object_moves_with_its_body(position, velocity, rate, arm):
+def test_velocity_of_a_child_object_follows_its_rotating_body(position, velocity, rate, arm):
     objects = ObjectTree()
     objects.add("body", body=Turning(position, velocity, rate))
     objects.add("frame", "body", frames.from_euler(arm, (0.1, 0.2, 0.3)))

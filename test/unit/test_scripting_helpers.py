@@ -1,4 +1,4 @@
-"""Modules beside a script: found, read anew at start, the script's own, and told by their own file and line."""
+"""Helper modules beside a script: import, reload at start, isolation, and errors with the helper's file and line."""
 
 import logging
 import os
@@ -35,7 +35,7 @@ def _printed(caplog):
     return lambda: [record.getMessage() for record in caplog.records if record.name == "drone_sim.script"]
 
 
-def refused(path, limit=60.0):
+def load_error(path, limit=60.0):
     with pytest.raises(ScriptError) as error:
         Simulation(parameters.load({"script_time_limit": limit}), script=path).close()
     return str(error.value)
@@ -50,19 +50,19 @@ ENDINGS = pytest.mark.parametrize("ending", ["py", "lua"])
 
 
 @ENDINGS
-def test_a_helper_is_found_and_read_anew_at_start(write, simulate, printed, tmp_path, ending):
+def test_helper_is_imported_and_read_again_at_each_start(write, simulate, printed, tmp_path, ending):
     helper = write(f"helper.{ending}", HELPERS[ending])
     simulation = simulate(write(f"script.{ending}", USERS[ending]))
     stamp = os.stat(helper)
     write(f"helper.{ending}", HELPERS[ending].replace("42", "43"))
-    os.utime(helper, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))  # even within the resolution of the clock
+    os.utime(helper, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))  # a change within the clock's resolution counts too
     simulation.start()
     assert printed() == ["42", "43"]
     assert sorted(os.listdir(tmp_path)) == [f"helper.{ending}", f"script.{ending}"]
 
 
 @ENDINGS
-def test_scripts_of_the_same_name_do_not_disturb_one_another(write, simulate, printed, ending):
+def test_scripts_with_the_same_name_have_separate_helpers(write, simulate, printed, ending):
     for number in ("1", "2"):
         write(f"{number}/script/helper.{ending}", HELPERS[ending].replace("42", number))
     simulations = [simulate(write(f"{number}/script/script.{ending}", USERS[ending])) for number in ("1", "2")]
@@ -73,12 +73,12 @@ def test_scripts_of_the_same_name_do_not_disturb_one_another(write, simulate, pr
 
 
 @ENDINGS
-def test_nothing_is_left_of_a_script_that_is_closed(write, ending):
+def test_closed_script_leaves_no_modules_and_no_import_hooks(write, ending):
     write(f"helper.{ending}", HELPERS[ending])
     before = set(sys.modules), list(sys.meta_path)
     Simulation(PARAMETERS, script=write(f"script.{ending}", USERS[ending])).close()
     write(f"helper.{ending}", "x = = 1")
-    refused(write(f"script.{ending}", USERS[ending]))
+    load_error(write(f"script.{ending}", USERS[ending]))
     assert {name for name in set(sys.modules) - before[0] if "script" in name and "drone_sim" not in name} == set()
     assert sys.meta_path == before[1]
 
@@ -127,24 +127,24 @@ def test_nothing_is_left_of_a_script_that_is_closed(write, ending):
         ),
     ],
 )
-def test_an_error_in_a_helper_has_its_file_and_line(write, ending, helper, user, phase, line, words):
+def test_error_in_a_helper_is_reported_with_its_file_and_line(write, ending, helper, user, phase, line, words):
     path = write(f"helper.{ending}", helper)
-    said = refused(write(f"script.{ending}", user), limit=0.5 if "stopped" in words else 60.0)
+    message = load_error(write(f"script.{ending}", user), limit=0.5 if "stopped" in words else 60.0)
     lines = line if isinstance(line, tuple) else (line,)
-    assert any(said.startswith(f"[{phase}] {path}:{one}: ") for one in lines), said
-    assert words in said and "\n" not in said and "_script" not in said
+    assert any(message.startswith(f"[{phase}] {path}:{number_of_line}: ") for number_of_line in lines), message
+    assert words in message and "\n" not in message and "_script" not in message
 
 
 @ENDINGS
-def test_a_misspelt_phase_is_found_in_a_helper_too(write, ending):
+def test_misspelt_phase_in_a_helper_is_reported(write, ending):
     define = {"py": "def sysCall_actuate():\n    pass", "lua": "function sysCall_actuate() end"}[ending]
     path = write(f"helper.{ending}", f"\n{define}\n")
-    said = refused(write(f"script.{ending}", {"py": "from helper import *", "lua": "require 'helper'"}[ending]))
-    assert said == f"[load] {path}:2: sysCall_actuate would never be called; near names are sysCall_actuation"
+    message = load_error(write(f"script.{ending}", {"py": "from helper import *", "lua": "require 'helper'"}[ending]))
+    assert message == f"[load] {path}:2: sysCall_actuate would never be called; near names are sysCall_actuation"
 
 
 @ENDINGS
-def test_a_snapshot_holds_the_variables_of_helpers(write, simulate, printed, ending):
+def test_snapshot_includes_the_variables_of_helpers(write, simulate, printed, ending):
     helper = {
         "py": "count = [0]\ndef up():\n    count[0] += 1\n    return count[0]\n",
         "lua": "local count = 0\nreturn {up = function() count = count + 1 return count end}",
@@ -167,7 +167,7 @@ def test_a_snapshot_holds_the_variables_of_helpers(write, simulate, printed, end
 # ---- Python
 
 
-def test_python_packages_and_names_within(write, simulate, printed):
+def test_python_packages_and_their_submodules_can_be_imported(write, simulate, printed):
     write("lib/__init__.py", "from .gains import Kp\n")
     write("lib/gains.py", "from __future__ import annotations\nfrom dataclasses import dataclass\nKp = 2\n"
           "@dataclass\nclass Gain:\n    value: float = 7\n")  # fmt: skip
@@ -189,13 +189,13 @@ def test_dataclasses_work_in_a_script(write, simulate, printed, first):
     assert printed() == ["8"]
 
 
-def test_a_python_helper_finds_what_the_script_finds(write, simulate, printed):
+def test_python_helper_has_the_same_globals_as_the_script(write, simulate, printed):
     write("helper.py", "print(sim.getObjectHandle('Drone') >= 0, simROS is not None)\nself.x = 3\n")
     simulate(write("script.py", "import helper\ndef sysCall_init():\n    print(self.x)\n"))
     assert printed() == ["True True", "3"]
 
 
-def test_pythons_own_modules_come_first_and_that_is_said(write, simulate, printed, caplog):
+def test_standard_library_takes_precedence_over_a_helper_and_a_line_is_logged(write, simulate, printed, caplog):
     write("random.py", "raise RuntimeError")
     folder = os.path.dirname(write("yaml.py", "mine = 5"))
     simulate(
@@ -206,17 +206,17 @@ def test_pythons_own_modules_come_first_and_that_is_said(write, simulate, printe
     assert sys.modules["yaml"].__name__ == "yaml" and not hasattr(sys.modules["yaml"], "mine")
 
 
-def test_a_python_helper_that_is_not_there_has_near_names(write):
+def test_missing_python_helper_is_reported_with_near_names(write):
     write("helper.py", "")
     path = write("script.py", "\nimport helpr\n")
-    said = f"[load] {path}:2: ModuleNotFoundError: No module named 'helpr'; near names are helper"
-    assert refused(path) == said
+    message = f"[load] {path}:2: ModuleNotFoundError: No module named 'helpr'; near names are helper"
+    assert load_error(path) == message
 
 
-def test_a_python_helper_has_limits(write, tmp_path):
+def test_python_helper_larger_than_1_mib_is_refused(write, tmp_path):
     write("large.py", "#" * (1024 * 1024 + 1))
     path = write("script.py", "\nimport large\n")
-    assert refused(path).startswith(f"[load] {path}:2: ImportError: {tmp_path}/large.py: larger than 1 MiB")
+    assert load_error(path).startswith(f"[load] {path}:2: ImportError: {tmp_path}/large.py: larger than 1 MiB")
 
 
 # ---- Lua
@@ -254,7 +254,7 @@ def test_lua_modules_in_folders_share_the_scripts_globals_and_are_read_once(writ
         ("circle", "requires itself"),
     ],
 )
-def test_a_lua_module_is_a_text_file_of_limited_size_in_the_scripts_folder(write, tmp_path, name, words):
+def test_lua_module_must_be_a_small_text_file_in_the_scripts_folder(write, tmp_path, name, words):
     write("outside.lua", "return 1")
     (tmp_path / "inner" / "folder.lua").mkdir(parents=True)
     write("inner/helper.lua", "return 1")
@@ -263,13 +263,13 @@ def test_a_lua_module_is_a_text_file_of_limited_size_in_the_scripts_folder(write
     write("inner/circle.lua", "require 'circle'")
     os.mkfifo(tmp_path / "inner" / "pipe.lua")
     (tmp_path / "inner" / "linked.lua").symlink_to(tmp_path / "outside.lua")
-    said = refused(write("inner/script.lua", f"\nrequire '{name}'"))
+    message = load_error(write("inner/script.lua", f"\nrequire '{name}'"))
     place = "circle.lua:1" if name == "circle" else "script.lua:2"
-    assert said.startswith(f"[load] {tmp_path}/inner/{place}: ")
-    assert words in said
+    assert message.startswith(f"[load] {tmp_path}/inner/{place}: ")
+    assert words in message
 
 
-def test_a_script_anywhere_imports_the_built_in_ones_and_a_file_beside_it_comes_first(write, simulate, printed):
+def test_built_in_scripts_can_be_imported_and_a_local_file_takes_precedence(write, simulate, printed):
     user = "import tutorial\nfrom tutorial import *\n"
     simulation = simulate(write("mine/script.py", user))
     for _ in range(20):

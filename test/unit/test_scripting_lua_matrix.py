@@ -10,7 +10,7 @@ from drone_sim.scripting import load
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.time_limit import TimeLimit
 
-FLAT = "local _ = function() simGetSimulationTime() end\n"  # which asks for Lua 5.1
+FLAT = "local _ = function() simGetSimulationTime() end\n"  # the flat API selects Lua 5.1
 DIALECTS = pytest.mark.parametrize("dialect", ["", FLAT], ids=["newest", "5.1"])
 A = np.array([[4.0, 7, 1], [2, 6, -1], [0.5, 3, 2]])
 B = np.array([[1.0, -2, 3], [0, 5, 1], [7, 2, -4]])
@@ -101,24 +101,24 @@ NUMBERS = {
 
 
 @DIALECTS
-def test_what_it_makes_is_what_numpy_makes(run, dialect):
+def test_matrix_operations_agree_with_numpy(run, dialect):
     checks = [f"print({call})" for call in [*EXAMPLES, *NUMBERS]]
     said = run(dialect + BEGIN + "\n".join(checks))
     for line, (call, expected) in zip(said, EXAMPLES.items()):
         rows, cols, data = re.fullmatch(r"Matrix\((\d+),(\d+),\{(.*)\}\)", line).groups()
-        made = np.array([float(one) for one in data.split(",")]).reshape(int(rows), int(cols))
-        assert made == pytest.approx(expected, abs=1e-9), call
+        matrix = np.array([float(number) for number in data.split(",")]).reshape(int(rows), int(cols))
+        assert matrix == pytest.approx(expected, abs=1e-9), call
     for line, (call, expected) in zip(said[len(EXAMPLES) :], NUMBERS.items()):
         assert float(line) == pytest.approx(expected), call
 
 
 @DIALECTS
-def test_elements_are_set_and_it_is_printed(run, dialect):
+def test_elements_can_be_set_and_a_matrix_can_be_printed(run, dialect):
     text = "local m = Matrix:eye(2) m[1][2] = 5 m:set(2, 1, 7):print() print(m == Matrix(2, 2, {1, 5, 7, 1}))"
     assert run(dialect + text) == ["1 5", "7 1", "true"]
 
 
-def test_a_file_beside_the_script_comes_first(run, tmp_path):
+def test_matrix_lua_beside_the_script_takes_precedence(run, tmp_path):
     (tmp_path / "matrix.lua").write_text("return {own = true}")
     assert run("print(require('matrix').own)") == ["true"]
 
@@ -137,7 +137,7 @@ def test_a_file_beside_the_script_comes_first(run, tmp_path):
         ("a:horzcat(Vector{1})", "Matrix: as many columns are expected"),
     ],
 )
-def test_a_mistake_is_one_line_with_its_place(run, dialect, call, said):
+def test_matrix_error_is_reported_with_file_and_line(run, dialect, call, said):
     with pytest.raises(ScriptError) as caught:
         run(dialect + BEGIN + f"print({call})")
     assert said in str(caught.value)

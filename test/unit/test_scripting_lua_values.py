@@ -1,4 +1,4 @@
-"""Values on their way between Lua and Python, in each form that they take."""
+"""Conversion of values between Lua and Python, in every form, and the thread that runs Lua."""
 
 import random
 import threading
@@ -28,15 +28,15 @@ def _call(request):
     scripts = []
 
     def call(arguments, give=lambda *values: None, then=""):
-        given = []
+        received = []
 
         def f(*values):
-            given.append(values)
+            received.append(values)
             return give(*values)
 
         source = PROLOGUE[request.param] + f"local r = {{test.f({arguments})}} {then}".encode()
         scripts.append(LuaScript("script.lua", source, {"test": Api("test", {"f": f}, {})}, TimeLimit(20)))
-        return given[0]
+        return received[0]
 
     yield call
     for script in scripts:
@@ -67,12 +67,12 @@ def _call(request):
         ("('x'):rep(5000)", ("x" * 5000,)),
     ],
 )
-def test_arguments(call, arguments, expected):
+def test_lua_arguments_are_converted_to_python(call, arguments, expected):
     assert call(arguments) == expected
 
 
 @pytest.mark.parametrize("count", [199, 200, 201, 400, 100_000])
-def test_long_lists(call, count):
+def test_long_lists_are_converted_in_both_directions(call, count):
     (values,) = call(
         f"(function() local t = {{}} for i = 1, {count} do t[i] = i end return t end)()",
         lambda values: values,
@@ -92,22 +92,22 @@ def test_long_lists(call, count):
         (10**30, "r[1] == 1e30"),
     ],
 )
-def test_results(call, result, check):
+def test_python_results_are_converted_to_lua(call, result, check):
     call("", lambda: result, f"assert({check})")
 
 
 @pytest.mark.parametrize("result, words", [({None: 1}, "cannot be a key"), ({float("nan"): 1}, "cannot be a key"),
                                            (b"x" * 2**27, "cannot be passed"), ([0] * 2**24, "too many")])  # fmt: skip
-def test_what_lua_cannot_take_is_an_error(call, result, words):
+def test_result_that_lua_cannot_represent_is_an_error(call, result, words):
     with pytest.raises(ScriptError, match=words):
         call("", lambda: result)
 
 
 @pytest.mark.parametrize("prologue", PROLOGUE.values())
 def test_lua_multiplies_matrices_as_python_does(prologue, new_simulation):
-    dice = random.Random(1)
-    m = [dice.uniform(-2, 2) for _ in range(12)]
-    v = [dice.uniform(-2, 2) for _ in range(3)]
+    generator = random.Random(1)
+    m = [generator.uniform(-2, 2) for _ in range(12)]
+    v = [generator.uniform(-2, 2) for _ in range(3)]
     lua = "{{{}}}".format
     source = prologue.decode() + (
         f"local m, v = {lua(', '.join(map(repr, m)))}, {lua(', '.join(map(repr, v)))}\n"
@@ -118,17 +118,17 @@ def test_lua_multiplies_matrices_as_python_does(prologue, new_simulation):
         "function sysCall_init() end"
     )
     simulation = new_simulation(lua=source)
-    found = simulation.child_scripts["drone"].parameters
-    assert found["product"] == list(frames.transform(m, v)) and found["inverse"] == list(frames.invert(m))
+    results = simulation.child_scripts["drone"].parameters
+    assert results["product"] == list(frames.transform(m, v)) and results["inverse"] == list(frames.invert(m))
 
 
-def test_what_counts_in_a_loop_may_be_set():
-    """As up to Lua 5.4, which CoppeliaSim has."""
-    said = []
-    api = Api("test", {"f": lambda value: said.append(value)}, {})
+def test_lua_loop_variable_may_be_assigned():
+    """As up to Lua 5.4, the version of CoppeliaSim."""
+    keys = []
+    api = Api("test", {"f": lambda value: keys.append(value)}, {})
     source = b"for key, value in pairs({a = 1}) do key = key .. '!' test.f(key) end"
     LuaScript("script.lua", source, {"test": api}, TimeLimit(20)).close()
-    assert said == ["a!"]
+    assert keys == ["a!"]
 
 
 # ---- Lua's thread
@@ -146,7 +146,7 @@ def spin(until):
         pass
 
 
-def test_results_and_errors_come_back(thread):
+def test_lua_thread_passes_on_results_and_errors(thread):
     assert thread.run(lambda a, b: a + b, 1, 2) == 3
     assert thread.run(threading.get_ident) != threading.get_ident()
     with pytest.raises(ZeroDivisionError):
@@ -154,7 +154,7 @@ def test_results_and_errors_come_back(thread):
     assert thread.run(lambda: 4) == 4
 
 
-def test_what_is_bound_to_the_callers_thread_runs_there_uncounted(thread):
+def test_outside_runs_a_function_in_the_callers_thread_without_a_time_limit(thread):
     limit = thread._limit
 
     def draw():
@@ -167,7 +167,7 @@ def test_what_is_bound_to_the_callers_thread_runs_there_uncounted(thread):
     assert thread.run(lambda: 5) == 5
 
 
-def test_who_hangs_is_left_behind_and_finds_the_api_closed(thread):
+def test_hanging_script_is_abandoned_and_its_api_calls_fail(thread):
     class Values:
         def readers(self):
             return (tuple,)

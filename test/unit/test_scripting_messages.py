@@ -1,4 +1,4 @@
-"""simROS without ROS, and the seam to it."""
+"""simROS without ROS, and its interface to a ROS backend."""
 
 import threading
 from types import SimpleNamespace
@@ -45,20 +45,20 @@ class FakeBackend:
         return self.senders.setdefault((topic, "image", queue), FakeSender())
 
 
-def test_names_stand_in_the_drones_namespace(caplog):
-    bus, heard = MessageBus("drone"), []
+def test_relative_topic_names_resolve_in_the_drones_namespace(caplog):
+    bus, received = MessageBus("drone"), []
     bus.subscribe("cmd_vel", "geometry_msgs/Twist", "relative")
     bus.subscribe("/drone/cmd_vel", "geometry_msgs/Twist", "absolute")
     bus.subscribe("/other/cmd_vel", "geometry_msgs/Twist", "other")
     bus.post("cmd_vel", 1)
-    heard += bus.take()
-    assert heard == [("relative", 1), ("absolute", 1)]
-    said = "/other/cmd_vel: no message will be received, because this flight runs without ROS"
-    assert [one.getMessage() for one in caplog.records] == [said]
+    received += bus.take()
+    assert received == [("relative", 1), ("absolute", 1)]
+    warning = "/other/cmd_vel: no message will be received, because this flight runs without ROS"
+    assert [item.getMessage() for item in caplog.records] == [warning]
 
 
-def test_the_same_subscription_once_more_is_the_one_that_is_there():
-    bus, heard = MessageBus("drone"), []
+def test_repeated_subscription_returns_the_existing_handle():
+    bus, received = MessageBus("drone"), []
     for _ in range(300):  # as from a script that subscribes in every step
         assert bus.subscribe("/cmd_vel", "geometry_msgs/Twist", "on_twist") == 1
     others = [
@@ -69,27 +69,27 @@ def test_the_same_subscription_once_more_is_the_one_that_is_there():
     assert others == [2, 3, 4]
     bus.end_subscription(3)
     bus.post("/cmd_vel", 1)
-    heard += bus.take()
-    assert heard == [("on_twist", 1), ("on_other", 1)]
+    received += bus.take()
+    assert received == [("on_twist", 1), ("on_other", 1)]
     bus.end_subscription(1)
     assert bus.subscribe("/cmd_vel", "geometry_msgs/Twist", "on_twist") == 5
 
 
 @pytest.mark.parametrize("queue, kept", [(0, [4]), (1, [4]), (3, [2, 3, 4]), (10, [0, 1, 2, 3, 4])])
-def test_the_last_messages_are_kept(queue, kept):
-    bus, heard = MessageBus("drone"), []
+def test_queue_holds_the_last_messages(queue, kept):
+    bus, received = MessageBus("drone"), []
     handle = bus.subscribe("x", "std_msgs/Int32", "f", queue)
     for message in range(5):
         bus.post("x", message)
-    heard += [message for _, message in bus.take() + bus.take()]
-    assert heard == kept
+    received += [message for _, message in bus.take() + bus.take()]
+    assert received == kept
     bus.end_subscription(handle)
     with pytest.raises(ValueError, match=f"no subscription with the handle {handle}"):
         bus.end_subscription(handle)
 
 
 @pytest.mark.parametrize("backend", [None, Recorder()])
-def test_what_is_published(backend):
+def test_publishers_work_with_and_without_a_backend(backend):
     bus = MessageBus("drone")
     bus.backend = backend
     handle = bus.advertise("said", "std_msgs/String")
@@ -101,7 +101,7 @@ def test_what_is_published(backend):
         assert first == ("/drone/said", "std_msgs/String", {"data": "x"})
         assert (topic, kind, sent.frame_id) == ("/drone/front", "sensor_msgs/Image", "here")
         assert sent.pixels.tolist() == [[[6, 7, 8], [9, 10, 11]], [[0, 1, 2], [3, 4, 5]]]
-    assert [bus.subscribers(one) for one in (handle, image)] == ([0, 0] if backend is None else [1, 1])
+    assert [bus.subscribers(item) for item in (handle, image)] == ([0, 0] if backend is None else [1, 1])
     with pytest.raises(ValueError, match="an image of 2 x 2 must have 12 bytes, not 3"):
         sim_ros.imageTransportPublish(image, b"abc", 2, 2, "here")
     with pytest.raises(ValueError, match="an image cannot have 0 x 2"):
@@ -113,17 +113,17 @@ def test_what_is_published(backend):
             call()
 
 
-def test_a_backend_carries_messages():
-    bus, backend, heard = MessageBus("drone"), FakeBackend(), []
+def test_backend_transports_messages():
+    bus, backend, received = MessageBus("drone"), FakeBackend(), []
     bus.backend = backend
     bus.subscribe("/scan", "sensor_msgs/LaserScan", "on_scan", 2)
     bus.subscribe("cmd_vel", "geometry_msgs/Twist", "on_twist")
-    assert list(backend.takes) == ["/scan"], "the drone posts its own commands"
+    assert list(backend.takes) == ["/scan"], "the drone itself posts its velocity commands"
     thread = threading.Thread(target=backend.takes["/scan"], args=("message",))
     thread.start()
     thread.join()
-    heard += bus.take()
-    assert heard == [("on_scan", "message")]
+    received += bus.take()
+    assert received == [("on_scan", "message")]
 
     bus.publish(bus.advertise("said", "std_msgs/String", 5, True), {"data": "x"})
     bus.advertise_image("front")
@@ -163,7 +163,7 @@ def heard(msg):
 
 
 @pytest.mark.parametrize("ending, source", [("lua", LUA), ("py", PYTHON)])
-def test_messages_pass_through_a_script(tmp_path, ending, source, new_simulation):
+def test_script_receives_and_publishes_messages(tmp_path, ending, source, new_simulation):
     path = tmp_path / f"script.{ending}"
     path.write_text(source, encoding="utf-8")
     backend = FakeBackend()
@@ -196,7 +196,7 @@ def test_messages_pass_through_a_script(tmp_path, ending, source, new_simulation
     assert sender.ended
 
 
-def test_twists_reach_the_script(new_simulation):
+def test_script_receives_the_drones_velocity_commands(new_simulation):
     simulation = new_simulation(
         lua="simROS.subscribe('/drone/cmd_vel', 'geometry_msgs/Twist', 'f')\n"
         "function f(m) assert(m.linear.x == 1 and m.linear.z == 0 and m.angular.z == 0.5) heard = true end\n"
@@ -206,7 +206,7 @@ def test_twists_reach_the_script(new_simulation):
     simulation.step()
 
 
-def test_scripts_leave_nothing_behind(tmp_path):
+def test_closed_scripts_are_garbage_collected(tmp_path):
     import gc
     import weakref
 

@@ -20,7 +20,7 @@ def _objects(simulation):
 
 @pytest.fixture(name="find")
 def _find(simulation, objects):
-    """What sim.getObject does in the drone's own script; the name in the place of the handle."""
+    """Return sim.getObject of the drone's script, but with the object's name in place of its handle."""
     functions = NameFunctions(simulation.child_scripts["drone"])
 
     def found(path, **options):
@@ -76,7 +76,7 @@ def _find(simulation, objects):
         ("ResizableFloor_5_25", "Floor"),
     ],
 )
-def test_paths(find, path, name):
+def test_path_finds_the_object(find, path, name):
     assert find(path) == name
 
 
@@ -89,7 +89,7 @@ def test_paths(find, path, name):
         ("/", "no object '/';"),
         ("/Floor/base", "near names"),
         ("/Quadcopter/propeller[x]", "near names"),
-        ("/Quadcopter/respondable[1]", "near names"),  # the first of each propeller, none is the second
+        ("/Quadcopter/respondable[1]", "near names"),  # each propeller has only one
         ("/Quadcopter/zzz*", "no object '/Quadcopter/zzz*'"),
         ("/Quadcopter" + "/*" * 99, "no object"),
         ("/*" * 5000, "no object"),
@@ -97,37 +97,37 @@ def test_paths(find, path, name):
         ("zzzzzzzz", "known are"),
     ],
 )
-def test_unknown_names_list_the_near_ones(find, path, near):
+def test_unknown_path_is_reported_with_near_names(find, path, near):
     with pytest.raises(ValueError, match="no object") as raised:
         find(path)
     assert near in str(raised.value)
 
 
-def test_paths_are_found_again(find, objects):
+def test_the_path_of_every_object_finds_that_object(find, objects):
     for handle in objects:
         assert find(objects.path(handle)) == objects[handle].name
 
 
-def test_the_index_of_a_path_counts_all_that_it_means(find):
+def test_index_selects_among_all_objects_that_match_the_path(find):
     found = [find("/Quadcopter/respondable", index=index, noError=True) for index in range(5)]
     assert found == [f"Quadricopter_propeller_respondable{number}" for number in (1, 2, 3, 4)] + [-1]
     assert find("/Quadcopter/propeller[2]/*", index=2) == "Quadricopter_propeller_joint3"
-    assert find("/*/*/respondable", index=3) == "Quadricopter_propeller_respondable4", "each counts once"
+    assert find("/*/*/respondable", index=3) == "Quadricopter_propeller_respondable4", "each match counts once"
     with pytest.raises(ValueError, match=r"no object '/Quadcopter/base' with the index 1, from 0"):
         find("/Quadcopter/base", index=1)
 
 
-def test_a_proxy_is_where_relative_paths_begin(find, objects):
+def test_relative_paths_start_at_the_proxy(find, objects):
     propeller = objects.handle("Quadricopter_propeller3")
     assert find("./joint", proxy=propeller) == "Quadricopter_propeller_joint3"
     assert find("..", proxy=propeller) == "Drone" and find(".", proxy=propeller) == "Quadricopter_propeller3"
-    assert find(":/base", proxy=propeller) == "Quadricopter_base", "from the model that it is part of"
-    assert find("/base", proxy=propeller) == "Quadricopter_base", "that from the root stays"
+    assert find(":/base", proxy=propeller) == "Quadricopter_base", "':' is the proxy's model"
+    assert find("/base", proxy=propeller) == "Quadricopter_base", "an absolute path ignores the proxy"
     with pytest.raises(ValueError, match="no object with the handle 4711"):
         find("./joint", proxy=4711)
 
 
-def test_parents(objects):
+def test_parents_of_the_drones_objects(objects):
     def parent(name):
         return objects[objects.handle(name)].parent
 
@@ -137,30 +137,30 @@ def test_parents(objects):
     assert parent("DronePosition").name == "Quadricopter_base"
 
 
-def test_a_target_without_parent_stays(simulation, objects):
+def test_target_without_parent_does_not_move_with_the_drone(simulation, objects):
     target = objects.handle("DronePosition")
-    carried = objects.matrix(target)
-    assert frames.position(carried) == pytest.approx((0, 0, 0.79))
+    original = objects.matrix(target)
+    assert frames.position(original) == pytest.approx((0, 0, 0.79))
     objects.set_parent(target, -1, True)
     simulation.drone.body.move(Pose((1, 2, 3)))
-    assert objects.matrix(target) == carried
+    assert objects.matrix(target) == original
 
 
-def test_no_object_hangs_on_itself(objects):
+def test_object_cannot_become_its_own_ancestor(objects):
     with pytest.raises(ValueError, match="its own ancestor"):
         objects.set_parent(objects.handle("Track_base"), objects.handle("TrackCam"), True)
 
 
 @pytest.mark.parametrize("upwards", [False, True])
-def test_no_object_hangs_too_deep(objects, upwards):
-    """However a script puts a chain together."""
-    made = [objects.add(f"o{number}") for number in range(999)]
-    pairs = list(zip(made[1:], made))
+def test_depth_of_the_object_tree_is_limited(objects, upwards):
+    """The limit holds in whichever order a script builds a chain."""
+    handles = [objects.add(f"o{number}") for number in range(999)]
+    pairs = list(zip(handles[1:], handles))
     with pytest.raises(ValueError, match=r"'o\d+'.* 200 "):
         for below, above in reversed(pairs) if upwards else pairs:
             objects.set_parent(below, above, True)
-    assert len(objects.matrix(made[-1])) == 12
-    objects.remove(made)
+    assert len(objects.matrix(handles[-1])) == 12
+    objects.remove(handles)
 
 
 @pytest.mark.parametrize("name, toward", [("FrontVision", (1, 0, 0)), ("Quadricopter_floorCamera", (0, 0, -1))])

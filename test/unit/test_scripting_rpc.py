@@ -1,4 +1,4 @@
-"""A script in another process: it flies the same to the last bit, and what comes from there is checked."""
+"""Scripts in another process: bit-identical flights, and validation of the messages from that process."""
 
 import contextlib
 import json
@@ -46,8 +46,8 @@ SCRIPTS = sorted(
         ROOT / "src" / "drone_sim" / "child_scripts" / "tutorial_v4.lua",
     ]
 )
-TASKS = [one.name for one in sorted(tasks.folder().iterdir()) if (one / "solution.py").exists()]
-# What a script may do beside the tutorial's; each flies as it does in this process.
+TASKS = [item.name for item in sorted(tasks.folder().iterdir()) if (item / "solution.py").exists()]
+# API calls beyond those of the tutorial; each must give the same flight as in this process.
 PYTHON = """
 import math, random
 import tutorial
@@ -70,7 +70,7 @@ def sysCall_sensing():
 def say(value):
     sim.setStringSignal("said", repr(value))
 """
-DOES = {
+ACTIONS = {
     "reads what it has put": "for one in (1, 2): sim.setObjectPosition(self.mark, -1, [one, 2, 3]);"
     " say([sim.getObjectPosition(self.mark, -1), sim.getObjectPose(self.d, self.mark), sim.getVelocity(self.mark)])",
     "turns what it has put": "sim.setObjectOrientation(self.mark, self.d, [0.1, 0.2, 0.3]);"
@@ -145,8 +145,8 @@ end
 
 
 @contextlib.contextmanager
-def process_of(serve):
-    """Give the end of a connection whose other end a process has, which calls `serve` with it."""
+def forked_process(serve):
+    """Fork a process that calls `serve` with one end of a connection, and yield the other end."""
     here, there = socket.socketpair()
     process = os.fork()
     if not process:
@@ -164,27 +164,27 @@ def process_of(serve):
         os.waitpid(process, 0)
 
 
-def flown_elsewhere(plan, script, seed=0, serve=None):
-    """Return the result of a flight whose script is elsewhere, and whether its door was closed by then."""
+def fly_remotely(plan, script, seed=0, serve=None):
+    """Return the result of a flight whose script runs in another process, and why its connection was closed."""
 
     def serve_script(end):
         random.seed(script_seed(seed))
         np.random.seed(script_seed(seed) % 2**32)
         script_process.serve(script_process.ScriptWorker(), end, script)
 
-    with process_of(serve or serve_script) as end:
-        door = ScriptConnection(end)
-        result = Flight(plan, script, seed, {}, door).grade()
-        return result, door.why_closed
+    with forked_process(serve or serve_script) as end:
+        script_connection = ScriptConnection(end)
+        result = Flight(plan, script, seed, {}, script_connection).grade()
+        return result, script_connection.why_closed
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("rpc")
-    (made / "scene.yaml").write_text(SCENE)
-    (made / "plan.yaml").write_text(PLAN)
-    (made / "quick.yaml").write_text(PLAN.replace("limit: 30.0", "limit: 0.2"))
-    return made
+    directory = tmp_path_factory.mktemp("rpc")
+    (directory / "scene.yaml").write_text(SCENE)
+    (directory / "plan.yaml").write_text(PLAN)
+    (directory / "quick.yaml").write_text(PLAN.replace("limit: 30.0", "limit: 0.2"))
+    return directory
 
 
 @pytest.fixture(scope="module")
@@ -197,50 +197,50 @@ def quick(folder):
     return plans.read(folder / "quick.yaml")
 
 
-def same(plan, script, seed=0):
-    """Return the result, which is the same in this process and in one of its own."""
-    elsewhere, why_closed = flown_elsewhere(plan, str(script), seed)
-    assert elsewhere == flight.grade(plan, str(script), seed) and not why_closed
-    return elsewhere
+def assert_same_flight(plan, script, seed=0):
+    """Return the result of a flight, after checking that it is the same with the script in another process."""
+    remote_result, why_closed = fly_remotely(plan, str(script), seed)
+    assert remote_result == flight.grade(plan, str(script), seed) and not why_closed
+    return remote_result
 
 
 # ---- the same flight
 
 
-@pytest.mark.parametrize("script", ["pilot", *SCRIPTS], ids=lambda one: "/".join(Path(one).parts[-2:]))
-def test_a_script_flies_the_same_behind_a_door(plan, script):
-    same(plan, script)
+@pytest.mark.parametrize("script", ["pilot", *SCRIPTS], ids=lambda item: "/".join(Path(item).parts[-2:]))
+def test_script_flies_the_same_in_another_process(plan, script):
+    assert_same_flight(plan, script)
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_a_solution_of_a_task_flies_the_same_behind_a_door(task):
+def test_task_solution_flies_the_same_in_another_process(task):
     task_plan = plans.read(tasks.find(task))
     shorter = task_plan.model_copy(update={"duration": min(2.0, task_plan.duration)})
-    result = same(shorter, tasks.folder() / task / "solution.py", seed=1)
+    result = assert_same_flight(shorter, tasks.folder() / task / "solution.py", seed=1)
     assert result.error is None
 
 
 @pytest.mark.parametrize("where", ["BEGIN", "ACT", "SENSE"])
-@pytest.mark.parametrize("what", DOES)
-def test_what_a_script_does_comes_out_the_same_behind_a_door(plan, tmp_path, what, where):
-    text = PYTHON.replace(where, DOES[what])
+@pytest.mark.parametrize("what", ACTIONS)
+def test_api_calls_give_the_same_results_in_another_process(plan, tmp_path, what, where):
+    text = PYTHON.replace(where, ACTIONS[what])
     for other in ("BEGIN", "ACT", "SENSE"):
         text = text.replace(other, "pass")
     path = tmp_path / "does.py"
     path.write_text(text + HELPERS)
-    result = same(plan.model_copy(update={"duration": 1.0}), path)
+    result = assert_same_flight(plan.model_copy(update={"duration": 1.0}), path)
     assert result.error is None and result.flown == 1.0
 
 
-def test_a_callback_hears_the_same_behind_a_door(plan, tmp_path):
+def test_callback_receives_the_same_messages_in_another_process(plan, tmp_path):
     for given in ("heard", "'heard'"):
         path = tmp_path / "hears.py"
         begin = f"simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', {given})"
         path.write_text(PYTHON.replace("BEGIN", begin).replace("ACT", "pass").replace("SENSE", "pass") + HELPERS)
-        assert "Twist(linear=" in same(plan, path).outcomes[0].said
+        assert "Twist(linear=" in assert_same_flight(plan, path).outcomes[0].said
 
 
-def test_a_thread_waits_the_same_behind_a_door(plan, tmp_path):
+def test_script_thread_waits_the_same_in_another_process(plan, tmp_path):
     path = tmp_path / "waits.py"
     thread = """
 def sysCall_thread():
@@ -251,10 +251,10 @@ def sysCall_thread():
         sim.switchThread()
 """
     path.write_text(PYTHON.replace("BEGIN", "pass").replace("ACT", "pass").replace("SENSE", "pass") + HELPERS + thread)
-    assert same(plan, path).error is None
+    assert assert_same_flight(plan, path).error is None
 
 
-def test_a_thread_and_the_phases_take_turns_behind_a_door(plan, tmp_path):
+def test_script_thread_and_phases_alternate_in_another_process(plan, tmp_path):
     path = tmp_path / "turns.py"
     act = "self.order = getattr(self, 'order', '') + 'a'; say(self.order)"
     thread = """
@@ -264,13 +264,13 @@ def sysCall_thread():
         sim.switchThread()
 """
     path.write_text(PYTHON.replace("BEGIN", "pass").replace("ACT", act).replace("SENSE", "pass") + HELPERS + thread)
-    assert "tatata" in same(plan, path).outcomes[0].said
+    assert "tatata" in assert_same_flight(plan, path).outcomes[0].said
 
 
-def test_lua_flies_the_same_behind_a_door(plan, tmp_path):
+def test_lua_script_flies_the_same_in_another_process(plan, tmp_path):
     path = tmp_path / "flies.lua"
     path.write_text(LUA)
-    assert "no object with the handle 99" in same(plan, path).outcomes[0].said
+    assert "no object with the handle 99" in assert_same_flight(plan, path).outcomes[0].said
 
 
 @pytest.mark.parametrize(
@@ -284,19 +284,19 @@ def test_lua_flies_the_same_behind_a_door(plan, tmp_path):
         "sim.wait(1)",
     ],
 )
-def test_what_fails_says_the_same_behind_a_door(quick, tmp_path, body):
+def test_error_message_is_the_same_in_another_process(quick, tmp_path, body):
     path = tmp_path / "fails.py"
     path.write_text(f"def sysCall_actuation():\n    {body}\n")
-    assert same(quick, path).error.startswith(f"[actuation] {path}:2: ")
+    assert assert_same_flight(quick, path).error.startswith(f"[actuation] {path}:2: ")
 
 
-def test_a_controller_asks_nothing_that_can_be_told_before(plan, monkeypatch):
-    came = []
+def test_controller_needs_no_more_than_two_messages_per_step(plan, monkeypatch):
+    received = []
     receive = connection.Channel.receive
-    monkeypatch.setattr(connection.Channel, "receive", lambda self: came.append(receive(self)) or came[-1])
+    monkeypatch.setattr(connection.Channel, "receive", lambda self: received.append(receive(self)) or received[-1])
     longer = plan.model_copy(update={"timeline": [], "duration": 10.0})
-    flown_elsewhere(longer, "pilot")
-    assert len([one for one in came if one]) < 2.1 * 200 + 100  # two messages in each of 200 steps, and the beginning
+    fly_remotely(longer, "pilot")
+    assert len([item for item in received if item]) < 2.1 * 200 + 100  # two in each of 200 steps, and the start
 
 
 # ---- values
@@ -323,7 +323,7 @@ def test_a_controller_asks_nothing_that_can_be_told_before(plan, monkeypatch):
     ],
     ids=repr,
 )
-def test_values_come_through_as_they_are(value):
+def test_values_survive_the_round_trip_between_processes(value):
     there = values.incoming(marshal.loads(marshal.dumps(values.outgoing(value))), int, int)
     assert repr(there) == repr(value)
     if not hasattr(value, "_fields"):
@@ -331,20 +331,20 @@ def test_values_come_through_as_they_are(value):
         assert repr(here) == repr(value)
 
 
-def test_all_that_is_said_of_functions_is_of_functions_that_there_are():
+def test_effect_tables_name_only_existing_functions():
     apis = listing.apis()
     known = {f"{name}.{key}" for name, api in apis.items() for key in contents(api)[1]}
     named = {*effects.READS, *effects.POSE_READS, *effects.CHANGES}
-    own = {f"sim.{one}" for names in effects.OWN.values() for one in names.split()}
+    own = {f"sim.{item}" for names in effects.OWN.values() for item in names.split()}
     assert named | own <= known
     modules = api_stubs.ApiStubs(None, None, Turns()).modules
     assert modules.keys() == apis.keys()
-    assert modules["sim"].packInt32Table([1]) == b"\x01\0\0\0"  # in this process: there is no link to call through
+    assert modules["sim"].packInt32Table([1]) == b"\x01\0\0\0"  # runs in this process: there is no connection
 
 
-# ---- what comes from a process that has been taken over
+# ---- messages from a compromised process
 
-SAID = {
+INVALID_MESSAGES = {
     "no JSON": (b"\x80\x04N.", "invalid message: not JSON"),
     "a text": (b'"x"', "list of items"),
     "items that are none": (b'[1, "x", []]', "list of items"),
@@ -373,31 +373,31 @@ SAID = {
 }
 
 
-@pytest.mark.parametrize("what", SAID)
-def test_what_is_no_message_ends_the_flight_in_one_line(plan, what):
-    message, said = SAID[what]
+@pytest.mark.parametrize("what", INVALID_MESSAGES)
+def test_invalid_message_ends_the_flight_with_one_line(plan, what):
+    message, said = INVALID_MESSAGES[what]
 
     def serve(end):
         end.sendall(struct.pack("<I", len(message)) + message)
         end.recv(2**20)
 
-    result, why_closed = flown_elsewhere(plan, "pilot", serve=serve)
+    result, why_closed = fly_remotely(plan, "pilot", serve=serve)
     assert not result.passed and result.points == 0
     assert said in result.error and said in why_closed and "\n" not in result.error
 
 
-def test_a_message_without_end_is_not_waited_for(plan):
-    result, _ = flown_elsewhere(plan, "pilot", serve=lambda end: end.sendall(struct.pack("<I", 2**32 - 1)))
+def test_announced_length_that_never_arrives_ends_the_flight(plan):
+    result, _ = fly_remotely(plan, "pilot", serve=lambda end: end.sendall(struct.pack("<I", 2**32 - 1)))
     assert result.error.endswith("its process has ended")
 
 
-def test_a_process_that_is_silent_is_not_waited_for(quick, monkeypatch):
+def test_silent_script_process_times_out(quick, monkeypatch):
     monkeypatch.setattr(script_proxy, "GRACE", 0.2)
-    result, _ = flown_elsewhere(quick, "pilot", serve=lambda end: end.recv(1) and end.recv(2**20) and end.recv(1))
+    result, _ = fly_remotely(quick, "pilot", serve=lambda end: end.recv(1) and end.recv(2**20) and end.recv(1))
     assert "did not return after 0.2 s (script_time_limit)" in result.error
 
 
-def test_a_process_that_floods_is_not_heard_out(quick, monkeypatch):
+def test_script_process_that_floods_messages_times_out(quick, monkeypatch):
     monkeypatch.setattr(script_proxy, "GRACE", 0.2)
     message = json.dumps([["set", "sim.setInt32Signal", "said", 1]]).encode()
 
@@ -405,5 +405,5 @@ def test_a_process_that_floods_is_not_heard_out(quick, monkeypatch):
         while True:
             end.sendall(struct.pack("<I", len(message)) + message)
 
-    result, _ = flown_elsewhere(quick, "pilot", serve=serve)
+    result, _ = fly_remotely(quick, "pilot", serve=serve)
     assert "did not return after 0.2 s (script_time_limit)" in result.error

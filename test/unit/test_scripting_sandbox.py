@@ -1,4 +1,4 @@
-"""A Lua script reaches nothing but the API."""
+"""The Lua sandbox: a script has access to nothing but the API."""
 
 import itertools
 import logging
@@ -74,16 +74,16 @@ def _run(tmp_path, caplog):
     return run
 
 
-def way_to_run(attempt):
-    """Return what decides how a script with this text is run: an attempt must not change it for another."""
+def execution_mode(attempt):
+    """Return the properties of the source that decide how it runs; only attempts that agree in them share a script."""
     text = LuaSource(attempt.encode())
     return text.loops_in_c, text.coroutines, text.threads
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_escapes_fail(run, dialect):
-    for _, attempts in itertools.groupby(sorted(ESCAPES, key=way_to_run), way_to_run):
-        tries = {one: f"do local ok, e = pcall(function() {one} end) print(ok, type(e)) end" for one in attempts}
+    for _, attempts in itertools.groupby(sorted(ESCAPES, key=execution_mode), execution_mode):
+        tries = {call: f"do local ok, e = pcall(function() {call} end) print(ok, type(e)) end" for call in attempts}
         assert dict(zip(tries, run("\n".join([DIALECTS[dialect], *tries.values()])))) == dict.fromkeys(
             tries, "false\tstring"
         )
@@ -95,17 +95,17 @@ def test_no_python_object_is_in_reach(run, dialect):
 
 
 @pytest.mark.parametrize("dialect, version", [("5.1", "Lua 5.1"), ("newest", "Lua 5.5")])
-def test_the_dialect_follows_the_api(run, dialect, version):
+def test_the_api_generation_selects_the_lua_version(run, dialect, version):
     lupa = pytest.importorskip("lupa.lua55" if dialect == "newest" else "lupa.lua51")
     assert lupa and run(f"{DIALECTS[dialect]}\nprint(_VERSION)") == [version]
 
 
-def test_comments_do_not_choose_the_dialect(run):
+def test_comments_do_not_select_the_lua_version(run):
     (version,) = run("-- simGetObjectHandle('x') sim_call_type\n--[[ simFoo() ]] print(_VERSION)")
     assert version != "Lua 5.1"
 
 
-def test_what_is_left_works(run):
+def test_permitted_standard_functions_work(run):
     source = """
     print(os.time() > 0, os.clock() >= 0, type(os.date()), math.mod(7, 4), math.pow(2, 3), unpack({1}))
     print(pcall(error, 'x'))
@@ -115,6 +115,6 @@ def test_what_is_left_works(run):
     print(load('return 1 + 1')(), loadstring('return 3')(), #{table.unpack({1, 2, 3})})
     print(require'sim' == sim, require('simROS') == simROS)
     """
-    said = run(source)
-    assert said[0].startswith("true\ttrue\tstring\t3")
-    assert said[1:] == ["false\tx", "false\ty!", "2", "5", "2\t3\t3", "true\ttrue"]
+    output = run(source)
+    assert output[0].startswith("true\ttrue\tstring\t3")
+    assert output[1:] == ["false\tx", "false\ty!", "2", "5", "2\t3\t3", "true\ttrue"]

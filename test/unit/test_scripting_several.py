@@ -1,4 +1,4 @@
-"""Several drones in one scene: what the names in each one's script mean."""
+"""Several drones in one scene: which objects the names in each drone's script refer to."""
 
 from typing import ClassVar
 
@@ -30,7 +30,7 @@ class Scene(ScriptContext):
 
 
 class Drone:
-    """A Host."""
+    """A test double for `Host`."""
 
     sensors: ClassVar[dict] = {}
     script_type = CHILD
@@ -137,7 +137,7 @@ def name_of(drone, path):
         ("/Floor", ["Floor"] * 3),
     ],
 )
-def test_names(drones, path, found):
+def test_names_and_paths_resolve_relative_to_each_drone(drones, path, found):
     assert [name_of(drone, path) for drone in drones] == found
 
 
@@ -151,18 +151,18 @@ def test_names(drones, path, found):
         (1, "/Quadcopter[3]/base", "no object '/Quadcopter\\[3\\]/base'; near names are /Quadcopter\\[2\\]/base"),
     ],
 )
-def test_a_name_that_the_own_model_does_not_have_is_no_other_drones(drones, index, path, said):
+def test_name_missing_in_the_own_model_does_not_resolve_to_another_drone(drones, index, path, said):
     with pytest.raises(ValueError, match=said):
         drones[index].sim().getObject(path)
 
 
-def test_the_only_drone_hears_any_suffix():
+def test_single_drone_accepts_any_name_suffix():
     drone = Drone(Scene())
     assert name_of(drone, "Quadricopter_base#0") == name_of(drone, "Quadricopter_base#7") == "Quadricopter_base"
     assert drone.sim().getNameSuffix() == -1
 
 
-def test_what_an_object_is_called(drones):
+def test_object_names_aliases_and_suffixes(drones):
     sim = drones[1].sim()
     base = sim.getObject("./base")
     assert (sim.getObjectName(base), sim.getObjectAlias(base)) == ("Quadricopter_base#0", "base")
@@ -171,7 +171,7 @@ def test_what_an_object_is_called(drones):
 
 
 @pytest.mark.parametrize("ending", SCRIPTS)
-def test_the_same_script_flies_each_of_them(drones, tmp_path, ending):
+def test_same_script_controls_each_drone(drones, tmp_path, ending):
     path = tmp_path / f"script.{ending}"
     path.write_text(SCRIPTS[ending], encoding="utf-8")
     scripts = [drone.load(path) for drone in drones]
@@ -185,13 +185,13 @@ def test_the_same_script_flies_each_of_them(drones, tmp_path, ending):
         "Quadricopter_base#1",
     ]
     assert {drone.parameters["base"].partition("/")[0] for drone in drones} == {"Quadricopter_base"}
-    heard = drones[0].sim()
-    assert [heard.getFloatSignal(f"height{suffix}") for suffix in (-1, 0, 1, 2)] == [1.5, 1.5, 1.5, None]
+    first_sim = drones[0].sim()
+    assert [first_sim.getFloatSignal(f"height{suffix}") for suffix in (-1, 0, 1, 2)] == [1.5, 1.5, 1.5, None]
     for script in scripts:
         script.close()
 
 
-def test_scripts_are_the_own_drones(drones):
+def test_script_handles_refer_to_the_own_drone(drones):
     sim = drones[1].sim()
     propeller = sim.getScriptHandle("./propeller/respondable")
     assert propeller == sim.getScriptHandle("Quadricopter_propeller_respondable1#0")
@@ -211,7 +211,7 @@ def test_forces_act_on_the_own_drone(drones):
         sim.addForceAndTorque(sim.getObject("Drone#"), [1, 0, 0])
 
 
-def test_one_drone_sees_another(drones):
+def test_script_can_read_the_position_of_another_drone(drones):
     leader, follower = drones[0].sim(), drones[1].sim()
     leader.setObjectPosition(leader.getObject("Drone"), -1, [1, 2, 3])
     assert follower.getObjectPosition(follower.getObject("Drone#")) == [1, 2, 3]
@@ -219,7 +219,7 @@ def test_one_drone_sees_another(drones):
 
 
 @pytest.mark.parametrize("shown", [True, False])
-def test_no_two_things_drawn_have_one_handle(shown):
+def test_drawings_of_two_drones_have_distinct_handles(shown):
     scene = Scene(shown)
     first, second = Drone(scene).sim(), Drone(scene, "#0").sim()
     restore = scene.drawings.save_state()
@@ -238,7 +238,7 @@ def test_no_two_things_drawn_have_one_handle(shown):
     assert draw() == [1, 2, 3, 4]
 
 
-def test_a_script_may_speak_of_another_suffix(drones):
+def test_script_may_select_another_name_suffix(drones):
     sim = drones[1].sim()
     own = sim.getNameSuffix()
     sim.setNameSuffix(1)
@@ -254,7 +254,7 @@ def test_a_script_may_speak_of_another_suffix(drones):
         sim.setNameSuffix("one")
 
 
-SPEAKS = {
+SUFFIX_SCRIPTS = {
     "lua": "function sysCall_actuation()\n"
     "  local base = sim.getObjectName(sim.getObject('Quadricopter_base'))\n"
     "  sim.setScriptSimulationParameter(sim.handle_self, 'base', base)\n"
@@ -266,10 +266,10 @@ SPEAKS = {
 }
 
 
-@pytest.mark.parametrize("ending", SPEAKS)
-def test_a_snapshot_knows_the_suffix(drones, tmp_path, ending):
+@pytest.mark.parametrize("ending", SUFFIX_SCRIPTS)
+def test_snapshot_includes_the_name_suffix(drones, tmp_path, ending):
     path = tmp_path / f"script.{ending}"
-    path.write_text(SPEAKS[ending], encoding="utf-8")
+    path.write_text(SUFFIX_SCRIPTS[ending], encoding="utf-8")
     script = drones[1].load(path)
     restore = script.save_state()
     found = []
@@ -283,7 +283,7 @@ def test_a_snapshot_knows_the_suffix(drones, tmp_path, ending):
     script.close()
 
 
-def test_when_a_drone_is_gone_the_others_stay_what_they_are(drones):
+def test_removing_a_drone_does_not_change_the_names_of_the_others(drones):
     first, second, third = drones
     sim = second.sim()
     base = sim.getObject("./base")
@@ -333,7 +333,7 @@ def sysCall_init():
 
 
 @pytest.mark.parametrize("ending, source", [("lua", LUA_SETS), ("py", PYTHON_SETS)])
-def test_a_script_reads_and_sets_its_own(tmp_path, caplog, ending, source):
+def test_script_reads_and_sets_its_own_parameters(tmp_path, caplog, ending, source):
     path = tmp_path / f"script.{ending}"
     path.write_text(source, encoding="utf-8")
     drone = Drone(Scene(), own=OWN)
@@ -351,7 +351,7 @@ def test_a_script_reads_and_sets_its_own(tmp_path, caplog, ending, source):
     assert not caplog.records
 
 
-def test_mistakes(caplog):
+def test_invalid_script_parameters_are_refused(caplog):
     sim = Drone(Scene(), own=OWN).sim()
     with pytest.raises(ValueError, match="no script parameter 'MyGian'; near names are MyGain"):
         sim.getScriptSimulationParameter(sim.handle_self, "MyGian")
@@ -362,7 +362,7 @@ def test_mistakes(caplog):
     assert not caplog.records
 
 
-def test_a_parameter_for_all_scripts_is_one_that_the_own_script_has(caplog):
+def test_setting_a_parameter_of_all_scripts_includes_the_own_script(caplog):
     drone = Drone(Scene(), own=OWN)
     sim = drone.sim()
     sim.setScriptSimulationParameter(sim.handle_tree, "MyGain", 2)
@@ -372,7 +372,7 @@ def test_a_parameter_for_all_scripts_is_one_that_the_own_script_has(caplog):
     assert "nothing reads 'nobodys'" in caplog.text
 
 
-def test_a_number_of_numpys_is_a_number():
+def test_numpy_number_is_accepted_as_a_number():
     sim = Drone(Scene(), own=OWN).sim()
     sim.setScriptSimulationParameter(sim.handle_self, "MyGain", np.float64(2.5))
     assert type(sim.getScriptSimulationParameter(sim.handle_self, "MyGain")) is float

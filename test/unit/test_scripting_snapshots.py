@@ -1,4 +1,4 @@
-"""A snapshot is whole: messages that wait, topics, drawings and a script's variables belong to it."""
+"""Snapshots include pending messages, topics, drawings and a script's variables."""
 
 import struct
 
@@ -39,11 +39,11 @@ def flight(simulation, steps=4):
     for _ in range(steps):
         simulation.step()
         path.append(struct.pack("3d", *simulation.drone.body.state.position))
-    drawn = {handle: list(one.items) for handle, one in simulation.context.drawings.objects.items()}
+    drawn = {handle: list(entry.items) for handle, entry in simulation.context.drawings.objects.items()}
     return path, list(backend.published), drawn
 
 
-def test_commands_on_their_way_are_delivered_again(new_simulation):
+def test_pending_commands_are_delivered_again_after_a_restore(new_simulation):
     simulation = new_simulation(lua=LUA, drawings=Drawings(), backend=Recorder())
     flights = []
     for x in (1, 2):
@@ -55,12 +55,12 @@ def test_commands_on_their_way_are_delivered_again(new_simulation):
         flights.append(flight(simulation))
         simulation.restore(snapshot)
     assert flights[0] == flights[1] == flights[2]
-    assert [one.message for one in flights[0][1]] == [{"count": 3, "x": 3}]
+    assert [entry.message for entry in flights[0][1]] == [{"count": 3, "x": 3}]
     assert flights[0][2] == {1: [(1, 0, 0), (2, 0, 0), (3, 0, 0)], 2: []}
 
 
 @pytest.mark.parametrize("script", ["", "target"])
-def test_flights_go_on_to_the_bit(script, new_simulation):
+def test_flight_after_a_restore_is_bit_identical(script, new_simulation):
     simulation = new_simulation(script=script, drawings=Drawings(), backend=Recorder())
     simulation.step()
     simulation.drone.commands.receive(Twist(Vector3(1, 0.5, 0.2), Vector3(0, 0, 0.3)))
@@ -71,8 +71,8 @@ def test_flights_go_on_to_the_bit(script, new_simulation):
     assert flight(simulation, 50) == first
 
 
-class Counted:
-    """A backend that says what is subscribed and advertised at the moment."""
+class TopicBackend:
+    """A backend that lists the topics that are currently subscribed or advertised."""
 
     def __init__(self):
         self.topics = set()
@@ -83,7 +83,7 @@ class Counted:
 
     def advertise(self, topic, kind, queue, latch):
         self.topics.add(topic)
-        return Counted.Sender(self, topic)
+        return TopicBackend.Sender(self, topic)
 
     class Sender:
         def __init__(self, backend, topic):
@@ -96,9 +96,9 @@ class Counted:
             self._backend.topics.discard(self._topic)
 
 
-def test_topics_come_back_under_their_handles():
+def test_restored_topics_have_their_former_handles():
     bus = MessageBus("drone")
-    bus.backend = Counted()
+    bus.backend = TopicBackend()
     heard, said = bus.subscribe("/in", "std_msgs/String", "f", 4), bus.advertise("/out", "std_msgs/String")
     bus.post("/in", {"data": [1]})
     restore = bus.save_state()
@@ -109,15 +109,15 @@ def test_topics_come_back_under_their_handles():
         restore()
         assert bus.backend.topics == {"/in", "/out"}
         bus.publish(said, {})
-        found = []
-        found += [(callback, message["data"].pop()) for callback, message in bus.take()]
-        assert found == [("f", 1)], "what a callback does to a message, it does to its own"
+        messages = []
+        messages += [(callback, message["data"].pop()) for callback, message in bus.take()]
+        assert messages == [("f", 1)], "each restore delivers an unchanged copy"
     assert bus.advertise("/new", "std_msgs/String") == 3
 
 
-def test_a_stopped_script_has_no_snapshots(new_simulation):
+def test_snapshot_and_restore_fail_after_the_script_was_stopped(new_simulation):
     limit = {"script_time_limit": 2.0}  # s, more than a snapshot takes on a busy machine
-    search = "string.find(('x'):rep(100), '.-.-.-.-.-y')"  # of some 10 s, which go on when this test has ended
+    search = "string.find(('x'):rep(100), '.-.-.-.-.-y')"  # takes about 10 s, beyond the end of this test
     simulation = new_simulation(limit, lua=f"function sysCall_sensing() {search} end")
     snapshot = simulation.snapshot()
     for attempt in (simulation.step, simulation.step, simulation.snapshot, lambda: simulation.restore(snapshot)):
@@ -125,8 +125,8 @@ def test_a_stopped_script_has_no_snapshots(new_simulation):
             attempt()
 
 
-def test_the_time_between_calls_is_not_the_scripts(new_simulation):
-    """A script with nothing to do in a step, and a snapshot after a pause, have no old deadline over them."""
+def test_time_between_calls_does_not_count_against_the_time_limit(new_simulation):
+    """A deadline that passed between two calls must stop neither a step nor a snapshot."""
     simulation = new_simulation(
         {"script_time_limit": 5}, lua="x = {} for i = 1, 20000 do x[i] = {i} end function sysCall_init() end"
     )
@@ -136,7 +136,7 @@ def test_the_time_between_calls_is_not_the_scripts(new_simulation):
     simulation.restore(simulation.snapshot())
 
 
-def test_a_script_that_keeps_itself_has_snapshots(new_simulation):
+def test_snapshot_of_a_script_that_refers_to_itself(new_simulation):
     simulation = new_simulation(
         python="self.me, self.too, self.list, self.count = self, [self], [], 0\n"
         "def sysCall_sensing(): self.me.count += 1; self.list.append(self)\n"
@@ -151,7 +151,7 @@ def test_a_script_that_keeps_itself_has_snapshots(new_simulation):
 
 
 @pytest.mark.parametrize("phase", ["init", "actuation", "sensing"])
-def test_a_script_that_has_lost_its_globals_has_snapshots(phase, new_simulation):
+def test_snapshot_of_a_script_that_cleared_its_globals(phase, new_simulation):
     simulation = new_simulation(
         python="def sysCall_init(): self.count = 0\n"
         "def sysCall_actuation(): self.count += 1\n"
@@ -176,7 +176,7 @@ def test_a_script_that_has_lost_its_globals_has_snapshots(phase, new_simulation)
          "def sysCall_init(): globals()[A('x')] = 1", "script.py:2: ZeroDivisionError"),
     ],
 )  # fmt: skip
-def test_what_a_script_does_while_it_is_copied_is_its_own_error(has, said, new_simulation):
+def test_error_while_copying_a_script_is_reported_as_a_script_error(has, said, new_simulation):
     limit = 0.2 if "stopped" in said else 60.0
     simulation = new_simulation({"script_time_limit": limit}, python=f"{has}\ndef sysCall_sensing(): pass\n")
     with pytest.raises(ScriptError, match=rf"^\[snapshot\] .*{said}"):

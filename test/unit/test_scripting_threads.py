@@ -1,4 +1,4 @@
-"""Threads: they wait while the simulation goes on, and are switched at the same call every time."""
+"""Script threads: they wait while the simulation continues, and yield at the same call every time."""
 
 import itertools
 
@@ -11,20 +11,20 @@ from drone_sim.scripting.errors import ScriptError
 
 @pytest.fixture(name="fly")
 def _fly(tmp_path):
-    """Give a function that flies a script for some steps; it returns the values that a signal had after each step."""
+    """Return a function that runs a script for some steps and returns a signal's value after each step."""
 
     def fly(text, steps, signal="n", **overrides):
         path = tmp_path / f"script.{'py' if 'def ' in text else 'lua'}"
         path.write_text(text, encoding="utf-8")
         simulation = Simulation(parameters.load(overrides), script=str(path))
-        found = []
+        values = []
         try:
             for _ in range(steps):
                 simulation.step()
-                found.append(simulation.context.signals.get(float, signal))
+                values.append(simulation.context.signals.get(float, signal))
         finally:
             simulation.close()
-        return [*found, simulation.context.signals.get(float, "end")] if "'end'" in text else found
+        return [*values, simulation.context.signals.get(float, "end")] if "'end'" in text else values
 
     return fly
 
@@ -120,7 +120,7 @@ def sysCall_thread():
 
 
 @pytest.mark.parametrize("generation", WAITS)
-def test_it_waits_while_the_simulation_goes_on(fly, generation):
+def test_thread_waits_while_the_simulation_continues(fly, generation):
     assert fly(WAITS[generation], 8) == [1, 1, 2, 2, 3, 3, 4, 4, pytest.approx(4, abs=1)]
 
 
@@ -134,21 +134,21 @@ BUSY = {
 
 
 @pytest.mark.parametrize("busy", BUSY)
-def test_it_is_switched_by_itself_at_the_same_call_every_time(fly, busy):
+def test_busy_thread_yields_automatically_at_the_same_call_every_time(fly, busy):
     first = 199 if busy == "5.1" else 200  # after simSetThreadSwitchTiming
-    found = fly(BUSY[busy], 4)
-    assert [after - before for before, after in itertools.pairwise(found)] == [200] * 3 and abs(found[0] - first) <= 1
-    assert fly(BUSY[busy], 4) == found
+    values = fly(BUSY[busy], 4)
+    assert [after - before for before, after in itertools.pairwise(values)] == [200] * 3 and abs(values[0] - first) <= 1
+    assert fly(BUSY[busy], 4) == values
 
 
 @pytest.mark.parametrize("busy", ["lua", "python"])
-def test_it_is_not_where_that_is_forbidden(fly, busy):
+def test_busy_thread_without_automatic_yield_exceeds_the_time_limit(fly, busy):
     text = BUSY[busy].replace("n = 0", "sim.setAutoYield(false) n = 0" if busy == "lua" else "n = 0; sim.acquireLock()")
     with pytest.raises(ScriptError, match=r"stopped after 0\.2 s"):
         fly(text, 1, script_time_limit=0.2)
 
 
-def test_it_waits_for_a_signal(fly):
+def test_thread_waits_for_a_signal(fly):
     text = """
     function sysCall_thread() sim.setFloatSignal('n', sim.waitForSignal('go')) end
     function sysCall_sensing() if sim.getSimulationTime() > 0.07 then sim.setFloatSignal('go', 7) end end
@@ -175,18 +175,18 @@ def test_it_waits_for_a_signal(fly):
         ),
     ],
 )
-def test_what_goes_wrong_in_it_gets_one_line(fly, text, words):
+def test_error_in_a_thread_is_reported_with_file_and_line(fly, text, words):
     with pytest.raises(ScriptError, match=words):
         fly(text, 3, script_time_limit=0.2 if "stopped" in words else 60.0)
 
 
 @pytest.mark.parametrize("rest", ["while True: sim.step()", "while True:\n      try: sim.step()\n      except: pass"])
-def test_one_that_does_not_want_to_end_is_ended(fly, rest):
+def test_thread_that_refuses_to_end_is_terminated(fly, rest):
     text = f"def sysCall_thread():\n  try:\n    {rest}\n  finally:\n    sim.setFloatSignal('n', 1); sim.step()"
     assert fly(text, 2) == [None, None]
 
 
-def test_what_is_restored_says_that_threads_go_on(tmp_path, caplog, new_simulation):
+def test_restore_logs_that_threads_continue_where_they_are(tmp_path, caplog, new_simulation):
     path = tmp_path / "script.lua"
     path.write_text(WAITS["4.3"], encoding="utf-8")
     simulation = new_simulation(script=str(path))
@@ -201,7 +201,7 @@ def test_what_is_restored_says_that_threads_go_on(tmp_path, caplog, new_simulati
 # ---- scripts that are run as a whole
 
 
-def test_one_of_v_rep_3_0_is_run_once_a_step(fly):
+def test_script_of_v_rep_3_0_runs_once_per_step(fly):
     text = """
     if (simGetScriptExecutionCount()==0) then n = 0 end
     simHandleChildScript(sim_handle_all_except_explicit)
@@ -213,7 +213,7 @@ def test_one_of_v_rep_3_0_is_run_once_a_step(fly):
 
 
 @pytest.mark.parametrize("word", ["sim.syscb_{}", "sim_childscriptcall_{}"])
-def test_one_that_looks_at_the_call_type_is_run_in_every_phase(fly, word):
+def test_script_that_reads_the_call_type_runs_in_every_phase(fly, word):
     init = word.format("init" if "syscb" in word else "initialization")
     text = f"""
     if (sim_call_type=={init}) then n = 0 end

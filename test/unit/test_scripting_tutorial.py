@@ -1,4 +1,4 @@
-"""The tutorial's Lua flies as the built-in Python script does, to the last digit."""
+"""The tutorial's Lua scripts give the same flight as the built-in Python script."""
 
 from pathlib import Path
 
@@ -49,18 +49,18 @@ def fly(script, steps=STEPS, backend=None):
 @pytest.fixture(name="built_in", scope="module")
 def _built_in():
     path = fly("")
-    assert max(abs(value) for position in path for value in position) < 50, "the reference flight itself is lost"
+    assert max(abs(value) for position in path for value in position) < 50, "the reference flight is out of control"
     return path
 
 
 @pytest.mark.parametrize("script", ["tutorial_v3", "tutorial_v4"])
-def test_lua_flies_as_the_python_script(script, built_in):
+def test_lua_script_gives_the_same_flight_as_the_python_script(script, built_in):
     path = fly(script)
     worst = max(abs(a - b) for ours, theirs in zip(path, built_in) for a, b in zip(ours, theirs))
     assert len(path) == STEPS and worst < 1e-9
 
 
-def test_the_tutorials_lua_publishes_its_camera():
+def test_lua_tutorial_publishes_its_camera_image():
     backend = Recorder()
     fly("tutorial_v3", steps=3, backend=backend)
     topic, kind, image = backend.published[-1]
@@ -71,17 +71,17 @@ def test_the_tutorials_lua_publishes_its_camera():
 
 
 @pytest.mark.parametrize("script", ["template_v3", "template_v4", "target_v3", "target_v4"])
-def test_every_built_in_script_in_lua_holds_the_drone(script):
+def test_every_built_in_lua_script_holds_the_drones_position(script):
     path = fly(script, steps=20)
     assert path[-1] == pytest.approx(path[0], abs=0.01)
 
 
-def test_the_stages_in_lua_hold_what_they_control():
-    """Stage 1 keeps the thrust, so it sinks slowly; from stage 2 on the height is held, and stage 6 obeys."""
-    flown = {file.stem: fly(str(file), steps=60) for file in sorted(STAGES.glob("*.lua"))}
-    assert list(flown) == ["1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros"]
-    assert flown["1_thrust"] == fly(str(STAGES / "1_thrust.py"), steps=60)
+def test_lua_stages_hold_the_quantities_that_they_control():
+    """Stage 1 has constant thrust and sinks slowly; later stages hold the height; stage 6 follows commands."""
+    flights = {file.stem: fly(str(file), steps=60) for file in sorted(STAGES.glob("*.lua"))}
+    assert list(flights) == ["1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros"]
+    assert flights["1_thrust"] == fly(str(STAGES / "1_thrust.py"), steps=60)
     for stage in ("2_elevation", "3_yaw", "4_pitch", "5_roll"):
-        assert flown[stage][-1] == pytest.approx((0, 0, 0.8), abs=0.01)
-    assert flown["6_ros"] == fly("tutorial_v3", steps=60)
-    assert flown["6_ros"][-1][0] > 1
+        assert flights[stage][-1] == pytest.approx((0, 0, 0.8), abs=0.01)
+    assert flights["6_ros"] == fly("tutorial_v3", steps=60)
+    assert flights["6_ros"][-1][0] > 1

@@ -1,4 +1,4 @@
-"""A name that is nearly right is told at load, before the drone falls for it."""
+"""Misspelt names of phases, parameters, callbacks and API functions are reported before the flight."""
 
 import os
 import subprocess
@@ -19,7 +19,7 @@ PARAMETERS = parameters.load()
 
 @pytest.fixture(name="load")
 def _load(tmp_path):
-    """Give a function that loads a script and ends it; it returns what that raised, and the script's path."""
+    """Return a function that loads and closes a script and returns the error message and the script's path."""
 
     def load(ending, source):
         path = tmp_path / f"script.{ending}"
@@ -64,14 +64,14 @@ def test_a_misspelt_phase_is_refused_with_its_line(load, ending, name, meant):
 
 
 @ENDINGS
-def test_a_name_of_the_scripts_own_is_its_own(load, caplog, ending):
+def test_unrelated_function_names_are_accepted_without_a_warning(load, caplog, ending):
     names = ["sensing", "init", "set_actuation", "scale_actuation", "call_init", "system", "Sysiphus"]
     assert load(ending, "".join(define(ending, name) for name in ("sysCall_actuation", *names)))[0] == ""
     assert not caplog.records
 
 
 @ENDINGS
-def test_what_coppeliasim_calls_and_nobody_here_is_said_once(load, caplog, ending):
+def test_unsupported_coppeliasim_callbacks_are_logged_once(load, caplog, ending):
     said, path = load(ending, "".join(define(ending, f"sysCall_{name}") for name in ("init", "msg", "joint")))
     assert said == ""
     phases = "these are: sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup"
@@ -81,7 +81,7 @@ def test_what_coppeliasim_calls_and_nobody_here_is_said_once(load, caplog, endin
 
 
 @ENDINGS
-def test_an_old_version_beside_the_phase_is_left_alone_but_told(load, caplog, ending):
+def test_old_version_of_a_phase_function_is_accepted_with_a_warning(load, caplog, ending):
     said, _ = load(ending, define(ending, "sysCall_actuation") + define(ending, "sysCall_actuation_old"))
     assert said == ""
     assert [record.getMessage().partition(": ")[2] for record in caplog.records] == [
@@ -103,14 +103,14 @@ def test_a_script_without_phases_is_refused(load, ending, name, more):
 
 
 @ENDINGS
-def test_an_empty_script_says_that_nothing_flies(load, caplog, ending):
+def test_empty_script_logs_that_nothing_flies_the_drone(load, caplog, ending):
     said, path = load(ending, "")
     assert said == ""
     assert [record.getMessage() for record in caplog.records] == [f"{path}: {IDLE}"]
 
 
 @pytest.mark.parametrize("source", ["def sysCall_actuation():\n    yield", "async def sysCall_actuation():\n    pass"])
-def test_a_phase_that_python_would_not_run_is_refused(load, source):
+def test_generator_or_async_phase_is_refused(load, source):
     said, path = load("py", source)
     assert said == f"[load] {path}:1: sysCall_actuation would not run, because it has a `yield` or is `async`"
 
@@ -121,25 +121,25 @@ def test_a_misspelt_call_type_is_refused(load, word):
     assert said.startswith(f"[load] {path}:2: there is no sim_childscriptcall_{word}; near names are childscriptcall_")
 
 
-# ---- two forms in one script
+# ---- two API generations in one script
 
 TEMPLATE = (BUILT_IN / "template_v4.lua").read_text()
-SEEDS = """
+OLD_BLOCK = """
 if (sim_call_type==sim_childscriptcall_sensing) then
     pos=simGetObjectPosition(d,-1)
 end
 """
 
 
-def test_a_script_in_the_forms_of_two_generations_is_refused_with_the_lines_of_both(load):
+def test_script_that_mixes_two_api_generations_is_refused_with_both_lines(load):
     function = TEMPLATE[: TEMPLATE.index("function sysCall_init")].count("\n") + 1
     block = TEMPLATE.count("\n") + 2
-    said, path = load("lua", TEMPLATE + SEEDS)
+    said, path = load("lua", TEMPLATE + OLD_BLOCK)
     assert said.startswith(f"[load] {path}:{block}: line {function} defines a function sysCall_")
     assert f"line {block} compares sim_call_type" in said and "template_v3" in said
     commented = TEMPLATE.replace("function sysCall_init", "--[[ one\ntwo ]]\nfunction sysCall_init")
-    said, path = load("lua", SEEDS + commented)
-    assert f":{SEEDS.count(chr(10)) + function + 2}: " in said and "line 2 compares sim_call_type" in said
+    said, path = load("lua", OLD_BLOCK + commented)
+    assert f":{OLD_BLOCK.count(chr(10)) + function + 2}: " in said and "line 2 compares sim_call_type" in said
 
 
 @pytest.mark.parametrize(
@@ -147,11 +147,11 @@ def test_a_script_in_the_forms_of_two_generations_is_refused_with_the_lines_of_b
     [
         TEMPLATE,
         (BUILT_IN / "template_v3.lua").read_text(),
-        TEMPLATE + f"--[[{SEEDS}]]\n-- sim_call_type",
+        TEMPLATE + f"--[[{OLD_BLOCK}]]\n-- sim_call_type",
         "function sysCall_init() end\nif sim_call_type==sim_childscriptcall_initialization then sysCall_init() end",
     ],
 )
-def test_a_script_of_one_form_or_that_calls_its_own_functions_is_loaded(load, source):
+def test_script_of_one_generation_or_calling_its_own_functions_is_loaded(load, source):
     assert load("lua", source)[0] == ""
 
 
@@ -183,20 +183,20 @@ def test_a_misspelt_parameter_of_a_propeller_is_refused(load, caplog, ending):
 
 
 @ENDINGS
-def test_any_other_parameter_is_the_scripts_own_and_told_once_if_a_propeller_gets_it(load, caplog, ending):
-    told = {
+def test_other_parameters_are_accepted_and_misplaced_ones_are_logged_once(load, caplog, ending):
+    reported = {
         (PROPELLER, "velocity"): "nothing reads 'velocity' of a propeller; particleVelocity drives it",
         ("sim.handle_self", "particleVelocity"): (
             "'particleVelocity' is a parameter of the propellers; in the script of Drone"
         ),
     }
-    untold = [("sim.handle_self", name) for name in ("Kzreff", "mine")]
-    untold += [(PROPELLER, "particlesAreVisible"), ("sim.handle_tree", "particlesAreVisible")]
-    calls = [SET.format(*one) for one in (*told, *untold, (PROPELLER, "particleVelocity"))]
+    unreported = [("sim.handle_self", name) for name in ("Kzreff", "mine")]
+    unreported += [(PROPELLER, "particlesAreVisible"), ("sim.handle_tree", "particlesAreVisible")]
+    calls = [SET.format(*one) for one in (*reported, *unreported, (PROPELLER, "particleVelocity"))]
     source = "".join(define(ending, phase, "\n    ".join(calls)) for phase in ("sysCall_init", "sysCall_cleanup"))
     assert load(ending, source)[0] == ""
     said = [record.getMessage() for record in caplog.records]
-    assert len(said) == len(told) and all(words in line for words, line in zip(told.values(), said))
+    assert len(said) == len(reported) and all(words in line for words, line in zip(reported.values(), said))
 
 
 # ---- subscriptions
@@ -209,7 +209,7 @@ def test_a_callback_may_be_defined_later_in_the_file(load, ending):
 
 
 @ENDINGS
-def test_a_callback_that_is_not_there_is_told_after_init_with_near_names(load, ending):
+def test_missing_callback_is_reported_after_init_with_near_names(load, ending):
     subscribe = define(ending, "sysCall_init", "simROS.subscribe('/x', 'std_msgs/Int32', 'on_twst')")
     said, path = load(ending, subscribe + define(ending, "on_twist"))
     assert said == f"[on_twst] {path}: no function 'on_twst' for this callback; near names are on_twist"
@@ -246,12 +246,12 @@ def test_a_wrong_message_type_is_refused(load, ending, topic, kind, words):
     assert said.startswith(f"[load] {path}:{source.count(chr(10)) + 1}: simROS.subscribe: ") and words in said
 
 
-# ---- names that the API does not have, in Lua
+# ---- unknown API names in Lua
 
 
 @pytest.fixture(name="failed")
 def _failed(tmp_path, monkeypatch):
-    """Return a function that returns what is wrong with a script of one line, '' for nothing."""
+    """Return a function that loads a script of one line and returns its error message, or ''."""
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "docs"))
     import make_api
 
@@ -283,11 +283,11 @@ def _failed(tmp_path, monkeypatch):
         ("simExtROS_enablePublisher('x')", "there is no simExtROS_enablePublisher here: the plugin of V-REP 3.0"),
     ],
 )
-def test_an_unknown_name_is_an_error_where_it_is_read(failed, body, said):
+def test_reading_an_unknown_name_is_an_error(failed, body, said):
     assert failed(body).startswith(said)
 
 
-def test_a_plugin_that_is_not_there_says_so(failed):
+def test_calling_an_unsupported_plugin_is_an_error(failed):
     assert "there is no plugin simIK here: inverse kinematics" in failed("simIK.createEnvironment()")
 
 
@@ -328,5 +328,5 @@ for line in ("assert(simOMPL == nil)", "simOMPL.createTask('x')", "simExtOMPL_cr
         "simRemoteApi.start(19999) simExtRemoteApiStart(19999)",
     ],
 )
-def test_what_scripts_ask_on_purpose(failed, body):
+def test_scripts_may_check_whether_a_name_exists(failed, body):
     assert failed(body) == ""

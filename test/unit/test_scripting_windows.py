@@ -1,4 +1,4 @@
-"""Floating views, dialogs and consoles of scripts: what is to be seen of them, and what a person answers."""
+"""Floating views, dialogs and consoles of scripts: their state and the user's answers."""
 
 import json
 import re
@@ -8,7 +8,7 @@ import pytest
 from drone_sim.files.resources import package_path
 from drone_sim.scripting.api.windows import MOST, Dialog, Windows, read_answer
 
-OPENS = """
+SCRIPT = """
 def sysCall_init():
     self.view = sim.floatingViewAdd(0.9, 0.9, 0.2, 0.2, 0)
     sim.adjustView(self.view, sim.getObjectHandle('FrontVision'), 64)
@@ -41,7 +41,7 @@ def _fly(tmp_path, new_simulation):
 
 
 def handles(simulation, kind):
-    return [one["handle"] for one in simulation.windows.state()[kind]]
+    return [item["handle"] for item in simulation.windows.state()[kind]]
 
 
 def result(simulation):
@@ -49,16 +49,16 @@ def result(simulation):
     return simulation.context.signals.get(str, "results")
 
 
-def test_a_person_sees_and_answers(fly):
-    simulation = fly(OPENS)
+def test_user_sees_the_windows_and_answers_the_dialogs(fly):
+    simulation = fly(SCRIPT)
     windows = simulation.windows
     windows.readers.add(lambda: True)
     state = windows.state()
-    assert [(one["sensor"], one["label"]) for one in state["views"]] == [("FrontVision", "FrontVision")]
+    assert [(item["sensor"], item["label"]) for item in state["views"]] == [("FrontVision", "FrontVision")]
     land, height, wait = state["dialogs"]
     assert (land["title"], land["text"], land["buttons"], land["typed"]) == ("Land?", "<b>now</b>", ("yes", "no"), None)
     assert (height["buttons"], height["typed"]) == (("ok",), "0.8")
-    assert wait["buttons"] == (), "what is modal counts as answered: nothing waits"
+    assert wait["buttons"] == (), "a modal dialog counts as answered: nothing waits for it"
     assert result(simulation) == repr((0, 0, ""))
     changes = windows.changes
     windows.answer(land["handle"], "no")
@@ -73,30 +73,30 @@ def test_a_person_sees_and_answers(fly):
     json.dumps(windows.state())
 
 
-def test_where_nobody_answers_it_is_ok(fly):
-    simulation = fly(OPENS)
+def test_dialogs_without_a_reader_are_answered_with_ok(fly):
+    simulation = fly(SCRIPT)
     assert result(simulation) == repr((1, 1, ""))
-    assert [one["title"] for one in simulation.windows.state()["dialogs"]] == ["Wait"]
+    assert [item["title"] for item in simulation.windows.state()["dialogs"]] == ["Wait"]
 
 
-def test_a_button_that_is_not_there_is_refused(fly):
-    simulation = fly(OPENS)
+def test_unknown_button_is_refused(fly):
+    simulation = fly(SCRIPT)
     with pytest.raises(ValueError, match="'Land\\?' has no button 'maybe', but yes and no"):
         simulation.windows.answer(handles(simulation, "dialogs")[0], "maybe")
 
 
-def test_what_a_script_closes_is_closed_and_a_snapshot_opens_it_again(fly):
-    simulation = fly(OPENS)
+def test_script_closes_its_windows_and_a_restore_reopens_them(fly):
+    simulation = fly(SCRIPT)
     simulation.windows.readers.add(lambda: True)
     before, snapshot = simulation.windows.state(), simulation.snapshot()
     simulation.context.signals.set(int, "close", 1)
     simulation.step()
-    assert [len(one) for one in simulation.windows.state().values()] == [0, 2, 0]
+    assert [len(item) for item in simulation.windows.state().values()] == [0, 2, 0]
     simulation.restore(snapshot)
     assert simulation.windows.state() == before
 
 
-def test_the_example_asks_and_prints(fly):
+def test_example_in_the_docs_shows_a_dialog_and_prints(fly):
     text = (package_path() / "docs" / "scripts.md").read_text(encoding="utf-8").partition("## Windows")[2]
     simulation = fly(re.findall(r"```python\n(.*?)```", text, re.DOTALL)[0])
     windows = simulation.windows
@@ -108,15 +108,15 @@ def test_the_example_asks_and_prints(fly):
     assert (len(state["views"]), state["dialogs"], state["consoles"][0]["lines"]) == (1, [], ["asked for 1.5 m", ""])
 
 
-def test_a_stop_closes_all(fly):
-    simulation = fly(OPENS)
+def test_stop_closes_all_windows(fly):
+    simulation = fly(SCRIPT)
     changes = simulation.windows.changes
     simulation.stop()
     assert simulation.windows.state() == {"views": [], "dialogs": [], "consoles": []}
     assert simulation.windows.changes > changes
 
 
-def test_windows_are_bounded():
+def test_number_and_size_of_windows_are_limited():
     windows = Windows()
     for handle in range(1000):
         windows.add_view(handle)
@@ -125,8 +125,8 @@ def test_windows_are_bounded():
         windows.add_console(handle, "title" * 1000, 10**9)
         for _ in range(20):
             windows.print(handle, "line" * 1000 + "\n" * 20)
-    assert [len(one) for one in (windows.views, windows.dialogs, windows.consoles)] == [MOST] * 3
-    assert min(windows.dialogs) == 1000 - MOST, "the oldest went"
+    assert [len(item) for item in (windows.views, windows.dialogs, windows.consoles)] == [MOST] * 3
+    assert min(windows.dialogs) == 1000 - MOST, "the oldest are removed first"
     assert len(json.dumps(windows.state())) < 700_000
 
 
@@ -134,7 +134,7 @@ def test_windows_are_bounded():
     "wrong",
     [None, [], "x", {}, {"handle": "1", "button": "ok"}, {"handle": 1}, {"handle": 1, "button": "ok", "typed": 3}],
 )
-def test_an_answer_has_handle_button_and_text(wrong):
+def test_malformed_answer_is_refused(wrong):
     with pytest.raises(ValueError, match="answer"):
         read_answer(wrong)
     assert read_answer({"handle": 1, "button": "ok", "typed": None}) == (1, "ok", "")

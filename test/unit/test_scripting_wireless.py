@@ -1,4 +1,4 @@
-"""sendData and receiveData: what scripts send to each other without wires."""
+"""sendData and receiveData: wireless messages between scripts."""
 
 import pytest
 
@@ -32,13 +32,13 @@ ALL = "sim.receiveData()"
 
 @pytest.fixture(name="heard")
 def _heard(tmp_path, new_simulation):
-    """Give a function that lets Sender call something every few steps; it yields what the others have heard by then."""
+    """Return a generator function that runs a call in Sender every few steps and yields what each receiver got."""
 
-    def heard(calls, asks=ALL, steps=3, before=""):
-        made = ", ".join(f"function() {call} end" for call in calls)
-        texts = {"Sender": SENDER.replace("CALLS", made).replace("STEPS", str(steps))}
+    def heard(calls, receive=ALL, steps=3, before=""):
+        functions = ", ".join(f"function() {call} end" for call in calls)
+        texts = {"Sender": SENDER.replace("CALLS", functions).replace("STEPS", str(steps))}
         names = "Below", "Beside", "Above"
-        texts |= {name: RECEIVER.replace("ASKS", asks) for name in names}
+        texts |= {name: RECEIVER.replace("ASKS", receive) for name in names}
         entries = []
         for name, text in texts.items():
             path = tmp_path / f"{name}.lua"
@@ -56,54 +56,54 @@ def _heard(tmp_path, new_simulation):
     return heard
 
 
-GOT = "Sender3pingx "
+RECEIVED = "Sender3pingx "
 PING = "sim.sendData({}, 3, 'ping', 'x'{})"
 
 
-def test_who_is_meant_and_in_reach_hears_it_once(heard):
-    hears = {
-        PING.format("sim.handle_tree", ""): [GOT, None, None],
+def test_addressed_receivers_in_reach_get_a_message_once(heard):
+    expected = {
+        PING.format("sim.handle_tree", ""): [RECEIVED, None, None],
         PING.format("sim.handle_chain", ""): [None, None, None],
-        PING.format("sim.getScriptHandle('Beside')", ""): [None, GOT, None],
-        PING.format("sim.handle_all", ""): [GOT, GOT, GOT],
-        PING.format("sim.handle_all", ", sim.handle_self, 2.5"): [None, None, GOT],
-        PING.format("sim.handle_all", ", sim.handle_self, 3.05"): [GOT, GOT, GOT],
-        PING.format("sim.handle_all", ", sim.handle_default, 6"): [GOT, GOT, None],  # from the world's origin
-        PING.format("sim.handle_all", ", sim.handle_self, 100, 1"): [GOT, GOT, None],  # flat
-        PING.format("sim.handle_all", ", sim.handle_self, 100, math.pi, 1"): [GOT, GOT, None],  # ahead
-        PING.format("sim.handle_all", ", sim.handle_self, 100, math.pi, 0.01"): [GOT, None, None],
+        PING.format("sim.getScriptHandle('Beside')", ""): [None, RECEIVED, None],
+        PING.format("sim.handle_all", ""): [RECEIVED, RECEIVED, RECEIVED],
+        PING.format("sim.handle_all", ", sim.handle_self, 2.5"): [None, None, RECEIVED],
+        PING.format("sim.handle_all", ", sim.handle_self, 3.05"): [RECEIVED, RECEIVED, RECEIVED],
+        PING.format("sim.handle_all", ", sim.handle_default, 6"): [RECEIVED, RECEIVED, None],  # from the world's origin
+        PING.format("sim.handle_all", ", sim.handle_self, 100, 1"): [RECEIVED, RECEIVED, None],  # flat
+        PING.format("sim.handle_all", ", sim.handle_self, 100, math.pi, 1"): [RECEIVED, RECEIVED, None],  # ahead
+        PING.format("sim.handle_all", ", sim.handle_self, 100, math.pi, 0.01"): [RECEIVED, None, None],
     }
-    assert dict(zip(hears, heard(list(hears)))) == hears
+    assert dict(zip(expected, heard(list(expected)))) == expected
 
 
-def test_what_is_asked_for(heard):
-    hears = {
-        "simReceiveData(3)": GOT,
+def test_receiver_selects_messages_by_id_and_header(heard):
+    expected = {
+        "simReceiveData(3)": RECEIVED,
         "simReceiveData(4)": None,
-        "simReceiveData(-1, 'ping')": GOT,
+        "simReceiveData(-1, 'ping')": RECEIVED,
         "simReceiveData(3, 'pong')": None,
-        "simReceiveData(nil, 'ping', sim.handle_default)": GOT,
+        "simReceiveData(nil, 'ping', sim.handle_default)": RECEIVED,
     }
-    asks = "".join(f" elseif turn == {number} then return {ask}" for number, ask in enumerate(hears))
+    receive = "".join(f" elseif turn == {number} then return {variant}" for number, variant in enumerate(expected))
     turn = "math.floor(simGetSimulationTime() / 0.15 + 0.01)"  # three steps each
-    asks = f"(function() local turn = {turn} if turn < 0 then{asks} end end)()"
-    calls = ["simSendData(sim_handle_all, 3, 'ping', 'x')"] * len(hears)
-    assert [below for below, _, _ in heard(calls, asks)] == list(hears.values())
+    receive = f"(function() local turn = {turn} if turn < 0 then{receive} end end)()"
+    calls = ["simSendData(sim_handle_all, 3, 'ping', 'x')"] * len(expected)
+    assert [below for below, _, _ in heard(calls, receive)] == list(expected.values())
 
 
-def test_it_can_be_looked_at_first(heard):
-    two = "sim.sendData(sim.handle_all, 3, 'ping', 'x') sim.sendData(sim.handle_all, 3, 'ping', 'y')"
-    asks = "(function() if not looked then looked = true return sim.receiveData(3, 'ping', sim.handle_self, 1) end"
-    ((below, _, _),) = heard([two], f"{asks} return sim.receiveData() end)()")
+def test_message_can_be_read_without_removing_it(heard):
+    both = "sim.sendData(sim.handle_all, 3, 'ping', 'x') sim.sendData(sim.handle_all, 3, 'ping', 'y')"
+    receive = "(function() if not looked then looked = true return sim.receiveData(3, 'ping', sim.handle_self, 1) end"
+    ((below, _, _),) = heard([both], f"{receive} return sim.receiveData() end)()")
     assert below == "Sender3pingy Sender3pingx Sender3pingy "
 
 
-def test_it_persists_for_so_long(heard):
+def test_message_persists_for_the_given_time(heard):
     late = "(function() if sim.getSimulationTime() % 0.5 > 0.3 then return sim.receiveData() end end)()"
     calls = [PING.format("sim.handle_all", more) for more in ("", ", sim.handle_self, 100, math.pi, 2 * math.pi, 1")]
-    assert [below for below, _, _ in heard(calls, late, 10)] == [None, GOT]
+    assert [below for below, _, _ in heard(calls, late, 10)] == [None, RECEIVED]
 
 
-def test_nobody_hears_himself(heard):
+def test_sender_does_not_receive_its_own_message(heard):
     own = "function sysCall_sensing() if sim.receiveData() then sim.setStringSignal('Below', 'own') end end\n"
     assert list(heard([PING.format("sim.handle_all", "")], "nil", before=own)) == [[None] * 3]

@@ -1,4 +1,4 @@
-"""Messages that leave a node: in the thread that publishes them, whole, and in their order."""
+"""Messages that a node sends: in the publishing thread, complete, and in order."""
 
 import os
 import socket
@@ -17,7 +17,7 @@ from drone_sim.ros.core import startup
 
 
 class Connection(Transport):
-    """A connection to a subscriber, which reads `far`."""
+    """A connection to a subscriber; `far` is the subscriber's end."""
 
     def __init__(self):
         super().__init__(0)
@@ -33,14 +33,14 @@ class Connection(Transport):
 def _connection():
     connection = Connection()
     connection.queued = QueuedConnection(connection, 1)
-    until(lambda: connection.queued._cond_data_available._waiters)
+    wait_until(lambda: connection.queued._cond_data_available._waiters)
     yield connection
     connection.close()
     connection.socket.close()
     connection.far.close()
 
 
-def until(condition):
+def wait_until(condition):
     end = threading.Event()
     for _ in range(500):
         if condition():
@@ -49,18 +49,18 @@ def until(condition):
     raise AssertionError("it took too long")
 
 
-def test_a_small_message_is_sent_at_once(connection):
+def test_small_message_is_sent_immediately_by_the_publishing_thread(connection):
     assert startup._send(connection.queued, b"one")
     connection.far.setblocking(False)
     assert connection.far.recv(10) == b"one"
-    assert not connection.senders, "no other thread was needed"
+    assert not connection.senders, "the thread of the queue was not used"
     assert (connection.stat_bytes, connection.stat_num_msg) == (3, 1)
 
 
-def test_of_a_message_that_does_not_fit_nothing_is_lost(connection):
+def test_message_that_exceeds_the_socket_buffer_arrives_completely(connection):
     message, sent = os.urandom(startup._MAX_AT_ONCE), 0
-    connection.queued._queue_size = 0  # keeps all: the thread may not have begun when the next message comes
-    while not connection.senders:  # until the kernel takes only a part
+    connection.queued._queue_size = 0  # unlimited: the thread may not have started when the next message comes
+    while not connection.senders:  # until the kernel accepts only a part
         startup._send(connection.queued, message)
         sent += 1
     startup._send(connection.queued, b"last")
@@ -71,7 +71,7 @@ def test_of_a_message_that_does_not_fit_nothing_is_lost(connection):
     assert received == sent * message + b"last"
 
 
-def test_a_slow_subscriber_gets_the_last_message_and_holds_nobody_up(connection):
+def test_slow_subscriber_gets_the_last_message_and_does_not_block_the_sender(connection):
     for number in range(1000):
         startup._send(connection.queued, bytes([number % 251]) * startup._MAX_AT_ONCE)
     received = bytearray()
@@ -83,8 +83,8 @@ def test_a_slow_subscriber_gets_the_last_message_and_holds_nobody_up(connection)
 
 
 @pytest.mark.parametrize(("asked", "given"), [("7", 7), ("0", 0), ("", 0), ("many", 0), ("-3", 0), ("99", 0)])
-def test_a_node_gives_way_as_the_environment_says(asked, given):
+def test_niceness_of_a_node_is_set_by_the_environment(asked, given):
     code = "import os; from drone_sim.ros.core.startup import give_way; give_way(); give_way(); print(os.nice(0))"
     environment = {**os.environ, "DRONE_SIM_NICENESS": asked}
-    said = subprocess.check_output([sys.executable, "-c", code], env=environment, text=True)
-    assert int(said) == max(given, os.nice(0))
+    output = subprocess.check_output([sys.executable, "-c", code], env=environment, text=True)
+    assert int(output) == max(given, os.nice(0))

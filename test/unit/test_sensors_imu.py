@@ -1,4 +1,4 @@
-"""The IMU against closed forms: at rest, falling, turning, speeding up."""
+"""The IMU compared with closed-form solutions: at rest, falling, turning, accelerating."""
 
 import math
 
@@ -18,23 +18,23 @@ def forces(carried, imu):
     return np.array([value.specific_force for value in carried.values(imu)])
 
 
-def test_at_rest_on_the_floor_it_feels_what_carries_it():
+def test_imu_at_rest_measures_the_supporting_force():
     drone = Flown(Pose((0, 0, 0.05)))
     imu = drone.fit(FAST)
     drone.step(400)
     drone.values(imu)
     drone.step(200)
-    felt = forces(drone, imu)
-    assert len(felt) == 200
-    assert np.linalg.norm(felt, axis=1) == pytest.approx(np.full(200, 9.81), abs=1e-6)
-    assert felt[:, 2] == pytest.approx(np.full(200, 9.81), abs=1e-6)
+    measured = forces(drone, imu)
+    assert len(measured) == 200
+    assert np.linalg.norm(measured, axis=1) == pytest.approx(np.full(200, 9.81), abs=1e-6)
+    assert measured[:, 2] == pytest.approx(np.full(200, 9.81), abs=1e-6)
     assert drone.values(imu) == []
 
 
-def test_falling_it_feels_nothing_however_it_tumbles():
+def test_imu_in_free_fall_measures_no_force_while_tumbling():
     drone = Flown(Pose((1, 2, 50), TILTED))
-    centre = frames.from_rpy(drone.world.inertial_frame(drone.body)[3::4], (0, 0, 0))
-    imu = drone.fit(FAST, centre)
+    mean = frames.from_rpy(drone.world.inertial_frame(drone.body)[3::4], (0, 0, 0))
+    imu = drone.fit(FAST, mean)
     drone.step(1, torque=(1e-3, -2e-3, 3e-3))
     drone.values(imu)
     drone.step(200)
@@ -43,18 +43,18 @@ def test_falling_it_feels_nothing_however_it_tumbles():
 
 
 @pytest.mark.parametrize("rate", [200, 50, 20])
-def test_a_steady_turn(rate):
+def test_imu_on_a_circle_measures_the_centripetal_acceleration(rate):
     body = Circling(radius=3.0, rate=1.2)
     imu = body.fit(ImuParameters(kind="imu", rate=rate))
     for _ in range(400):
         body.step()
     inwards = 3.0 * 1.2**2
-    for value in body.values(imu):  # x ahead: the middle is on the left
+    for value in body.values(imu):  # x points ahead, so the centre is on the left
         assert value.specific_force == pytest.approx((0.0, inwards, -GRAVITY), abs=0.005 * inwards)
         assert value.angular_velocity == pytest.approx((0, 0, 1.2), abs=1e-9)
 
 
-def test_off_the_axis_it_feels_the_turn_of_a_real_body():
+def test_imu_off_the_axis_of_a_rotating_body_measures_the_centripetal_acceleration():
     drone = Flown(gravity=0.0, floor=False)
     imu = drone.fit(FAST, frames.from_rpy((0.2, 0.0, 0.0), (0, 0, 0)))
     drone.step(100, torque=(0, 0, 0.05))
@@ -65,7 +65,7 @@ def test_off_the_axis_it_feels_the_turn_of_a_real_body():
     assert forces(drone, imu) == pytest.approx(np.tile([-0.2 * rate**2, 0, 0], (100, 1)), rel=0.01, abs=0.01 * rate**2)
 
 
-def test_a_mounted_imu_has_axes_of_its_own():
+def test_mounted_imu_measures_in_its_own_axes():
     drone = Carried()
     imu = drone.fit(FAST, frames.from_rpy((0, 0, 0), (math.pi, 0, 0)))
     drone.look()
@@ -74,26 +74,26 @@ def test_a_mounted_imu_has_axes_of_its_own():
     assert value.orientation == pytest.approx((1, 0, 0, 0), abs=1e-12)
 
 
-def test_the_samples_add_up_to_the_motion_however_seldom_they_are_taken():
-    """A flight with turns and a crash, integrated; none tells where in its period it crashed."""
+def test_integrated_samples_give_the_motion_at_every_rate():
+    """Integrate a flight with turns and a crash; no sample tells when in its period the crash was."""
     drone = Flown(Pose((0, 0, 1.0)))
     within = {200: 0.1, 40: 0.1, 20: 0.1}  # m/s
     imus = {rate: drone.fit(ImuParameters(kind="imu", rate=rate)) for rate in within}
-    began = drone.state
+    initial = drone.state
     for force, torque in [((1, 0, 5), (0, 2e-3, 0)), ((0, 1, 5), (1e-3, 0, 2e-3)), ((0.5, 0, 2), (0, 0, 0))] * 4:
         drone.step(20, force, torque)
-    assert any(one.body == drone.floor for one in drone.world.queries.contacts(drone.body))
+    assert any(contact.body == drone.floor for contact in drone.world.queries.contacts(drone.body))
     for rate, imu in imus.items():
-        velocity, turn = np.array(began.linear_velocity), began.orientation
+        velocity, turn = np.array(initial.linear_velocity), initial.orientation
         for value in drone.values(imu):
             turned = np.array(value.angular_velocity) / rate
-            centre = (1 + rate / 200) / 2  # of the sub-steps' ends, in the time since the last sample
-            felt = frames.turned(frames.multiply_quaternions(turn, _rotation(turned * centre)), value.specific_force)
+            mean = (1 + rate / 200) / 2  # of the sub-steps' ends, in sample periods
+            measured = frames.turned(frames.multiply_quaternions(turn, _rotation(turned * mean)), value.specific_force)
             turn = frames.multiply_quaternions(turn, _rotation(turned))
-            velocity += np.add(felt, (0, 0, GRAVITY)) / rate
+            velocity += np.add(measured, (0, 0, GRAVITY)) / rate
         assert velocity == pytest.approx(drone.state.linear_velocity, abs=within[rate])
-        same = abs(np.dot(turn, drone.state.orientation))
-        assert 2 * math.acos(min(1.0, same)) < 0.002
+        overlap = abs(np.dot(turn, drone.state.orientation))
+        assert 2 * math.acos(min(1.0, overlap)) < 0.002
 
 
 def _rotation(vector):
@@ -102,21 +102,21 @@ def _rotation(vector):
     return x, y, z, math.cos(angle / 2)
 
 
-def test_speeding_up_against_differentiated_odometry():
+def test_acceleration_matches_the_differentiated_odometry():
     drone = Flown(gravity=GRAVITY)
     imu = drone.fit(FAST)
-    velocities, felt = [drone.state.linear_velocity], []
+    velocities, measured = [drone.state.linear_velocity], []
     for step in range(400):
         swing = math.sin(2 * math.pi * step * SUB_STEP)
         drone.step(1, (1.5 * swing, 0.8, 5.1012))
         velocities.append(drone.state.linear_velocity)
-        felt += [frames.turned(drone.state.orientation, force) for force in forces(drone, imu)]
+        measured += [frames.turned(drone.state.orientation, force) for force in forces(drone, imu)]
     expected = np.diff(velocities, axis=0)[:, :2] / SUB_STEP
     assert np.abs(expected).max() > 2.5
-    assert np.array(felt)[:, :2] == pytest.approx(expected, rel=0.01, abs=1e-6)
+    assert np.array(measured)[:, :2] == pytest.approx(expected, rel=0.01, abs=1e-6)
 
 
-def test_being_put_somewhere_is_no_acceleration():
+def test_moving_the_body_causes_no_acceleration():
     drone = Flown(Pose((0, 0, 5)))
     imu = drone.fit(FAST)
     drone.step(100)  # 4.9 m/s downwards
@@ -126,7 +126,7 @@ def test_being_put_somewhere_is_no_acceleration():
     assert np.abs(forces(drone, imu)).max() < 1e-6
 
 
-def test_the_messages():
+def test_imu_messages():
     body = Carried(State((0, 0, 0), TILTED, (0, 0, 0), (0, 0, 0)))
     noise = {"linear_acceleration": {"density": 0.01}, "orientation": {"variance": 1e-4}}
     imu = body.fit(ImuParameters(kind="imu", rate=100, noise=noise))
@@ -149,7 +149,7 @@ def test_the_messages():
     assert imu.read() == data
 
 
-def test_it_is_brought_back_in_the_middle_of_a_sample():
+def test_state_can_be_restored_in_the_middle_of_a_sample_period():
     noise = {"linear_acceleration": {"density": 0.01, "bias_walk": 0.1}, "angular_velocity": {"deviation": 0.1}}
     parameters = ImuParameters(kind="imu", rate=40, latency=0.02, noise=noise)
     body = Circling(2.0, 1.0)

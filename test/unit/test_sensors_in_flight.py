@@ -1,4 +1,4 @@
-"""Sensors on the tutorial's drone, in a whole simulation: rates, snapshots, restarts, scripts."""
+"""Sensors on the tutorial's drone in a complete simulation: rates, snapshots, restarts, scripts."""
 
 import math
 
@@ -34,31 +34,31 @@ def _still(tmp_path):
 
 
 def fly(simulation, steps):
-    """Return all readings of a flight."""
-    found = []
+    """Run `steps` steps; return vehicle, sensor name and reading for each reading."""
+    entries = []
     for _ in range(steps):
         simulation.step()
         for vehicle in simulation.vehicles.values():
             for name, sensor in vehicle.instruments.by_name.items():
-                found += [(vehicle.name, name, reading) for reading in sensor.readings]
-    return found
+                entries += [(vehicle.name, name, reading) for reading in sensor.readings]
+    return entries
 
 
-def test_every_sensor_comes_at_its_rate(simulate):
+def test_every_sensor_measures_at_its_rate(simulate):
     readings = fly(simulate(), 100)
     counts = {name: sum(one[1] == name for one in readings) for name in parameters.load(ALL).sensors}
     expected = {"imu": 1000, "magnetic_field": 250, "pressure": 250, "range": 100, "contacts": 100, "battery": 50}
-    assert counts == {**expected, "fix": 24}  # and one on its way
+    assert counts == {**expected, "fix": 24}  # one more is delayed by its latency
     at = [reading.at for _, name, reading in readings if name == "imu"]
     assert at == list(range(1, 1001))
 
 
-def test_sensors_change_nothing_of_the_flight(simulate):
-    with_them, without = simulate(), simulate({"cameras": {}})
-    for simulation in (with_them, without):
+def test_sensors_do_not_change_the_flight(simulate):
+    with_sensors, without = simulate(), simulate({"cameras": {}})
+    for simulation in (with_sensors, without):
         simulation.drone.commands.receive(FLYING)
         fly(simulation, 100)
-    assert with_them.drone.body.state == without.drone.body.state
+    assert with_sensors.drone.body.state == without.drone.body.state
 
 
 def test_the_same_flight_has_the_same_readings(simulate):
@@ -68,7 +68,7 @@ def test_the_same_flight_has_the_same_readings(simulate):
     assert fly(first, 60) == fly(second, 60)
 
 
-def test_a_snapshot_and_a_restart(simulate):
+def test_readings_are_the_same_after_a_restore_and_a_restart(simulate):
     simulation = simulate()
     beginning = fly(simulation, 20)
     simulation.drone.commands.receive(FLYING)
@@ -83,7 +83,7 @@ def test_a_snapshot_and_a_restart(simulate):
     assert fly(simulation, 20) == beginning
 
 
-def test_two_drones_have_noise_of_their_own(simulate, still):
+def test_two_drones_have_independent_noise(simulate, still):
     simulation = simulate({**ALL, "vehicles": 2}, script=still)
     readings = fly(simulation, 10)
     biases = {
@@ -94,7 +94,7 @@ def test_two_drones_have_noise_of_their_own(simulate, still):
     assert {"imu", "imu#0"} <= set(simulation.context.objects.names)
 
 
-def test_what_touches_is_named(simulate, still):
+def test_contacts_name_the_touched_object(simulate, still):
     box = {"shape": "box", "size": [9, 9, 0.2], "position": [0, 0, 0.1]}
     for named, expected in (({"name": "Table"}, "Table"), ({}, "Cuboid")):
         scene = {"objects": [{**box, **named}]}
@@ -104,8 +104,8 @@ def test_what_touches_is_named(simulate, still):
         assert touched == {expected}
 
 
-def test_two_drones_feel_each_other(simulate, still):
-    """One falls onto the other, which lies on the floor."""
+def test_contacts_between_two_drones_are_measured(simulate, still):
+    """drone2 falls onto drone1, which lies on the floor."""
     pair = {"drone1": {"position": [0, 0, 0.1]}, "drone2": {"position": [0, 0, 0.5]}}
     simulation = simulate({**ALL, "vehicles": pair}, script=still)
     touched = {name: set() for name in pair}
@@ -116,34 +116,34 @@ def test_two_drones_feel_each_other(simulate, still):
     assert "drone1" in touched["drone2"]
 
 
-def test_flown_acceleration_against_the_odometry(simulate):
+def test_measured_acceleration_matches_the_odometry(simulate):
     simulation = simulate({"sensors": EXACT})
     fly(simulation, 20)
     simulation.drone.commands.receive(Twist(Vector3(1.5, 0.5, 0)))
-    velocities, felt = [simulation.drone.body.state.linear_velocity], []
+    velocities, measured = [simulation.drone.body.state.linear_velocity], []
     for _ in range(60):
         mean = np.zeros(3)
         simulation.step()
         for reading in simulation.drone.instruments.by_name["imu"].readings:
             mean += np.array(frames.turned(reading.value.orientation, reading.value.specific_force)) / 10
-        felt.append(mean)
+        measured.append(mean)
         velocities.append(simulation.drone.body.state.linear_velocity)
     expected = np.diff(velocities, axis=0) / 0.05
     assert np.abs(expected[:, :2]).max() > 1.0
-    assert np.array(felt)[:, :2] == pytest.approx(expected[:, :2], rel=1e-6, abs=1e-9)
+    assert np.array(measured)[:, :2] == pytest.approx(expected[:, :2], rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("size", [5.3, 10.0, 20.0, 60.0])
-def test_lying_on_any_floor_it_feels_its_weight(simulate, still, size):
+def test_imu_of_a_drone_on_a_floor_of_any_size_measures_gravity(simulate, still, size):
     scene = {"floor": {"size": size}}
     simulation = simulate({"sensors": EXACT, "scene": scene, "drone": {"position": [0, 0, 0.05]}}, script=still)
     fly(simulation, 100)
-    felt = np.array([one.value.specific_force for _, _, one in fly(simulation, 40)])
-    assert felt[:, 2] == pytest.approx(np.full(len(felt), 9.81), abs=1e-6)
-    assert np.linalg.norm(felt, axis=1) == pytest.approx(felt[:, 2], abs=1e-6)
+    measured = np.array([one.value.specific_force for _, _, one in fly(simulation, 40)])
+    assert measured[:, 2] == pytest.approx(np.full(len(measured), 9.81), abs=1e-6)
+    assert np.linalg.norm(measured, axis=1) == pytest.approx(measured[:, 2], abs=1e-6)
 
 
-def test_being_moved_and_restored_is_no_acceleration(simulate):
+def test_moving_and_restoring_cause_no_acceleration(simulate):
     simulation = simulate({"sensors": EXACT})
     simulation.drone.commands.receive(Twist(Vector3(2, 0, 0)))
     fly(simulation, 40)
@@ -157,7 +157,7 @@ def test_being_moved_and_restored_is_no_acceleration(simulate):
     assert max(math.hypot(*one.value.specific_force) for _, _, one in fly(simulation, 1)) < 12
 
 
-def test_a_snapshot_in_the_middle_of_a_picture_s_period(simulate):
+def test_snapshot_in_the_middle_of_a_camera_period(simulate):
     small = {"width": 8, "height": 6, "every": 3}
     simulation = simulate({"cameras": {"front": small}})
     front = simulation.drone.cameras["front"]
@@ -175,7 +175,7 @@ def test_a_snapshot_in_the_middle_of_a_picture_s_period(simulate):
     assert front.latest is None and front.image is None
 
 
-def test_where_nothing_can_be_measured_the_flight_ends_as_without_sensors(simulate):
+def test_diverged_flight_with_sensors_ends_as_without_them(simulate):
     simulation = simulate()
     fly(simulation, 3)
     simulation.drone.pushes.add(Push((0.0, 0.0, float("nan")), (0.0, 0.0, 0.0), 1.0))
@@ -189,7 +189,7 @@ def test_the_stock_range_sensor_of_a_landed_drone_is_above_the_floor(simulate):
     sensor = simulation.drone.instruments.by_name["range"]
     reading = sensor.latest.value
     assert 0 < frames.position(sensor.mounting.pose())[2] < sensor.parameters.min_range
-    assert reading.distance == -math.inf  # nearer than it can measure, for REP-117
+    assert reading.distance == -math.inf  # REP-117: nearer than the minimum range
     assert (reading.hit.what, reading.hit.distance) == ("Floor", pytest.approx(0, abs=2e-3))
     assert reading.hit.normal == pytest.approx((0, 0, 1), abs=1e-9)
     assert reading.normal == pytest.approx((0, 0, -1), abs=1e-9)
@@ -207,14 +207,14 @@ def _sim(simulate):
     return simulation, sim
 
 
-def test_a_script_reads_the_ray_as_in_v_rep(sim):
+def test_script_reads_a_range_sensor_as_in_v_rep(sim):
     simulation, sim = sim
     ray = sim.getObject("/down")
     assert sim.readProximitySensor(ray) == (-1, 0.0, [0.0, 0.0, 0.0], -1, [0.0, 0.0, 0.0])
     simulation.step()
-    state, distance, point, met, normal = sim.readProximitySensor(ray)
+    state, distance, point, hit_object, normal = sim.readProximitySensor(ray)
     height = simulation.drone.body.state.position[2]
-    assert (state, met) == (1, sim.getObject("/Box"))
+    assert (state, hit_object) == (1, sim.getObject("/Box"))
     assert distance == pytest.approx(height - 0.3, abs=1e-3)
     in_world = sim.multiplyVector(sim.getObjectMatrix(ray, -1), point)
     assert in_world == pytest.approx([0, 0, 0.3], abs=1e-3)
@@ -227,7 +227,7 @@ def test_a_script_reads_the_ray_as_in_v_rep(sim):
     assert sim.readProximitySensor(ray)[3] == sim.getObject("/Floor")
 
 
-def test_a_script_reads_any_sensor_by_its_message(sim):
+def test_script_reads_a_sensor_as_its_message(sim):
     simulation, sim = sim
     imu = sim.getObject("/imu")
     assert sim.readSensor(imu) is None
@@ -246,7 +246,7 @@ def test_a_script_reads_any_sensor_by_its_message(sim):
         (lambda sim: sim.readSensor(9999), "no object with the handle 9999"),
     ],
 )
-def test_a_script_s_mistake(sim, call, words):
+def test_invalid_sensor_handle_is_reported(sim, call, words):
     with pytest.raises((TypeError, ValueError), match=words):
         call(sim[1])
 
@@ -270,7 +270,7 @@ def test_a_script_s_mistake(sim, call, words):
         ),
     ],
 )
-def test_scripts_in_both_languages(simulate, tmp_path, name, text):
+def test_python_and_lua_scripts_read_sensors(simulate, tmp_path, name, text):
     (tmp_path / name).write_text(text)
     sensors = {"down": {"kind": "range", "rate": 20, "min_range": 0.05, "max_range": 2.0}, **EXACT}
     simulation = simulate({"sensors": sensors, "gravity": 0.0}, script=str(tmp_path / name))

@@ -1,4 +1,4 @@
-"""What `sensors:` may say, and the one line that a mistake gets."""
+"""The parameter `sensors` and the messages for its errors."""
 
 import pytest
 
@@ -16,7 +16,7 @@ BATTERY = {
 DOWN = {"position": [0, 0, -0.1], "rpy": [0, 1.5708, 0]}
 
 
-def refused(overrides):
+def load_error(overrides):
     with pytest.raises(parameters.ParameterError) as error:
         Simulation(parameters.load(overrides)).close()
     assert "\n" not in str(error.value)
@@ -75,48 +75,48 @@ def refused(overrides):
         ({"Drone": IMU}, "sensor Drone: an object named 'Drone' already exists"),
     ],
 )
-def test_a_mistake_gets_one_line(sensors, words):
-    assert words in refused({"sensors": sensors})
+def test_an_invalid_sensor_raises_a_one_line_error(sensors, words):
+    assert words in load_error({"sensors": sensors})
 
 
-def test_a_mistake_has_the_line_of_its_file(tmp_path):
+def test_error_names_the_line_of_the_file(tmp_path):
     file = tmp_path / "my.yaml"
     file.write_text("sensors:\n  imu:\n    kind: imu\n    rate: 150\n")
-    assert refused({"config": str(file)}).startswith(f"{file}: line 4: parameter sensors/imu/rate = 150")
+    assert load_error({"config": str(file)}).startswith(f"{file}: line 4: parameter sensors/imu/rate = 150")
     file.write_text("sensors:\n  imu:\n    kind: imu\n    rate: 100\n    noise: {angular_velocity: {densty: 1}}\n")
-    assert f"{file}: line 5: parameter sensors/imu/noise/angular_velocity/densty: unknown key" in refused(
+    assert f"{file}: line 5: parameter sensors/imu/noise/angular_velocity/densty: unknown key" in load_error(
         {"config": str(file)}
     )
 
 
-def test_a_mistake_of_one_vehicle_names_it():
+def test_error_in_one_vehicle_names_the_vehicle():
     fleet = {"drone1": {}, "drone2": {"sensors": {"imu": {"rate": 150}}}}
-    assert "vehicles/drone2/sensors/imu/rate = 150" in refused({"sensors": {"imu": IMU}, "vehicles": fleet})
+    assert "vehicles/drone2/sensors/imu/rate = 150" in load_error({"sensors": {"imu": IMU}, "vehicles": fleet})
 
 
-def test_there_are_none_unless_somebody_wants_them():
+def test_there_are_no_sensors_by_default():
     assert parameters.load().sensors == {}
 
 
-def test_the_file_with_all_of_them_is_good():
-    read = parameters.load({"config": ALL})
-    assert {one.kind for one in read.sensors.values()} == {
+def test_sensors_yaml_defines_every_kind_of_sensor():
+    loaded = parameters.load({"config": ALL})
+    assert {sensor.kind for sensor in loaded.sensors.values()} == {
         *("imu", "range", "magnetic_field", "pressure", "fix", "contacts", "battery")
     }
-    assert [*read.sensors] == [*read.fleet[0].sensors]
+    assert [*loaded.sensors] == [*loaded.fleet[0].sensors]
 
 
 @pytest.mark.parametrize("datum", [{"latitude": 91}, {"longitude": 200}, {"altitude": 1e5}, {"height": 3}])
-def test_a_datum_that_is_nowhere(datum):
-    assert f"scene/datum/{next(iter(datum))}" in refused({"scene": {"datum": datum}})
+def test_invalid_datum_is_refused(datum):
+    assert f"scene/datum/{next(iter(datum))}" in load_error({"scene": {"datum": datum}})
 
 
-def test_a_scene_file_has_its_datum_and_its_field(tmp_path, new_simulation):
+def test_scene_file_may_set_datum_and_magnetic_field(tmp_path, new_simulation):
     file = tmp_path / "scene.yaml"
     file.write_text("datum: {latitude: -33.5, altitude: 10}\nmagnetic_field: [0, 2.4e-5, 5.1e-5]\n")
-    read = parameters.load({"scene_file": str(file)}).scene
-    assert (read.datum.latitude, read.datum.longitude, read.datum.altitude) == (-33.5, 8.545594, 10.0)
-    assert read.magnetic_field == (0.0, 2.4e-5, 5.1e-5)
+    loaded = parameters.load({"scene_file": str(file)}).scene
+    assert (loaded.datum.latitude, loaded.datum.longitude, loaded.datum.altitude) == (-33.5, 8.545594, 10.0)
+    assert loaded.magnetic_field == (0.0, 2.4e-5, 5.1e-5)
     simulation = new_simulation({"scene_file": str(file)})
     simulation.save_scene(tmp_path / "saved.yaml")
-    assert parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.datum == read.datum
+    assert parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.datum == loaded.datum

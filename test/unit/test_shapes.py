@@ -1,4 +1,4 @@
-"""What each shape says of itself to PyBullet, to the cameras and to rviz agrees."""
+"""PyBullet, the cameras and rviz agree on the size of each shape."""
 
 import numpy as np
 import pybullet
@@ -33,7 +33,7 @@ def _torus(tmp_path):
 
 
 def urdf_of(folder, *geometries):
-    """Return a URDF that shows these."""
+    """Return a URDF with one visual for each geometry."""
     visuals = "".join(f"<visual><geometry>{geometry}</geometry></visual>" for geometry in geometries)
     (folder / "all.urdf").write_text(f"<robot name='r'><link name='a'>{visuals}</link></robot>")
     return Urdf(str(folder / "all.urdf"))
@@ -46,12 +46,12 @@ def span(corners):
 
 
 def span_in_rviz(primitive):
-    """Return the lowest and the highest x, y, z of what rviz draws; it draws these upright."""
+    """Return the lowest and the highest x, y, z that rviz draws for an upright primitive."""
     unit = primitive.corners or [(-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)]
     return span(unit * np.array(primitive.scale) + np.reshape(primitive.local, (3, 4))[:, 3])
 
 
-def test_what_a_urdf_shows_comes_back_from_bullet_as_it_was_given(world, torus, tmp_path):
+def test_bullet_reports_the_visual_shapes_of_a_urdf(world, torus, tmp_path):
     body = world.add_object(
         urdf_of(
             tmp_path,
@@ -71,7 +71,7 @@ def test_what_a_urdf_shows_comes_back_from_bullet_as_it_was_given(world, torus, 
 
 @pytest.mark.parametrize("mass", [0.0, 1.0])
 @pytest.mark.parametrize("word", ["box", "cylinder", "sphere", "mesh"])
-def test_what_bullet_hits_is_as_large_as_what_the_cameras_draw(world, tmp_path, word, mass):
+def test_collision_shape_is_as_large_as_the_drawn_shape(world, tmp_path, word, mass):
     trimesh.creation.box((0.6, 0.8, 1.0)).export(str(tmp_path / "block.stl"))
     shapes = {**{shape.word: shape for shape in SIZED}, "mesh": Mesh(str(tmp_path / "block.stl"), (1.0, 2.0, 0.5))}
     body = world.add_object(shapes[word], Pose((0, 0, 0)), mass=mass)
@@ -84,7 +84,7 @@ def test_what_bullet_hits_is_as_large_as_what_the_cameras_draw(world, tmp_path, 
 
 
 @pytest.mark.parametrize("shape", SIZED, ids=lambda shape: shape.word)
-def test_rviz_draws_it_as_large_as_the_cameras(shape):
+def test_rviz_primitives_are_as_large_as_the_drawn_shape(shape):
     (part,) = shape.triangles()
     spans = [span_in_rviz(primitive) for primitive in shape.for_rviz()]
     drawn = np.array([np.min(spans, axis=0)[0], np.max(spans, axis=0)[1]])
@@ -92,7 +92,7 @@ def test_rviz_draws_it_as_large_as_the_cameras(shape):
 
 
 @pytest.mark.parametrize("shape", SIZED, ids=lambda shape: shape.word)
-def test_what_is_shared_is_scaled_to_the_same_triangles(shape):
+def test_scaled_shared_form_has_the_triangles_of_the_shape(shape):
     form, scale = shape.shared()
     (own,), (shared,) = shape.triangles(), form.triangles()
     np.testing.assert_allclose(np.array(scale) * shared.corners, own.corners, rtol=0, atol=1e-12)

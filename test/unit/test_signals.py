@@ -1,4 +1,4 @@
-"""A signal that comes while rospy holds a lock that ending needs, too: the node ends all the same."""
+"""A signal that arrives while rospy holds a lock that the shutdown also needs: the node ends anyway."""
 
 import re
 import signal
@@ -11,10 +11,10 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 PACKAGE = Path(__file__).parents[2]
-HANGS = 90.0  # s; nothing here takes nearly as long unless it hangs
+LIMIT = 90.0  # s; every node ends much sooner unless it hangs
 
 # A node without a master. It holds a lock, as rospy does while a message goes into the queue of a connection, and the
-# signal comes just then; ending takes the same lock, as rospy does to close the connection.
+# signal arrives just then; the shutdown takes the same lock, as rospy does to close the connection.
 NODE = """
 import signal, sys, threading
 import rospy
@@ -55,32 +55,32 @@ WAYS = {
 def run(number, install, over, last, guarded):
     program = NODE.format(signal=number.name, install=install, over=over, last=last, guarded=guarded)
     return subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=HANGS, check=False, cwd=PACKAGE / "src"
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=LIMIT, check=False, cwd=PACKAGE / "src"
     )
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("way", WAYS)
-def test_a_signal_within_a_write_ends_the_node(way, number):
+def test_signal_during_a_write_ends_the_node(way, number):
     done = run(number, *WAYS[way])
     assert (done.returncode, done.stdout, done.stderr) == (0, "ended\n", "")
 
 
-def test_what_nohup_has_ignored_stays_ignored():
+def test_signal_ignored_by_nohup_stays_ignored():
     install = "signal.signal(signal.SIGHUP, signal.SIG_IGN); end_on_signals()"
     done = run(signal.SIGHUP, install, "signal.raise_signal(signal.SIGTERM) is None and rospy.is_shutdown()", "", False)
     assert (done.returncode, done.stdout) == (0, "ended\n")
 
 
-def test_no_node_of_ours_has_the_handlers_of_rospy():
-    files = [one for folder in ("src", "docs", "scripts") for one in (PACKAGE / folder).rglob("*") if one.is_file()]
+def test_every_node_disables_the_signal_handlers_of_rospy():
+    files = [file for folder in ("src", "docs", "scripts") for file in (PACKAGE / folder).rglob("*") if file.is_file()]
     calls = {
-        f"{one.name}: {call}"
-        for one in files
-        if one.suffix in ("", ".py")
-        and one.parent.name not in ("lockstep", "drivers")  # examples of nodes that users write
-        and "html" not in one.parts  # the manual, which has copies of them
-        for call in re.findall(r"\binit_node\([^\n]+", one.read_text(encoding="utf-8"))
+        f"{file.name}: {call}"
+        for file in files
+        if file.suffix in ("", ".py")
+        and file.parent.name not in ("lockstep", "drivers")  # examples of nodes that users write
+        and "html" not in file.parts  # the manual has copies of the examples
+        for call in re.findall(r"\binit_node\([^\n]+", file.read_text(encoding="utf-8"))
         if "disable_signals=True" not in call and "**options" not in call
     }
     assert not calls

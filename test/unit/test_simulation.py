@@ -1,4 +1,4 @@
-"""Start and stop, again and again; snapshots; what a run leaves behind: nothing."""
+"""Repeated starts and stops, snapshots, and the resources that every run must release."""
 
 import gc
 import os
@@ -39,8 +39,8 @@ def _simulate(new_simulation):
     return simulate
 
 
-def everything(simulation):
-    """Return the state of all that moves, and the time."""
+def full_state(simulation):
+    """Return the time, the states of all moving objects, and the current command."""
     objects = simulation.context.objects
     moving = [objects[handle].body.state for handle in objects if objects[handle].body is not None]
     return [simulation.time, simulation.drone.body.state, *moving, simulation.drone.commands.now]
@@ -50,7 +50,7 @@ def fly(simulation, steps):
     path = []
     for _ in range(steps):
         simulation.step()
-        path.append(everything(simulation))
+        path.append(full_state(simulation))
     return path
 
 
@@ -60,7 +60,7 @@ def maneuver(simulation):
 
 
 def resources():
-    """Return resident memory (bytes), and the numbers of open files and of PyBullet's clients."""
+    """Return resident memory (bytes) and the numbers of open files and PyBullet clients."""
     gc.collect()
     with open("/proc/self/statm", encoding="ascii") as file:
         resident = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
@@ -69,7 +69,7 @@ def resources():
 
 
 @pytest.mark.long
-def test_100_runs_fly_alike_and_leak_nothing(simulate):
+def test_100_runs_give_the_same_flight_and_leak_nothing(simulate):
     simulation = simulate(scene={"objects": CLUTTER})
     first, measured = None, []
     for run in range(RUNS):
@@ -79,39 +79,39 @@ def test_100_runs_fly_alike_and_leak_nothing(simulate):
         assert path == first
         simulation.stop()
         simulation.start()
-        if run in (39, 59, 79, 99):  # by then every cache is full, and the heap has its shape
+        if run in (39, 59, 79, 99):  # by then the caches are full and the heap is stable
             measured.append(resources())
     assert {one[1:] for one in measured} == {measured[0][1:]}
-    # What leaks does so in every part; what else the process holds, of the tests before, may move once.
+    # A leak grows in every interval; other memory, of earlier tests, may change once.
     assert min(after[0] - before[0] for before, after in pairwise(measured)) < LEAK
 
 
-def test_worlds_beside_each_other_do_not_meddle(simulate):
-    alone = fly(simulate(scene={"objects": CLUTTER}), 20)
+def test_simultaneous_worlds_do_not_affect_each_other(simulate):
+    reference = fly(simulate(scene={"objects": CLUTTER}), 20)
     first, second = simulate(scene={"objects": CLUTTER}), simulate(scene={"objects": CLUTTER})
     path = fly(first, 10)
     second.start()
     fly(second, 7)
     second.stop()
-    assert path + fly(first, 10) == alone
+    assert path + fly(first, 10) == reference
     second.start()
-    assert fly(second, 20) == alone
+    assert fly(second, 20) == reference
 
 
 @pytest.mark.parametrize("script", ["", "tutorial_v3", "tutorial_v4"])
-def test_a_snapshot_brings_the_flight_back_bit_for_bit(simulate, script):
-    """In the middle of a manoeuvre, a push under way, things of the scene tumbling."""
+def test_restored_flight_is_bit_identical(simulate, script):
+    """The snapshot is taken during a manoeuvre and a push, while objects of the scene tumble."""
     simulation = simulate(script, scene={"objects": CLUTTER})
     maneuver(simulation)
     fly(simulation, 4)
-    snapshot, now = simulation.snapshot(), everything(simulation)
+    snapshot, now = simulation.snapshot(), full_state(simulation)
     path = fly(simulation, 40)
-    assert path[-1][3:] != now[3:], "nothing else moved"
+    assert path[-1][3:] != now[3:], "the objects of the scene did not move"
     for steps in (3, 25, 40):
         simulation.drone.body.move(Pose((3, 3, 3), (0, 0, 0, 1)))
         simulation.drone.pushes.add(Push((0, 0, 5), (0, 0, 0), 1.0))
         simulation.restore(snapshot)
-        assert everything(simulation) == now
+        assert full_state(simulation) == now
         assert fly(simulation, steps) == path[:steps]
     simulation.forget(snapshot)
     simulation.stop()
@@ -121,14 +121,14 @@ def test_a_snapshot_brings_the_flight_back_bit_for_bit(simulate, script):
 
 def test_stop_restores_the_initial_scene(simulate):
     simulation = simulate(scene={"objects": CLUTTER})
-    initial = everything(simulation)
+    initial = full_state(simulation)
     target = simulation.context.objects.matrix(simulation.context.objects.handle("DronePosition"))
     maneuver(simulation)
     fly(simulation, 20)
     objects = simulation.context.objects
     objects.set_matrix(objects.handle("DronePosition"), -1, frames.from_rpy((5, 5, 5), (0, 0, 0)))
     simulation.stop()
-    assert everything(simulation) == initial
+    assert full_state(simulation) == initial
     objects = simulation.context.objects
     assert objects.matrix(objects.handle("DronePosition")) == target
     assert not simulation.running
@@ -147,7 +147,7 @@ def test_start_reads_script_and_scene_again(simulate, tmp_path):
     simulation.stop()
     assert simulation.drone.body.state.position[0] == 1.0 and "A" in simulation.context.objects
     simulation.start()
-    assert simulation.drone.body.state.position == (0.0, 0.0, 0.8), "what the file no longer says is as without it"
+    assert simulation.drone.body.state.position == (0.0, 0.0, 0.8), "a removed value returns to its default"
     assert "A" not in simulation.context.objects
     assert simulation.context.signals.get(int, "edited") == 1
     simulation.start(scene_file="")
@@ -158,7 +158,7 @@ MESH = "objects: [{shape: mesh, file: %s, position: [0, 0, 0]}]"
 
 
 @pytest.mark.parametrize("wrong", [MESH % "no.obj", MESH % "scene.yaml", "drone: [", "x: 1"])
-def test_a_scene_that_cannot_be_read_leaves_the_last_one(simulate, tmp_path, wrong):
+def test_unreadable_scene_leaves_the_previous_scene(simulate, tmp_path, wrong):
     scene = tmp_path / "scene.yaml"
     scene.write_text(
         "drone: {position: [1, 0, 2]}\nobjects: [{name: A, shape: sphere, size: [1], position: [5, 0, 1]}]"
@@ -167,9 +167,9 @@ def test_a_scene_that_cannot_be_read_leaves_the_last_one(simulate, tmp_path, wro
     path = fly(simulation, 10)
     good = scene.read_text()
     scene.write_text(wrong)
-    with pytest.raises(parameters.ParameterError) as refused:
+    with pytest.raises(parameters.ParameterError) as caught:
         simulation.start()
-    assert str(tmp_path) in str(refused.value) and "\n" not in str(refused.value)
+    assert str(tmp_path) in str(caught.value) and "\n" not in str(caught.value)
     assert (simulation.running, simulation.time, simulation.drone.body.state.position) == (False, 0.0, (1.0, 0.0, 2.0))
     assert simulation.drone.cameras["front"].take().shape == (12, 16, 3)
     scene.write_text(good)
@@ -178,7 +178,7 @@ def test_a_scene_that_cannot_be_read_leaves_the_last_one(simulate, tmp_path, wro
 
 
 @pytest.mark.parametrize("end", ["stop", "close", "start", "error", "close twice", "stop twice"])
-def test_cleanup_runs_once_however_it_ends(simulate, tmp_path, caplog, end):
+def test_cleanup_runs_once_for_every_way_to_end(simulate, tmp_path, caplog, end):
     caplog.set_level("INFO")
     script = tmp_path / "script.py"
     script.write_text(COUNTING.format(actuation="1 / 0" if end == "error" else "pass"))
@@ -195,7 +195,7 @@ def test_cleanup_runs_once_however_it_ends(simulate, tmp_path, caplog, end):
 
 
 @pytest.mark.parametrize("end", ["stop", "close"])
-def test_cleanup_that_fails_runs_once_too(simulate, tmp_path, caplog, end):
+def test_failing_cleanup_runs_only_once(simulate, tmp_path, caplog, end):
     caplog.set_level("INFO")
     script = tmp_path / "script.py"
     script.write_text("def sysCall_cleanup():\n    print('cleanup')\n    1 / 0\n")
@@ -206,8 +206,8 @@ def test_cleanup_that_fails_runs_once_too(simulate, tmp_path, caplog, end):
     assert [record.getMessage() for record in caplog.records].count("cleanup") == 1
 
 
-def test_a_scene_that_cannot_be_built_leaves_the_last_one_standing(simulate, tmp_path):
-    """What is wrong shows only when all is built: a name that the drone has."""
+def test_a_scene_that_cannot_be_built_leaves_the_previous_scene(simulate, tmp_path):
+    """The error, a name that the drone already has, is found only while the scene is built."""
     simulation = simulate(scene={"objects": CLUTTER})
     world, drone, path = simulation.world, simulation.drone, fly(simulation, 10)
     scene = tmp_path / "scene.yaml"
@@ -221,26 +221,26 @@ def test_a_scene_that_cannot_be_built_leaves_the_last_one_standing(simulate, tmp
     assert fly(simulation, 10) == path
 
 
-def test_numbers_that_mean_nothing_end_the_flight_with_one_line(simulate):
+def test_a_nan_force_ends_the_flight_with_a_one_line_error(simulate):
     simulation = simulate()
     path = fly(simulation, 3)
     simulation.drone.pushes.add(Push((0.0, 0.0, float("nan")), (0.0, 0.0, 0.0), 1.0))
-    with pytest.raises(Diverged, match=r"the simulation has diverged at t = 0\.\d\d s: position") as said:
+    with pytest.raises(Diverged, match=r"the simulation has diverged at t = 0\.\d\d s: position") as raised:
         fly(simulation, 20)
-    assert "\n" not in str(said.value)
+    assert "\n" not in str(raised.value)
     simulation.start()
     assert fly(simulation, 3) == path
 
 
 @pytest.mark.parametrize("script", ["missing.py", "missing.lua", "nosuch", "x" * 300 + ".py", "a\0.py"])
-def test_a_script_that_is_not_there_ends_it_before_anything_is_built(tmp_path, script):
+def test_a_missing_script_raises_a_one_line_error(tmp_path, script):
     for started in (True, False):
-        with pytest.raises(ScriptError) as said:
+        with pytest.raises(ScriptError) as raised:
             Simulation(parameters.load(), script=script, started=started)
-        assert "\n" not in str(said.value)
+        assert "\n" not in str(raised.value)
 
 
-def test_a_script_that_has_gone_is_refused_at_the_start_and_the_simulation_stands(simulate, tmp_path):
+def test_start_with_a_deleted_script_fails_and_the_simulation_can_be_stopped(simulate, tmp_path):
     script = tmp_path / "script.py"
     script.write_text("def sysCall_init(): pass\n")
     simulation = simulate(script)
@@ -252,8 +252,8 @@ def test_a_script_that_has_gone_is_refused_at_the_start_and_the_simulation_stand
     assert not simulation.running
 
 
-def test_a_world_with_a_window_is_filled_anew_and_flies_alike(simulate, tmp_path):
-    """There is one window in a process; here it is one that cannot be seen."""
+def test_world_with_a_window_is_reused_and_gives_the_same_flight(simulate, tmp_path):
+    """A process has at most one window; `_gui` is set here without opening it."""
     simulation = simulate(scene={"objects": CLUTTER})
     simulation._gui = True
     world, path = simulation.world, fly(simulation, 10)
@@ -266,7 +266,7 @@ def test_a_world_with_a_window_is_filled_anew_and_flies_alike(simulate, tmp_path
     assert fly(simulation, 10) == path
 
 
-def test_what_a_script_held_goes_back_to_the_system(tmp_path, new_simulation):
+def test_memory_of_a_script_is_freed_at_the_next_start(tmp_path, new_simulation):
     script = tmp_path / "eats.lua"
     script.write_text("t = {}\nfor i = 1, 500000 do t[i] = {i} end\nfunction sysCall_init() end\n")
     simulation = new_simulation({"script_time_limit": 0.0})
@@ -274,20 +274,20 @@ def test_what_a_script_held_goes_back_to_the_system(tmp_path, new_simulation):
     before = resources()[0]
     simulation.script = str(script)
     simulation.start()
-    eaten = resources()[0] - before
+    used = resources()[0] - before
     simulation.script = ""
     simulation.start()
-    assert eaten > 30e6
-    assert resources()[0] - before < eaten / 4
+    assert used > 30e6
+    assert resources()[0] - before < used / 4
 
 
-def test_a_scene_that_cannot_be_restored_at_stop_is_not_the_beginning_of_the_next_flight(simulate, tmp_path, caplog):
+def test_a_scene_that_cannot_be_restored_at_stop_is_read_again_at_start(simulate, tmp_path, caplog):
     mesh = tmp_path / "wedge.obj"
     wedge = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
     mesh.write_text(wedge)
-    thing = {"name": "Wedge", "shape": "mesh", "file": str(mesh), "position": [3, 0, 0.5]}
+    wedge_object = {"name": "Wedge", "shape": "mesh", "file": str(mesh), "position": [3, 0, 0.5]}
     simulation = simulate(
-        scene={"objects": [thing, {"name": "Crate", "shape": "box", "size": [0.2] * 3, "position": [2, 0, 1]}]}
+        scene={"objects": [wedge_object, {"name": "Crate", "shape": "box", "size": [0.2] * 3, "position": [2, 0, 1]}]}
     )
     simulation.operations.remove([simulation.object_handles["Crate"]])
     mesh.unlink()

@@ -1,4 +1,4 @@
-"""A flight back from its table, drawn as when it was flown; what is no table gets one line."""
+"""Flight tables: plotted as during the flight; an invalid table is reported in one line."""
 
 import pytest
 from matplotlib.figure import Figure
@@ -12,14 +12,14 @@ HEADER = ",".join(COLUMNS) + "\n"
 ROW = "0,0,0,0.8,0,0,0,1" + ",0" * 14 + "\n"
 
 
-def test_a_table_is_drawn_as_the_flight_was(tmp_path, monkeypatch):
-    drawn = []
+def test_plot_of_a_table_equals_the_plot_of_the_flight(tmp_path, monkeypatch):
+    figures = []
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: figures.append(figure))
     (tmp_path / "up.yaml").write_text("[{at: 0.1, twist: {linear: [1, 0, 0.5]}}]")
     assert main(["--commands", "up.yaml", "--duration", "1", "--csv", "flight.csv", "--plot", "flown.png"]) == 0
     assert plot_flight.main(["flight.csv"]) == 0
-    lines = [[line.get_xydata().tolist() for ax in figure.axes for line in ax.get_lines()] for figure in drawn]
+    lines = [[line.get_xydata().tolist() for ax in figure.axes for line in ax.get_lines()] for figure in figures]
     assert lines[0] == lines[1]
     assert (tmp_path / "flight.png").exists()
     assert recording.read_table("flight.csv").rows[-1][0] == 1.0
@@ -42,16 +42,16 @@ def test_a_table_is_drawn_as_the_flight_was(tmp_path, monkeypatch):
         (b"\x89PNG\r\n\xff\xfe\n", "is not a text file"),
     ],
 )
-def test_what_is_no_table_gets_one_line(tmp_path, capsys, content, said):
+def test_invalid_table_is_reported_in_one_line(tmp_path, capsys, content, said):
     path = tmp_path / "flight.csv"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     assert plot_flight.main([str(path), str(tmp_path / "out.png")]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"plot_flight: {path}: {said}")
-    assert [one.name for one in tmp_path.iterdir()] == ["flight.csv"]
+    assert [file.name for file in tmp_path.iterdir()] == ["flight.csv"]
 
 
-def test_a_table_has_its_limit(tmp_path, monkeypatch):
+def test_number_of_rows_in_a_table_is_limited(tmp_path, monkeypatch):
     monkeypatch.setattr(recording, "MAX_ROWS", 2)
     path = tmp_path / "flight.csv"
     path.write_text(HEADER + "".join(f"{time}{ROW[1:]}" for time in range(3)))

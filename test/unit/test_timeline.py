@@ -1,4 +1,4 @@
-"""Timelines: which step an entry takes effect in, and what a mistake in the file says."""
+"""Timelines: the step in which an entry takes effect, and the messages for errors in the file."""
 
 import random
 import re
@@ -19,7 +19,7 @@ KINDS = "twist, pose, push, goto, object, reset, takeoff, land, emergency, home,
 
 
 class DroneLog:
-    """Stands in for a drone, and keeps what it is told."""
+    """A test double of a drone that records its calls."""
 
     def __init__(self):
         self.calls = []
@@ -45,7 +45,7 @@ def read(folder, text):
 def test_entry_at_a_steps_own_time_belongs_to_that_step(time_step):
     for step in range(50_000):
         assert first_step(step * time_step, time_step) == step
-        assert first_step(round(step * time_step, 9), time_step) == step  # as somebody writes it
+        assert first_step(round(step * time_step, 9), time_step) == step  # rounded, as in a file
 
 
 @pytest.mark.parametrize("time, step", [(0.0, 0), (0.001, 1), (0.049, 1), (0.051, 2), (0.0999, 2), (3599.96, 72000)])
@@ -61,7 +61,7 @@ def test_entry_between_steps_waits_for_the_next_one(time, step):
         ("- {at: 0.1, land: {}}", "entry at 0.1 s: there is no vehicle"),
     ],
 )
-def test_an_entry_that_cannot_be_executed_says_why(tmp_path, text, why):
+def test_entry_that_cannot_be_executed_is_reported_with_the_reason(tmp_path, text, why):
     commands = read(tmp_path, text)
     with closing(Simulation(PARAMETERS, started=False)) as simulation:
         commands.apply(0, simulation.vehicles)
@@ -70,7 +70,7 @@ def test_an_entry_that_cannot_be_executed_says_why(tmp_path, text, why):
             commands.apply(2, vehicles)
 
 
-def test_a_digest_tells_timelines_apart(tmp_path):
+def test_different_timelines_have_different_digests(tmp_path):
     rows = [
         "- {at: 1, push: {force: [0, 0, 1], duration: 0.2}}",
         "- {at: 1, weather: {wind: [0, 1, 0], gusts: {deviation: [0.1, 0, 0]}}}",
@@ -86,7 +86,7 @@ def test_a_digest_tells_timelines_apart(tmp_path):
     assert Timeline((), 0.05).digest == ""
 
 
-def test_each_kind_reaches_the_drone_once_in_its_step(tmp_path):
+def test_each_kind_of_entry_is_applied_once_in_its_step(tmp_path):
     commands = read(
         tmp_path,
         """
@@ -95,26 +95,26 @@ def test_each_kind_reaches_the_drone_once_in_its_step(tmp_path):
         - {at: 0.3, push: {force: [1, 0, 0], torque: [0, 2, 0], duration: 0.2}}
         """,
     )
-    told = {}
+    calls_by_step = {}
     for step in range(20):
         drone = DroneLog()
         commands.apply(step, {"drone": drone})
         if drone.calls:
-            told[step] = drone.calls
-    assert told == {
+            calls_by_step[step] = drone.calls
+    assert calls_by_step == {
         2: [("receive", Twist(Vector3(1, 2, 3), Vector3(0, 0, 0.5)))],
         3: [("move", Pose((4, 5, 6), pytest.approx((0, 0, 1, 0), abs=1e-12)))],
         6: [("push", (1, 0, 0), (0, 2, 0), 0.2)],
     }
 
 
-def test_parts_that_are_left_out_are_zero(tmp_path):
+def test_omitted_parts_are_zero(tmp_path):
     commands = read(tmp_path, "[{at: 0, twist: {}}, {at: 1, pose: {}}, {at: 2, push: {duration: 1}}]")
     zero = (0, 0, 0)
     assert [entry.action for entry in commands.entries] == [Twist(), Pose(zero), Push(zero, zero, 1)]
 
 
-def test_entries_are_sorted_by_time_and_keep_the_files_order_within_one():
+def test_entries_are_sorted_by_time_and_keep_their_order_at_equal_times():
     entries = [Entry(at, Twist(Vector3(number))) for number, at in enumerate([0.3, 0.1, 0.3, 0.2, 0.1])]
     assert [entry.action.linear.x for entry in Timeline(entries, 0.05).entries] == [1, 4, 3, 0, 2]
 
@@ -126,7 +126,7 @@ def test_entries_are_sorted_by_time_and_keep_the_files_order_within_one():
     assert len(applied) == sum(entry.at == 0.5 for entry in numbered)
 
 
-def test_end_counts_the_longest_push():
+def test_end_includes_the_longest_push():
     push = Push((1, 0, 0), (0, 0, 0), 4.0)
     assert Timeline([Entry(1.0, push), Entry(3.0, Twist())], 0.05).end == 5.0
     assert Timeline([Entry(1.0, push), Entry(6.0, Twist())], 0.05).end == 6.0
@@ -166,7 +166,7 @@ def test_end_counts_the_longest_push():
         ("[{at: 1, push: {duration: 1, torque: [0, .inf, 0]}}]", "entry 1: push.torque = [0, inf, 0]: must be three"),
     ],
 )
-def test_a_mistake_is_named_in_one_line(tmp_path, text, says):
+def test_invalid_timeline_is_reported_in_one_line(tmp_path, text, says):
     with pytest.raises(TimelineError) as caught:
         read(tmp_path, text)
     message = str(caught.value)

@@ -1,4 +1,4 @@
-"""What is tuned in flight holds from the next step on, all or nothing, and stays; a dump brings it back."""
+"""Tuning in flight: changes take effect in the next step, all or none; a dump restores them."""
 
 import math
 import struct
@@ -51,52 +51,52 @@ def _simulate(new_simulation):
 
 
 def fly(simulation, steps):
-    """Return what the states and the readings of a flight are, to the bit."""
-    flown = []
+    """Return the states and readings of a flight in a bit-exact form."""
+    flight = []
     for _ in range(steps):
         simulation.step()
-        flown.append(struct.pack("13d", *(x for part in simulation.drone.body.state for x in part)))
-        flown.append(repr([one.latest for one in simulation.drone.instruments.by_object.values()]))
-    return flown
+        flight.append(struct.pack("13d", *(x for part in simulation.drone.body.state for x in part)))
+        flight.append(repr([entry.latest for entry in simulation.drone.instruments.by_object.values()]))
+    return flight
 
 
 def thrust(drone):
     return sum(drone.propulsion.particle_velocities) / 4
 
 
-def dumped(values, path):
-    """Write what `dynparam dump` writes."""
+def write_dump(values, path):
+    """Write a file as `dynparam dump` does; return its path."""
     body = {"dictitems": values, "state": []}
     text = "!!python/object/new:dynamic_reconfigure.encoding.Config\n" + yaml.dump(body)
     path.write_text(text, encoding="utf-8")
     return str(path)
 
 
-# ---- what there is
+# ---- tunable parameters
 
 
-def test_each_says_what_it_is_and_what_it_may_be(simulate):
+def test_every_parameter_has_a_description_and_a_value_within_its_limits(simulate):
     tuning = tuning_of(simulate())
-    assert not [name for name, one in tuning.known.items() if not one.description]
+    assert not [name for name, entry in tuning.known.items() if not entry.description]
     assert tuning.known["Kzref"].description == comments()["control/Kzref"] == "(m/s) per m"
-    assert [(one.low, one.high) for one in (tuning.known["Kzref"], tuning.known["cmd_vel_timeout"])] == [
+    assert [(entry.low, entry.high) for entry in (tuning.known["Kzref"], tuning.known["cmd_vel_timeout"])] == [
         (0, 1e4),
         (0, 1e6),
     ]
     values = tuning.values()
-    for name, one in tuning.known.items():
-        fits = values[name] in one.choices if one.choices else one.low <= values[name] <= one.high
-        assert type(values[name]) is one.kind and fits, name
-    wanted = {"thrust_limits/lowest", "weather/wind/x", "weather/gusts/deviation/across", "faults/commands/loss"}
-    wanted |= {"faults/propellers/front_left", "faults/sensors/imu", "faults/sensors/floor", "push/force_limit"}
-    assert wanted | {"sensors/fix/noise/vertical/bias", "cameras/track/horizontal_fov"} <= set(values)
+    for name, entry in tuning.known.items():
+        fits = values[name] in entry.choices if entry.choices else entry.low <= values[name] <= entry.high
+        assert type(values[name]) is entry.kind and fits, name
+    expected = {"thrust_limits/lowest", "weather/wind/x", "weather/gusts/deviation/across", "faults/commands/loss"}
+    expected |= {"faults/propellers/front_left", "faults/sensors/imu", "faults/sensors/floor", "push/force_limit"}
+    assert expected | {"sensors/fix/noise/vertical/bias", "cameras/track/horizontal_fov"} <= set(values)
     assert not [name for name in values if name.endswith(("seed", "variance"))]
 
 
 # ---- changing
 
 
-def test_a_gain_counts_from_the_next_step_on(simulate):
+def test_changed_gain_takes_effect_in_the_next_step(simulate):
     simulation = simulate()
     drone = simulation.drone
     fly(simulation, 3)
@@ -106,11 +106,11 @@ def test_a_gain_counts_from_the_next_step_on(simulate):
         simulation.step()
         z = drone.body.state.position[2]
         simulation.step()
-        wanted = 5.33 + gain * (0.8 - z) - 3 * (z - 0.9) / 0.05  # the speed is the mean of the step
-        assert thrust(drone) == pytest.approx(wanted, abs=1e-3)
+        expected = 5.33 + gain * (0.8 - z) - 3 * (z - 0.9) / 0.05  # the speed is the mean of the step
+        assert thrust(drone) == pytest.approx(expected, abs=1e-3)
 
 
-def test_limits_height_and_cameras_change_with_it(simulate):
+def test_command_timeout_and_cameras_can_be_changed(simulate):
     simulation = simulate()
     drone = simulation.drone
     camera = drone.cameras["front"]
@@ -121,7 +121,7 @@ def test_limits_height_and_cameras_change_with_it(simulate):
     assert drone.commands.timeout == 0.5 and drone.parameters.cmd_vel_timeout == 0.5
 
 
-def test_noise_is_that_of_its_own_measurement(simulate):
+def test_changed_noise_applies_only_to_its_own_measurement(simulate):
     simulation = simulate()
     drone = simulation.drone
     imu, fix = drone.instruments.by_object["imu"], drone.instruments.by_object["fix"]
@@ -158,25 +158,25 @@ def test_noise_is_that_of_its_own_measurement(simulate):
         ({"x" * 10_000: 1.0}, "cannot be changed in flight"),
     ],
 )
-def test_what_is_wrong_changes_nothing_and_says_why(simulate, changes, said):
+def test_invalid_change_is_refused_with_the_reason_and_changes_nothing(simulate, changes, said):
     simulation = simulate(script_parameters={"text": "a", "rate": 1})
     drone = simulation.drone
     before = tuning_of(simulation).values(), drone.parameters
-    with pytest.raises(ParameterError) as refused:
+    with pytest.raises(ParameterError) as caught:
         tuning_of(simulation).change({"Dzref": 1.0, **changes})
-    assert said in str(refused.value) and "\n" not in str(refused.value) and len(str(refused.value)) < 600
+    assert said in str(caught.value) and "\n" not in str(caught.value) and len(str(caught.value)) < 600
     assert (tuning_of(simulation).values(), drone.parameters) == before
 
 
-def test_what_comes_otherwise_is_seen_and_what_holds_already_is_no_change(simulate):
+def test_external_changes_are_visible_and_unchanged_values_are_ignored(simulate):
     simulation = simulate()
     drone, shared = simulation.drone, simulation.context
     tuning_of(simulation).change(tuning_of(simulation).values())
     assert not shared.weather.is_felt and not tuning_of(simulation).chosen
-    counted = shared.tunings
+    count_before = shared.tunings
     drone.context.change_weather({"wind": [1, 2, 3]})
     drone.change_faults({"propellers": [1, 1, 0.5, 1]})
-    assert shared.tunings == counted + 2
+    assert shared.tunings == count_before + 2
     tuning_of(simulation).change({"weather/wind/z": 0.0, "weather/gusts/speed": 3.0})
     values = tuning_of(simulation).values()
     assert [values[f"weather/wind/{axis}"] for axis in "xyz"] == [1, 2, 0]
@@ -186,7 +186,7 @@ def test_what_comes_otherwise_is_seen_and_what_holds_already_is_no_change(simula
 # ---- starts and snapshots
 
 
-def test_what_is_tuned_stays_through_every_start_and_conditions_do_not(simulate):
+def test_tuned_values_survive_every_start_but_faults_do_not(simulate):
     simulation = simulate()
     for begin in (simulation.start, simulation.stop, lambda: simulation.drone.ask("reset")):
         simulation.start()
@@ -198,21 +198,21 @@ def test_what_is_tuned_stays_through_every_start_and_conditions_do_not(simulate)
     assert simulation.drone.parameters.cmd_vel_limits.linear == 1 and simulation.drone.parameters.is_alone
 
 
-def test_a_snapshot_brings_back_what_was_tuned(simulate):
+def test_restore_brings_back_the_tuned_values(simulate):
     simulation = simulate()
     drone = simulation.drone
     drone.commands.receive(FORWARD)
     fly(simulation, 3)
-    snapshot, before, held = simulation.snapshot(), tuning_of(simulation).values(), drone.parameters
-    flown = fly(simulation, 5)
+    snapshot, before, initial = simulation.snapshot(), tuning_of(simulation).values(), drone.parameters
+    flight = fly(simulation, 5)
     simulation.restore(snapshot)
     changes = {"Pangle": 0.1, "weather/wind/x": 2.0, "sensors/imu/noise/angular_velocity/bias": 1.0}
     tuning_of(simulation).change({**TUNED, **changes, "cmd_vel_timeout": 0.1})
-    assert fly(simulation, 5) != flown
+    assert fly(simulation, 5) != flight
     simulation.restore(snapshot)
-    assert (tuning_of(simulation).values(), drone.parameters, tuning_of(simulation).chosen) == (before, held, {})
+    assert (tuning_of(simulation).values(), drone.parameters, tuning_of(simulation).chosen) == (before, initial, {})
     assert drone.cameras["front"].period == 1
-    assert fly(simulation, 5) == flown
+    assert fly(simulation, 5) == flight
     simulation.start()
     assert tuning_of(simulation).values()["Kzref"] == 5
 
@@ -220,7 +220,7 @@ def test_a_snapshot_brings_back_what_was_tuned(simulate):
 # ---- scripts
 
 
-def test_a_script_declares_parameters_and_hears_of_new_values(simulate, tmp_path):
+def test_script_declares_parameters_and_is_notified_of_new_values(simulate, tmp_path):
     script = tmp_path / "own.py"
     script.write_text(PYTHON, encoding="utf-8")
     simulation = simulate(str(script), script_parameters={"mood": "bright", "rate": 3})
@@ -252,14 +252,14 @@ def gains_of(simulation):
     return {name: value for name, value in tuning_of(simulation).values().items() if name in READ}
 
 
-def test_only_what_the_script_reads_is_offered(simulate, tmp_path):
+def test_only_gains_that_the_script_reads_are_offered(simulate, tmp_path):
     script = tmp_path / "own.py"
     script.write_text(DECLARES.format(Kzref=4), encoding="utf-8")
     simulation = simulate(script_parameters={"of_the_file": 1})
     assert set(gains_of(simulation)) == READ
     simulation.script = str(script)
     simulation.start()
-    assert set(gains_of(simulation)) == READ, "until a step has been flown, nobody knows what will be read"
+    assert set(gains_of(simulation)) == READ, "which gains a script reads is unknown before its first step"
     simulation.step()
     assert gains_of(simulation) == {"Kzref": 4}
     assert {"weather/wind/x", "script_parameters/of_the_file", "cmd_vel_limits/linear"} <= set(
@@ -269,12 +269,12 @@ def test_only_what_the_script_reads_is_offered(simulate, tmp_path):
     assert set(gains_of(simulation)) == {"Kzref"}
 
 
-def test_before_the_first_flight_everything_is_offered(new_simulation):
+def test_all_gains_are_offered_before_the_first_flight(new_simulation):
     simulation = new_simulation({"cameras": SMALL}, started=False)
     assert set(gains_of(simulation)) == READ
 
 
-def test_a_parameter_that_is_asked_for_later_is_counted(simulate, tmp_path):
+def test_gain_that_a_script_reads_later_is_offered_then(simulate, tmp_path):
     script = tmp_path / "own.py"
     text = 'def sysCall_actuation():\n    if sim.getSimulationTime() > 0.1:\n        sim.{}(sim.handle_self, "Dzref")\n'
     script.write_text(text.format("getScriptSimulationParameter"), encoding="utf-8")
@@ -285,10 +285,10 @@ def test_a_parameter_that_is_asked_for_later_is_counted(simulate, tmp_path):
     assert simulation.context.scripts.asked == asked + 1 and set(gains_of(simulation)) == {"Dzref"}
 
 
-def test_a_gain_of_the_scripts_text_gives_way_to_files_and_to_tuning_until_it_is_another(simulate, tmp_path):
+def test_precedence_of_gains_from_script_file_and_tuning(simulate, tmp_path):
     script = tmp_path / "own.py"
 
-    def begun(simulation, text):
+    def start_with(simulation, text):
         script.write_text(DECLARES.format(Kzref=text), encoding="utf-8")
         simulation.start()
         simulation.step()
@@ -297,12 +297,12 @@ def test_a_gain_of_the_scripts_text_gives_way_to_files_and_to_tuning_until_it_is
     script.write_text(DECLARES.format(Kzref=4), encoding="utf-8")
     simulation = simulate(str(script))
     tuning_of(simulation).change({"Kzref": 8.0})
-    assert [begun(simulation, text) for text in (4, 4, 6, 6)] == [8, 8, 6, 6]
+    assert [start_with(simulation, text) for text in (4, 4, 6, 6)] == [8, 8, 6, 6]
     simulation = simulate(str(script), control={"Kzref": 2})
-    assert [begun(simulation, text) for text in (4, 6)] == [2, 2]
+    assert [start_with(simulation, text) for text in (4, 6)] == [2, 2]
 
 
-def test_what_a_script_puts_where_a_gain_was_breaks_nothing(simulate):
+def test_invalid_gains_set_by_a_script_do_not_break_tuning(simulate):
     simulation = simulate()
     own = simulation.child_scripts["drone"].parameters
     own.update(Kzref="much", Dzref=7.0, thrust_limits=[1])
@@ -315,13 +315,13 @@ def test_what_a_script_puts_where_a_gain_was_breaks_nothing(simulate):
 # ---- dump
 
 
-def test_the_flight_of_a_dump_is_the_flight_that_was_tuned(simulate, tmp_path):
+def test_flight_with_a_dump_equals_the_tuned_flight(simulate, tmp_path):
     before = tmp_path / "before.yaml"
     before.write_text(yaml.dump({"sensors": SENSORS, "control": {"Kzref": 9}}), encoding="utf-8")
     first = simulate(config=str(before))
     tuning_of(first).change({**TUNED, "thrust_limits/lowest": 1.0})
     first.start()
-    file = dumped(tuning_of(first).values(), tmp_path / "tuned.yaml")
+    file = write_dump(tuning_of(first).values(), tmp_path / "tuned.yaml")
     second = simulate(config=f"{before},{file}")
     flights = []
     for simulation in (first, second, simulate()):
@@ -332,11 +332,11 @@ def test_the_flight_of_a_dump_is_the_flight_that_was_tuned(simulate, tmp_path):
     assert second.parameters.control.recovery_margin is None
 
 
-def test_a_dump_of_a_hexacopter_has_its_six_propellers(simulate, tmp_path):
+def test_dump_of_a_hexacopter_has_six_propellers(simulate, tmp_path):
     type_of = "package://drone_sim/config/hexacopter.yaml"
     first = simulate(config=type_of, sensors={})
     tuning_of(first).change({"faults/propellers/right": 0.9})
-    file = dumped(tuning_of(first).values(), tmp_path / "six.yaml")
+    file = write_dump(tuning_of(first).values(), tmp_path / "six.yaml")
     second = simulate(config=f"{type_of},{file}", sensors={})
     assert second.drone.faults.now.propellers == (1, 1, 1, 1, 0.9, 1)
 
@@ -356,23 +356,23 @@ def test_a_dump_of_a_hexacopter_has_its_six_propellers(simulate, tmp_path):
         ("encoding.Config", "encoding.Else", "dump.yaml: the tag"),
     ],
 )
-def test_a_mistake_in_a_dump_says_where(simulate, tmp_path, old, new, said):
+def test_error_in_a_dump_is_reported_with_file_and_parameter(simulate, tmp_path, old, new, said):
     file = tmp_path / "dump.yaml"
-    dumped(tuning_of(simulate(sensors={})).values(), file)
+    write_dump(tuning_of(simulate(sensors={})).values(), file)
     text = file.read_text(encoding="utf-8")
     assert old in text
     file.write_text(text.replace(old, new), encoding="utf-8")
-    with pytest.raises(ParameterError) as refused:
+    with pytest.raises(ParameterError) as caught:
         parameters.load({"config": str(file)})
-    assert said in str(refused.value) and "\n" not in str(refused.value)
+    assert said in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_vehicles_are_tuned_one_by_one_in_one_air(simulate):
+def test_gains_are_per_vehicle_and_the_weather_is_shared(simulate):
     simulation = simulate(vehicles={"a": {}, "b": {"position": [0, 2, 0.8]}}, sensors={})
     a, b = simulation.child_scripts.values()
     a.tuning.change({"Kzref": 1.0, "weather/wind/x": 3.0})
-    assert [one.tuning.values()["Kzref"] for one in (a, b)] == [1, 5]
+    assert [entry.tuning.values()["Kzref"] for entry in (a, b)] == [1, 5]
     assert b.tuning.values()["weather/wind/x"] == 3
     simulation.set_vehicles({"a": {}, "c": {"position": [0, 4, 0.8]}})
     simulation.start()
-    assert [one.tuning.values()["Kzref"] for one in simulation.child_scripts.values()] == [1, 5]
+    assert [entry.tuning.values()["Kzref"] for entry in simulation.child_scripts.values()] == [1, 5]

@@ -1,4 +1,4 @@
-"""The tutorial's drone flies as measured in V-REP's numbers: hover, commands, and return from any displacement."""
+"""Flight of the tutorial's drone with V-REP's numbers: hover, commands, and return from displacements."""
 
 import itertools
 import math
@@ -11,7 +11,7 @@ pytestmark = pytest.mark.long
 
 FORWARD, LEFT, UP = Twist(Vector3(1, 0, 0)), Twist(Vector3(0, 1, 0)), Twist(Vector3(0, 0, 1))
 TURN = Twist(Vector3(), Vector3(0, 0, 1))
-COMMANDS = {"vx": (FORWARD, 0), "vy": (LEFT, 1), "vz": (UP, 2), "wz": (TURN, 5)}  # and where it shows
+COMMANDS = {"vx": (FORWARD, 0), "vy": (LEFT, 1), "vz": (UP, 2), "wz": (TURN, 5)}  # command and its index in `velocity`
 STARTS = list(
     itertools.product(
         (0.0, 0.5, -0.5, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0),  # m, above the height to hold
@@ -72,12 +72,12 @@ def test_displaced_starts_return_to_rest(control, propellers, lowest, highest, n
     returned = 0
     for start in STARTS:
         simulation.restore(begin)
-        returned += returns(simulation, *start)
+        returned += returns_to_rest(simulation, *start)
     assert lowest <= returned <= highest
 
 
-def returns(simulation, above, tilted):
-    """Tell whether the drone comes to rest within 12 s, at 5 m; a second of rest decides it."""
+def returns_to_rest(simulation, above, tilted):
+    """Return whether the drone is at rest at 5 m after 12 s, or before that for a whole second."""
     tilt, azimuth = tilted
     half = math.sin(tilt / 2)
     turn = (half * math.cos(azimuth), half * math.sin(azimuth), 0.0, math.cos(tilt / 2))

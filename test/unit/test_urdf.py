@@ -1,4 +1,4 @@
-"""The drone's URDF as one rigid body: V-REP's numbers, derived."""
+"""The drone's URDF as one rigid body, compared with V-REP's numbers."""
 
 import numpy as np
 import pybullet
@@ -25,7 +25,7 @@ def test_composite_is_derived_from_the_cuboid_and_the_four_cylinders():
     assert np.diag(body.inertia) == pytest.approx([4.04e-3, 4.94e-3, 8.93e-3], rel=2e-3)
 
 
-def test_inertia_turns_with_its_link(tmp_path):
+def test_inertia_rotates_with_its_link(tmp_path):
     path = tmp_path / "turned.urdf"
     path.write_text(
         """<robot name="r"><link name="a"><inertial><mass value="1"/>
@@ -36,7 +36,7 @@ def test_inertia_turns_with_its_link(tmp_path):
     )
     body = urdf.read(str(path))
     assert body.centre_of_mass == pytest.approx([0, 0, 2])
-    # Turned about x by 90 degrees, b's y and z moments change places; d = 2 and 1 along z.
+    # Rotated about x by 90 degrees, b's y and z moments are swapped; d = 2 and 1 along z.
     assert body.inertia == pytest.approx(np.diag([1 + 1 + 4 + 2, 1 + 3 + 4 + 2, 1 + 2]), abs=1e-9)
 
 
@@ -55,17 +55,17 @@ def test_front_camera_looks_forward_upright():
         ('type="continuous"', 'type="prismatic"', "type prismatic: must be fixed or continuous"),
     ],
 )
-def test_a_wrong_urdf_gets_one_line(tmp_path, old, new, message):
+def test_invalid_urdf_is_reported_in_one_line(tmp_path, old, new, message):
     path = tmp_path / "wrong.urdf"
     path.write_text(DRONE.read_text().replace(old, new))
-    with pytest.raises(urdf.UrdfError) as refused:
+    with pytest.raises(urdf.UrdfError) as caught:
         urdf.read(str(path))
-    assert message in str(refused.value)
-    assert str(path) in str(refused.value)
-    assert "\n" not in str(refused.value)
+    assert message in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
-def test_any_pybullet_program_can_load_it():
+def test_pybullet_can_load_the_urdf_directly():
     client = pybullet.connect(pybullet.DIRECT)
     drone = pybullet.loadURDF(str(DRONE), physicsClientId=client)
     links = range(-1, pybullet.getNumJoints(drone, client))

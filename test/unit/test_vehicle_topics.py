@@ -1,4 +1,4 @@
-"""Which vehicles keep their topics when another scene is loaded, and what late steps leave out."""
+"""Topics of vehicles when another scene is loaded, time stamps, and what late steps skip."""
 
 import contextlib
 from types import SimpleNamespace
@@ -26,7 +26,7 @@ criteria: [{kind: reach, places: [[1, 0, 1]], within: 0.3}]
 
 
 class Topics:
-    """Those of one vehicle, without a master."""
+    """The topics of one vehicle, without a ROS master."""
 
     def __init__(self, _simulation, vehicle, _inbox, _gate):
         self.vehicle, self.is_open = vehicle, True
@@ -55,7 +55,7 @@ def _fleet(monkeypatch, tmp_path, new_simulation):
     return vehicle_topics.FleetTopics(simulation, None, None)
 
 
-def test_a_vehicle_that_begins_elsewhere_keeps_its_topics(fleet, tmp_path):
+def test_vehicle_with_another_start_position_keeps_its_topics(fleet, tmp_path):
     simulation, (topics,) = fleet._simulation, fleet._topics.values()
     (tmp_path / "plan.yaml").write_text(PLAN)
     simulation.load_scene(scene_file(plans.read(tmp_path / "plan.yaml"), 3))
@@ -73,7 +73,7 @@ def test_a_vehicle_that_begins_elsewhere_keeps_its_topics(fleet, tmp_path):
         ("script: target", False),
     ],
 )
-def test_what_topics_depend_on(fleet, tmp_path, said, stays):
+def test_topics_are_closed_only_if_cameras_or_script_change(fleet, tmp_path, said, stays):
     (topics,) = fleet._topics.values()
     scene = tmp_path / "scene.yaml"
     scene.write_text(f"vehicles: {{drone: {{{said}}}}}\n")
@@ -92,15 +92,15 @@ NOW = 1.7e9  # s
 @pytest.mark.parametrize(
     ("moved", "apart"),
     [
-        (STEP, 0.01),  # not at all: 0.01 s ago is 0.01 s ago
-        (STEP / 2, 0.005),  # a step that came faster, after a late one
+        (STEP, 0.01),  # the clock was not set
+        (STEP / 2, 0.005),  # a shorter step after a late one
         (3600.0, 0.01),
         (-0.5, 0.01),
         (-3600.0, 0.01),
         (-NOW + 1, 0.01),  # 1970
     ],
 )
-def test_what_was_measured_within_a_step_is_stamped_shortly_before_it(monkeypatch, moved, apart):
+def test_measurement_within_a_step_is_stamped_before_the_end_of_the_step(monkeypatch, moved, apart):
     clock = [NOW]
     monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time.from_sec(clock[0]))
     parameters = SimpleNamespace(time_step=STEP, real_time_factor=1.0)
@@ -113,7 +113,7 @@ def test_what_was_measured_within_a_step_is_stamped_shortly_before_it(monkeypatc
 
 
 class Publisher:
-    """It counts subscribers, and publishes nothing."""
+    """A publisher with given numbers of subscribers that publishes nothing."""
 
     subscribers: ClassVar[dict] = {}  # by topic
 
@@ -126,7 +126,7 @@ class Publisher:
 
 @pytest.fixture(name="pictures")
 def _pictures(monkeypatch, new_simulation, fleet):
-    """Return a function that flies 16 steps, late or not, and returns those with a picture for who is heard."""
+    """Return a function that returns `fly`, which runs 16 steps and returns the steps that have a picture."""
     monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
     monkeypatch.setattr(rospy, "Publisher", Publisher)
     monkeypatch.setattr(cameras, "Server", mock.Mock())
@@ -139,15 +139,15 @@ def _pictures(monkeypatch, new_simulation, fleet):
         output = cameras.CameraOutput(own, camera, own.cameras["front"], None)
         fleet._topics = {"drone": SimpleNamespace(cameras=[("front", output)])}
 
-        def fly(is_late, *heard):
-            Publisher.subscribers = dict.fromkeys(heard, 1)
-            before, seen = simulation.steps, []
+        def fly(is_late, *subscribed):
+            Publisher.subscribers = dict.fromkeys(subscribed, 1)
+            before, step_numbers = simulation.steps, []
             for _ in range(16):
                 with fleet.hurrying() if is_late else contextlib.nullcontext():
                     simulation.step()
                 if camera.image is not None:
-                    seen.append(simulation.steps - before)
-            return seen
+                    step_numbers.append(simulation.steps - before)
+            return step_numbers
 
         return fly
 
@@ -158,32 +158,32 @@ RAW, COMPRESSED = "drone/front", "drone/front/compressed"
 
 
 @pytest.mark.parametrize("every", [1, 2])
-def test_late_steps_leave_out_pictures_that_only_go_out_compressed(pictures, every):
-    fly, all_of_them = pictures(every), list(range(every, 17, every))
-    assert fly(False, COMPRESSED) == all_of_them
-    assert fly(True, COMPRESSED) == all_of_them[3::4], "no more than three are left out in a row"
-    assert fly(True, COMPRESSED, RAW) == all_of_them
+def test_late_steps_skip_pictures_with_only_compressed_subscribers(pictures, every):
+    fly, all_steps = pictures(every), list(range(every, 17, every))
+    assert fly(False, COMPRESSED) == all_steps
+    assert fly(True, COMPRESSED) == all_steps[3::4], "at most three are skipped in a row"
+    assert fly(True, COMPRESSED, RAW) == all_steps
     assert fly(True) == []
-    assert fly(False, COMPRESSED) == all_of_them
+    assert fly(False, COMPRESSED) == all_steps
 
 
-def test_pictures_that_a_fault_delays_come_as_late_as_it_says_also_in_late_steps(pictures):
+def test_late_steps_do_not_change_the_delay_of_pictures_by_a_fault(pictures):
     fly = pictures(images={"latency": 0.15})
     assert fly(True, COMPRESSED) == list(range(4, 17))
 
 
 @pytest.mark.parametrize(("lockstep", "shown"), [(None, [3, 7, 11]), (mock.Mock(), list(range(12)))])
-def test_late_steps_leave_out_markers_but_three_times_in_a_row_at_most(lockstep, shown):
-    node, markers, seen = Node.__new__(Node), mock.Mock(), []
+def test_late_steps_skip_markers_at_most_three_times_in_a_row(lockstep, shown):
+    node, markers, step_numbers = Node.__new__(Node), mock.Mock(), []
     vars(node).update(_pacer=SimpleNamespace(is_late=True), _lockstep=lockstep, _rviz=[markers], _left_out=0)
     vars(node).update(_parameters=SimpleNamespace(gui=False))
     others = ("topics", "windows", "signals", "inspection", "editing", "interventions", "beat")
     vars(node).update({f"_{other}": mock.Mock() for other in others})
     for step in range(12):
-        markers.update.side_effect = lambda step=step: seen.append(step)
+        markers.update.side_effect = lambda step=step: step_numbers.append(step)
         node._publish_displays()
-    assert seen == shown and node._editing.update.call_count == len(shown)
+    assert step_numbers == shown and node._editing.update.call_count == len(shown)
     assert node._topics.publish_command.call_count == 12
     node._pacer.is_late = False
     node._publish_displays()
-    assert seen == [*shown, 11], "the step after"
+    assert step_numbers == [*shown, 11], "the next punctual step publishes them"

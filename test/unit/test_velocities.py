@@ -1,4 +1,4 @@
-"""What scripts are told of velocities and time, as V-REP measures them."""
+"""Velocities and times that scripts read, as V-REP measures them."""
 
 import json
 
@@ -60,43 +60,43 @@ def _told(new_shared_simulation):
 
 
 def sensed(told, index):
-    return [one for one in told if one["phase"] == "sensing"][index]
+    return [sample for sample in told if sample["phase"] == "sensing"][index]
 
 
-def test_time_goes_on_after_the_sensing_phase(told):
-    assert [one["phase"] for one in told[:4]] == ["actuation", "sensing"] * 2
-    assert [one["time"] for one in told] == pytest.approx([STEP * (index // 2) for index in range(12)])
-    assert [one["pass"] for one in told] == [index // 2 for index in range(12)]
+def test_time_advances_after_the_sensing_phase(told):
+    assert [sample["phase"] for sample in told[:4]] == ["actuation", "sensing"] * 2
+    assert [sample["time"] for sample in told] == pytest.approx([STEP * (index // 2) for index in range(12)])
+    assert [sample["pass"] for sample in told] == [index // 2 for index in range(12)]
 
 
-def test_a_fall_is_measured_as_the_mean_of_the_step_and_reached_at_its_end(told):
+def test_fall_has_the_mean_and_the_final_velocity_of_the_step(told):
     for index in range(6):
-        # Semi-implicit Euler: of 10 sub-steps of 5 ms each goes at the velocity that it ends with.
+        # Semi-implicit Euler: each of the 10 sub-steps of 5 ms moves with its final velocity.
         mean = -GRAVITY * (STEP * index + 0.0275)
         assert sensed(told, index)["measured"][BASE][0] == pytest.approx([0, 0, mean], abs=1e-9)
         assert sensed(told, index)["reached"][BASE][0] == pytest.approx([0, 0, -GRAVITY * STEP * (index + 1)], abs=1e-9)
 
 
 @pytest.mark.parametrize("which", [ROD, TIP])
-def test_a_turn_is_measured_in_euler_angles_of_its_own_frame_or_as_a_rotation_vector(told, which):
+def test_angular_velocity_is_given_as_euler_angles_or_rotation_vector(told, which):
     before, now = (sensed(told, index) for index in (0, 1))
-    turns = [np.reshape(one["matrices"][which], (3, 4))[:, :3] for one in (before, now)]
-    places = [np.reshape(one["matrices"][which], (3, 4))[:, 3] for one in (before, now)]
+    turns = [np.reshape(sample["matrices"][which], (3, 4))[:, :3] for sample in (before, now)]
+    positions = [np.reshape(sample["matrices"][which], (3, 4))[:, 3] for sample in (before, now)]
     turn = frames.relative_turn(before["matrices"][which], now["matrices"][which])
     linear, angular = now["measured"][which]
-    assert linear == pytest.approx((places[1] - places[0]) / STEP, abs=1e-9)
+    assert linear == pytest.approx((positions[1] - positions[0]) / STEP, abs=1e-9)
     assert angular == pytest.approx(np.array(frames.to_euler(turn)) / STEP, abs=1e-9)
     assert now["axis"][which] == pytest.approx(Rotation.from_matrix(turns[1] @ turns[0].T).as_rotvec() / STEP, abs=1e-9)
     assert now["axis"][which] == pytest.approx([4, 7, 4], abs=1e-6)
     assert np.linalg.norm(np.subtract(angular, now["axis"][which])) > 0.5
 
 
-def test_what_a_script_moves_is_as_fast_as_that(told):
+def test_object_moved_by_a_script_has_the_velocity_of_that_motion(told):
     assert sensed(told, 2)["measured"][PAD][0] == pytest.approx([0.1 / STEP, 0, 0])
     assert sensed(told, 2)["reached"][PAD][0] == [0, 0, 0]
 
 
-def test_what_the_dynamics_moves_has_not_moved_where_a_script_puts_it(told):
+def test_placing_a_dynamic_object_by_script_does_not_count_as_motion(told):
     for index in (2, 3, 4):
         assert abs(sensed(told, index)["measured"][ROD][0][0]) < 1e-9
     assert sensed(told, 3)["matrices"][ROD][3] == pytest.approx(-5)

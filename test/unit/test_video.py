@@ -1,4 +1,4 @@
-"""Videos: what a camera saw, with what the drone did written over it; read back with a decoder."""
+"""Videos of a flight: the pictures of a camera with an overlay of the drone's state, read with a decoder."""
 
 import math
 
@@ -16,13 +16,13 @@ LEVEL = hud.HudState(time=1.0, state="flying", height=0.8, speed=0.0, roll=0.0, 
 SKY, GROUND = [200, 130, 60], [50, 90, 130]  # BGR
 
 
-def decoded(path):
+def read_video(path):
     reader = cv2.VideoCapture(str(path))
     rate = reader.get(cv2.CAP_PROP_FPS)
     pictures = []
     while True:
-        there, picture = reader.read()
-        if not there:
+        has_picture, picture = reader.read()
+        if not has_picture:
             return pictures, rate
         pictures.append(picture)
 
@@ -36,20 +36,20 @@ def differences(first, second):
     return abs(first.astype(int) - second).mean(axis=(1, 2))
 
 
-# ---- the flight's
+# ---- video of a flight
 
 
-def test_a_flight_is_filmed_as_its_camera_saw_it(tmp_path, new_simulation):
+def test_video_shows_the_pictures_of_the_camera(tmp_path, new_simulation):
     out, commands = tmp_path / "out.mp4", tmp_path / "commands.yaml"
     commands.write_text("[{at: 0, twist: {linear: [1, 0, 0.5]}}]")
     flight = ["--commands", str(commands), "--duration", "1.0"]
     small = ["cameras.track.width=320", "cameras.track.height=240", "cameras.track.every=2"]
     assert main([*flight, "--set", *small, "--video", str(out), "--camera", "track"]) == 0
-    pictures, rate = decoded(out)
+    pictures, rate = read_video(out)
     assert (len(pictures), rate, pictures[0].shape) == (10, 10.0, (240, 320, 3))
     with av.open(str(out)) as made:
         codec = made.streams.video[0].codec_context
-        assert (codec.name, codec.pix_fmt) == ("h264", "yuv420p"), "what browsers play"
+        assert (codec.name, codec.pix_fmt) == ("h264", "yuv420p"), "the format that browsers play"
     assert not list(tmp_path.glob(".*"))
 
     simulation = new_simulation({"cameras": {"track": {"width": 320, "height": 240}}})
@@ -59,24 +59,24 @@ def test_a_flight_is_filmed_as_its_camera_saw_it(tmp_path, new_simulation):
     track = simulation.drone.cameras["track"]
     track.viewers.add(lambda: True)
     simulation.step()
-    seen = cv2.cvtColor(track.image, cv2.COLOR_RGB2BGR)
-    rows = differences(pictures[-1], seen)
-    assert rows[20:150].mean() < 6  # but for what the codec leaves out
+    last_picture = cv2.cvtColor(track.image, cv2.COLOR_RGB2BGR)
+    rows = differences(pictures[-1], last_picture)
+    assert rows[20:150].mean() < 6  # except for the losses of the codec
     assert min(rows[:15].mean(), rows[-15:].mean()) > 40  # the strips of the display
 
 
-def test_filming_changes_nothing_in_the_flight(tmp_path):
+def test_recording_a_video_does_not_change_the_flight(tmp_path):
     for name, more in (("a", []), ("b", ["--video", str(tmp_path / "b.mp4")])):
         assert main(["--duration", "0.5", "--csv", str(tmp_path / f"{name}.csv"), *more]) == 0
     assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
 
 
-def test_a_flight_that_fails_leaves_its_film_and_one_that_cannot_begin_the_last_one(tmp_path, capsys):
+def test_failed_flight_leaves_its_video_and_failed_start_keeps_the_previous_one(tmp_path, capsys):
     out, script = tmp_path / "out.mp4", tmp_path / "script.py"
     script.write_text("def sysCall_actuation():\n    if sim.getSimulationTime() > 0.49:\n        undefined\n")
     arguments = ["--video", str(out), "--camera", "floor"]
     assert main(["--script", str(script), *arguments]) == 1
-    pictures, _ = decoded(out)
+    pictures, _ = read_video(out)
     assert (len(pictures), pictures[0].shape) == (10, (256, 256, 3))
     assert "wrote" in capsys.readouterr().out
     before = out.read_bytes()
@@ -93,35 +93,35 @@ def test_a_flight_that_fails_leaves_its_film_and_one_that_cannot_begin_the_last_
     ("shape", "made"),
     [((1, 1), (240, 240)), ((100, 161), (300, 484)), ((479, 641), (480, 642)), ((1, 4096), (240, 4096))],
 )
-def test_any_size_can_be_played(tmp_path, shape, made):
+def test_video_of_any_picture_size_can_be_played(tmp_path, shape, made):
     path = tmp_path / "out.mp4"
     with video.writing_to(str(path), 20) as writing:
         writing.add(grey(*shape), LEVEL, times=2)
-    pictures, _ = decoded(path)
+    pictures, _ = read_video(path)
     assert [picture.shape for picture in pictures] == [(*made, 3)] * 2
 
 
-def test_depth_is_grey_and_colours_are_what_they_are():
+def test_depth_becomes_grey_and_colours_are_unchanged():
     assert to_color(np.array([[0.0, 3.0, np.nan]], np.float32))[0, :, 0].tolist() == [255, 127, 0]
     assert to_color(np.full((1, 1, 3), (1, 2, 3), np.uint8)).tolist() == [[[3, 2, 1]]]
 
 
-def test_a_film_that_cannot_be_written_whole_is_told(tmp_path):
+def test_incomplete_video_is_reported_and_removed(tmp_path):
     path = tmp_path / "out.mp4"
-    said = r"out\.mp4: only 0 of 3 pictures were written"
-    with pytest.raises(OSError, match=said), video.writing_to(str(path), 20) as film:
+    error_pattern = r"out\.mp4: only 0 of 3 pictures were written"
+    with pytest.raises(OSError, match=error_pattern), video.writing_to(str(path), 20) as film:
         film.add(grey(), None, times=3)
         film._path = str(tmp_path / "elsewhere.mp4")
     assert not list(tmp_path.iterdir())
 
 
-def test_one_that_is_interrupted_can_be_played_as_far_as_it_goes(tmp_path):
+def test_interrupted_video_can_be_played(tmp_path):
     path = tmp_path / "out.mp4"
     with pytest.raises(KeyboardInterrupt), video.writing_to(str(path), 20) as film:
         film.add(grey(), None, times=3)
         raise KeyboardInterrupt
     before = path.read_bytes()
-    assert len(decoded(path)[0]) == 3
+    assert len(read_video(path)[0]) == 3
     with pytest.raises(OSError, match=r"out\.mp4: interrupted"), video.writing_to(str(path), 20):
         raise KeyboardInterrupt
     assert path.read_bytes() == before
@@ -130,11 +130,11 @@ def test_one_that_is_interrupted_can_be_played_as_far_as_it_goes(tmp_path):
 # ---- the display
 
 
-def test_the_display_leaves_the_middle_of_the_picture_alone():
+def test_overlay_does_not_cover_the_middle_of_the_picture():
     shown = grey()
     hud.draw(shown, LEVEL)
     changed = (shown != grey()).any(axis=2)
-    assert min(changed[:15].mean(), changed[-15:].mean()) > 0.95  # a letter's edge may have the picture's own colour
+    assert min(changed[:15].mean(), changed[-15:].mean()) > 0.95  # a letter's edge may have the colour of the picture
     assert not changed[20:160].any()
     assert (shown[:15] > 150).any(), "there is text"
 
@@ -149,7 +149,7 @@ def test_the_display_leaves_the_middle_of_the_picture_alone():
         (0.0, -1.5, "up down left right", ""),
     ],
 )
-def test_the_horizon_turns_and_climbs(roll, pitch, sky, ground):
+def test_artificial_horizon_shows_roll_and_pitch(roll, pitch, sky, ground):
     shown = grey(480, 640)
     hud.draw(shown, LEVEL._replace(roll=roll, pitch=pitch))
     dial = hud.dial(shown)
@@ -161,7 +161,7 @@ def test_the_horizon_turns_and_climbs(roll, pitch, sky, ground):
     assert [dial[places[name]].tolist() for name in ground.split()] == [GROUND] * len(ground.split())
 
 
-def test_it_shows_what_a_row_of_a_recording_says():
+def test_overlay_shows_the_values_of_a_recorded_row():
     half = math.sqrt(0.5)
     row = (2.5, 1, 2, 3, 0, 0, half, half, 3, 4, 0, 0, 0, 0)
     shown = hud.HudState.of(row, "flying")

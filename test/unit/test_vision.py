@@ -38,7 +38,7 @@ simulation.close()
 def pictures_of_a_process(folder, **environment):
     file = folder / "pictures.npz"
     command = [sys.executable, "-c", PICTURE.format(scene=SCENE), str(file)]
-    ended = subprocess.run(
+    completed = subprocess.run(
         command,
         env={**os.environ, "PYTHONPATH": SOURCE, **environment},
         capture_output=True,
@@ -46,8 +46,8 @@ def pictures_of_a_process(folder, **environment):
         check=False,
         timeout=100,
     )
-    assert ended.returncode == 0, ended.stderr
-    return dict(np.load(file)), ended.stderr
+    assert completed.returncode == 0, completed.stderr
+    return dict(np.load(file)), completed.stderr
 
 
 def red(picture):
@@ -56,20 +56,20 @@ def red(picture):
 
 
 def test_without_egl_pybullet_draws_the_same_view_after_one_warning(tmp_path):
-    # glvnd finds its vendors by this list: an empty one is a machine without EGL.
-    drawn, warnings = pictures_of_a_process(tmp_path, __EGL_VENDOR_LIBRARY_FILENAMES="/dev/null")
+    # glvnd reads its vendors from this list; an empty list is like a machine without EGL.
+    rendered, warnings = pictures_of_a_process(tmp_path, __EGL_VENDOR_LIBRARY_FILENAMES="/dev/null")
     assert warnings.count("WARNING") == 1, warnings
     assert "TinyRenderer" in warnings
     expected, quiet = pictures_of_a_process(tmp_path)
     assert "WARNING" not in quiet
-    ours, theirs = red(expected["front"]), red(drawn["front"])
+    ours, theirs = red(expected["front"]), red(rendered["front"])
     assert (ours & theirs).sum() / (ours | theirs).sum() > 0.98
     both = ours & theirs
-    assert drawn["depth"][both] == pytest.approx(expected["depth"][both], abs=0.02)
-    assert np.isnan(drawn["depth"][0]).all()
+    assert rendered["depth"][both] == pytest.approx(expected["depth"][both], abs=0.02)
+    assert np.isnan(rendered["depth"][0]).all()
 
 
-def test_a_picture_is_taken_only_while_somebody_looks(new_simulation):
+def test_pictures_are_taken_only_while_there_is_a_viewer(new_simulation):
     simulation = new_simulation()
     front = simulation.drone.cameras["front"]
     simulation.step()
@@ -82,7 +82,7 @@ def test_a_picture_is_taken_only_while_somebody_looks(new_simulation):
     assert front.image is None
 
 
-def test_the_own_body_is_not_in_the_front_picture(new_simulation):
+def test_front_camera_does_not_see_its_own_vehicle(new_simulation):
     simulation = new_simulation()
     depth = simulation.drone.cameras["depth"].take()
     assert np.nanmin(depth) > 0.5
@@ -100,12 +100,12 @@ def test_the_track_camera_stays_level_while_its_parent_is_the_track_frame(new_si
         simulation = new_simulation({"cameras": {"track": {"mount": {"parent": parent}}}})
         simulation.drone.body.move(simulation.drone.body.state._replace(orientation=(0.2, 0.0, 0.0, 0.98)))
         simulation.step()
-        across = simulation.drone.cameras["track"].pose()[8]  # z of the optical x axis in the world
-        level[parent] = abs(across) < 1e-6
+        x_axis_height = simulation.drone.cameras["track"].pose()[8]  # z of the optical x axis in the world
+        level[parent] = abs(x_axis_height) < 1e-6
     assert level == {"Track_base": True, "Quadricopter_base": False}
 
 
-SEES = """
+SCRIPT = """
 import numpy as np
 def sysCall_init():
     self.camera = sim.getObject('/FrontVision')
@@ -122,10 +122,10 @@ def as_script(picture):
 
 @pytest.fixture(name="simulation")
 def _simulation(new_simulation):
-    return new_simulation(SMALL, python=SEES)
+    return new_simulation(SMALL, python=SCRIPT)
 
 
-def test_a_camera_sees_what_is_there_now(simulation):
+def test_a_camera_image_shows_the_current_scene(simulation):
     front = simulation.drone.cameras["front"]
     front.viewers.add(lambda: True)
     first = front.take()
@@ -136,9 +136,9 @@ def test_a_camera_sees_what_is_there_now(simulation):
     assert np.array_equal(moved, front.take()) and not np.array_equal(moved, first)
     snapshot = simulation.snapshot()
     simulation.step()
-    flown = front.image
-    assert simulation.context.signals.get(str, "sensing") == as_script(flown)
-    assert np.array_equal(flown, front.take()) and not np.array_equal(flown, moved)
+    after_step = front.image
+    assert simulation.context.signals.get(str, "sensing") == as_script(after_step)
+    assert np.array_equal(after_step, front.take()) and not np.array_equal(after_step, moved)
     simulation.restore(snapshot)
     simulation.look()
     assert np.array_equal(front.image, moved)
@@ -149,7 +149,7 @@ def test_a_camera_sees_what_is_there_now(simulation):
     assert simulation.context.signals.get(str, "init") == as_script(first)
 
 
-def test_another_scene_is_seen_at_once(simulation, tmp_path):
+def test_camera_sees_another_scene_immediately(simulation, tmp_path):
     front = simulation.drone.cameras["front"]
     first = front.look()
     (tmp_path / "scene.yaml").write_text("objects: [{shape: box, size: [1, 1, 1], position: [3, 0, 0.8]}]")
@@ -158,19 +158,19 @@ def test_another_scene_is_seen_at_once(simulation, tmp_path):
     assert now == as_script(front.take()) != as_script(first)
 
 
-def test_what_has_not_changed_is_not_drawn_again(simulation):
+def test_unchanged_view_is_not_rendered_again(simulation):
     front = simulation.drone.cameras["front"]
     assert front.look() is front.look()
     simulation.drone.body.move(Pose((0, 0, 1)))
     assert front.look() is not None
-    again = front.look()
+    cached = front.look()
     simulation.look()
-    assert front.look() is again
+    assert front.look() is cached
     objects = simulation.context.objects
     camera = objects[objects.handle("FrontVision")]
-    here = camera.matrix()
-    camera.put((*here[:3], here[3] + 0.5, *here[4:]))  # a script moves the camera
-    assert not np.array_equal(front.look(), again)
+    camera_matrix = camera.matrix()
+    camera.put((*camera_matrix[:3], camera_matrix[3] + 0.5, *camera_matrix[4:]))  # a script moves the camera
+    assert not np.array_equal(front.look(), cached)
 
 
 def depths_and_colours(sim, handle):
@@ -179,7 +179,7 @@ def depths_and_colours(sim, handle):
     return np.frombuffer(image, np.uint8).reshape(*size[::-1], 3), np.frombuffer(depth, "<f4").reshape(size[::-1])
 
 
-def test_every_sensor_gives_colours_and_depths(new_simulation):
+def test_every_vision_sensor_returns_colours_and_depths(new_simulation):
     eye = {
         "name": "Eye",
         "kind": "vision_sensor",
@@ -188,8 +188,8 @@ def test_every_sensor_gives_colours_and_depths(new_simulation):
         "width": 64,
     }
     simulation = new_simulation({"scene": {"objects": [*SCENE["scene"]["objects"], {**eye, "height": 48}]}})
-    around = services([simulation.drone], simulation.context, simulation.operations, TimeLimit(0.0), Turns())
-    sim = make_sim(simulation.child_scripts["drone"], around)
+    scene_services = services([simulation.drone], simulation.context, simulation.operations, TimeLimit(0.0), Turns())
+    sim = make_sim(simulation.child_scripts["drone"], scene_services)
     for name in ("FrontVision", "DepthVision", "Eye"):
         handle = sim.getObjectHandle(name)
         colours, depths = depths_and_colours(sim, handle)
@@ -197,10 +197,10 @@ def test_every_sensor_gives_colours_and_depths(new_simulation):
         assert box.sum() > 20 and box[box.shape[0] // 2, box.shape[1] // 2]
         near = depths[box].min()
         assert 1.4 < near < 1.8 and depths[box].max() < near + 0.01
-        assert np.isinf(depths[-1]).all(), "the sky"
+        assert np.isinf(depths[-1]).all(), "the sky has no depth"
         _, values, _ = sim.readVisionSensor(handle)
         assert values[4] == pytest.approx(sim.getVisionSensorDepthBuffer(handle)[depths.argmin()])
-        assert values[6] > 0.5, "the reddest"
+        assert values[6] > 0.5, "the maximum of red"
 
 
 LARGE = """
@@ -216,7 +216,7 @@ end
 """
 
 
-def test_an_image_of_a_large_sensor_comes_as_numbers(new_simulation):
+def test_lua_receives_the_image_of_a_large_sensor_as_numbers(new_simulation):
     eye = {"name": "Eye", "kind": "vision_sensor", "width": 640, "height": 560}  # more than a million numbers
     signals = new_simulation({"scene": {"objects": [eye]}, "script_time_limit": 0.0}, lua=LARGE).context.signals
     numbers = [signals.get(int, name) for name in ("numbers", "depths", "bytes")]
@@ -224,20 +224,20 @@ def test_an_image_of_a_large_sensor_comes_as_numbers(new_simulation):
 
 
 @pytest.mark.parametrize(("width", "height"), [(80, 40), (40, 80), (80, 80)])
-def test_the_field_of_view_is_that_of_the_larger_side(new_simulation, width, height):
+def test_field_of_view_applies_to_the_larger_side(new_simulation, width, height):
     down = {"position": [9, 9, 3], "rpy": [np.pi, 0, 0], "fov": np.pi / 2, "width": width, "height": height}
     eye = {"name": "Eye", "kind": "vision_sensor", **down}
     box = {"name": "Box", "shape": "box", "size": [0.5, 0.5, 1], "position": [9, 9, 0.5]}  # 2 m below the sensor
     simulation = new_simulation({"scene": {"objects": [eye, box]}})
     tree = simulation.context.objects
-    seen = tree[tree.resolve("Eye")].picture("handles") == tree.resolve("Box")
-    assert seen.any(axis=0).sum() == seen.any(axis=1).sum() == 10  # 80 px are 4 m there
+    is_box = tree[tree.resolve("Eye")].picture("handles") == tree.resolve("Box")
+    assert is_box.any(axis=0).sum() == is_box.any(axis=1).sum() == 10  # 80 px are 4 m there
 
 
-def test_the_right_camera_of_the_stereo_pair_projects_what_is_in_the_left_one_s_frame(new_simulation):
+def test_right_stereo_camera_projects_points_given_in_the_left_cameras_frame(new_simulation):
     simulation = new_simulation({"config": str(package_path() / "config" / "stereo.yaml")})
     left, right = (simulation.drone.cameras[name] for name in ("left", "right"))
-    point = np.array([0.3, -0.2, 2.0, 1.0])  # m, in the left one's frame
+    point = np.array([0.3, -0.2, 2.0, 1.0])  # m, in the frame of the left camera
     poses = [np.reshape((*one.pose(), 0, 0, 0, 1), (4, 4)) for one in (left, right)]
     own = np.linalg.inv(poses[1]) @ poses[0] @ point
     u, v, w = np.reshape(right.intrinsics.P, (3, 4)) @ point

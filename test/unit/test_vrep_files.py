@@ -1,4 +1,4 @@
-"""V-REP's files are read to the last byte; what is no such file, or a broken one, gets one line."""
+"""Reading of V-REP files; an invalid file is reported in one line."""
 
 import itertools
 import math
@@ -31,32 +31,32 @@ HALF_TURN_ABOUT_Z = (0.0, 0.0, 0.0, 1.0)  # w, x, y, z
 
 @pytest.mark.parametrize("compressed", [False, True])
 @pytest.mark.parametrize("version", [16, 22, 23, 24, 25])
-def test_both_widths_and_both_compressions(version, compressed):
+def test_single_and_double_precision_with_and_without_compression(version, compressed):
     own = (
         integers("Jtt", 10)
         + numbers("_rt", "Prt", 0.5, version=version)
         + numbers("_mr", "Pmr", -1, 3, version=version)
     )
     joint = scene_object("JNT", 3, "Hinge", at=(1, 2, 3), own=own, version=version)
-    (found,) = read(file(joint, version=version, compressed=compressed)).objects
-    assert (found.name, found.pose.position, found.of.position, found.of.limits) == ("Hinge", (1, 2, 3), 0.5, (-1, 2))
+    (data,) = read(file(joint, version=version, compressed=compressed)).objects
+    assert (data.name, data.pose.position, data.of.position, data.of.limits) == ("Hinge", (1, 2, 3), 0.5, (-1, 2))
 
 
-def test_a_double_counts_where_both_are_there():
+def test_double_tag_takes_precedence_over_the_single_tag():
     level = numbers("_y2", "Dy2", 0.1, version=25) + numbers("_y2", "Dy2", 0.9, version=22)
     assert read(file(scene_object("DMY", 0, "D", own=level))).objects[0].of.size == 0.1
 
 
-def test_unknown_tags_are_passed_over():
+def test_unknown_tags_are_ignored():
     unknown = chunk("???", b"anything")
     dummy = scene_object("DMY", 0, "D", base=unknown, own=unknown)
-    found = read(file(chunk("New", b"x"), dummy, version=25))
-    assert [one.name for one in found.objects] == ["D"]
+    data = read(file(chunk("New", b"x"), dummy, version=25))
+    assert [one.name for one in data.objects] == ["D"]
 
 
 def test_a_child_may_come_before_its_parent():
-    found = read(file(scene_object("DMY", 5, "Child", parent=9), scene_object("DMY", 9, "Parent"))).objects
-    assert [one.name for one in found] == ["Parent", "Child"] and found[0].children == [found[1]]
+    data = read(file(scene_object("DMY", 5, "Child", parent=9), scene_object("DMY", 9, "Parent"))).objects
+    assert [one.name for one in data] == ["Parent", "Child"] and data[0].children == [data[1]]
 
 
 def test_names_and_aliases():
@@ -71,29 +71,29 @@ def test_names_and_aliases():
 # ---- shapes
 
 
-def test_a_mesh_has_a_place_in_its_shape():
-    found = read(file(shape(0, "S", mesh("cylinder", (2, 2, 5), (0, 0, 4), HALF_TURN_ABOUT_Z)))).objects[0].shape
-    (one,) = found.meshes
+def test_mesh_is_placed_in_the_frame_of_its_shape():
+    data = read(file(shape(0, "S", mesh("cylinder", (2, 2, 5), (0, 0, 4), HALF_TURN_ABOUT_Z)))).objects[0].shape
+    (one,) = data.meshes
     assert np.allclose(one.vertices, [[0, 0, 4], [-1, 0, 4], [0, -1, 4]])
     assert (one.primitive.word, one.primitive.size, one.primitive.pose.position) == ("cylinder", (2, 2, 5), (0, 0, 4))
 
 
 @pytest.mark.parametrize("faces", ["Ind", "In2"])
-def test_meshes_may_lie_in_a_pool(faces):
+def test_meshes_may_be_stored_in_a_pool(faces):
     indices = {"Ind": struct.pack("<3i", 2, 1, 0), "In2": packed([2, 1, 0])}[faces]
     pool = chunk("VIN", chunk("Ver", struct.pack("<9f", *range(9))) + chunk(faces, indices) + b"EOO")
     (one,) = read(file(pool, shape(0, "S", mesh(inline=False)))).objects[0].shape.meshes
     assert one.faces.tolist() == [[2, 1, 0]] and one.vertices[2].tolist() == [6, 7, 8]
 
 
-def test_a_compound_in_a_compound_is_flat_and_the_root_has_the_mass():
+def test_nested_compounds_are_flattened_and_the_root_has_the_mass():
     inner = chunk("Wrp", weight(7.0) + chunk("Geo", b"EOO" + mesh(size=(1, 2, 3))) + b"EOO")
     outer = chunk("Gsg", weight(0.5, (1, 2, 3), (0, 0, 0.1)) + inner + chunk("Geo", b"EOO" + mesh("sphere")) + b"EOO")
     own = chunk("Ge2", outer + b"EOO") + chunk("Sss", b"\x80") + chunk("Ss3", b"\x01")
-    found = read(file(scene_object("SHP", 0, "S", own=own))).objects[0].shape
-    assert [one.primitive.word for one in found.meshes] == ["cuboid", "spheroid"]
-    assert (found.mass, found.inertia.moments, found.inertia.pose.position) == (0.5, (1, 2, 3), (0, 0, 0.1))
-    assert found.is_dynamic and found.is_respondable
+    data = read(file(scene_object("SHP", 0, "S", own=own))).objects[0].shape
+    assert [one.primitive.word for one in data.meshes] == ["cuboid", "spheroid"]
+    assert (data.mass, data.inertia.moments, data.inertia.pose.position) == (0.5, (1, 2, 3), (0, 0, 0.1))
+    assert data.is_dynamic and data.is_respondable
 
 
 def test_packed_faces_of_every_length():
@@ -108,14 +108,14 @@ def test_colours():
     old = chunk(
         "Cl0", chunk("Cl2", struct.pack("<12f", 0.17, 0.34, 0.51, 0.34, 0.34, 0.34, *[0] * 6)) + chunk("Var", b"\x04")
     )
-    found = [read(file(shape(0, "S", mesh(more=color)))).objects[0].shape.meshes[0].color for color in (new, old)]
-    assert np.allclose(found, [(0.1, 0.2, 0.3, 0.5), (0.4, 0.6, 0.8, 1.0)])
+    data = [read(file(shape(0, "S", mesh(more=color)))).objects[0].shape.meshes[0].color for color in (new, old)]
+    assert np.allclose(data, [(0.1, 0.2, 0.3, 0.5), (0.4, 0.6, 0.8, 1.0)])
 
 
-# ---- the others
+# ---- other objects
 
 
-def test_sensors_and_what_v_rep_leaves_unset():
+def test_sensors_with_unset_values():
     volume = numbers("_s3", "Ss3", 0.1, 5.0, math.nan, 1e38, 0, 0, 0, 0, math.inf)
     ray = scene_object("SNR", 0, "Ray", own=integers("Snt", 34) + chunk("Vod", volume))
     eye = scene_object(
@@ -129,7 +129,7 @@ def test_sensors_and_what_v_rep_leaves_unset():
 @pytest.mark.parametrize(
     "switches, mode, target", [(0x00, "passive", 0.7), (0x10, "velocity", 2.0), (0x30, "position", 0.7)]
 )
-def test_what_moves_a_joint(switches, mode, target):
+def test_mode_and_target_of_a_joint(switches, mode, target):
     own = (
         integers("Jmd", 5)
         + chunk("Va9", bytes([switches | 1]))
@@ -140,7 +140,7 @@ def test_what_moves_a_joint(switches, mode, target):
     assert (joint.mode, joint.target, joint.max_force, joint.limits) == (mode, target, 9.0, None)
 
 
-def test_a_step_that_is_a_preset_comes_before_the_number():
+def test_time_step_preset_takes_precedence_over_the_number():
     said = chunk("St2", struct.pack("<Q", 20_000)) + chunk("Sts", struct.pack("<f", 0.5))
     gravity = chunk("En3", struct.pack("<i3fi", 0, 0, 0, -9.81, 0))
     steps = [
@@ -154,45 +154,45 @@ def test_a_step_that_is_a_preset_comes_before_the_number():
 
 
 @pytest.mark.parametrize("code", ["", "x", "ab", "abc", "-- été\nx = 1", "\x7f\x80 far"])
-def test_scripts_of_any_length_and_letters(code):
-    (found,) = read(file(scene_object("DMY", 4, "D"), script(4, code, parameters=[("gain", "2.5")]))).scripts
-    assert (found.text, found.object, found.kind, found.parameters) == (code, 4, "child", (("gain", "2.5"),))
+def test_script_texts_of_any_length_and_characters(code):
+    (data,) = read(file(scene_object("DMY", 4, "D"), script(4, code, parameters=[("gain", "2.5")]))).scripts
+    assert (data.text, data.object, data.kind, data.parameters) == (code, 4, "child", (("gain", "2.5"),))
 
 
-def test_a_script_in_latin_1_with_zeros_at_its_end_and_a_first_line_that_names_its_language():
-    (found,) = read(file(script(-1, b"--lua\r\nx = '\xe9'\r\n\0\0"))).scripts
-    assert found.text == "x = 'é'\n"
+def test_latin_1_script_without_its_language_line_and_trailing_zeros():
+    (data,) = read(file(script(-1, b"--lua\r\nx = '\xe9'\r\n\0\0"))).scripts
+    assert data.text == "x = 'é'\n"
 
 
-def test_a_script_object_acts_on_its_parent():
+def test_script_object_belongs_to_its_parent():
     own = script(99, "x = 1", tag="Soo", more=chunk("Lne", text("lua")))
-    held = scene_object("SCT", 8, "Script", parent=2, own=own)
-    (found,) = read(file(scene_object("DMY", 2, "D"), held, version=25)).scripts
-    assert (found.object, found.text, found.is_enabled) == (2, "x = 1", True)
+    script_object = scene_object("SCT", 8, "Script", parent=2, own=own)
+    (data,) = read(file(scene_object("DMY", 2, "D"), script_object, version=25)).scripts
+    assert (data.object, data.text, data.is_enabled) == (2, "x = 1", True)
 
 
 @pytest.mark.parametrize("switches, enabled", [(8, True), (9, True), (10, False)])
-def test_the_switches_of_a_script(switches, enabled):
-    (found,) = read(file(scene_object("DMY", 0, "D"), script(0, "x = 1", switches=switches))).scripts
-    assert found.is_enabled == enabled
+def test_switches_of_a_script_tell_whether_it_is_enabled(switches, enabled):
+    (data,) = read(file(scene_object("DMY", 0, "D"), script(0, "x = 1", switches=switches))).scripts
+    assert data.is_enabled == enabled
 
 
 def test_a_collection():
     items = collection_item(7, 1) + collection_item(8, 3, removes=True)
-    (found,) = read(
+    (data,) = read(
         file(chunk("GRP", chunk("Grn", text("arm")) + integers("Gix", 2000000) + items + b"EOO"))
     ).collections
-    assert found == VrepCollection(
+    assert data == VrepCollection(
         "arm", (VrepCollectionItem("tree", 7, False, False), VrepCollectionItem("chain", 8, True, False))
     )
     with pytest.raises(VrepFileError, match="collection 1: Gty: an item of type 9"):
         read(file(chunk("GRP", collection_item(7, 9) + b"EOO")))
 
 
-# ---- what is no such file
+# ---- invalid files
 
 
-def a_file(compressed=False):
+def small_file(compressed=False):
     pool = chunk(
         "VIN", chunk("Ver", struct.pack("<9f", *range(9))) + chunk("Ind", struct.pack("<3i", 2, 1, 0)) + b"EOO"
     )
@@ -206,32 +206,32 @@ def a_file(compressed=False):
     )
 
 
-def test_a_file_cut_at_every_byte_gets_one_line():
-    whole = a_file()
+def test_file_cut_at_any_byte_is_reported_in_one_line():
+    whole = small_file()
     for length in itertools.chain(range(0, 1021, 100), range(1020, len(whole))):
         with pytest.raises(VrepFileError) as error:
             read(whole[:length])
         assert str(error.value) and "\n" not in str(error.value)
 
 
-def test_a_payload_cut_at_every_byte_is_never_more_than_one_line():
-    """A payload that says how long it is: the cut shows within its chunks."""
-    payload = a_file()[1021:]
+def test_payload_cut_at_any_byte_is_refused():
+    """The header has the length of the cut payload, so the error is found within the chunks."""
+    payload = small_file()[1021:]
     for length in range(len(payload)):
         with pytest.raises(VrepFileError):
             read(container(payload[:length]))
 
 
-def test_a_compressed_file_that_is_cut():
-    whole = a_file(compressed=True)
+def test_truncated_compressed_file_is_refused():
+    whole = small_file(compressed=True)
     for length in (1021, 1022, 1100, 1021 + 320, len(whole) - 2):
         with pytest.raises(VrepFileError, match=r"is truncated|ends within its Huffman tree"):
             read(whole[:length])
 
 
 @pytest.mark.parametrize("size", [-1, -(2**31), 2**31 - 1, 10**6])
-def test_sizes_that_cannot_be_are_refused(size):
-    payload = a_file()[1021:]
+def test_impossible_chunk_sizes_are_refused(size):
+    payload = small_file()[1021:]
     at = payload.index(b"Ge2") + 3
     broken = payload[:at] + struct.pack("<i", size) + payload[at + 4 :]
     with pytest.raises(VrepFileError, match=r"Ge2: a chunk of .* does not fit"):
@@ -249,7 +249,7 @@ def _chain(length):
     return file(*(scene_object("DMY", number, f"D{number}", parent=number - 1) for number in range(length)))
 
 
-REFUSED = {
+INVALID_FILES = {
     "empty": (b"", "is empty"),
     "foreign": (b"solid cube" * 200, "is not a file of V-REP"),
     "no header": (b"VREP1234", "is truncated"),
@@ -282,8 +282,8 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("content, words", REFUSED.values(), ids=REFUSED)
-def test_a_broken_file_gets_one_line_that_names_it(tmp_path, content, words):
+@pytest.mark.parametrize("content, words", INVALID_FILES.values(), ids=INVALID_FILES)
+def test_invalid_file_is_reported_in_one_line_with_its_path(tmp_path, content, words):
     path = tmp_path / "scene.ttt"
     path.write_bytes(content)
     with pytest.raises(VrepFileError) as error:
@@ -292,7 +292,7 @@ def test_a_broken_file_gets_one_line_that_names_it(tmp_path, content, words):
     assert said.startswith(f"{path}: ") and words in said and "\n" not in said
 
 
-def test_what_is_no_file_gets_one_line(tmp_path):
+def test_folder_or_missing_file_is_refused(tmp_path):
     for path in (tmp_path, tmp_path / "none.ttt"):
         with pytest.raises(VrepFileError, match=str(path)):
             read_file(path)

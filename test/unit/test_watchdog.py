@@ -1,4 +1,4 @@
-"""A process ends when it is told to, whatever it does; and the watchdog ends with it."""
+"""The watchdog: a process ends after a signal, whatever it does, and the watchdog ends with it."""
 
 import contextlib
 import os
@@ -9,7 +9,7 @@ import sys
 import pytest
 
 SOURCE = os.pathsep.join(path for path in sys.path if path)
-HANGS = 90.0  # s; nothing here takes nearly as long unless it hangs
+TIMEOUT = 90.0  # s; every process ends much sooner unless it hangs
 BEGIN = """
 import ctypes, os, signal, sys, threading, time
 from drone_sim.run import watchdog
@@ -21,8 +21,8 @@ def hang():
 """
 
 
-# What runs after BEGIN, and the signal that it gets then. All run at once: most of their time is patience.
-HANG = "hang()"  # in a call that holds Python's lock, and that no signal ends
+# Each program runs after BEGIN and then gets a signal. All run in parallel, since they mostly wait.
+HANG = "hang()"  # in a call that holds the GIL and that no signal ends
 LOOKS = "while not watchdog.asked: time.sleep(0.01)\n"
 SCRIPT = """
 from drone_sim.scripting.time_limit import Labels, TimeLimit
@@ -62,7 +62,7 @@ PROGRAMS = {
         None,
     ),
     "ends with atexit": (READY + "import atexit\natexit.register(time.sleep, 1000)\nwatchdog.end(3)", None),
-    "ends": (READY + "import atexit\natexit.register(print, 'saved')\nwatchdog.end(3)", None),
+    "ends": (READY + "import atexit\natexit.register(lambda: print('saved', file=sys.stderr))\nwatchdog.end(3)", None),
     "killed": (READY + HANG, signal.SIGKILL),
     "a fork": (
         "watchdog.ready()\nchild = os.fork()\nif child == 0:\n    time.sleep(1000)\n"
@@ -75,7 +75,7 @@ PROGRAMS = {
 
 @pytest.fixture(name="ended", scope="module")
 def _ended():
-    """Run all programs up to their first line of output, send the signals, and give what returns how one ended."""
+    """Start all programs, send the signals after the first line of output, and yield a function that awaits the end."""
     started = {name: _start(program) for name, (program, _) in PROGRAMS.items()}
     for name, process in started.items():
         assert process.stdout.readline() == "begun\n", name
@@ -83,15 +83,15 @@ def _ended():
             process.send_signal(PROGRAMS[name][1])
 
     def ended(name):
-        """Return exit status and stderr; stderr ends when the watchdog has ended, too."""
-        _, errors = started[name].communicate(timeout=HANGS)
+        """Return exit status and stderr, which is complete when the watchdog has also ended."""
+        _, errors = started[name].communicate(timeout=TIMEOUT)
         return started[name].returncode, errors
 
     yield ended
     for process in started.values():
         with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)  # its forks, too
-        process.communicate(timeout=HANGS)
+            os.killpg(process.pid, signal.SIGKILL)  # with its forks
+        process.communicate(timeout=TIMEOUT)
 
 
 def _start(program):
@@ -109,7 +109,7 @@ STUCK = ("in a call that holds Python's lock", "in a call that lets go of it", "
 
 
 @pytest.mark.parametrize("where", STUCK)
-def test_what_does_not_look_is_killed_after_one_line(ended, where):
+def test_process_that_ignores_the_signal_is_killed_after_one_line(ended, where):
     status, errors = ended(where)
     assert status == -signal.SIGKILL
     assert errors.startswith("it: killed: it did not end within 2.5 s") and errors.count("\n") == 1
@@ -123,50 +123,50 @@ def test_a_script_that_nothing_can_stop_is_killed_after_one_line(ended, which):
     assert errors.count("\n") == 1
 
 
-def test_the_simulators_own_time_and_that_after_a_script_are_not_the_scripts(ended):
+def test_paused_time_and_time_after_a_script_do_not_count(ended):
     assert ended("a script that pauses") == (4, "")
 
 
 @pytest.mark.parametrize("which", ["ends beside a thread", "ends with atexit"])
-def test_what_a_script_leaves_behind_does_not_keep_the_process(ended, which):
+def test_remaining_threads_and_exit_handlers_do_not_keep_the_process_alive(ended, which):
     status, errors = ended(which)
     assert status == 3 and errors.startswith("it: ended without waiting for ") and errors.count("\n") == 1
 
 
-def test_what_ends_in_time_is_waited_for(ended):
-    assert ended("ends") == (3, "")
+def test_end_waits_for_exit_handlers_that_end_in_time(ended):
+    assert ended("ends") == (3, "saved\n")
 
 
-def test_more_signals_give_no_more_time(ended):
+def test_further_signals_do_not_extend_the_time(ended):
     assert ended("more signals")[0] == -signal.SIGKILL
 
 
-def test_what_looks_ends_as_it_likes(ended):
+def test_process_that_reacts_to_the_signal_chooses_its_exit_status(ended):
     assert ended("looks") == (7, "")
 
 
-def test_other_signals_are_not_its_business(ended):
+def test_watchdog_ignores_other_signals(ended):
     assert ended("another signal") == (0, "")
 
 
-def test_before_it_is_ready_a_signal_ends_it_at_once_and_quietly(ended):
+def test_a_signal_during_startup_ends_the_process_without_a_message(ended):
     assert ended("not ready") == (-signal.SIGINT, "")
 
 
-def test_it_counts_without_a_signal_too(ended):
+def test_count_starts_the_time_limit_without_a_signal(ended):
     assert ended("counts")[0] == -signal.SIGKILL
 
 
-def test_once_it_stands_down_the_next_signal_ends_it(ended):
+def test_signal_after_stand_down_ends_the_process(ended):
     assert ended("stands down") == (-signal.SIGINT, "")
 
 
-def test_it_ends_with_the_process_however_that_ends(ended):
+def test_watchdog_ends_with_a_killed_process(ended):
     assert ended("killed") == (-signal.SIGKILL, "")
 
 
-def test_a_fork_goes_its_own_way(ended):
-    """Its signals do not count, and what it holds open does not keep the watchdog."""
+def test_fork_is_not_watched(ended):
+    """Signals to the fork do not count, and its open files do not keep the watchdog alive."""
     assert ended("a fork") == (0, "")
 
 
@@ -186,6 +186,6 @@ def test_the_watchdog_has_no_file_of_the_process_open(tmp_path):
         env={**os.environ, "PYTHONPATH": SOURCE},
         capture_output=True,
         text=True,
-        timeout=HANGS,
+        timeout=TIMEOUT,
     )
     assert ended.stdout == "['pipe', 'pipe']\n", ended.stderr

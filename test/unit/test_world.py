@@ -1,4 +1,4 @@
-"""The world's dynamics against closed forms."""
+"""The world's dynamics compared with closed-form solutions, and its rays and contacts."""
 
 import math
 
@@ -41,7 +41,7 @@ def test_free_fall_without_drag():
     world.close()
 
 
-def test_a_force_at_the_centre_of_mass_does_not_turn(space):
+def test_force_at_the_centre_of_mass_causes_no_rotation(space):
     drone = space.add_rigid_body(BODY, Pose((0, 0, 1), TILTED))
     space.advance({drone: wrench(force=(1.0, -2.0, 3.0))}, 10)
     assert space.state(drone).angular_velocity == pytest.approx((0, 0, 0), abs=1e-12)
@@ -53,23 +53,23 @@ def test_a_force_at_the_centre_of_mass_does_not_turn(space):
     [((0, 0, 0), (1e-3, -2e-3, 3e-3), (0, 0, 0)), ((0.1, 0.2, -0.3), (0, 0, 0), (0.09, -0.09, 0.001))],
     ids=["a torque", "a force off the centre"],
 )
-def test_it_turns_by_the_inertia_in_the_world(space, force, torque, point):
+def test_rotation_follows_from_the_inertia_in_the_world_frame(space, force, torque, point):
     drone = space.add_rigid_body(BODY, Pose((0, 0, 1), TILTED))
     space.advance({drone: wrench(force, torque, point)}, 1)
     turn = np.reshape(Pose((0, 0, 0), TILTED).matrix, (3, 4))[:, :3]
-    whole = np.cross(turn @ point, force) + torque  # the point turns with the body
-    expected = np.linalg.inv(turn @ BODY.inertia @ turn.T) @ whole * SUB_STEP
+    total_torque = np.cross(turn @ point, force) + torque  # the point turns with the body
+    expected = np.linalg.inv(turn @ BODY.inertia @ turn.T) @ total_torque * SUB_STEP
     assert space.state(drone).angular_velocity == pytest.approx(expected, rel=1e-5)
 
 
-def test_the_pose_of_the_root_link_comes_back_as_it_was_set(space):
+def test_pose_of_the_root_link_is_returned_as_set(space):
     drone = space.add_rigid_body(BODY, Pose((0, 0, 1)))
     space.set_pose(drone, Pose((0.1, -0.2, 0.3), TILTED))
     assert space.state(drone).position == pytest.approx((0.1, -0.2, 0.3), abs=1e-12)
     assert space.state(drone).orientation == pytest.approx(TILTED, abs=1e-12)
 
 
-def test_the_velocity_of_the_root_link_is_that_of_its_point(space):
+def test_velocity_of_the_root_link_is_measured_at_its_origin(space):
     drone = space.add_rigid_body(BODY, Pose((0, 0, 1)))
     space.advance({drone: wrench(torque=(1e-3, 0, 0))}, 1)
     spin = space.state(drone).angular_velocity[0]
@@ -88,7 +88,7 @@ def test_the_drone_lands_on_the_floor(space):
     world.close()
 
 
-def test_two_worlds_do_not_know_each_other(space):
+def test_two_worlds_are_independent(space):
     other = World(SUB_STEP, gravity=-9.81)
     here = space.add_rigid_body(BODY, Pose((0, 0, 1)))
     there = other.add_rigid_body(BODY, Pose((0, 0, 1)))
@@ -103,35 +103,35 @@ def test_two_worlds_do_not_know_each_other(space):
 @pytest.mark.parametrize("gap", [0.0, 0.03, 0.07, 0.11])
 @pytest.mark.parametrize("thrown", ["drone", "box"])
 @pytest.mark.parametrize("onto", ["wall", "floor"])
-def test_what_is_fast_is_held_and_does_not_rebound(space, thrown, onto, gap, speed):
-    way = np.array((1.0, 0.0, 0.0) if onto == "wall" else (0.0, 0.0, -1.0))
+def test_fast_body_does_not_tunnel_and_does_not_rebound(space, thrown, onto, gap, speed):
+    along = np.array((1.0, 0.0, 0.0) if onto == "wall" else (0.0, 0.0, -1.0))
     end = np.array((2.0, 0.0, 2.0) if onto == "wall" else (0.0, 0.0, 0.0))
     if onto == "wall":
-        space.add_object(Box((0.1, 4.0, 4.0)), Pose(tuple(end + 0.05 * way)))
+        space.add_object(Box((0.1, 4.0, 4.0)), Pose(tuple(end + 0.05 * along)))
     else:
         space.add_floor(10.0, "")
-    start = Pose(tuple(end - (2.0 - gap) * way))
+    start = Pose(tuple(end - (2.0 - gap) * along))
     body = (
         space.add_rigid_body(BODY, start) if thrown == "drone" else space.add_object(Box((0.2,) * 3), start, mass=1.0)
     )
-    space.set_velocity(body, tuple(speed * way), (0.0, 0.0, 0.0))
+    space.set_velocity(body, tuple(speed * along), (0.0, 0.0, 0.0))
     states = []
     for _ in range(300):
         space.advance({body: Wrench()}, 1)
         states.append(space.state(body))
-    assert max((np.array(one.position) - end) @ way for one in states) < 0.01, "its centre is in front of the face"
-    assert min(np.array(one.linear_velocity) @ way for one in states) > -0.01 * speed
+    assert max((np.array(one.position) - end) @ along for one in states) < 0.01, "its centre stays in front of the face"
+    assert min(np.array(one.linear_velocity) @ along for one in states) > -0.01 * speed
 
 
-def test_a_velocity_makes_pictures_outdated_because_exposures_show_it(space):
+def test_setting_a_velocity_makes_pictures_outdated_because_of_motion_blur(space):
     body = space.add_rigid_body(BODY, Pose((0.0, 0.0, 1.0)))
     before = space.pictures.changes
     space.set_velocity(body, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     assert space.pictures.changes != before
 
 
-def test_what_acts_in_a_sub_step_acts_through_all_of_its_parts(space):
-    """A body that slides along a wall is fast and near something: its sub-steps are divided."""
+def test_force_of_a_sub_step_acts_during_all_of_its_parts(space):
+    """The sub-steps of a fast body that slides along a wall are divided."""
     space.add_object(Box((0.1, 100.0, 4.0)), Pose((0.16, 0.0, 2.0)))
     gained = []
     for x in (0.0, -50.0):  # beside the wall, 1 cm off, and far from it
@@ -147,7 +147,7 @@ def test_what_acts_in_a_sub_step_acts_through_all_of_its_parts(space):
 # ---- rays and contacts
 
 
-THINGS = {  # shape, position, mass
+OBJECTS = {  # shape, position, mass
     "ground": (Box((20.0, 20.0, 0.2)), (0, 0, -0.1), 0.0),
     "box": (Box((1.0, 1.0, 0.2)), (0, 0, 0.1), 5.0),
     "ball": (Sphere((0.2,)), (0.1, 0, 0.4), 1.0),
@@ -155,7 +155,7 @@ THINGS = {  # shape, position, mass
 
 
 def add(world, name):
-    shape, position, mass = THINGS[name]
+    shape, position, mass = OBJECTS[name]
     return world.add_object(shape, Pose(position), mass=mass)
 
 
@@ -166,7 +166,7 @@ def _world():
     world.close()
 
 
-def test_a_ray_meets_the_nearest_of_many_in_whatever_order_they_came(world):
+def test_ray_hits_the_nearest_body_in_any_order_of_creation(world):
     balls = {x: world.add_object(Sphere((0.2,)), Pose((x, 0, 0))) for x in (5, 2, 4, 1, 3)}
     hit = world.queries.ray((0, 0, 0), (10, 0, 0))
     assert (hit.body, hit.distance, hit.normal) == (balls[1], pytest.approx(0.8, abs=1e-9), (-1, 0, 0))
@@ -176,7 +176,7 @@ def test_a_ray_meets_the_nearest_of_many_in_whatever_order_they_came(world):
     assert world.queries.ray((0, 0, 0), (0.7, 0, 0)) is None
 
 
-def test_a_ray_that_begins_in_something_is_met_at_once_by_a_surface_against_it(world):
+def test_ray_that_starts_inside_a_body_hits_it_at_zero_distance(world):
     ball = world.add_object(Sphere((1.0,)), Pose((0, 0, 0)))
     start, end = (0.1, 0.2, 0.01), (0.3, 0.2, -4.0)
     length = math.dist(start, end)
@@ -186,7 +186,7 @@ def test_a_ray_that_begins_in_something_is_met_at_once_by_a_surface_against_it(w
     assert (met.body, met.normal) == (ball, against)
 
 
-def test_a_ray_goes_through_the_body_that_is_ignored(world):
+def test_ray_passes_through_an_ignored_body(world):
     floor = world.add_floor(10.0, FLOOR)
     drone = world.add_rigid_body(BODY, Pose((0, 0, 1.0)))
     for x in (0.0, 0.09):  # through the stick, and through a propeller
@@ -196,7 +196,7 @@ def test_a_ray_goes_through_the_body_that_is_ignored(world):
     assert world.queries.ray((0, 0, 2), (0, 0, 0.5), ignoring=drone) is None
 
 
-def test_a_ray_meets_what_has_been_moved_where_it_is_now(world):
+def test_ray_hits_a_moved_body_at_its_new_pose(world):
     ball = add(world, "ball")
     world.set_pose(ball, Pose((3, 0, 0)))
     assert world.queries.ray((0, 0, 0), (10, 0, 0)).distance == pytest.approx(2.8, abs=1e-9)
@@ -206,17 +206,17 @@ def test_contacts_carry_the_weight(world):
     box, ball, floor = add(world, "box"), add(world, "ball"), world.add_floor(10.0, FLOOR)
     world.advance({}, 300)
     by_body = {floor: np.zeros(3), ball: np.zeros(3)}
-    for touch in world.queries.contacts(box):
-        by_body[touch.body] += touch.force
-        assert touch.normal == pytest.approx((0, 0, 1 if touch.body == floor else -1), abs=1e-4)
-        assert touch.point[2] == pytest.approx(0.0 if touch.body == floor else 0.2, abs=1e-3)
+    for contact in world.queries.contacts(box):
+        by_body[contact.body] += contact.force
+        assert contact.normal == pytest.approx((0, 0, 1 if contact.body == floor else -1), abs=1e-4)
+        assert contact.point[2] == pytest.approx(0.0 if contact.body == floor else 0.2, abs=1e-3)
     assert by_body[floor] == pytest.approx([0, 0, 6 * 9.81], rel=1e-4, abs=1e-3)
     assert by_body[ball] == pytest.approx([0, 0, -9.81], rel=1e-4, abs=1e-3)
     assert world.queries.contacts(ball)[0].force == pytest.approx((0, 0, 9.81), rel=1e-4, abs=1e-3)
 
 
 @pytest.mark.parametrize("first", ["box", "ground"])
-def test_friction_is_in_the_force_whichever_body_came_first(world, first):
+def test_contact_force_includes_friction_in_any_order_of_bodies(world, first):
     made = {name: add(world, name) for name in sorted(["box", "ground"], reverse=first == "ground")}
     world.advance({}, 100)
     pushed = Wrench()
@@ -225,14 +225,14 @@ def test_friction_is_in_the_force_whichever_body_came_first(world, first):
     world.advance({made["box"]: pushed}, 1)
     gained = (np.array(world.state(made["box"]).linear_velocity) - before) / SUB_STEP
     by_newton = 5.0 * (gained - [0, 0, -9.81]) - [80, 40, 0]
-    force = np.sum([touch.force for touch in world.queries.contacts(made["box"])], axis=0)
-    back = np.sum([touch.force for touch in world.queries.contacts(made["ground"])], axis=0)
+    force = np.sum([contact.force for contact in world.queries.contacts(made["box"])], axis=0)
+    reaction = np.sum([contact.force for contact in world.queries.contacts(made["ground"])], axis=0)
     assert abs(by_newton[0]) > 10
     assert force == pytest.approx(by_newton, abs=1e-6)
-    assert back == pytest.approx(-by_newton, abs=1e-6)
+    assert reaction == pytest.approx(-by_newton, abs=1e-6)
 
 
-def test_what_is_near_and_does_not_push_is_no_contact(world):
+def test_close_body_without_force_is_not_a_contact(world):
     ball = add(world, "ball")
     add(world, "ground")
     world.set_pose(ball, Pose((0, 0, 0.203)))

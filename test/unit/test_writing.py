@@ -17,7 +17,7 @@ SOURCE = Path(__file__).resolve().parents[2] / "src"
 
 
 def in_child(program, *arguments):
-    """Run a program on a disk that takes no more than 64 KiB a file; return the ended process."""
+    """Run a program that can write at most 64 KiB per file, as on a full disk; return the completed process."""
 
     def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536))
@@ -33,7 +33,7 @@ def in_child(program, *arguments):
     )
 
 
-def test_the_content_and_the_mode_are_there(tmp_path):
+def test_written_file_has_its_content_and_mode(tmp_path):
     path = tmp_path / "file"
     writing.write(path, "one\n")
     mask = os.umask(0)
@@ -45,14 +45,14 @@ def test_the_content_and_the_mode_are_there(tmp_path):
     assert os.listdir(tmp_path) == ["file"]
 
 
-def test_a_link_stays_a_link(tmp_path):
+def test_writing_through_a_link_keeps_the_link(tmp_path):
     (tmp_path / "there").write_text("old")
     (tmp_path / "link").symlink_to("there")
     writing.write(tmp_path / "link", "new")
     assert (tmp_path / "link").is_symlink() and (tmp_path / "there").read_text() == "new"
 
 
-def test_what_fails_half_way_keeps_the_old_file_only_on_an_oserror(tmp_path):
+def test_interrupted_write_keeps_the_old_file_only_on_an_oserror(tmp_path):
     path = tmp_path / "file"
     path.write_text("old")
     with pytest.raises(OSError, match=r"file: No space left"), writing.replacing(path) as file:
@@ -66,26 +66,26 @@ def test_what_fails_half_way_keeps_the_old_file_only_on_an_oserror(tmp_path):
     assert os.listdir(tmp_path) == ["file"]
 
 
-def test_a_full_disk_leaves_what_was_there(tmp_path):
+def test_full_disk_keeps_the_old_file(tmp_path):
     path = tmp_path / "file"
     path.write_text("old")
-    ended = in_child("import sys; from drone_sim.files import writing; writing.write(sys.argv[1], 'x' * 100_000)", path)
-    assert f"OSError: {path}: File too large" in ended.stderr
+    child = in_child("import sys; from drone_sim.files import writing; writing.write(sys.argv[1], 'x' * 100_000)", path)
+    assert f"OSError: {path}: File too large" in child.stderr
     assert path.read_text() == "old" and os.listdir(tmp_path) == ["file"]
 
 
-def test_a_table_on_a_full_disk_ends_with_one_line_and_keeps_the_old_one(tmp_path):
+def test_full_disk_is_reported_in_one_line_and_keeps_the_old_table(tmp_path):
     path = tmp_path / "flight.csv"
     path.write_text("old")
     program = "import sys; from drone_sim.offline.fly import main; sys.exit(main(sys.argv[1:]))"
-    ended = in_child(program, "--duration", "60", "--csv", path)
-    assert ended.returncode == 1 and ended.stderr == f"fly: {path}: File too large\n"
+    child = in_child(program, "--duration", "60", "--csv", path)
+    assert child.returncode == 1 and child.stderr == f"fly: {path}: File too large\n"
     assert path.read_text() == "old" and os.listdir(tmp_path) == ["flight.csv"]
 
 
 @pytest.mark.parametrize("option", ["--csv", "--plot"])
 @pytest.mark.parametrize("name", ["/dev/full", "/tmp", "/no/such/folder.png", "x" * 300, "a\0b"])
-def test_what_cannot_be_written_gets_one_line(capsys, option, name):
+def test_unwritable_output_is_reported_in_one_line(capsys, option, name):
     assert main(["--duration", "1", option, name]) == 1
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1 and lines[0].startswith("fly: ")
@@ -106,18 +106,18 @@ def test_a_device_is_written_directly(tmp_path, capfd):
 
 @pytest.fixture(name="removed")
 def _removed(monkeypatch):
-    """Paths that were to be removed: nothing is, whatever goes wrong."""
+    """Record the paths that would be removed; nothing is removed, even if the test fails."""
     paths = []
     monkeypatch.setattr("shutil.rmtree", lambda path, *_, **__: paths.append(str(path)))
     monkeypatch.setattr(Path, "unlink", lambda path, missing_ok=False: paths.append(str(path)))
     return paths
 
 
-LEADS_OUT = ("/", "//", "..", ".", "", "../z", "a/../..", "a/../../z", "/etc", "link/z", "link/../z", "a/link/..")
+OUTSIDE_PATHS = ("/", "//", "..", ".", "", "../z", "a/../..", "a/../../z", "/etc", "link/z", "link/../z", "a/link/..")
 
 
-@pytest.mark.parametrize("name", LEADS_OUT)
-def test_a_path_out_of_its_folder_is_refused(tmp_path, removed, name):
+@pytest.mark.parametrize("name", OUTSIDE_PATHS)
+def test_path_outside_its_folder_is_refused(tmp_path, removed, name):
     folder = tmp_path / "folder"
     (folder / "a").mkdir(parents=True)
     (folder / "link").symlink_to("/usr/share")
@@ -128,7 +128,7 @@ def test_a_path_out_of_its_folder_is_refused(tmp_path, removed, name):
     assert removed == []
 
 
-def test_what_lies_below_its_folder_is_removed_and_a_link_is_not_followed(tmp_path, removed):
+def test_files_below_the_folder_are_removed_and_links_are_not_followed(tmp_path, removed):
     folder = tmp_path / "folder"
     (folder / "a/b").mkdir(parents=True)
     (folder / "file").touch()
@@ -139,7 +139,7 @@ def test_what_lies_below_its_folder_is_removed_and_a_link_is_not_followed(tmp_pa
     assert removed == [str(folder / name) for name in ("a", "a/b", "file", "link")]
 
 
-# The modules that remove or rename files themselves, with how many calls. No name comes from outside. Add a new place
+# The modules that remove or rename files, and the number of calls. No name comes from outside. Add a new module
 # here; for a tree, for files in a loop, or for a name from outside use `drone_sim.files.containment`.
 KNOWN = {
     "editing/drafts.py": 3,  # its own draft
@@ -156,28 +156,28 @@ KNOWN = {
     "world/bodies.py": 1,
 }
 REMOVALS = {"unlink", "rmdir", "rmtree", "removedirs", "renames"}
-OF_MODULES = {"remove", "rename", "replace", "link", "move"}
+MODULE_FUNCTIONS = {"remove", "rename", "replace", "link", "move"}
 
 
 def _removals(tree):
     """Yield the calls in a module that remove or rename files, and whether each is in a loop."""
     loops = (ast.For, ast.While, ast.ListComp, ast.SetComp, ast.GeneratorExp, ast.DictComp)
-    inside = {id(one) for loop in ast.walk(tree) if isinstance(loop, loops) for one in ast.walk(loop)}
-    for call in (one for one in ast.walk(tree) if isinstance(one, ast.Call)):
+    inside = {id(node) for loop in ast.walk(tree) if isinstance(loop, loops) for node in ast.walk(loop)}
+    for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
         name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
         owner = ast.unparse(call.func.value) if isinstance(call.func, ast.Attribute) else ""
         is_of_path = name in ("rename", "replace") and len(call.args) == 1 and not call.keywords and owner
-        if name in REMOVALS or is_of_path or (owner in ("os", "shutil") and name in OF_MODULES):
+        if name in REMOVALS or is_of_path or (owner in ("os", "shutil") and name in MODULE_FUNCTIONS):
             yield name, id(call) in inside
 
 
 def test_only_known_places_remove_or_rename_files_and_none_does_in_a_loop():
-    found = {}
+    calls_by_module = {}
     for path in sorted((SOURCE / "drone_sim").rglob("*.py")):
         text = path.read_text(encoding="utf-8")
         name, calls = str(path.relative_to(SOURCE / "drone_sim")), list(_removals(ast.parse(text)))
         assert "rmtree" not in text or name == "files/containment.py", name
         assert not any(in_loop for _, in_loop in calls), name
         if calls:
-            found[name] = len(calls)
-    assert found == KNOWN
+            calls_by_module[name] = len(calls)
+    assert calls_by_module == KNOWN

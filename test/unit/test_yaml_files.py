@@ -1,4 +1,4 @@
-"""YAML: what can surprise, or grow without end, is refused in one line."""
+"""YAML files: surprising or unbounded input is refused in one line, and written values are read back."""
 
 import os
 
@@ -45,11 +45,11 @@ def bomb(levels, start, link):
         ("x" * 2_000_000, "larger than 1 MiB"),
     ],
 )
-def test_what_can_surprise_is_refused_in_one_line(text, words):
-    with pytest.raises(yaml_files.YamlError) as refused:
+def test_surprising_or_unbounded_yaml_is_refused_in_one_line(text, words):
+    with pytest.raises(yaml_files.YamlError) as caught:
         yaml_files.parse(text)
-    assert words in str(refused.value)
-    assert "\n" not in str(refused.value) and len(str(refused.value)) < 300
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
 
 
 @pytest.mark.parametrize(
@@ -82,15 +82,15 @@ def test_only_regular_files_in_utf_8_are_read(tmp_path, monkeypatch, name):
     (tmp_path / "latin.yaml").write_bytes(b"gravity: 1\nscript: \xff")
     (tmp_path / "utf16.yaml").write_bytes("gravity: 1".encode("utf-16"))
     for key in ("config", "scene_file"):
-        with pytest.raises(ParameterError) as refused:
+        with pytest.raises(ParameterError) as caught:
             parameters.load({key: name})
-        assert name[:50].split("\0")[0] in str(refused.value)
-        assert "\n" not in str(refused.value) and len(str(refused.value)) < 900
+        assert name[:50].split("\0")[0] in str(caught.value)
+        assert "\n" not in str(caught.value) and len(str(caught.value)) < 900
     if name == "latin.yaml":
-        assert "line 2: must be text in UTF-8" in str(refused.value)
+        assert "line 2: must be text in UTF-8" in str(caught.value)
 
 
-def test_what_is_no_file_is_not_kept_open(tmp_path):
+def test_refused_paths_leave_no_open_file_descriptor(tmp_path):
     os.mkfifo(tmp_path / "pipe.yaml")
     (tmp_path / "large.yaml").write_text(" " * (2**20 + 1))
     before = len(os.listdir("/proc/self/fd"))
@@ -130,23 +130,23 @@ VALUES = st.sampled_from([1, 2.5, "x: y", None, [1, 2], {"a": {"b": 1}}, [ITEM],
     floor=st.dictionaries(st.sampled_from(["size", "edge", "tile"]), VALUES),
     stay=st.lists(st.sampled_from([0, 1, 2]), unique=True).map(sorted),
     changes=st.dictionaries(st.sampled_from(["name", "position", "size", "mass", "more"]), VALUES),
-    gone=st.sampled_from(["name", "position", "size", "none"]),
-    added=st.integers(0, 2),
+    removed_key=st.sampled_from(["name", "position", "size", "none"]),
+    added_count=st.integers(0, 2),
 )
-def test_a_text_says_what_it_is_to_say_whatever_that_is(keys, floor, stay, changes, gone, added):
-    said = yaml_files.parse(WRITTEN)
-    items = [said["objects"][index] for index in stay]
-    for one in items[:1]:
-        one.update(changes)
-        one.pop(gone, None)
-    new = {**said, "floor": {**said["floor"], **floor}, **keys, "objects": [*items, *[ITEM] * added]}
-    made = yaml_writing.YamlText(WRITTEN).rewrite(new, {"objects": [*stay, *[None] * added]})
-    assert yaml_writing.has_values(made, new), made
-    assert "# above\n" in made
+def test_rewritten_text_has_the_requested_values(keys, floor, stay, changes, removed_key, added_count):
+    original = yaml_files.parse(WRITTEN)
+    items = [original["objects"][index] for index in stay]
+    for item in items[:1]:
+        item.update(changes)
+        item.pop(removed_key, None)
+    new = {**original, "floor": {**original["floor"], **floor}, **keys, "objects": [*items, *[ITEM] * added_count]}
+    rewritten = yaml_writing.YamlText(WRITTEN).rewrite(new, {"objects": [*stay, *[None] * added_count]})
+    assert yaml_writing.has_values(rewritten, new), rewritten
+    assert "# above\n" in rewritten
 
 
 @pytest.mark.parametrize("layout", ["block", "compact", "line", "scene"])
-def test_what_is_written_in_any_layout_is_read_as_it_was(layout):
+def test_values_survive_dump_and_parse_in_every_layout(layout):
     strings = {text: text for text in ("1e3", "1:30", "010", "0x1F", "yes", "~", ".inf", "2001-01-01", "a: b", "å", "")}
     long = {f"key {number}": "word " * number for number in range(9)}
     values = {**strings, "numbers": [1, -2.5, 1e300, 1e15, float("inf")], "long": [long], "inner": {"a": {"b": [long]}}}

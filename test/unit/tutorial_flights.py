@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 TEXT = (DOCS / "tutorial.md").read_text(encoding="utf-8")
 STAGES = {path.stem: path for path in sorted((DOCS / "tutorial").glob("[0-9]_*.py"))}
-CONTROLLERS = [name for name in STAGES if name[0] < "8"]  # which hold all of the law; the last one builds on it
+CONTROLLERS = [name for name in STAGES if name[0] < "8"]  # these contain the whole control law; stage 8 builds on it
 
 
 @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""Writes small files of V-REP's, for the tests: chunks, texts, scrambled scripts, Huffman codes of 8 bits."""
+"""Encoder of small V-REP files for the tests: chunks, texts, scrambled scripts, Huffman codes of 8 bits."""
 
 import struct
 
@@ -15,7 +15,7 @@ def text(value):
 
 
 def numbers(double, single, *values, version=22):
-    """The double tag since 24, the single one until 24."""
+    """Return the single tag up to version 24, and the double tag from version 24 on."""
     doubles = chunk(double, struct.pack(f"<{len(values)}d", *values)) if version >= 24 else b""
     singles = chunk(single, struct.pack(f"<{len(values)}f", *values)) if version <= 24 else b""
     return singles + doubles
@@ -26,7 +26,7 @@ def integers(tag, *values):
 
 
 def scrambled(plain):
-    """A script's text as files hide it."""
+    """Return the text of a script, scrambled as in V-REP files."""
     if len(plain) < 3:
         return plain
     signed = [byte - 256 if byte > 127 else byte for byte in (plain[0], plain[-1])]
@@ -39,7 +39,7 @@ def scrambled(plain):
 
 
 def huffman(payload):
-    """Compressed with a tree in which each code is the byte itself."""
+    """Compress a payload with a tree in which each code is the byte itself."""
 
     def tree(depth, prefix):
         if depth == 8:
@@ -59,7 +59,7 @@ def container(payload, version=22, compressed=False, length=None):
 
 
 def packed(indices):
-    """The faces of an `In2`."""
+    """Return indices in the compressed form of an `In2` chunk."""
     data, before = struct.pack("<i", len(indices)), 0
     for index in indices:
         more = next(
@@ -96,7 +96,7 @@ def weight(mass=1.0, moments=(1, 1, 1), at=(0, 0, 0), turned=IDENTITY, version=2
 
 
 def shape(handle, name, *parts, parent=-1, at=(0, 0, 0), dynamic=False, respondable=True, wrapper=None, **more):
-    """One mesh, or a compound of several."""
+    """Return a shape with one mesh, or a compound of several."""
     wrapper = weight() if wrapper is None else wrapper
     if len(parts) > 1:
         geometry = chunk("Gsg", wrapper + b"".join(chunk("Geo", b"EOO" + part) for part in parts) + b"EOO")
@@ -109,7 +109,7 @@ def shape(handle, name, *parts, parent=-1, at=(0, 0, 0), dynamic=False, responda
 def script(handle, code, kind=1, switches=8, parameters=(), tag="LST", more=b""):
     data = code if isinstance(code, bytes) else code.encode()
     listed = b"".join(text(name) + text("") + text(value) + struct.pack("<i", 0) for name, value in parameters)
-    given = (
+    parameter_chunk = (
         chunk(
             "Prm",
             integers("Par", len(parameters))[:3]
@@ -126,14 +126,14 @@ def script(handle, code, kind=1, switches=8, parameters=(), tag="LST", more=b"")
         integers("Si2", 0, handle, kind)
         + chunk("Va2", bytes([switches]))
         + chunk("Ste", scrambled(data))
-        + given
+        + parameter_chunk
         + more
         + b"EOO",
     )
 
 
 def collection_item(handle, kind, removes=False):
-    """A part of a collection: 0 the object, 1 and 2 what hangs on it, 3 and 4 what it hangs on, 5 all."""
+    """Return an item of a collection; `kind` 0: the object, 1 and 2: its tree, 3 and 4: its chain, 5: all objects."""
     switches = chunk("Gty", bytes([kind])) + chunk("Var", bytes([not removes]))
     return chunk("Asg", integers("Obj", handle, -1) + switches + b"EOO")
 

@@ -1,4 +1,4 @@
-"""A quadricopter of the form of V-REP's, as chunks of a file."""
+"""A quadricopter with the structure of V-REP's, as chunks of a V-REP file."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ PARAMETERS = {"particleCountPerSecond": "430", "particleDensity": "8500", "parti
 def quadricopter(
     first=0, end="", at=(0, 0, 1), name="Quadricopter", code="x = 1", scale=1.0, propeller=PROPELLER, **changed
 ):
-    """Objects and scripts; handles from `first`, names ending in `end`, `code` on its body."""
+    """Return objects and scripts; handles start at `first`, names end in `end`, `code` is attached to the body."""
     body = weight(0.12 * scale**3, (6.667e-5 * scale**2, 7.533e-3 * scale**2, 7.533e-3 * scale**2))
     stick = mesh(size=(0.3 * scale, 0.02 * scale, 0.02 * scale))
     made = [shape(first, f"{name}{end}", stick, at=at, dynamic=True, wrapper=body, base=numbers("_fa", "Sfa", scale))]

@@ -1,4 +1,4 @@
-"""A browser for all tests: Debian's chromium, which playwright drives. `./dev.sh test-web` installs both."""
+"""Fixtures: Debian's chromium, driven by playwright, and a simulation. `./dev.sh test-web` installs both programs."""
 
 import shutil
 import sys
@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 import rospy
-from cockpit_page import Drone, Panel, left_as_found, open_page
+from cockpit_page import Drone, Panel, initial_state_restored, open_page
 from launched import launched
 from playwright.sync_api import sync_playwright
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
 
-# Without a GPU, Mesa draws the cockpit's scene four times as fast as Chromium's own SwiftShader. Without it, Chromium
-# puts the page together faster.
+# Without a GPU, Mesa draws the cockpit's scene four times as fast as Chromium's own SwiftShader. Without GPU
+# compositing, Chromium puts the page together faster.
 DRAWING = ["--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist", "--disable-gpu-compositing"]
 
 
@@ -30,7 +30,7 @@ def _browser():
 
 @pytest.fixture(name="page")
 def _page(browser):
-    """A page that keeps what goes wrong, and what it asks the network for, in `troubles`."""
+    """A page that collects console messages, errors, dialogs and network requests in `troubles`."""
     context = browser.new_context(viewport={"width": 1000, "height": 700})
     page = context.new_page()
     page.troubles = []
@@ -48,7 +48,7 @@ def _page(browser):
 
 @pytest.fixture(name="cockpit", scope="session")
 def _cockpit(browser):
-    """One running simulation for all tests of a worker; each leaves it as it has found it."""
+    """One running simulation for all tests of a worker; each test restores its initial state."""
     with launched() as cockpit:
         rospy.init_node("test_cockpit", anonymous=True, disable_signals=True)
         cockpit.drone = Drone()
@@ -57,14 +57,14 @@ def _cockpit(browser):
 
 @pytest.fixture(name="opened")
 def _opened(cockpit, browser):
-    """The cockpit's page in a browser of its own, while the pilot flies; what is written in it is gone afterwards."""
-    with left_as_found(cockpit), open_page(cockpit, browser) as page:
+    """The cockpit's page in a browser context of its own, while the pilot flies; new scripts are deleted afterwards."""
+    with initial_state_restored(cockpit), open_page(cockpit, browser) as page:
         yield page
 
 
 @pytest.fixture(name="panel", scope="module")
 def _panel(cockpit, browser):
-    """The panel of a page that the tests of a file share; each leaves it as it has found it."""
+    """The panel of a page that the tests of a module share; each test restores its initial state."""
     cockpit.start_afresh()
     with open_page(cockpit, browser) as page:
         yield Panel(page)

@@ -1,4 +1,4 @@
-"""drone.launch with its cockpit, on a ROS master of its own, for tests and pictures; rospy of this process joins it."""
+"""drone.launch with its cockpit on a ROS master of its own, for tests and pictures; rospy here connects to it."""
 
 import contextlib
 import os
@@ -16,7 +16,7 @@ _PATIENCE = 120  # s
 
 
 class Launched:
-    """The address of the page, and the folder of the editor's scripts."""
+    """A running simulation: the address of its page, the folder of the editor's scripts, and the log file."""
 
     def __init__(self, address, scripts, log):
         self.address = address
@@ -24,23 +24,23 @@ class Launched:
         self.log = log
 
     def call(self, service, *request):
-        """Call a service of the simulation; return what it says."""
+        """Call a service of the simulation; return the message of its response."""
         import rospy
         from std_srvs.srv import SetBool, Trigger
 
         service = f"/drone_sim/{service}"
-        rospy.wait_for_service(service, _PATIENCE)  # the cockpit may be there before the simulation
+        rospy.wait_for_service(service, _PATIENCE)  # the cockpit may start before the simulation
         return rospy.ServiceProxy(service, SetBool if request else Trigger)(*request).message
 
     def load(self, scene):
-        """Begin anew in a scene's file; '' is the scene as it was launched without one."""
+        """Load a scene file; '' is the scene of a launch without a scene file."""
         import rospy
 
         rospy.set_param("/drone_sim/scene_file", scene)
         self.call("load_scene")
 
     def start_afresh(self):
-        """Fly the pilot from the start, as after the launch."""
+        """Restart the pilot, as after the launch."""
         import rospy
 
         rospy.set_param("/drone_sim/script", "pilot")
@@ -50,7 +50,7 @@ class Launched:
 
 @contextlib.contextmanager
 def launched(*arguments):
-    """Give a running simulation with a cockpit."""
+    """Yield a running simulation with a cockpit."""
     with tempfile.TemporaryDirectory() as folder:
         port = free_port()
         log = Path(folder) / "launch.log"
@@ -61,7 +61,7 @@ def launched(*arguments):
             "HOME": folder,
             "ROS_HOME": f"{folder}/.ros",
         }
-        environment.pop("PYTHONUNBUFFERED", None)  # the address has to be in the log at once without it, too
+        environment.pop("PYTHONUNBUFFERED", None)  # the address must be in the log at once without it, too
         command = ["roslaunch", "-p", str(port), "drone_sim", "drone.launch", "rviz:=false", "web:=true"]
         options = [f"web_port:={free_port()}", *arguments]
         with log.open("w") as output:
@@ -79,17 +79,17 @@ def launched(*arguments):
 
 
 def _address(process, log):
-    began = time.monotonic()
-    while time.monotonic() - began < _PATIENCE and process.poll() is None:
-        found = _ADDRESS.search(log.read_text())
-        if found:
-            return found[1]
+    start = time.monotonic()
+    while time.monotonic() - start < _PATIENCE and process.poll() is None:
+        match = _ADDRESS.search(log.read_text())
+        if match:
+            return match[1]
         time.sleep(0.1)
     print(log.read_text(), file=sys.stderr)
     raise RuntimeError("the cockpit did not start")
 
 
 def free_port():
-    with socket.socket() as one:
-        one.bind(("", 0))
-        return one.getsockname()[1]
+    with socket.socket() as probe:
+        probe.bind(("", 0))
+        return probe.getsockname()[1]

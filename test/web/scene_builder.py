@@ -1,15 +1,15 @@
-"""The Edit panel of the cockpit's page, as somebody clicks it; tests and pictures build with it."""
+"""Operates the Edit panel of the cockpit's page, for tests and pictures."""
 
 from cockpit_page import PROJECT, Panel, wait_until
 
 SELECTED = "scene.editing.objects.get(scene.editing.last)?.name ?? null"
-# Names of an object, of what it hangs on, and where it is in that one's frame.
+# Return the description of an object by its name; `above` is the name of its parent.
 OBJECT = """name => {
     const { objects } = scene.editing;
     const one = objects.named(name);
     return one && { ...one, matrix: null, above: objects.get(one.parent)?.name ?? "" };
 }"""
-# Half way along the arrow in the direction of y, in the world.
+# Return the middle of the arrow along y, in the world.
 ARROW = """() => {
     const { taken, controls } = scene.editing.handles, { camera } = scene;
     const at = taken.getWorldPosition(camera.position.clone());
@@ -20,7 +20,7 @@ ARROW = """() => {
 
 
 class Builder:
-    """The Edit panel, as somebody clicks it."""
+    """The Edit panel, operated as a user does."""
 
     def __init__(self, page):
         self.page = page
@@ -33,23 +33,23 @@ class Builder:
     def object(self, name):
         return self.page.evaluate(OBJECT, name)
 
-    def wait(self, name, is_so):
-        """Wait until what the node tells of an object is so; return that."""
-        wait_until(self.page, lambda: (one := self.object(name)) is not None and is_so(one))
+    def wait(self, name, condition):
+        """Wait until the condition is true for the description of an object; return the description."""
+        wait_until(self.page, lambda: (entry := self.object(name)) is not None and condition(entry))
         return self.object(name)
 
-    def menu(self, which, item):
-        self.page.get_by_role("button", name=which).click()  # "Scene file" has the file's name behind it
+    def menu(self, button, item):
+        self.page.get_by_role("button", name=button).click()  # the button "Scene file" also shows the file's name
         self.page.get_by_role("menuitem", name=item).click()
 
     def new_scene(self):
-        """Begin a scene of a floor alone, without what is not saved; wait until old cameras' pictures are gone."""
+        """Open a new scene with only a floor, discard unsaved edits, and wait until old camera pictures are closed."""
         page = self.page
         self.menu("Scene file", "New")
-        sure = page.get_by_role("button", name="Throw them away")
-        wait_until(page, lambda: sure.is_visible() or page.get_by_role("treeitem").count() == 1)
-        if sure.is_visible():
-            sure.click()
+        discard = page.get_by_role("button", name="Throw them away")
+        wait_until(page, lambda: discard.is_visible() or page.get_by_role("treeitem").count() == 1)
+        if discard.is_visible():
+            discard.click()
             wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
         wait_until(page, lambda: page.locator(".picture").count() == 0)
 
@@ -66,12 +66,12 @@ class Builder:
         self.page.keyboard.press("Enter")
         self.row(after).wait_for()
 
-    def hang(self, name, parent):
+    def set_parent(self, name, parent):
         self.row(name).drag_to(self.row(parent))
-        self.wait(name, lambda one: one["above"] == parent)
+        self.wait(name, lambda entry: entry["above"] == parent)
 
     def drop(self, model, point):
-        """Drag a model from the shelf to a point of the world; it is selected then."""
+        """Drag a model from the shelf to a point of the world; return the name of the new object, which is selected."""
         self.page.get_by_role("searchbox", name="Find a model").fill(model)
         self.page.locator("#models").get_by_role("button", name=model, exact=True).hover()
         self.page.mouse.down()
@@ -81,8 +81,8 @@ class Builder:
         wait_until(self.page, lambda: self.page.evaluate(SELECTED) not in (before, None))
         return self.page.evaluate(SELECTED)
 
-    def pull(self, pixels):
-        """Drag what is selected by the arrow in the direction of y, so far to the right."""
+    def drag_along_y(self, pixels):
+        """Drag the selected object by its arrow along y, to the right by `pixels`."""
         wait_until(self.page, lambda: self.page.evaluate("Boolean(scene.editing.handles.controls.object)"))
         x, y = self.page.evaluate(PROJECT, self.page.evaluate(ARROW))
         self.page.mouse.move(x, y)
@@ -92,7 +92,7 @@ class Builder:
         self.page.mouse.up()
 
     def write(self, relative="World", **numbers):
-        """Write numbers of the position and orientation: X, Y, Z (m), Alpha, Beta, Gamma (degrees)."""
+        """Enter numbers of the position and orientation: X, Y, Z (m), Alpha, Beta, Gamma (degrees)."""
         self.page.get_by_label("Relative to").select_option(label=relative)
         for name, value in numbers.items():
             field = self.page.get_by_label(f"{name}, {'m' if len(name) == 1 else 'degrees'}", exact=True)

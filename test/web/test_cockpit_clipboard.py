@@ -1,4 +1,4 @@
-"""Objects are copied in one scene and pasted in another, in another page, and as the text that they are."""
+"""Objects are copied to the clipboard and pasted into another scene, another page, and from text."""
 
 import pytest
 import yaml
@@ -20,7 +20,7 @@ def put_on_clipboard(page, text):
     page.evaluate("text => navigator.clipboard.writeText(text)", text)
 
 
-def test_what_is_copied_is_pasted_in_another_scene_another_page_and_from_text(cockpit, browser):
+def test_objects_are_pasted_into_another_scene_another_page_and_from_text(cockpit, browser):
     options = {"viewport": SIZE, "permissions": ["clipboard-read", "clipboard-write"]}
     with open_page(cockpit, browser, **options) as page:
         panel, builder = Panel(page), Builder(page)
@@ -28,30 +28,30 @@ def test_what_is_copied_is_pasted_in_another_scene_another_page_and_from_text(co
         crate = builder.drop("Cuboid", [1, 0, 0])
         builder.rename(crate, "Crate")
         builder.set("mass", 2)
-        before = builder.wait("Crate", lambda one: one["values"].get("mass") == 2)
-        page.keyboard.press("Escape")  # which leaves the field; another click on the row might be the third in a row
+        before = builder.wait("Crate", lambda entry: entry["values"].get("mass") == 2)
+        page.keyboard.press("Escape")  # leaves the field; a click on the row could become a triple click
         page.keyboard.press("Control+c")
         panel.wait_for("copied: Crate")
-        (said,) = yaml.safe_load(clipboard(page))["objects"]
-        assert (said["name"], said["shape"], said["mass"], said["position"]) == ("Crate", "box", 2, before["position"])
+        (item,) = yaml.safe_load(clipboard(page))["objects"]
+        assert (item["name"], item["shape"], item["mass"], item["position"]) == ("Crate", "box", 2, before["position"])
         page.keyboard.press("Control+v")
-        builder.wait("Crate0", lambda one: one["position"][0] == before["position"][0] + 0.5)
+        builder.wait("Crate0", lambda entry: entry["position"][0] == before["position"][0] + 0.5)
         page.keyboard.press("Control+z")
         builder.row("Crate0").wait_for(state="detached")
 
         builder.new_scene()
         with open_page(cockpit, browser, **options) as other:
-            there = Builder(other)
+            target = Builder(other)
             other.bring_to_front()
             other.keyboard.press("Control+v")
-            there.wait("Crate", lambda one: one["position"] == before["position"] and one["values"]["mass"] == 2)
+            target.wait("Crate", lambda entry: entry["position"] == before["position"] and entry["values"]["mass"] == 2)
             put_on_clipboard(other, BALL)
-            there.select("Floor")
+            target.select("Floor")
             other.keyboard.press("Control+v")
-            there.wait("Ball", lambda one: one["position"] == [1, 1, 0.5])
+            target.wait("Ball", lambda entry: entry["position"] == [1, 1, 0.5])
             put_on_clipboard(other, "Dear John,\nhow are you?")
             other.keyboard.press("Control+v")
             Panel(other).wait_for("must be objects as in a scene file")
-            names = {one.inner_text() for one in other.locator("#tree .name").all()}
+            names = {entry.inner_text() for entry in other.locator("#tree .name").all()}
             assert names == {"Floor", "Crate", "Ball"}
-    cockpit.load("")  # as it was launched
+    cockpit.load("")  # the scene of the launch

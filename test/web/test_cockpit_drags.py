@@ -1,4 +1,4 @@
-"""The mouse on the scene of the cockpit: arrows of the drone, and of an object, which go where they are dragged."""
+"""Dragging with the mouse in the cockpit's scene: the handles of the drone and of an object."""
 
 import math
 
@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import PROJECT, TIP, let_fly, wait_until
+from cockpit_page import PROJECT, TIP, wait_for_steps, wait_until
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import InteractiveMarkerFeedback, MarkerArray
 
@@ -17,8 +17,8 @@ objects:
   - {name: Crate, shape: box, size: [0.3, 0.3, 0.3], position: [1.5, -0.5, 0.8], color: [1, 0, 0, 1], mass: 1}
   - {name: Shelf, shape: box, size: [0.4, 0.4, 0.1], position: [1.5, -0.5, 0.59]}
 """
-ARROW, RING = (0.0, 0.0, 0.95), (0.0, 0.72, 0.0)  # in parts; the ring's is to the left
-# How far the lower edge of the drone's label is above the tip of the handles, in half pictures.
+ARROW, RING = (0.0, 0.0, 0.95), (0.0, 0.72, 0.0)  # in the frames of the parts; on the left of the ring
+# Return the height of the label's lower edge above the tip of the handles, in half picture heights.
 LABEL_OVER_HANDLES = """() => {
     const label = [...scene.tree.markers.values()].find((one) => one.userData.said.layer === "view/state");
     const heightOf = (point) => point.project(scene.camera).y;
@@ -30,39 +30,39 @@ LABEL_OVER_HANDLES = """() => {
 
 
 class Mouse:
-    """The mouse on a page, whose eyes stand still while something is dragged."""
+    """The mouse on a page; the camera of the page stands still during a drag."""
 
     def __init__(self, page):
-        self.page, self.on = page, (0.0, 0.0, 0.0)
+        self.page, self.target = page, (0.0, 0.0, 0.0)
 
-    def over(self, point):
-        """Go to a point of the world; there is another picture when the page has seen it."""
-        self.on = list(map(float, point))
-        self.page.mouse.move(*self.page.evaluate(PROJECT, self.on))
+    def move_to(self, point):
+        """Move to a point of the world, and wait until the page has painted another picture."""
+        self.target = list(map(float, point))
+        self.page.mouse.move(*self.page.evaluate(PROJECT, self.target))
         self.page.evaluate("new Promise(done => scene.canvas.then(done))")
 
-    def take(self, part, place=ARROW):
-        """Press the button on a part of the handle; return where that is in the world."""
+    def grab(self, part, place=ARROW):
+        """Press the mouse button on a part of the handle; return the position of that point in the world."""
         self.wait("scene.gizmo.isShown", True)
         tip = np.array(self.page.evaluate(TIP, [part, place]))
-        self.over(tip)
+        self.move_to(tip)
         self.page.mouse.down()
         return tip
 
-    def wait(self, seen, expected):
-        """Stay on the point until the page shows what is expected.
+    def wait(self, expression, expected):
+        """Stay on the point until the value of `expression` in the page is as expected.
 
-        What comes under a mouse that rests is not seen: it moves a little. In a scene that has just been loaded, the
-        eyes may still follow the drone: where the point is, is asked anew.
+        The page does not notice an object that moves under a resting mouse, so the mouse moves a little. In a scene
+        that has just been loaded, the camera may still follow the drone, so the point is projected each time.
         """
 
-        def is_seen():
-            x, y = self.page.evaluate(PROJECT, self.on)
+        def is_as_expected():
+            x, y = self.page.evaluate(PROJECT, self.target)
             self.page.mouse.move(x + 1, y)
             self.page.mouse.move(x, y)
-            return self.page.evaluate(seen) == expected
+            return self.page.evaluate(expression) == expected
 
-        wait_until(self.page, is_seen)
+        wait_until(self.page, is_as_expected)
 
     def drag(self, point):
         self.page.mouse.move(*self.page.evaluate(PROJECT, list(map(float, point))), steps=5)
@@ -76,7 +76,7 @@ def _mouse(opened):
     mouse = Mouse(opened)
     yield mouse
     mouse.drop()
-    load("")  # as it was
+    load("")  # the scene of the launch
 
 
 def load(scene):
@@ -84,10 +84,10 @@ def load(scene):
     assert rospy.ServiceProxy("/drone_sim/load_scene", Trigger)().success
 
 
-def listen(topic, kind):
-    heard = []
-    rospy.Subscriber(topic, kind, heard.append)
-    return heard
+def listen(topic, message_type):
+    messages = []
+    rospy.Subscriber(topic, message_type, messages.append)
+    return messages
 
 
 def hover(cockpit, page):
@@ -97,30 +97,30 @@ def hover(cockpit, page):
 
 def test_a_drone_has_handles_and_thrust_arrows_while_the_mouse_is_on_it(cockpit, opened, mouse):
     hover(cockpit, opened)
-    seen = """[scene.gizmo.isShown, scene.outline.scene.children.length > 0, [...scene.tree.markers.values()]
+    expression = """[scene.gizmo.isShown, scene.outline.scene.children.length > 0, [...scene.tree.markers.values()]
         .some((one) => one.userData.said.layer === 'view/forces' && one.visible)]"""
-    wait_until(opened, lambda: opened.evaluate(seen) == [False, False, False])
-    mouse.over(cockpit.drone.place)
-    mouse.wait(seen, [True, True, True])
+    wait_until(opened, lambda: opened.evaluate(expression) == [False, False, False])
+    mouse.move_to(cockpit.drone.place)
+    mouse.wait(expression, [True, True, True])
     wait_until(opened, lambda: opened.evaluate(LABEL_OVER_HANDLES) > 0)
-    mouse.over(np.add(cockpit.drone.place, (0.5, 0.6, -0.6)))
-    mouse.wait(seen, [False, False, False])
+    mouse.move_to(np.add(cockpit.drone.place, (0.5, 0.6, -0.6)))
+    mouse.wait(expression, [False, False, False])
     opened.evaluate("scene.select('drone')")
     mouse.wait("scene.gizmo.isShown", True)
     cockpit.call("restart")
     mouse.wait("[scene.gizmo.isShown, scene.selected]", [False, ""])
 
 
-def test_the_drone_goes_where_its_arrow_is_dragged(cockpit, opened, mouse):
+def test_the_drone_follows_its_dragged_arrow(cockpit, opened, mouse):
     hover(cockpit, opened)
     drone, before, aside = cockpit.drone, np.array(cockpit.drone.place), np.array((0, 0.3, 0))
     feedback = listen("/drone/markers/feedback", InteractiveMarkerFeedback)
-    mouse.over(before)
-    tip = mouse.take(1)
+    mouse.move_to(before)
+    tip = mouse.grab(1)
     eye = opened.evaluate("scene.camera.position.toArray()")
     mouse.drag(tip + aside)
     wait_until(opened, lambda: np.allclose(drone.place, before + aside, atol=0.06))
-    assert np.allclose(opened.evaluate("scene.camera.position.toArray()"), eye, atol=0.02), "the eyes stay"
+    assert np.allclose(opened.evaluate("scene.camera.position.toArray()"), eye, atol=0.02), "the camera stands still"
     mouse.drop()
     wait_until(opened, lambda: feedback[-1].event_type == InteractiveMarkerFeedback.MOUSE_UP)
     assert feedback[0].event_type == InteractiveMarkerFeedback.MOUSE_DOWN
@@ -131,41 +131,41 @@ def test_the_drone_turns_with_its_ring(cockpit, opened, mouse):
     hover(cockpit, opened)
     before, place = cockpit.drone.pose.orientation, np.array(cockpit.drone.place)
     assert abs(before.z) < 0.05
-    mouse.over(place)
-    grip = mouse.take(6, RING) - place
+    mouse.move_to(place)
+    grip = mouse.grab(6, RING) - place
     (x, y), sine, cosine = grip[:2], math.sin(0.6), math.cos(0.6)
     mouse.drag(np.add(place, (x * cosine - y * sine, x * sine + y * cosine, 0.0)))
     wait_until(opened, lambda: abs(2 * math.asin(cockpit.drone.pose.orientation.z) - 0.6) < 0.1)
 
 
-def test_an_object_that_is_clicked_on_has_arrows_and_falls_when_it_is_let_go(cockpit, opened, mouse, tmp_path):
+def test_a_clicked_object_can_be_dragged_and_falls_when_it_is_released(cockpit, opened, mouse, tmp_path):
     scene = tmp_path / "scene.yaml"
     scene.write_text(SCENE)
     load(scene)
-    shown = listen("/drone/scene", MarkerArray)
+    scenes = listen("/drone/scene", MarkerArray)
 
     def crate():
-        found = [one.pose.position for one in shown[-1].markers if one.ns == "Crate"] if shown else []
-        return np.array([(at.x, at.y, at.z) for at in found]).reshape(-1, 3)
+        centers = [one.pose.position for one in scenes[-1].markers if one.ns == "Crate"] if scenes else []
+        return np.array([(at.x, at.y, at.z) for at in centers]).reshape(-1, 3)
 
     wait_until(opened, lambda: len(crate()) and math.dist(cockpit.drone.place, (0, 0, 0.8)) < 0.02)
     before, aside = crate()[0], np.array((0, 0.5, 0))
     wait_until(opened, lambda: opened.evaluate("Boolean(scene.handleOf('Crate'))"))
     opened.evaluate("scene.frame('Crate')")
     opened.mouse.move(200, 400)
-    for _ in range(4):  # away from it: it is to be dragged for half a metre
+    for _ in range(4):  # zoom out, so that half a metre fits into the picture
         opened.mouse.wheel(0, 300)
     wait_until(opened, lambda: opened.evaluate("scene.view.distance") > 4.2)
     opened.evaluate("new Promise(done => scene.canvas.then(done))")
-    mouse.over(before)
+    mouse.move_to(before)
     opened.mouse.down()
     opened.mouse.up()
     assert opened.evaluate("scene.selected") == "Crate"
-    tip = mouse.take(1)
+    tip = mouse.grab(1)
     mouse.drag(tip + aside)
     wait_until(opened, lambda: np.allclose(crate(), before + aside, atol=0.1))
-    let_fly(opened, cockpit.drone, 30)
-    assert abs(crate()[0, 2] - before[2]) < 0.1, "it is held"
+    wait_for_steps(opened, cockpit.drone, 30)
+    assert abs(crate()[0, 2] - before[2]) < 0.1, "the crate is held"
     mouse.drop()
     wait_until(opened, lambda: crate()[0, 2] < 0.2)
     opened.keyboard.press("Escape")

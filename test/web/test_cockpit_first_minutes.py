@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import Panel, left_as_found, let_pass, open_page, ready, wait_until
+from cockpit_page import Panel, initial_state_restored, let_time_pass, open_page, ready, wait_until
 
 STAGES = ("1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros", "7_camera", "8_gate")
 GAIN = 'self.thrust = gain("thrust_gravity")'
@@ -16,14 +16,14 @@ GAIN = 'self.thrust = gain("thrust_gravity")'
 @pytest.fixture(name="student")
 def _student(cockpit, browser):
     """A page that is opened for the first time."""
-    with left_as_found(cockpit):
+    with initial_state_restored(cockpit):
         with open_page(cockpit, browser, started=False, viewport={"width": 1440, "height": 900}) as page:
             yield page
-        rospy.set_param("/drone_sim/scene_file", "")  # lessons and tasks bring scenes of their own
+        rospy.set_param("/drone_sim/scene_file", "")  # lessons and tasks load their own scenes
         cockpit.call("load_scene")
 
 
-def door(page, name):
+def open_from_start_page(page, name):
     if not page.get_by_role("dialog", name="drone_sim").is_visible():
         page.click("#home")
     page.get_by_role("dialog", name="drone_sim").get_by_role("button", name=name).click()
@@ -35,22 +35,22 @@ def run(page, answer="started"):
 
 
 def type_into(page, place, keys, words):
-    """Click into a line, press keys that lead to where one writes, and write."""
+    """Click into the line that contains `place`, press keys that move the cursor, and type the words."""
     page.locator("#text .cm-line", has_text=place).click()
     for key in keys:
         page.keyboard.press(key)
     page.keyboard.type(words)
 
 
-def test_from_the_address_to_a_gain_that_is_tuned(cockpit, student):
-    door(student, "Just fly")
+def test_a_student_flies_fixes_a_script_debugs_it_and_tunes_a_gain(cockpit, student):
+    open_from_start_page(student, "Just fly")
     wait_until(student, lambda: cockpit.drone.state == "flying")
     student.keyboard.down("w")
     wait_until(student, lambda: cockpit.drone.command[0] == 1.0)
     student.keyboard.up("w")
     wait_until(student, lambda: cockpit.drone.command[0] == 0.0)
 
-    door(student, "Tutorial")
+    open_from_start_page(student, "Tutorial")
     wait_until(student, lambda: student.input_value("#script") == "tutorial/1_thrust.py")
     student.select_option("#lesson", label="Stage 6: the twist topic")
     wait_until(student, lambda: student.input_value("#script") == "tutorial/6_ros.py")
@@ -62,7 +62,7 @@ def test_from_the_address_to_a_gain_that_is_tuned(cockpit, student):
     type_into(student, "prnt('hello')", ["End", "Shift+Home"], "sim.getObjectPosi")
     options = student.locator(".cm-tooltip-autocomplete li")
     wait_until(student, lambda: options.count() and options.first.inner_text().startswith("getObjectPosition"))
-    let_pass(student, 100)  # in its first 75 ms, Enter begins a line
+    let_time_pass(student, 100)  # for the first 75 ms of a completion, Enter starts a new line
     student.keyboard.press("Enter")
     student.keyboard.press("Home")
     student.keyboard.type("print('at', ")
@@ -84,7 +84,7 @@ def test_from_the_address_to_a_gain_that_is_tuned(cockpit, student):
     panel = Panel(student)
     panel.show("Tune")
     field = panel.field("Kzref (m/s) per m")
-    for value in ("2.5", "5"):  # and back: another script of the drone's has it, too
+    for value in ("2.5", "5"):  # and back, since another script of the drone uses it
         field.click()
         student.keyboard.press("Control+a")
         student.keyboard.type(value)
@@ -93,8 +93,8 @@ def test_from_the_address_to_a_gain_that_is_tuned(cockpit, student):
         assert field.input_value() == value
 
 
-def test_each_stage_flies_when_one_goes_from_one_to_the_next(cockpit, student):
-    door(student, "Tutorial")
+def test_every_stage_of_the_tutorial_flies_one_after_the_other(cockpit, student):
+    open_from_start_page(student, "Tutorial")
     for stage in STAGES:
         wait_until(student, lambda stage=stage: student.input_value("#script") == f"tutorial/{stage}.py")
         wait_until(student, lambda: "Run" in student.inner_text("#lesson-text"))
@@ -103,7 +103,7 @@ def test_each_stage_flies_when_one_goes_from_one_to_the_next(cockpit, student):
         wait_until(student, lambda: cockpit.drone.state == "flying" and Panel(student).status == "flying")
         assert "error" not in student.inner_text("#console").lower()
         student.click("#after")
-        if stage == "5_roll":  # the stability tests come between, with its script
+        if stage == "5_roll":  # the stability tests come next, with the same script
             wait_until(student, lambda: student.input_value("#lesson") == "stability-tests")
             student.click("#after")
 
@@ -120,7 +120,7 @@ def test_keys_alone_lead_from_the_start_page_to_a_graded_task_and_its_replay(stu
     wait_until(student, lambda: has_focus(student, "#lesson-body"))
     wait_until(student, lambda: student.input_value("#script") == "tasks/hover.py")
     student.locator("#start").wait_for(state="hidden")
-    assert "solution" not in student.inner_text("#lesson-text").lower(), "there is none to be opened here"
+    assert "solution" not in student.inner_text("#lesson-text").lower(), "the task offers no solution"
     student.keyboard.press("Tab")
     assert has_focus(student, "#grade")
     student.keyboard.press("Enter")
@@ -130,7 +130,7 @@ def test_keys_alone_lead_from_the_start_page_to_a_graded_task_and_its_replay(stu
     assert has_focus(student, "#graded .seeds button:first-child")
     graded = student.inner_text("#graded")
     assert re.search(r"\d+(\.\d)? of \d+ points", graded) and "seed 2" in graded and "Try this" in graded
-    replay_of_the_second_that_failed(student)
+    check_replay_of_failure(student)
     student.locator("#graded a.when").first.click()
     student.locator("#replay").wait_for()
     run(student)
@@ -140,12 +140,12 @@ def test_keys_alone_lead_from_the_start_page_to_a_graded_task_and_its_replay(stu
     wait_until(opened.value, lambda: opened.value.locator("#stage[data-shown]").count())
     opened.value.close()
     student.click("#home")
-    door(student, "Tasks")
+    open_from_start_page(student, "Tasks")
     assert "your best: 3 of 6 points" in student.locator("#gallery-tasks button").first.inner_text()
 
 
-def replay_of_the_second_that_failed(page):
-    """A ghost flies in the scene; keys alone choose the second, play, and end it."""
+def check_replay_of_failure(page):
+    """Open the replay at the second of a failure, play it with a ghost in the scene, and close it, all with keys."""
     view = page.evaluate("scene.view.name")
     link = page.locator("#graded a.when").first
     link.press("Enter")
@@ -154,9 +154,9 @@ def replay_of_the_second_that_failed(page):
     second = float(slider.input_value())
     assert second == pytest.approx(float(link.get_attribute("data-at")), abs=0.05)
     assert page.evaluate("scene.isShown({ layer: 'view/bodies', ns: 'drone' })") is False, "only the ghost is shown"
-    there = page.evaluate("scene.replay.ghost.position.toArray()")
+    position_before = page.evaluate("scene.replay.ghost.position.toArray()")
     slider.press("Home")
-    assert page.evaluate("scene.replay.ghost.position.toArray()") != there
+    assert page.evaluate("scene.replay.ghost.position.toArray()") != position_before
     assert page.inner_text("#replay-text") == "Replay, seed 0: 0.00 s"
     page.get_by_role("button", name="Play", exact=True).press("Enter")
     wait_until(page, lambda: float(slider.input_value()) > 0.3)
@@ -166,8 +166,8 @@ def replay_of_the_second_that_failed(page):
     assert link.evaluate("one => one === document.activeElement")
 
 
-def test_a_script_that_fails_its_task_is_graded_with_the_reason(student):
-    door(student, "Tasks")
+def test_a_failing_script_is_graded_with_the_reason(student):
+    open_from_start_page(student, "Tasks")
     student.locator("#gallery-tasks button").first.click()
     wait_until(student, lambda: student.input_value("#script") == "tasks/hover.py")
     student.locator("#text .cm-content").click()
@@ -179,7 +179,7 @@ def test_a_script_that_fails_its_task_is_graded_with_the_reason(student):
     wait_until(student, lambda: "of the script" in student.inner_text("#graded"))
 
 
-def test_the_browsers_back_and_forward_lead_away_and_back_to_what_was_written(student):
+def test_the_browsers_back_button_returns_to_the_edited_script(student):
     student.click("#start-close")
     student.select_option("#script", "tutorial/3_yaw.py")
     wait_until(student, lambda: "Stage 3" in student.inner_text("#text .cm-content"))

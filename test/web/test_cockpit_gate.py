@@ -1,4 +1,4 @@
-"""Who the cockpit lets in, asked by a real browser."""
+"""Access control of the cockpit, tested with a real browser."""
 
 import shutil
 import stat
@@ -22,16 +22,16 @@ SOCKET = """path => new Promise(said => {
 
 @pytest.mark.parametrize("query", ["", "?token=", "?token=wrong"])
 def test_an_address_without_the_right_token_is_refused(cockpit, browser, query):
-    with_nothing = browser.new_context()
+    fresh_context = browser.new_context()
     for path in ("", "mesh/a.glb", "cockpit.js"):
-        answer = with_nothing.request.get(f"{cockpit.address.partition('?')[0]}{path}{query}")
+        answer = fresh_context.request.get(f"{cockpit.address.partition('?')[0]}{path}{query}")
         assert answer.status == 403 and "token" in answer.text()
-    with_nothing.close()
+    fresh_context.close()
 
 
 @pytest.fixture(name="stranger")
 def _stranger():
-    """Serve a page of somebody else's on this machine; give its address."""
+    """Serve a page of another origin on this machine; yield its address."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), _Stranger)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     yield f"http://127.0.0.1:{server.server_port}/"
@@ -48,7 +48,7 @@ class _Stranger(BaseHTTPRequestHandler):
         pass
 
 
-def test_a_page_of_another_origin_opens_no_socket_though_the_browser_has_the_cookie(cockpit, browser, stranger):
+def test_a_page_of_another_origin_opens_no_socket_despite_the_cookie(cockpit, browser, stranger):
     """Browsers send a host's cookies to all its ports, from pages of all ports."""
     context, host = browser.new_context(), urlsplit(cockpit.address).netloc
     context.request.get(cockpit.address)
@@ -60,57 +60,57 @@ def test_a_page_of_another_origin_opens_no_socket_though_the_browser_has_the_coo
     context.close()
 
 
-def test_the_token_is_in_no_log_but_in_a_file_of_its_user(cockpit):
-    """roslaunch's log and the nodes' lie in ~/.ros, where everybody may read them; rosout has what all nodes say."""
+def test_the_token_is_in_a_private_file_and_in_no_log(cockpit):
+    """All users can read the logs of roslaunch and of the nodes in ~/.ros; rosout has the messages of all nodes."""
     token, home = cockpit.address.partition("?token=")[2], cockpit.scripts.parent
     logs = [file for file in (home / ".ros" / "log").rglob("*") if file.is_file()]
     assert any("the cockpit listens at" in file.read_text() for file in logs)
     assert [file for file in logs if token in file.read_text()] == []
-    (kept,) = (home / ".ros" / "drone_sim").glob("cockpit_*.txt")
-    assert kept.read_text() == f"{cockpit.address}\n" and stat.S_IMODE(kept.stat().st_mode) == 0o600
+    (token_file,) = (home / ".ros" / "drone_sim").glob("cockpit_*.txt")
+    assert token_file.read_text() == f"{cockpit.address}\n" and stat.S_IMODE(token_file.stat().st_mode) == 0o600
 
 
 @pytest.fixture(name="rebound")
 def _rebound(browser):
-    """A browser that takes this machine for evil.example, as after DNS rebinding."""
+    """A browser that resolves evil.example to this machine, as after DNS rebinding."""
     rules = "--host-resolver-rules=MAP evil.example 127.0.0.1"
-    other = browser.browser_type.launch(executable_path=shutil.which("chromium"), args=[rules])
-    yield other
-    other.close()
+    chromium = browser.browser_type.launch(executable_path=shutil.which("chromium"), args=[rules])
+    yield chromium
+    chromium.close()
 
 
-def test_a_page_under_a_foreign_name_gets_nothing(cockpit, rebound):
+def test_requests_under_a_foreign_host_name_are_refused(cockpit, rebound):
     port = urlsplit(cockpit.address).port
     context = rebound.new_context()
     page = context.new_page()
-    page.goto(cockpit.address)  # the browser has the cookie, for this machine's own name
+    page.goto(cockpit.address)  # the browser now has the cookie, for this machine's name
     foreign = f"http://evil.example:{port}"
     for path in ("/", "/mesh/a.glb", "/cockpit.js"):
         answer = page.goto(foreign + path)
         assert answer.status == 403 and "token" in page.inner_text("body")
     host = f"evil.example:{port}"
     assert page.evaluate(SOCKET, f"{host}/socket") == "refused"
-    # From there to this machine's own name: the browser would send the cookie, were it of the same site.
+    # From the foreign page to this machine's name: the browser would send the cookie if both were the same site.
     assert page.evaluate(SOCKET, f"127.0.0.1:{port}/socket") == "refused"
     context.close()
 
 
-def test_nobody_elses_page_shows_the_cockpit_in_a_frame(cockpit, browser, stranger):
+def test_a_page_of_another_origin_cannot_frame_the_cockpit(cockpit, browser, stranger):
     context = browser.new_context()
     context.request.get(cockpit.address)
     page = context.new_page()
-    refused = []
-    page.on("console", lambda message: refused.append(message.text))
+    console_lines = []
+    page.on("console", lambda message: console_lines.append(message.text))
     page.goto(stranger)
-    here = cockpit.address.partition("?")[0]
-    page.evaluate('there => { document.body.innerHTML = `<iframe src="${there}"></iframe>` }', here)
-    wait_until(page, lambda: any("frame" in line and "ancestors" in line for line in refused))
-    assert not any(frame.url.startswith(here) for frame in page.frames)
+    cockpit_url = cockpit.address.partition("?")[0]
+    page.evaluate('there => { document.body.innerHTML = `<iframe src="${there}"></iframe>` }', cockpit_url)
+    wait_until(page, lambda: any("frame" in line and "ancestors" in line for line in console_lines))
+    assert not any(frame.url.startswith(cockpit_url) for frame in page.frames)
     context.close()
 
 
-def test_a_script_in_our_page_can_neither_load_nor_tell_what_is_not_from_here(cockpit, opened, stranger):
-    tell = "there => fetch(there, { mode: 'no-cors' }).then(() => 'told', () => 'refused')"
+def test_the_page_cannot_contact_other_origins_or_run_inline_scripts(cockpit, opened, stranger):
+    send = "there => fetch(there, { mode: 'no-cors' }).then(() => 'told', () => 'refused')"
     load = """there => new Promise(said => {
         const script = document.createElement("script");
         script.src = there;
@@ -118,7 +118,7 @@ def test_a_script_in_our_page_can_neither_load_nor_tell_what_is_not_from_here(co
         script.onerror = () => said("refused");
         document.head.append(script);
     })"""
-    assert opened.evaluate(tell, stranger) == opened.evaluate(load, stranger) == "refused"
+    assert opened.evaluate(send, stranger) == opened.evaluate(load, stranger) == "refused"
     assert (
         opened.evaluate(
             "new Promise(said => { const s = document.createElement('script'); "
@@ -129,14 +129,14 @@ def test_a_script_in_our_page_can_neither_load_nor_tell_what_is_not_from_here(co
     opened.troubles.clear()
 
 
-# Each is also the name of a file, so none has a slash.
+# It is also part of file names, so it has no slash.
 MARKUP = "<img src=x onerror=alert(1)>"
 WEDGE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 FAILS = f"print({MARKUP!r})\ndef sysCall_init():\n    raise ValueError({MARKUP!r})\n"
 
 
 def test_markup_in_names_of_scripts_models_objects_and_scenes_is_text(cockpit, browser):
-    """Nothing of it becomes an element: the page's policy would stop the script, but not the picture."""
+    """Markup must not become an element: the page's policy would block its script, but not its picture."""
     cockpit.start_afresh()
     cockpit.scripts.mkdir(exist_ok=True)
     content = {".py": FAILS, ".lua": f"print('{MARKUP}')", ".obj": WEDGE, ".yaml": "objects: []\n"}

@@ -1,14 +1,14 @@
-"""What flies besides keys: touch sticks and a gamepad; and when keys are released, with one browser and with two."""
+"""Touch sticks, a gamepad and keys that fly the drone, and the release of keys, with one browser and with two."""
 
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-from cockpit_page import Panel, open_page, wait_until
+from cockpit_page import Panel, open_page, wait_for_steps, wait_until
 
-PAD = "window.pad = null; navigator.getGamepads = () => [window.pad];"
+FAKE_GAMEPAD = "window.pad = null; navigator.getGamepads = () => [window.pad];"
 STILL = (0.0, 0.0, 0.0)
-FRENCH = """Object.defineProperty(navigator, "keyboard", { value: { getLayoutMap: async () =>
+FRENCH_KEYBOARD = """Object.defineProperty(navigator, "keyboard", { value: { getLayoutMap: async () =>
     new Map(Object.entries({ KeyW: "z", KeyA: "q", KeyQ: "a", KeyS: "s", KeyD: "d" })) } });"""
 PRESS = """([type, code, key]) => document.activeElement.dispatchEvent(
     new KeyboardEvent(type, { code, key, bubbles: true, cancelable: true }))"""
@@ -16,22 +16,22 @@ PRESS = """([type, code, key]) => document.activeElement.dispatchEvent(
 
 @pytest.fixture(name="tablet", scope="module")
 def _tablet(cockpit, browser):
-    """A page on a touch screen, with a gamepad at hand."""
-    with open_page(cockpit, browser, init=PAD, has_touch=True, is_mobile=True) as page:
+    """A page on a touch screen, with a simulated gamepad."""
+    with open_page(cockpit, browser, init=FAKE_GAMEPAD, has_touch=True, is_mobile=True) as page:
         yield page
 
 
 @pytest.fixture(autouse=True)
-def _afresh(cockpit, tablet):
+def _restart_pilot(cockpit, tablet):
     cockpit.start_afresh()
     wait_until(tablet, lambda: cockpit.drone.command == STILL)
 
 
-def nearly(command, wanted):
-    return all(abs(one - other) < 0.1 for one, other in zip(command, wanted))
+def is_near(command, expected):
+    return all(abs(one - other) < 0.1 for one, other in zip(command, expected))
 
 
-def test_two_sticks_on_a_touch_screen(cockpit, tablet):
+def test_two_touch_sticks_fly_the_drone(cockpit, tablet):
     fingers = tablet.context.new_cdp_session(tablet)
     boxes = [tablet.locator(f"#{stick}").bounding_box() for stick in ("left", "right")]
     middles = [(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2) for box in boxes]
@@ -42,25 +42,26 @@ def test_two_sticks_on_a_touch_screen(cockpit, tablet):
 
     touch("touchStart", (0, 0), (0, 0))
     touch("touchMove", (0, -52), (0, -52))  # both up: climb, and forward
-    wait_until(tablet, lambda: nearly(cockpit.drone.command, (0.85, 0.85, 0.0)))
+    wait_until(tablet, lambda: is_near(cockpit.drone.command, (0.85, 0.85, 0.0)))
     touch("touchMove", (52, 0), (0, 0))  # turn to the right
-    wait_until(tablet, lambda: nearly(cockpit.drone.command, (0.0, 0.0, -0.85)))
+    wait_until(tablet, lambda: is_near(cockpit.drone.command, (0.0, 0.0, -0.85)))
     touch("touchEnd")
     wait_until(tablet, lambda: cockpit.drone.command == STILL)
 
 
-def test_a_gamepad_in_the_standard_mapping(cockpit, tablet):
+def test_a_gamepad_with_the_standard_mapping_flies_the_drone(cockpit, tablet):
     tablet.evaluate("pad = { axes: [-0.5, 0.05, 0, -1], buttons: [], mapping: 'standard', connected: true }")
-    wait_until(tablet, lambda: nearly(cockpit.drone.command, (1.0, 0.0, 0.5)))
+    wait_until(tablet, lambda: is_near(cockpit.drone.command, (1.0, 0.0, 0.5)))
     tablet.evaluate("pad = null")
     wait_until(tablet, lambda: cockpit.drone.command == STILL)
 
 
-def test_keys_are_released_when_the_window_is_left(cockpit, tablet):
+def test_keys_are_released_when_the_window_loses_the_focus(cockpit, tablet):
     tablet.locator("#command").click()
     tablet.keyboard.down("w")
     wait_until(tablet, lambda: cockpit.drone.command[0] == 1.0)
     tablet.locator("#script").focus()  # still in the window
+    wait_for_steps(tablet, cockpit.drone, 5)
     assert cockpit.drone.command[0] == 1.0
     tablet.evaluate("window.dispatchEvent(new Event('blur'))")
     wait_until(tablet, lambda: cockpit.drone.command == STILL)
@@ -72,7 +73,7 @@ def test_keys_are_released_when_the_window_is_left(cockpit, tablet):
     wait_until(tablet, lambda: cockpit.drone.command == STILL)
 
 
-def test_two_browsers_see_the_same_and_the_keys_of_both_count(cockpit, browser, tablet):
+def test_two_browsers_show_the_same_state_and_both_can_fly(cockpit, browser, tablet):
     with open_page(cockpit, browser) as other:
         panels = Panel(tablet), Panel(other)
         panels[1].press("Pause", "paused at")
@@ -91,8 +92,8 @@ def test_two_browsers_see_the_same_and_the_keys_of_both_count(cockpit, browser, 
     wait_until(tablet, lambda: cockpit.drone.command == STILL)
 
 
-def test_on_a_french_keyboard_the_same_places_fly_under_their_own_letters(cockpit, browser):
-    with open_page(cockpit, browser, init=FRENCH) as page:
+def test_a_french_keyboard_uses_the_same_key_positions_with_its_own_letters(cockpit, browser):
+    with open_page(cockpit, browser, init=FRENCH_KEYBOARD) as page:
         wait_until(page, lambda: page.inner_text("#keys").startswith("ZSQD"))
         page.evaluate(PRESS, ["keydown", "KeyW", "z"])
         wait_until(page, lambda: cockpit.drone.command[0] == 1.0)

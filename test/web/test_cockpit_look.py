@@ -1,4 +1,4 @@
-"""How the page looks: contrast, targets and room for the scene, light and dark, from a phone to a large screen."""
+"""The page's layout: contrast, button sizes and room for the scene, light and dark, from phones to large screens."""
 
 import pytest
 
@@ -6,10 +6,10 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 from cockpit_page import Panel, open_page, ready, switch_camera, wait_until
 
-CONTRAST = 4.5  # to 1, of text on its ground: WCAG 2.2, level AA
-TARGET = 32  # px, height of what is pressed
-# All visible text of the page around the scene whose contrast is too low, and all buttons that are too low.
-LOOK = """([contrast, target]) => {
+MIN_CONTRAST = 4.5  # minimum ratio of text to its background: WCAG 2.2, level AA
+MIN_HEIGHT = 32  # px, minimum height of buttons and fields
+# Return the visible elements around the scene whose contrast is too low, and the controls that are not high enough.
+FIND_FLAWS = """([contrast, target]) => {
     const canvas = Object.assign(document.createElement("canvas"), { width: 1, height: 1 });
     const ink = canvas.getContext("2d", { willReadFrequently: true });
     const rgba = (colour) => {
@@ -51,19 +51,19 @@ LOOK = """([contrast, target]) => {
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_can_be_read_and_buttons_can_be_hit(cockpit, browser, scheme):
+def test_text_has_enough_contrast_and_buttons_are_high_enough(cockpit, browser, scheme):
     with open_page(cockpit, browser, color_scheme=scheme, viewport={"width": 1440, "height": 900}) as page:
         panel = Panel(page)
         for name in ("View", "Cameras", "Plots", "Tune", "Log", "Edit"):
             panel.show(name)
             page.locator(f"#{name.lower()}-panel").wait_for()
-            assert page.evaluate(LOOK, [CONTRAST, TARGET]) == []
+            assert page.evaluate(FIND_FLAWS, [MIN_CONTRAST, MIN_HEIGHT]) == []
         panel.press("Stop", "stopped")
         panel.press("Step", "failed")
-        assert page.evaluate(LOOK, [CONTRAST, TARGET]) == []
+        assert page.evaluate(FIND_FLAWS, [MIN_CONTRAST, MIN_HEIGHT]) == []
         for opens, closes in (("#home", "#start-close"), ("#help-open", "#help-close")):
             page.click(opens)
-            assert page.evaluate(LOOK, [CONTRAST, TARGET]) == []
+            assert page.evaluate(FIND_FLAWS, [MIN_CONTRAST, MIN_HEIGHT]) == []
             page.click(closes)
         panel.press("Start", "started")
 
@@ -97,7 +97,7 @@ def visible_lines(page):
 @pytest.mark.parametrize(
     "width, height, beside_text, alone", [(1440, 900, 15, 30), (820, 1180, 11, 22), (720, 450, 0, 4), (390, 844, 0, 10)]
 )
-def test_code_has_room_beside_a_text_or_the_text_covers_it(cockpit, browser, width, height, beside_text, alone):
+def test_code_has_room_beside_a_lesson_or_is_hidden_by_it(cockpit, browser, width, height, beside_text, alone):
     with open_page(cockpit, browser, viewport={"width": width, "height": height}) as page:
         show_script(page)
         page.select_option("#lesson", "stage-2-elevation")
@@ -113,7 +113,7 @@ def test_code_has_room_beside_a_text_or_the_text_covers_it(cockpit, browser, wid
         assert page.evaluate("document.querySelector('#below').offsetHeight / editor.offsetHeight") >= 0.4 - 0.01
 
 
-def test_panel_and_editor_are_as_they_were_left(cockpit, browser):
+def test_a_reload_restores_the_panels_width_and_side(cockpit, browser):
     with open_page(cockpit, browser) as page:
         Panel(page).show("Tune")
         edge = page.locator("#side-edge")
@@ -132,23 +132,23 @@ def test_panel_and_editor_are_as_they_were_left(cockpit, browser):
 
 
 @pytest.mark.parametrize("width, height", [(820, 1180), (390, 844)])
-def test_on_touch_screens_thumbs_reach_both_sticks_and_nothing_lies_above_the_drone(cockpit, browser, width, height):
+def test_on_touch_screens_thumbs_reach_both_sticks_and_the_scene_is_uncovered(cockpit, browser, width, height):
     size = {"width": width, "height": height}
     with open_page(cockpit, browser, viewport=size, has_touch=True, is_mobile=True) as page:
-        for stick, near in (("left", 0), ("right", width)):
+        for stick, edge_x in (("left", 0), ("right", width)):
             box = page.locator(f"#{stick}").bounding_box()
             middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-            assert abs(middle[0] - near) < 110 and height - middle[1] < 200
+            assert abs(middle[0] - edge_x) < 110 and height - middle[1] < 200
         top = page.evaluate(
             "([x, y]) => document.elementFromPoint(x, y).closest('#scene') !== null", [width / 2, height / 2]
         )
-        assert top, "the middle of the scene is free"
+        assert top, "the middle of the scene is not covered"
         show_script(page)
         assert page.locator("#editor").bounding_box()["width"] == width
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         page.select_option("#script", "tutorial/1_thrust.py")
         wait_until(page, lambda: page.inner_text("#flying") == "built-in/pilot.py flies")
-        assert page.locator("#script").bounding_box()["width"] > 200, "its name can be read beside what flies"
+        assert page.locator("#script").bounding_box()["width"] > 200, "the script's name is readable beside the state"
         page.click("#run")
         wait_until(page, lambda: page.inner_text("#flying") == "flies")
         page.locator("#toggle, [data-place=scene]").locator("visible=true").click()
@@ -157,7 +157,7 @@ def test_on_touch_screens_thumbs_reach_both_sticks_and_nothing_lies_above_the_dr
     cockpit.start_afresh()
 
 
-# Whether the tabs stand in the toolbar's first row, also beside the longest words of a state.
+# Return whether the tabs stay in the toolbar's first row beside the longest state texts.
 TABS_STAY = """() => {
     const at = (id) => document.getElementById(id);
     at("why").hidden = false;
@@ -167,18 +167,18 @@ TABS_STAY = """() => {
 }"""
 
 
-def test_on_a_tablet_that_is_held_upright_scene_script_and_edit_are_tabs(cockpit, browser):
+def test_on_an_upright_tablet_scene_script_and_edit_are_tabs(cockpit, browser):
     size = {"width": 768, "height": 1024}
     with open_page(cockpit, browser, viewport=size, has_touch=True, is_mobile=True) as page:
         tabs = page.get_by_role("group", name="What is shown")
-        shown = {  # what each tab shows of these; a strip of the scene is above the script, too
+        parts_of_tabs = {  # the parts that each tab shows; a strip of the scene is always visible
             "Edit": {"#panel", "#shelf", "#build-bar"},
             "Script": {"#editor"},
             "Scene": {"#rail", "#left", "#right"},
         }
-        for name, parts in shown.items():
+        for name, parts in parts_of_tabs.items():
             tabs.get_by_role("button", name=name).tap()
-            for part in set.union(*shown.values()):
+            for part in set.union(*parts_of_tabs.values()):
                 assert page.locator(part).is_visible() == (part in parts), f"{name}: {part}"
             assert tabs.locator("[aria-pressed=true]").all_inner_texts() == [name]
             assert page.locator("#scene").bounding_box()["height"] > 150
@@ -186,7 +186,7 @@ def test_on_a_tablet_that_is_held_upright_scene_script_and_edit_are_tabs(cockpit
         page.locator("#rail").get_by_role("button", name="Plots").tap()
         assert tabs.locator("[aria-pressed=true]").all_inner_texts() == ["Scene"]
         assert not page.locator("#toggle").is_visible()
-        assert page.evaluate(TABS_STAY), "a failure is told without another row of the toolbar"
+        assert page.evaluate(TABS_STAY), "a failure message adds no row to the toolbar"
         switch_camera(page)
         tabs.get_by_role("button", name="Edit").tap()
         title, warning = page.locator(".picture header"), page.locator("#until-stop")
@@ -201,7 +201,7 @@ def test_on_a_tablet_that_is_held_upright_scene_script_and_edit_are_tabs(cockpit
         title.wait_for(state="detached")
 
 
-def test_in_a_narrow_window_the_scene_is_edited_without_the_script(cockpit, browser):
+def test_in_a_narrow_window_the_edit_panel_hides_the_script(cockpit, browser):
     with open_page(cockpit, browser, viewport={"width": 1024, "height": 768}) as page:
         bar, script = page.locator("#build-bar"), page.locator("#editor")
         edit = page.locator("#rail").get_by_role("button", name="Edit", exact=True)
@@ -210,9 +210,9 @@ def test_in_a_narrow_window_the_scene_is_edited_without_the_script(cockpit, brow
             assert bar.is_visible() and not script.is_visible()
             box, last = bar.bounding_box(), page.locator("#edit-menu-open").bounding_box()
             for side, size in (("x", "width"), ("y", "height")):
-                assert last[side] + last[size] <= box[side] + box[size], "all of the bar is in it"
+                assert last[side] + last[size] <= box[side] + box[size], "the last button is inside the bar"
             page.reload()
             ready(page)
-            assert bar.is_visible() and not script.is_visible(), "Edit was open"
+            assert bar.is_visible() and not script.is_visible(), "the open Edit panel is restored"
             page.click("#toggle")
             assert script.is_visible() and not bar.is_visible()

@@ -1,4 +1,4 @@
-"""The cockpit in a browser, against the running node: looked at, flown, tuned, and a script edited into an error."""
+"""The cockpit in a browser with a running simulator: keys, the editor, the console, the start page, and the token."""
 
 import time
 
@@ -7,10 +7,10 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import open_page, ready, switch_camera, wait_for, wait_until
+from cockpit_page import open_page, ready, switch_camera, wait_for, wait_for_steps, wait_until
 
 
-def test_a_key_that_is_held_flies_and_one_that_is_released_stops(cockpit, opened):
+def test_a_held_key_flies_the_drone_and_a_released_key_stops_it(cockpit, opened):
     assert "token" not in opened.url
     before = cockpit.drone.place[0]
     opened.locator("#command").click()
@@ -22,22 +22,25 @@ def test_a_key_that_is_held_flies_and_one_that_is_released_stops(cockpit, opened
     opened.keyboard.down("ArrowUp")
     wait_until(opened, lambda: cockpit.drone.command == (1.0, 0.0, 0.0))
     opened.close()
-    closed = time.monotonic()
+    closed_at = time.monotonic()
     while cockpit.drone.command != (0.0, 0.0, 0.0):
-        assert time.monotonic() < closed + 90, "a browser that is gone leaves a stopped drone"
+        assert time.monotonic() < closed_at + 90, "the drone stops after its browser was closed"
         time.sleep(0.05)
 
 
-def test_what_is_written_into_the_editor_is_no_command(cockpit, opened):
+def test_typing_in_the_editor_does_not_fly_the_drone(cockpit, opened):
+    before = set(cockpit.drone.flight_steps)
     opened.locator(".cm-content").click()
     opened.keyboard.press("Control+End")
     opened.keyboard.type("# wasd\n")
-    assert cockpit.drone.command == (0.0, 0.0, 0.0)
+    wait_for_steps(opened, cockpit.drone, 5)
+    steps = [step for stamp, step in cockpit.drone.flight_steps.copy().items() if stamp not in before]
+    assert {step["command"] for step in steps if "command" in step} == {(0.0, 0.0, 0.0, 0.0)}
     wait_until(opened, lambda: opened.inner_text("#saved") == "saved as mine/pilot.py")
     wait_until(opened, lambda: (cockpit.scripts / "pilot.py").read_text().endswith("# wasd\n"))  # it may save twice
 
 
-def test_a_script_is_edited_into_an_error_mended_and_flown(cockpit, opened):
+def test_a_script_with_an_error_is_marked_and_flies_after_a_revert(cockpit, opened):
     opened.select_option("#script", "tutorial/2_elevation.py")
     wait_for(opened, "document.querySelector('.cm-content').innerText.includes('Stage 2 of')")
     opened.locator(".cm-line").first.click()
@@ -55,10 +58,10 @@ def test_a_script_is_edited_into_an_error_mended_and_flown(cockpit, opened):
     assert rospy.get_param("/drone_sim/script") == str(cockpit.scripts / "2_elevation.py")
 
 
-def test_what_a_script_prints_stands_under_it(cockpit, opened):
+def test_the_console_shows_the_output_of_a_script(cockpit, opened):
     cockpit.scripts.mkdir(exist_ok=True)
-    says = "def sysCall_init():\n    for _ in range(3):\n        print('<b>same</b>')\n"
-    (cockpit.scripts / "says.py").write_text(says)
+    script = "def sysCall_init():\n    for _ in range(3):\n        print('<b>same</b>')\n"
+    (cockpit.scripts / "says.py").write_text(script)
     wait_until(opened, lambda: opened.locator("#script option[value='mine/says.py']").count())
     opened.select_option("#script", "mine/says.py")
     wait_for(opened, "document.querySelector('.cm-content').innerText.includes('same')")
@@ -66,19 +69,19 @@ def test_what_a_script_prints_stands_under_it(cockpit, opened):
     wait_until(opened, lambda: "<b>same</b>  (3 times)" in opened.inner_text("#console"))
 
 
-def test_a_key_flies_while_a_switch_has_the_focus(cockpit, opened):
+def test_a_key_flies_the_drone_while_a_switch_has_the_focus(cockpit, opened):
     switch_camera(opened)
     picture = opened.locator(".picture img")
     wait_until(opened, lambda: picture.evaluate_all("all => all.some(one => one.naturalWidth === 640)"))
     assert opened.locator(".picture header").inner_text() == "front"
-    opened.keyboard.down("w")  # the focus is on a switch, into which nobody writes
+    opened.keyboard.down("w")  # the focus is on a switch, which takes no text
     wait_until(opened, lambda: cockpit.drone.command[0] == 1.0)
     opened.keyboard.up("w")
     switch_camera(opened)
     wait_until(opened, lambda: not picture.count())
 
 
-def test_the_start_page_and_the_way_back(cockpit, browser):
+def test_the_start_page_opens_every_activity_and_can_be_reopened(cockpit, browser):
     with open_page(cockpit, browser, started=False) as page:
         start = page.get_by_role("dialog", name="drone_sim")
         assert start.is_visible() and not page.locator("#go-on").is_visible()
@@ -109,7 +112,7 @@ def test_the_start_page_and_the_way_back(cockpit, browser):
         page.click("#fold-side")
         page.reload()
         ready(page)
-        assert not start.is_visible(), "it is answered"
+        assert not start.is_visible(), "it has been answered"
         page.click("#home")
         page.keyboard.press("Escape")
         assert not start.is_visible()
@@ -119,7 +122,7 @@ def test_the_start_page_and_the_way_back(cockpit, browser):
         assert page.locator("#editor").is_visible()
 
 
-def test_a_second_address_needs_the_token(cockpit, browser):
+def test_an_address_without_the_token_is_refused(cockpit, browser):
     context = browser.new_context()
     page = context.new_page()
     answer = page.goto(cockpit.address.partition("?")[0])

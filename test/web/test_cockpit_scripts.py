@@ -1,4 +1,4 @@
-"""Scripts and texts in the cockpit's page: a stage, a task in its scene, and edits that nothing can take away."""
+"""Scripts and texts in the cockpit's page: a stage, a task in its scene, and edits that are never lost."""
 
 import contextlib
 import json
@@ -17,7 +17,7 @@ DRAFT = "drone_sim/draft/mine/edited.py"
 
 
 @contextlib.contextmanager
-def page_at_once(cockpit, browser):
+def editor_page(cockpit, browser):
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     context.add_init_script(STARTED)
     page = context.new_page()
@@ -32,19 +32,19 @@ def page_at_once(cockpit, browser):
 
 @pytest.fixture(name="desk", scope="module")
 def _desk(cockpit, browser):
-    """A page that these tests share; what they have written, flown and loaded is gone in the end."""
+    """A page that the tests of this module share; afterwards the pilot flies again and new scripts are deleted."""
     before = {path.name for path in cockpit.scripts.glob("*")}
-    with page_at_once(cockpit, browser) as page:
+    with editor_page(cockpit, browser) as page:
         yield page
         open_script(page, "built-in/pilot.py", "stops the propellers")
         page.click("#run")
-        wait_until(page, lambda: said(page).startswith("started"))
+        wait_until(page, lambda: message(page).startswith("started"))
     for path in cockpit.scripts.glob("*"):
         if path.name not in before:
             path.unlink()
 
 
-def said(page):
+def message(page):
     return page.inner_text("#said")
 
 
@@ -63,7 +63,7 @@ def write_at_the_end(page, words):
     page.keyboard.insert_text(words)
 
 
-def test_a_stages_text_is_beside_it_and_the_next_follows(desk):
+def test_a_stage_opens_with_its_text_and_leads_to_the_next_stage(desk):
     open_script(desk, "tutorial/1_thrust.py", "constant thrust")
     wait_until(desk, lambda: "A propeller blows particles" in desk.inner_text("#lesson-text"))
     assert desk.locator("#lesson-text math").count() > 3 and desk.locator("#lesson-text .tok-number").count() > 3
@@ -76,32 +76,32 @@ def test_a_stages_text_is_beside_it_and_the_next_follows(desk):
     wait_until(desk, lambda: "You need two control laws" in desk.inner_text("#lesson-text"))
     desk.locator("#lesson-body").focus()
     desk.keyboard.down("ArrowDown")
-    assert "-" not in desk.inner_text("#command"), "who reads does not fly"
+    assert "-" not in desk.inner_text("#command"), "keys in the lesson do not fly the drone"
     desk.keyboard.up("ArrowDown")
 
 
-def test_a_task_flies_in_its_scene_and_after_it_the_users_comes_back(cockpit, desk):
+def test_a_task_flies_in_its_scene_and_the_users_scene_returns_afterwards(cockpit, desk):
     before = rospy.get_param("/drone_sim/scene_file")
     open_script(desk, "tasks/hover.py", "how far the wind")
     wait_until(desk, lambda: "The wind blows with 2.7 m/s" in desk.inner_text("#flies"))
     desk.click("#run")
-    wait_until(desk, lambda: said(desk) == "started in the scene of the task hover")
+    wait_until(desk, lambda: message(desk) == "started in the scene of the task hover")
     wait_until(desk, lambda: cockpit.drone.place[2] > 1.1)
     assert rospy.get_param("/drone_sim/scene_file").endswith("tasks/hover.yaml")
     open_script(desk, "tutorial/2_elevation.py", "zref")
     desk.click("#run")
-    wait_until(desk, lambda: "the launch" in said(desk))
+    wait_until(desk, lambda: "the launch" in message(desk))
     assert rospy.get_param("/drone_sim/scene_file") == before
     wait_until(desk, lambda: desk.inner_text("#flown") == "tutorial/2_elevation.py")
 
 
-def test_the_mark_of_an_error_goes_when_its_line_is_mended(cockpit, desk):
+def test_an_error_mark_disappears_when_its_line_is_fixed(cockpit, desk):
     cockpit.scripts.mkdir(exist_ok=True)
     (cockpit.scripts / "fails.py").write_text("1 / 0\nx = 1\n")
     wait_until(desk, lambda: desk.locator("#script option[value='mine/fails.py']").count())
     open_script(desk, "mine/fails.py", "1 / 0")
     desk.click("#run")
-    wait_until(desk, lambda: "ZeroDivisionError" in said(desk))
+    wait_until(desk, lambda: "ZeroDivisionError" in message(desk))
     assert desk.locator(".cm-lintRange-error").inner_text() == "1 / 0"
     write_at_the_end(desk, "y = 2")
     wait_until(desk, lambda: desk.locator(".cm-lintRange-error").count())
@@ -110,7 +110,7 @@ def test_the_mark_of_an_error_goes_when_its_line_is_mended(cockpit, desk):
     assert not desk.locator(".cm-lintRange-error").count()
 
 
-def test_a_question_mark_shows_all_keys_and_leads_to_the_manual(desk):
+def test_the_help_button_shows_all_keys_and_a_link_to_the_manual(desk):
     desk.click("#help-open")
     assert "forward, back" in desk.inner_text("#sheet") and "find, replace" in desk.inner_text("#sheet")
     with desk.expect_popup() as opened:
@@ -121,13 +121,13 @@ def test_a_question_mark_shows_all_keys_and_leads_to_the_manual(desk):
     assert not desk.is_visible("#sheet")
 
 
-def test_a_file_that_another_program_changes_is_told_and_both_texts_are_kept(cockpit, desk):
+def test_a_file_changed_by_another_program_is_reported_and_both_texts_survive(cockpit, desk):
     open_script(desk, "tutorial/1_thrust.py", "constant thrust")
     write_at_the_end(desk, "# mine\n")
     wait_until(desk, lambda: desk.input_value("#script").startswith("mine/1_thrust"))
     file = cockpit.scripts / desk.input_value("#script").partition("/")[2]
     file.write_text(file.read_text().replace("# mine", "# theirs"))
-    wait_until(desk, lambda: "# theirs" in text(desk) and "changed by another program" in said(desk))
+    wait_until(desk, lambda: "# theirs" in text(desk) and "changed by another program" in message(desk))
     desk.locator("#text .cm-content").press("Control+z")
     wait_until(desk, lambda: "# mine" in file.read_text())
     desk.locator("#text .cm-content").press("Control+End")
@@ -136,11 +136,11 @@ def test_a_file_that_another_program_changes_is_told_and_both_texts_are_kept(coc
         file.write_text("# written meanwhile\n")
     desk.get_by_role("button", name="The other's").click()
     wait_until(desk, lambda: text(desk).startswith("# written meanwhile"))
-    other = cockpit.scripts / said(desk).rpartition("/")[2]
-    assert other != file and "# not saved yet" in other.read_text() and file.read_text() == "# written meanwhile\n"
+    copy = cockpit.scripts / message(desk).rpartition("/")[2]
+    assert copy != file and "# not saved yet" in copy.read_text() and file.read_text() == "# written meanwhile\n"
     open_script(desk, "built-in/pilot.py", "stops the propellers")
     desk.locator("#text .cm-content").press("Control+z")
-    assert "stops the propellers" in text(desk), "each script has a history of its own"
+    assert "stops the propellers" in text(desk), "each script has its own undo history"
     desk.click("#more")
     desk.get_by_role("menuitem", name="Save as").click()
     desk.keyboard.type("named")
@@ -149,10 +149,10 @@ def test_a_file_that_another_program_changes_is_told_and_both_texts_are_kept(coc
     assert (cockpit.scripts / "named.py").read_text() == (package_path() / PILOT).read_text()
 
 
-def test_what_was_not_saved_is_there_after_a_reload(cockpit, desk, browser):
+def test_an_unsaved_draft_is_restored_after_a_reload(cockpit, desk, browser):
     cockpit.scripts.mkdir(exist_ok=True)
     (cockpit.scripts / "edited.py").write_text("first")
-    with page_at_once(cockpit, browser) as page:
+    with editor_page(cockpit, browser) as page:
         page.evaluate(
             f"localStorage[{json.dumps(DRAFT)}] = {json.dumps(json.dumps({'text': 'second', 'version': 'old'}))}"
         )
@@ -165,7 +165,7 @@ def test_what_was_not_saved_is_there_after_a_reload(cockpit, desk, browser):
         wait_until(page, lambda: page.evaluate(f"localStorage[{json.dumps(DRAFT)}] === undefined"))
 
 
-def test_a_script_opens_at_its_beginning_wherever_the_one_before_was_scrolled_to(desk):
+def test_each_script_has_its_own_scroll_position(desk):
     open_script(desk, "built-in/pilot.py", "stops the propellers")
     scroller = desk.locator("#text .cm-scroller")
     scroller.evaluate("one => one.scrollTo(60, 700)")
@@ -180,12 +180,12 @@ def test_a_script_opens_at_its_beginning_wherever_the_one_before_was_scrolled_to
 @pytest.mark.parametrize("number", ["5.33", "-1"])
 def test_a_double_click_selects_a_whole_number(desk, number):
     open_script(desk, "tutorial/1_thrust.py", "Stage 1")
-    found = desk.locator("#text .cm-line", has_text=f" {number}").locator("span", has_text=number.lstrip("-")).last
-    found.dblclick()
+    digits = desk.locator("#text .cm-line", has_text=f" {number}").locator("span", has_text=number.lstrip("-")).last
+    digits.dblclick()
     wait_until(desk, lambda: desk.evaluate("document.getSelection().toString()") == number)
 
 
-# Chooses a task, and another one while the script of the first is being opened.
+# Choose a task, and a second task while the script of the first is being opened.
 CHOOSE_TWICE = """async () => {
     const choice = document.querySelector("#lesson");
     const choose = (name) => {
@@ -198,7 +198,7 @@ CHOOSE_TWICE = """async () => {
 }"""
 
 
-def test_the_task_that_was_chosen_last_is_shown(opened):
+def test_the_task_chosen_last_is_shown(opened):
     opened.evaluate(CHOOSE_TWICE)
     wait_until(opened, lambda: opened.input_value("#script") == "tasks/hover.py")
     wait_until(opened, lambda: opened.input_value("#lesson") == "tasks/hover")

@@ -1,4 +1,4 @@
-"""The cockpit's panel, pressed button by button, against the running node; its plots, its log, and several drones."""
+"""The cockpit's toolbar and panels, operated with a running simulator: flight, plots, parameters, log, two drones."""
 
 import re
 
@@ -9,12 +9,12 @@ pytest.importorskip("rospy", reason="needs ROS")
 from pathlib import Path
 
 import rospy
-from cockpit_page import Drone, let_pass, ready, wait_for, wait_until
+from cockpit_page import Drone, let_time_pass, ready, wait_for, wait_until
 from diagnostic_msgs.msg import KeyValue
 
 HOSTILE = '<img src=x onerror="window.top.hacked = true">'
-# How many pixels of a chart have about the colour of its first line.
-COLOURED = """(figure) => {
+# Count the pixels of a chart that have about the colour of its first line.
+COUNT_COLOURED = """(figure) => {
     const canvas = figure.querySelector("canvas");
     const wanted = getComputedStyle(document.documentElement).getPropertyValue("--line-1").match(/\\w\\w/g);
     const [r, g, b] = wanted.map((one) => parseInt(one, 16));
@@ -35,31 +35,31 @@ def sysCall_actuation():
 
 
 @pytest.fixture(autouse=True)
-def _afresh(cockpit, panel):
+def _restart_pilot(cockpit, panel):
     cockpit.start_afresh()
     wait_until(panel.page, lambda: panel.status == "flying")
 
 
-def stands(panel, drone):
-    """Return where the paused drone is, once odometry says so again and again."""
+def settled_place(panel, drone):
+    """Return the place of the paused drone, as soon as two more odometry messages confirm it."""
     place = None
     while place != drone.place:
-        place, heard = drone.place, drone.heard
-        wait_until(panel.page, lambda heard=heard: drone.heard >= heard + 2)
+        place, odometry_count = drone.place, drone.odometry_count
+        wait_until(panel.page, lambda odometry_count=odometry_count: drone.odometry_count >= odometry_count + 2)
     return place
 
 
-def test_pause_one_step_snapshot_and_restore(cockpit, panel):
+def test_a_paused_flight_is_stepped_saved_and_restored(cockpit, panel):
     panel.press("Pause", "paused at t =")
     assert panel.status == "paused"
-    before = stands(panel, cockpit.drone)
+    before = settled_place(panel, cockpit.drone)
     time = float(panel.message.rpartition("= ")[2].removesuffix(" s"))
     assert panel.page.get_attribute("#sim-pause", "aria-pressed") == "true"
     panel.press("Snapshot", f"snapshot at t = {time:.2f} s")
-    cockpit.drone.flown.clear()
+    cockpit.drone.flight_steps.clear()
     panel.press("Step", f"t = {time + 0.05:.2f} s")
-    assert stands(panel, cockpit.drone) != before
-    assert len({one["place"] for one in cockpit.drone.flown.values() if "place" in one} - {before}) == 1
+    assert settled_place(panel, cockpit.drone) != before
+    assert len({one["place"] for one in cockpit.drone.flight_steps.values() if "place" in one} - {before}) == 1
     panel.press("Restore", f"restored t = {time:.2f} s")
     wait_until(panel.page, lambda: cockpit.drone.place == before)
     panel.press("Start", "resumed at t =")
@@ -77,7 +77,7 @@ def test_stop_start_and_restart(cockpit, panel):
     panel.press("Restart", "started")
 
 
-def test_keys_of_the_toolbar_are_none_where_somebody_writes(cockpit, panel):
+def test_toolbar_keys_have_no_effect_in_a_text_field(cockpit, panel):
     page = panel.page
     page.locator("#command").click()
     page.keyboard.press("Space")
@@ -101,7 +101,7 @@ def test_keys_of_the_toolbar_are_none_where_somebody_writes(cockpit, panel):
     page.keyboard.press("Escape")
 
 
-def test_a_message_moves_nothing_and_an_error_stays_until_the_next_action(cockpit, panel):
+def test_a_message_does_not_move_the_scene_and_an_error_stays(cockpit, panel):
     page = panel.page
     page.evaluate(
         "() => { const plain = setTimeout; window.setTimeout = (then, ms) => plain(then, Math.min(ms, 1500)) }"
@@ -112,7 +112,7 @@ def test_a_message_moves_nothing_and_an_error_stays_until_the_next_action(cockpi
     panel.press("Stop")
     wait_until(page, lambda: panel.status == "stopped")
     panel.press("Step", "failed")
-    let_pass(page, 2000)
+    let_time_pass(page, 2000)
     assert "failed" in panel.message and page.locator("#scene").bounding_box() == before
     panel.press("Put the message away")
     assert panel.message == ""
@@ -128,13 +128,13 @@ def test_landing_and_takeoff(cockpit, panel):
     wait_until(panel.page, lambda: cockpit.drone.place[2] > 0.5)
 
 
-def test_a_script_that_cannot_land_is_said_so(cockpit, panel):
+def test_land_without_effect_is_reported_with_the_reason(cockpit, panel):
     rospy.set_param("/drone_sim/script", "tutorial")
     assert cockpit.call("restart").startswith("started")
     panel.press("Land", "land: no effect: the child script does not subscribe")
 
 
-def test_another_scene(cockpit, panel):
+def test_a_scene_can_be_chosen_from_the_list(cockpit, panel):
     scene = "package://drone_sim/config/scenes/empty.yaml"
     panel.choose("Scene", "empty")
     panel.wait_for(f"started in {scene}")
@@ -143,7 +143,7 @@ def test_another_scene(cockpit, panel):
     panel.wait_for("started in the scene of the parameters")
 
 
-def test_the_keys_fly_the_drone_that_is_chosen(cockpit, panel):
+def test_the_keys_fly_the_chosen_drone(cockpit, panel):
     rospy.set_param("/drone_sim/vehicles", {"drone": {}, "wing": {"position": [0, 2, 1]}})
     try:
         assert cockpit.call("set_vehicles") == "wing added"
@@ -171,22 +171,22 @@ def test_plots_are_drawn_enlarged_and_saved(cockpit, panel):
     page = panel.page
     panel.show("Plots")
     height = page.get_by_role("group", name="Height, m")
-    wait_until(page, lambda: height.evaluate(COLOURED) > 50)
+    wait_until(page, lambda: height.evaluate(COUNT_COLOURED) > 50)
     assert re.search(r"height:?\s*[01]\.\d\d", height.inner_text()), "without a pointer, the legend has the last value"
-    small = height.bounding_box()["width"]
+    small_width = height.bounding_box()["width"]
     height.get_by_role("button", name="Enlarge").click()
-    wait_until(page, lambda: height.bounding_box()["width"] > 1.3 * small)
+    wait_until(page, lambda: height.bounding_box()["width"] > 1.3 * small_width)
     velocity = page.get_by_role("group", name="Velocity, m/s")
     velocity.locator(".plot").click()
     wait_until(page, lambda: page.locator("#enlarged .chart").count() == 2)
-    with page.expect_download() as saved:
+    with page.expect_download() as export:
         height.get_by_role("button", name="CSV").click()
-    head, *rows = Path(saved.value.path()).read_text().splitlines()
+    head, *rows = Path(export.value.path()).read_text().splitlines()
     assert head == '"t, s","height, m"' and len(rows) > 10
     assert abs(float(rows[-1].split(",")[1]) - cockpit.drone.place[2]) < 0.1
-    with page.expect_download() as saved:
+    with page.expect_download() as export:
         height.get_by_role("button", name="PNG").click()
-    assert Path(saved.value.path()).read_bytes().startswith(b"\x89PNG") and saved.value.suggested_filename.endswith(
+    assert Path(export.value.path()).read_bytes().startswith(b"\x89PNG") and export.value.suggested_filename.endswith(
         ".png"
     )
     for chart in (height, velocity):
@@ -194,7 +194,7 @@ def test_plots_are_drawn_enlarged_and_saved(cockpit, panel):
     panel.press("Close the panel")
 
 
-def test_what_a_script_signals_is_drawn(cockpit, panel):
+def test_signals_and_graph_streams_of_a_script_are_plotted(cockpit, panel):
     page = panel.page
     cockpit.scripts.mkdir(exist_ok=True)
     script = cockpit.scripts / "signals.py"
@@ -205,13 +205,13 @@ def test_what_a_script_signals_is_drawn(cockpit, panel):
     for name in ("height", "twice"):
         page.locator("#plot-list").get_by_label(name, exact=True).check()
         chart = page.get_by_role("group", name=name, exact=True)
-        wait_until(page, lambda chart=chart: chart.count() and chart.evaluate(COLOURED) > 20)
+        wait_until(page, lambda chart=chart: chart.count() and chart.evaluate(COUNT_COLOURED) > 20)
         chart.get_by_role("button", name="Close").click()
     cockpit.start_afresh()
     script.unlink()
 
 
-def test_a_number_is_taken_as_it_is_written_and_a_wrong_one_is_refused(cockpit, panel):
+def test_a_valid_number_is_accepted_and_an_invalid_one_is_refused(cockpit, panel):
     page = panel.page
     panel.show("Tune")
     field = panel.field("Kzref (m/s) per m")
@@ -236,7 +236,7 @@ def test_a_number_is_taken_as_it_is_written_and_a_wrong_one_is_refused(cockpit, 
     page.locator("#tune-filter").fill("")
 
 
-def test_a_parameter_without_limits_has_a_slider_about_its_value(cockpit, panel):
+def test_a_parameter_without_limits_has_a_slider_around_its_value(cockpit, panel):
     page = panel.page
     panel.show("Tune")
     script = cockpit.scripts / "bend.py"
@@ -252,7 +252,7 @@ def test_a_parameter_without_limits_has_a_slider_about_its_value(cockpit, panel)
     script.unlink()
 
 
-def test_only_what_the_script_reads_is_tuned_and_who_does_not_listen_says_so(cockpit, panel):
+def test_only_parameters_of_the_script_are_shown_and_ignored_commands_are_reported(cockpit, panel):
     page = panel.page
     panel.show("Tune")
     wait_until(page, lambda: page.locator("#deaf").is_hidden() and panel.field("Kzref (m/s) per m").is_visible())
@@ -273,8 +273,8 @@ def test_the_log_shows_a_warning_and_text_is_never_html(cockpit, panel):
     weather = rospy.Publisher("/drone/weather", KeyValue, queue_size=1, latch=True)
     weather.publish(KeyValue(HOSTILE, "3"))
     panel.show("Log")
-    said = f"warning: weather refused: {HOSTILE}: unknown key"
-    wait_until(panel.page, lambda: said in panel.page.inner_text("#log-lines"))
+    warning = f"warning: weather refused: {HOSTILE}: unknown key"
+    wait_until(panel.page, lambda: warning in panel.page.inner_text("#log-lines"))
     weather.unregister()
     script = cockpit.scripts / "<img src=x onerror=hacked()>.py"
     script.parent.mkdir(exist_ok=True)

@@ -1,4 +1,4 @@
-"""What scripts open, in the page: a sensor's picture, a dialog that is answered, a console; and the pace."""
+"""Windows in the page that scripts open (views, dialogs, consoles); the speed; overlays and recordings of cameras."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def sysCall_actuation():
         self.dialog = None
 """
 
-# Adds up the bytes of all films, which come about every second.
+# Add up the bytes of all recordings, which arrive about every second.
 COUNT_RECORDED = """() => {
     window.recorded = 0;
     const { start } = MediaRecorder.prototype;
@@ -34,12 +34,12 @@ COUNT_RECORDED = """() => {
         start.apply(this, options);
     };
 }"""
-PLACES = "all => all.map((one) => document.querySelector(one).getBoundingClientRect().toJSON())"
+RECTANGLES = "all => all.map((one) => document.querySelector(one).getBoundingClientRect().toJSON())"
 
 
 @pytest.fixture(name="flown")
 def _flown(cockpit, opened):
-    """The page while that script flies."""
+    """The page while SCRIPT flies."""
     cockpit.scripts.mkdir(exist_ok=True)
     (cockpit.scripts / "opens.py").write_text(SCRIPT)
     opened.reload()
@@ -55,13 +55,13 @@ def _flown(cockpit, opened):
     wait_for(opened, "!document.querySelector('.window')")
 
 
-def test_views_dialogs_and_consoles_of_a_script(flown):
+def test_views_dialogs_and_consoles_of_a_script_are_shown(flown):
     for picture in ("Quadricopter_floorCamera", "how far"):
         window = flown.locator(".picture", has_text=picture)
         wait_until(flown, lambda window=window: window.locator("img").evaluate("one => one.naturalWidth") > 0)
     assert " m (blue) to " in flown.locator(".picture", has_text="how far").inner_text()
     dialog = flown.locator(".dialog")
-    assert "How <b>high</b>?" in dialog.inner_text(), "text, not HTML"
+    assert "How <b>high</b>?" in dialog.inner_text(), "markup is shown as text"
     field = dialog.locator("input")
     assert field.input_value() == "0.8"
     field.fill("1.2 m")
@@ -70,7 +70,7 @@ def test_views_dialogs_and_consoles_of_a_script(flown):
     wait_until(flown, lambda: dialog.count() == 0)
 
 
-def test_the_pace_is_changed_and_follows(cockpit, opened):
+def test_the_speed_field_sets_and_follows_the_real_time_factor(cockpit, opened):
     node = Client("/drone_sim", timeout=90)
     field = opened.get_by_label("Speed", exact=True)
     field.select_option("0.5")
@@ -82,7 +82,7 @@ def test_the_pace_is_changed_and_follows(cockpit, opened):
     node.close()
 
 
-def test_boxes_and_a_mask_lie_over_the_picture_of_a_camera_with_truth(cockpit, opened):
+def test_boxes_and_a_mask_can_be_shown_over_a_cameras_picture(cockpit, opened):
     rospy.set_param("/drone_sim/scene_file", str(Path(__file__).parents[2] / "docs/tutorial/8_scene.yaml"))
     cockpit.call("load_scene")
     try:
@@ -92,8 +92,8 @@ def test_boxes_and_a_mask_lie_over_the_picture_of_a_camera_with_truth(cockpit, o
         window = opened.locator(".picture")
         wait_until(opened, lambda: set(window.locator("svg text").all_text_contents()) == {"Red", "Green"})
         wait_until(opened, lambda: {"Red", "Green"} <= set(window.locator(".legend span").all_text_contents()))
-        # At once: with every picture come other boxes.
-        image, rect = opened.evaluate(PLACES, [".picture img", ".picture .boxes-over rect"])
+        # In a single call, since every picture brings new boxes.
+        image, rect = opened.evaluate(RECTANGLES, [".picture img", ".picture .boxes-over rect"])
         assert image["x"] - 2 < rect["x"] < rect["x"] + rect["width"] < image["x"] + image["width"] + 2
         opened.get_by_role("button", name="Boxes over /drone/front").click()
         wait_until(opened, lambda: window.locator("svg text").count() == 0)
@@ -103,20 +103,20 @@ def test_boxes_and_a_mask_lie_over_the_picture_of_a_camera_with_truth(cockpit, o
         cockpit.call("load_scene")
 
 
-def test_a_camera_is_recorded_and_the_films_name_says_which(cockpit, opened):
+def test_a_recording_is_named_after_its_camera_and_saved_at_the_end(cockpit, opened):
     switch_camera(opened)
     picture = opened.locator(".picture img")
     wait_until(opened, lambda: picture.evaluate_all("all => all.some(one => one.naturalWidth === 640)"))
-    film = opened.get_by_role("button", name="Record /drone/front")
+    record_button = opened.get_by_role("button", name="Record /drone/front")
     opened.evaluate(COUNT_RECORDED)
-    film.click()
-    wait_until(opened, lambda: film.get_attribute("aria-pressed") == "true")
+    record_button.click()
+    wait_until(opened, lambda: record_button.get_attribute("aria-pressed") == "true")
     wait_for(opened, "recorded > 1000")
-    with opened.expect_download() as saved:
-        film.click()
-    assert saved.value.suggested_filename.startswith("drone_sim-drone_front-")
-    assert Path(saved.value.path()).stat().st_size > 1000
-    film.click()
+    with opened.expect_download() as download:
+        record_button.click()
+    assert download.value.suggested_filename.startswith("drone_sim-drone_front-")
+    assert Path(download.value.path()).stat().st_size > 1000
+    record_button.click()
     wait_for(opened, "recorded > 2000")
-    with opened.expect_download():  # nothing of a film is lost if its camera is switched off
+    with opened.expect_download():  # switching the camera off saves the recording
         switch_camera(opened)

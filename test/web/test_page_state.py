@@ -1,6 +1,6 @@
-"""What the page holds to be true: the store of web/src/state, fed with events in order, late, doubled and missing.
+"""The page's state store (web/src/state), fed with events that are in order, late, duplicated or missing.
 
-The store knows no page and no clock, so it runs in the browser without a simulation.
+The store needs no page and no clock, so it runs in the browser without a simulation.
 """
 
 import json
@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 SOURCE = Path(__file__).parents[2] / "web" / "src"
 FILE, OTHER = "/scripts/a.py", "/scripts/b.py"
 OPEN = ["opened", {"script": "mine/a.py", "file": FILE}]
-# Feeds [event, content] and [ms], which lets time pass, to a new store; returns what the page says after each event.
+# Feed [event, content], or [ms] to let time pass, to a new store; return the page's texts after each event.
 FEED = """async (events) => {
     const { Store } = await import("http://page.test/state/store.js");
     const words = await import("http://page.test/state/words.js");
@@ -66,7 +66,7 @@ def _empty_page(browser):
 
 @pytest.fixture(name="feed", scope="module")
 def _feed(empty_page):
-    """Return what the page says after each event."""
+    """A function that feeds events to a new store and returns the page's texts after each event."""
     return lambda *events: empty_page.evaluate(FEED, list(events))
 
 
@@ -87,8 +87,8 @@ def reached(line, state="paused"):
     return ["variables", {"state": state, "reached": at, "time": 1.5, "scripts": []}]
 
 
-def failure(line=5, said="ZeroDivisionError", phase="actuation", file=FILE):
-    return ["failure", {"file": file, "line": line, "said": said, "phase": phase}]
+def failure(line=5, shown="ZeroDivisionError", phase="actuation", file=FILE):
+    return ["failure", {"file": file, "line": line, "said": shown, "phase": phase}]
 
 
 CONNECTED = [["connected"], OPEN, ["flown", "mine/a.py"]]
@@ -101,20 +101,20 @@ def last(feed, *events):
 # ---- pauses
 
 
-def test_the_end_of_a_pause_is_heard_without_a_word_from_the_inspection(feed):
+def test_a_new_flight_state_ends_a_pause_without_an_event_of_the_variables(feed):
     paused = last(feed, status("paused"), reached(63))
     assert paused["said"] == "paused at line 63, t = 1.50 s" and paused["marked"]["paused"] == 63
-    gone = last(feed, status("paused"), reached(63), ["variables", None], status("flying", 2))
-    assert gone["said"] == "" and gone["marked"]["paused"] == 0
+    resumed = last(feed, status("paused"), reached(63), ["variables", None], status("flying", 2))
+    assert resumed["said"] == "" and resumed["marked"]["paused"] == 0
     assert last(feed, status("paused"), reached(63), ["lost"])["marked"]["paused"] == 0
 
 
 @pytest.mark.parametrize("events", [[status("paused"), reached(3)], [reached(3), status("paused")]])
-def test_a_pause_and_its_breakpoint_come_in_either_order(feed, events):
+def test_a_pause_and_its_breakpoint_may_arrive_in_either_order(feed, events):
     assert last(feed, *events)["marked"]["paused"] == 3
 
 
-def test_a_breakpoint_that_is_told_after_its_pause_is_none_of_the_next_pause(feed):
+def test_a_late_breakpoint_event_is_not_shown_in_the_next_pause(feed):
     late = [status("paused"), status("flying", 2), reached(3), [3000], status("paused", 3)]
     assert last(feed, *late)["said"] == ""
 
@@ -122,49 +122,49 @@ def test_a_breakpoint_that_is_told_after_its_pause_is_none_of_the_next_pause(fee
 # ---- errors of scripts
 
 
-def test_a_mended_syntax_error_goes_and_the_next_one_takes_its_place(feed):
+def test_a_fixed_syntax_error_is_replaced_by_the_next_one(feed):
     first = {"line": 5, "said": "SyntaxError: invalid syntax", "severity": "error"}
-    wrong = failure(5, first["said"], "not started")
-    assert last(feed, wrong)["said"] == "not started, line 5: SyntaxError: invalid syntax"
+    syntax_error = failure(5, first["said"], "not started")
+    assert last(feed, syntax_error)["said"] == "not started, line 5: SyntaxError: invalid syntax"
     other = {"line": 29, "said": "SyntaxError: '(' was never closed", "severity": "error"}
-    moved = last(feed, wrong, ["checked", {"file": FILE, "found": [other]}])
+    moved = last(feed, syntax_error, ["checked", {"file": FILE, "found": [other]}])
     assert moved["said"] == "not started, line 29: SyntaxError: '(' was never closed"
-    assert last(feed, wrong, ["checked", {"file": OTHER, "found": []}])["said"] != "", "the check of another file"
+    assert last(feed, syntax_error, ["checked", {"file": OTHER, "found": []}])["said"] != "", "a check of another file"
     assert moved["console"] == f"error: [load] {FILE}:29: SyntaxError: '(' was never closed"
-    mended = last(feed, wrong, ["checked", {"file": FILE, "found": []}])
+    mended = last(feed, syntax_error, ["checked", {"file": FILE, "found": []}])
     assert mended["said"] == mended["console"] == ""
 
 
 @pytest.mark.parametrize("end", [["run"], ["started"], ["moved", 0]])
-def test_an_error_of_a_flight_ends_with_the_next_start_or_when_its_line_is_mended(feed, end):
+def test_a_flight_error_ends_with_the_next_start_or_a_fix_of_its_line(feed, end):
     assert last(feed, failure())["said"] == "actuation, line 5: ZeroDivisionError"
     assert last(feed, failure(), ["moved", 7])["marked"]["failed"] == 7
     assert last(feed, failure(), end)["said"] == ""
 
 
-def test_a_repetition_of_a_mended_error_does_not_bring_it_back_but_a_new_flight_does(feed):
+def test_a_fixed_error_reappears_only_if_it_is_reported_again_later(feed):
     assert last(feed, failure(), ["moved", 0], failure())["said"] == ""
     assert last(feed, failure(), ["moved", 0], [6000], failure())["said"] != ""
 
 
-def test_a_start_that_nobody_told_ends_an_error_after_some_seconds_of_flight(feed):
+def test_without_a_start_event_some_seconds_of_flight_end_an_error(feed):
     events = [status("stopped"), failure(), [1000], status("flying", 2), [1000], [1000], [2000]]
-    said = [one["said"] for one in feed(*CONNECTED, *events)]
-    assert said[-2] != "" and said[-1] == ""
+    shown = [one["said"] for one in feed(*CONNECTED, *events)]
+    assert shown[-2] != "" and shown[-1] == ""
     crashed = [status("flying"), [4000], failure(), [10_000]]
-    assert last(feed, *crashed)["said"] != "", "a script of an object fails, and the flight goes on"
+    assert last(feed, *crashed)["said"] != "", "an object's script failed, and the flight continues"
 
 
-def test_an_error_belongs_to_its_file_and_goes_with_the_copy(feed):
+def test_an_error_names_its_file_and_follows_a_rename(feed):
     assert last(feed, failure(file=OTHER))["said"] == "actuation, b.py, line 5: ZeroDivisionError"
-    copied = last(feed, failure(), ["renamed", {"script": "mine/c.py", "file": "/scripts/c.py"}])
-    assert copied["said"] == "actuation, line 5: ZeroDivisionError" and copied["marked"]["failed"] == 5
+    renamed = last(feed, failure(), ["renamed", {"script": "mine/c.py", "file": "/scripts/c.py"}])
+    assert renamed["said"] == "actuation, line 5: ZeroDivisionError" and renamed["marked"]["failed"] == 5
 
 
-def test_beside_run_stands_what_the_script_does(feed):
+def test_the_state_of_the_script_is_shown_beside_run(feed):
     assert last(feed, status("flying"))["flying"] == "flies"
     assert last(feed, status("flying"), ["flown", "mine/bad.py"])["flying"] == "mine/bad.py flies"
-    assert last(feed, status("flying"), ["flown", ""])["status"] == "Running", "without a vehicle"
+    assert last(feed, status("flying"), ["flown", ""])["status"] == "Running", "the scene has no vehicle"
     failed = last(feed, ["flown", "mine/bad.py"], status("stopped"), flight("script failed"))
     assert (failed["flying"], failed["is"], failed["status"]) == ("mine/bad.py has failed", "failed", "Script failed")
     assert last(feed, status("paused"))["flying"] == "is paused"
@@ -174,7 +174,7 @@ def test_beside_run_stands_what_the_script_does(feed):
         assert last(feed, status("flying"), nothing)["flying"] == ""
 
 
-# ---- messages: each ends
+# ---- messages and the events that end them
 
 
 MESSAGES = json.loads("[" + ",".join(
@@ -193,18 +193,18 @@ def test_every_message_ends_with_each_of_its_events(feed, kind):
     assert events
     for event in events:
         after = {"stopped": status("stopped"), "unanswered": pulse(6)}.get(event, [event, contents.get(event)])
-        said = feed(*CONNECTED, status("flying", 0), ["say", {"kind": kind, "text": "words"}], after)
-        assert said[-2]["message"] == kind and said[-1]["message"] == "", event
+        shown = feed(*CONNECTED, status("flying", 0), ["say", {"kind": kind, "text": "words"}], after)
+        assert shown[-2]["message"] == kind and shown[-1]["message"] == "", event
 
 
 @pytest.mark.parametrize("end", [["lost"], pulse(6), pulse(6, ended=True), status("no simulation", 2)])
-def test_a_refusal_is_not_said_after_the_simulator_stopped_answering(feed, end):
+def test_a_refusal_disappears_when_the_simulator_stops_answering(feed, end):
     refused = ["say", {"kind": "refused", "text": "the simulator refused it"}]
-    said = [one["said"] for one in feed(*CONNECTED, status("flying"), refused, end)]
-    assert said[-2] != "" and said[-1] == ""
+    shown = [one["said"] for one in feed(*CONNECTED, status("flying"), refused, end)]
+    assert shown[-2] != "" and shown[-1] == ""
 
 
-def test_a_notice_goes_by_itself_and_an_error_with_the_next_good_start(feed):
+def test_a_notice_expires_and_an_error_notice_ends_with_the_next_start(feed):
     good, bad = ["notice", {"text": "paused", "bad": False}], ["notice", {"text": "step: failed", "bad": True}]
     assert last(feed, good, [5000])["notice"] == "paused" and last(feed, good, [7000])["notice"] == ""
     assert last(feed, bad, [60_000])["notice"] == "step: failed"
@@ -214,44 +214,44 @@ def test_a_notice_goes_by_itself_and_an_error_with_the_next_good_start(feed):
 # ---- the connection
 
 
-def test_the_banner_says_what_does_not_answer(feed):
+def test_the_banner_names_the_process_that_does_not_answer(feed):
     flying = [["heard"], status("flying")]
     assert last(feed, *flying)["banner"] == ""
     assert last(feed, *flying, [4000])["banner"].startswith("No data from the cockpit for 4 s")
     assert last(feed, *flying, pulse(6.2))["banner"].startswith("No data from the simulator for 6 s")
-    assert last(feed, *flying, pulse(4.2))["banner"] == "", "it may be busy"
+    assert last(feed, *flying, pulse(4.2))["banner"] == "", "the simulator may be busy"
     assert last(feed, *flying, ["lost"], [12_000])["banner"].startswith("No connection to the cockpit for 12 s")
     assert "Open the address" in last(feed, *flying, ["lost"], ["refused"])["banner"]
     ended = "The simulator has ended: start it again."
     assert last(feed, *flying, pulse(6.2, ended=True))["banner"] == ended
     assert last(feed, *flying, status("no simulation", 2))["banner"] == ended
     assert last(feed, status("no simulation"))["banner"].startswith("There is no simulator yet")
-    assert last(feed, *flying, ["lost"], ["connected"])["banner"] == "", "the panel is on its way"
+    assert last(feed, *flying, ["lost"], ["connected"])["banner"] == "", "the panel's first update is pending"
     assert "master" in last(feed, *flying, ["panel", {"panel": {"master": False}, "version": 3}])["banner"]
 
 
-def test_a_page_that_slept_does_not_blame_the_cockpit(feed):
+def test_after_a_sleep_the_page_does_not_report_missing_data_at_once(feed):
     assert last(feed, status("flying"), [1000], ["sleep", 60_000])["banner"] == ""
     assert last(feed, status("flying"), ["sleep", 60_000], [4000])["banner"].startswith("No data from the cockpit")
 
 
-def test_what_the_simulator_said_last_is_not_shown_as_true_when_it_is_silent(feed):
+def test_old_values_are_not_shown_while_the_simulator_is_silent(feed):
     events = [status("flying"), ["pace", "0.98"], ["hears_commands", False]]
-    said = last(feed, *events)
-    assert said["pace"].startswith("0.98 ") and said["deaf"] and said["diagnosis"] == "Nothing is wrong."
+    shown = last(feed, *events)
+    assert shown["pace"].startswith("0.98 ") and shown["deaf"] and shown["diagnosis"] == "Nothing is wrong."
     for dead in (["lost"], [4000], pulse(6), status("no simulation", 2)):
-        said = last(feed, *events, dead)
-        assert said["pace"] == said["deaf"] == "" and "does not answer" in said["diagnosis"]
-    assert last(feed, *events, status("stopped", 2))["deaf"] == "", "a script that is stopped hears nothing anyway"
+        shown = last(feed, *events, dead)
+        assert shown["pace"] == shown["deaf"] == "" and "does not answer" in shown["diagnosis"]
+    assert last(feed, *events, status("stopped", 2))["deaf"] == "", "a stopped script cannot listen anyway"
 
 
-def test_buttons_that_can_do_nothing_are_disabled(feed):
+def test_buttons_without_effect_are_disabled(feed):
     flying = status("flying")
     assert last(feed, flying)["can"]["run"] and not last(feed, flying)["can"]["sim-start"]
     for dead in (["lost"], [4000], pulse(6), status("no simulation", 2)):
         can = last(feed, flying, dead)["can"]
         assert not any(can[one] for one in ("run", "sim-pause", "sim-start", "takeoff", "speed", "vehicle")), dead
-    assert last(feed, flying, pulse(6))["can"]["grade"], "it needs the cockpit alone"
+    assert last(feed, flying, pulse(6))["can"]["grade"], "grading needs only the cockpit"
     assert not last(feed, flying, ["grading", True])["can"]["grade"]
 
 
@@ -270,7 +270,7 @@ STORE = """async () => {
 }"""
 
 
-def test_a_value_is_that_of_the_storage_unless_it_could_not_be_stored(empty_page):
+def test_values_are_read_from_the_storage_unless_storing_failed(empty_page):
     assert empty_page.evaluate(STORE) == [2, 3]
 
 
@@ -293,41 +293,41 @@ EVENTS = st.one_of(
     st.sampled_from([["checked", {"file": FILE, "found": []}], ["notice", {"text": "no", "bad": True}]]),
     st.builds(lambda kind: ["say", {"kind": kind, "text": "words"}], st.sampled_from(MESSAGES)),
 ).map(list)
-ANY = settings(
+MANY_EXAMPLES = settings(
     max_examples=150, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 
-@ANY
+@MANY_EXAMPLES
 @given(st.lists(EVENTS, max_size=40))
 def test_the_page_never_contradicts_itself(feed, events):
-    for said in feed(*events) if events else []:
-        if said["marked"]["paused"] or said["said"].startswith("paused"):
-            assert said["status"] in ("Paused", "No answer")
-        if said["connection"] != "connected":
-            assert said["banner"] or said["connection"] == "connecting"
-            assert not any(said["can"].values()) and not said["flying"]
-        if said["banner"]:
-            assert not said["can"]["run"] and not said["can"]["sim-pause"]
-        if said["can"]["run"]:
-            assert said["banner"] == "" and said["connection"] == "connected"
+    for shown in feed(*events) if events else []:
+        if shown["marked"]["paused"] or shown["said"].startswith("paused"):
+            assert shown["status"] in ("Paused", "No answer")
+        if shown["connection"] != "connected":
+            assert shown["banner"] or shown["connection"] == "connecting"
+            assert not any(shown["can"].values()) and not shown["flying"]
+        if shown["banner"]:
+            assert not shown["can"]["run"] and not shown["can"]["sim-pause"]
+        if shown["can"]["run"]:
+            assert shown["banner"] == "" and shown["connection"] == "connected"
 
 
-@ANY
+@MANY_EXAMPLES
 @given(st.lists(EVENTS, max_size=40), st.sampled_from(STATES), st.sampled_from([0, 63]))
-def test_after_any_events_a_reconnection_shows_what_is_true(feed, events, is_, line):
-    """Whatever came before, late, doubled or missing: what the node tells a page that connects is what it shows."""
+def test_after_any_events_a_reconnection_shows_the_current_state(feed, events, is_, line):
+    """Earlier events, even if late, duplicated or missing, do not change what the page shows after it reconnects."""
     truth = [["lost"], ["connected"], OPEN, ["run"], status(is_, 100), flight("flying", 100), ["flown", "mine/b.py"]]
     truth += [pulse(0), ["panel", {"panel": {"master": True}, "version": 100}]]
     truth += [reached(line if is_ == "paused" else 0, is_)]
-    said, expected = feed(*events, *truth)[-1], feed(["connected"], status("flying", 0), *truth)[-1]
-    left_out = {"notice": "", "banner": ""}  # whether there was a simulator before is another matter
-    assert {**said, **left_out} == {**expected, **left_out} and bool(said["banner"]) == bool(expected["banner"])
+    shown, expected = feed(*events, *truth)[-1], feed(["connected"], status("flying", 0), *truth)[-1]
+    ignored = {"notice": "", "banner": ""}  # these depend on whether there was a simulator before
+    assert {**shown, **ignored} == {**expected, **ignored} and bool(shown["banner"]) == bool(expected["banner"])
 
 
-@ANY
+@MANY_EXAMPLES
 @given(st.lists(EVENTS, max_size=30), st.data())
-def test_an_event_that_comes_twice_says_the_same_as_once(feed, events, data):
+def test_a_duplicated_event_does_not_change_the_result(feed, events, data):
     events = [one for one in events if not isinstance(one[0], int)]
     at = data.draw(st.integers(0, len(events)))
     doubled = [*events[:at], *events[max(0, at - 1) : at], *events[at:]]
@@ -335,7 +335,7 @@ def test_an_event_that_comes_twice_says_the_same_as_once(feed, events, data):
         assert feed(*doubled)[-1] == feed(*events)[-1]
 
 
-@ANY
+@MANY_EXAMPLES
 @given(st.permutations([status("paused", 7), status("flying", 6), status("stopped", 5), flight("flying", 4)]))
-def test_parts_that_come_out_of_order_leave_the_newest(feed, events):
+def test_the_newest_version_wins_when_parts_arrive_out_of_order(feed, events):
     assert last(feed, *events)["status"] == "Paused"

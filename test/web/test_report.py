@@ -1,4 +1,4 @@
-"""The report in a browser: opened from a file, played, scrubbed, and seen to show what the table says."""
+"""The report in a browser: opened from a file, played, scrubbed, and compared with the table of the flight."""
 
 import io
 import json
@@ -12,8 +12,8 @@ from PIL import Image
 
 from drone_sim.grading.outputs.html import report
 
-HUB = (255, 90, 0)  # the drone's middle on the canvas
-NEAR = 2.0  # px
+HUB = (255, 90, 0)  # RGB colour of the drone's middle on the canvas
+TOLERANCE = 2.0  # px
 
 
 @pytest.fixture(name="report", scope="module")
@@ -40,7 +40,7 @@ def open_flight(page, report, script, flight=1):
 
 
 def drone(page):
-    """Return where the drone's middle is seen on the canvas, from its top left, px."""
+    """Return the position of the drone's middle on the canvas, from the top left, px."""
     picture = np.asarray(Image.open(io.BytesIO(page.locator("#canvas").screenshot())).convert("RGB")).astype(int)
     rows, columns = np.nonzero(np.abs(picture - HUB).max(axis=2) < 8)
     assert len(rows) > 20
@@ -48,7 +48,7 @@ def drone(page):
 
 
 def expected(page, time, axes):
-    """Return where a top (x, y) or side (x, z) view shows the table's place at a time, px."""
+    """Return the canvas position of the table's place at a time in a top (x, y) or side (x, z) view, px."""
     canvas = page.locator("#canvas")
     scale = float(canvas.get_attribute("data-scale"))
     target = [float(word) for word in canvas.get_attribute("data-target").split()]
@@ -63,23 +63,23 @@ def scrub(page, time):
     )
 
 
-def test_the_replay_shows_the_drone_where_the_table_says(page, report):
+def test_the_replay_shows_the_drone_at_the_place_in_the_table(page, report):
     open_flight(page, report, "good.py")
     for view, axes in (("top", (0, 1)), ("side", (0, 2))):
         page.click(f"[data-view={view}]")
-        seen = []
+        positions = []
         for time in (1.025, 3.5):
             scrub(page, time)
-            seen.append(drone(page))
-            assert np.abs(seen[-1] - expected(page, time, axes)).max() < NEAR, f"{view}, at {time} s"
-        assert np.abs(seen[0] - seen[1]).max() > 30
+            positions.append(drone(page))
+            assert np.abs(positions[-1] - expected(page, time, axes)).max() < TOLERANCE, f"{view}, at {time} s"
+        assert np.abs(positions[0] - positions[1]).max() > 30
     assert page.troubles == []
 
 
-def test_play_goes_on_to_the_end_and_pause_stands_still(page, report):
+def test_play_runs_to_the_end_and_pause_stops_it(page, report):
     open_flight(page, report, "good.py")
-    shown = page.locator("#time")
-    assert shown.inner_text() == "0.00 / 4.00 s"
+    display = page.locator("#time")
+    assert display.inner_text() == "0.00 / 4.00 s"
     page.select_option("#speed", "10")
     page.click("#play")
     page.wait_for_function("document.getElementById('time').textContent === '4.00 / 4.00 s'")
@@ -88,14 +88,14 @@ def test_play_goes_on_to_the_end_and_pause_stands_still(page, report):
     page.click("#play")
     page.wait_for_function("!document.getElementById('time').textContent.startsWith('0.00')")
     page.click("#play")
-    before = shown.inner_text()
+    before = display.inner_text()
     assert 0 < float(before.split()[0]) < 4
     page.evaluate("new Promise(requestAnimationFrame)")
-    assert shown.inner_text() == before
+    assert display.inner_text() == before
     assert page.troubles == []
 
 
-def test_a_failure_is_marked_and_a_click_on_its_time_goes_there(page, report):
+def test_a_failure_is_marked_and_a_click_on_its_time_seeks_to_it(page, report):
     open_flight(page, report, "good.py", 2)
     assert page.locator("#marks i").count() == 1
     assert page.locator("#plots path title").first.text_content() == "no_contact failed at 1.50 s"
@@ -106,7 +106,7 @@ def test_a_failure_is_marked_and_a_click_on_its_time_goes_there(page, report):
     assert page.troubles == []
 
 
-def test_names_and_errors_are_text_and_a_flight_without_a_table_says_so(page, report):
+def test_names_and_errors_are_text_and_a_missing_table_is_reported(page, report):
     open_flight(page, report, "evil.py")
     assert "<script>alert(1)</script>" in page.locator(".chosen .error").inner_text()
     assert page.locator("#note").inner_text() == "no table of this flight was kept"
@@ -125,7 +125,7 @@ ATTACKS = (
 
 @pytest.fixture(name="attacked", scope="module")
 def _attacked(tmp_path_factory):
-    """A report in which every text that comes from outside is an attack: names, errors, criteria, objects, sources."""
+    """A report in which all external texts are attacks: names, errors, criteria, objects, sources."""
     folder = tmp_path_factory.mktemp("attacked")
     title, *objects = map(json.dumps, (ATTACKS[0], *(one for one in ATTACKS if one.isprintable() and len(one) < 64)))
     boxes = [f"  - {{name: {one}, shape: box, size: [1, 1, 1], position: [0, 0, 1]}}\n" for one in objects]
@@ -141,7 +141,7 @@ def _attacked(tmp_path_factory):
     return folder / "out"
 
 
-def test_no_text_from_outside_runs_in_a_report(page, attacked):
+def test_code_in_untrusted_text_does_not_run_in_a_report(page, attacked):
     page.add_init_script("window.hits = []; window.hit = (how) => window.hits.push(how)")
     files = [*attacked.rglob("*.html")]
     assert len(files) == 1 + 3 * len(ATTACKS) + 3  # for each script a page and the cards of two flights
@@ -156,8 +156,9 @@ def test_no_text_from_outside_runs_in_a_report(page, attacked):
         links = page.locator("a").evaluate_all("all => all.map(a => a.href)")
         assert {urlsplit(one).scheme for one in links} <= {"file"}
     page.goto((attacked / "index.html").as_uri())
-    shown = page.locator("body").inner_text()
-    assert all(one in shown for one in ATTACKS[:6]) and "49" not in page.locator("td.script").all_inner_texts()
+    display = page.locator("body").inner_text()
+    assert all(one in display for one in ATTACKS[:6])
+    assert not any("49" in cell for cell in page.locator("td.script").all_inner_texts())
     page.click("th:has-text('script')")
     assert page.evaluate("window.hits") == [] and page.troubles == []
 
@@ -174,7 +175,7 @@ def test_a_click_on_a_heading_sorts_the_scripts(page, report):
     assert page.troubles == []
 
 
-def test_a_students_folder_needs_nothing_beside_it(page, report, tmp_path):
+def test_a_students_folder_works_without_the_rest_of_the_report(page, report, tmp_path):
     (folder,) = (report / "scripts").glob("*-good")
     shutil.copytree(folder, tmp_path / "handed on")
     page.goto((tmp_path / "handed on/index.html").as_uri())

@@ -1,1 +1,1 @@
-"""What is tried: a module per kind of input, each with a strategy `CASES`."""
+"""Strategies of the fuzz tests: a module for each kind of input, with its strategy `CASES`."""

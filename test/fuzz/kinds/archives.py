@@ -18,7 +18,7 @@ _PIECES = (
     *("home", "etc", "store", "all", "canary", "submission_1", "__MACOSX", LONG, "é" * 130),
     *(*_STUDENTS, *(f"{one}my.py" for one in _STUDENTS), f"{_STUDENTS[0]}..", f"Bo_9_assignsubmission_file_{GOOD}x.py"),
 )
-_LETTERS = st.characters(blacklist_categories=["Cs"])  # which a zip cannot name
+_LETTERS = st.characters(blacklist_categories=["Cs"])  # a zip cannot store surrogates in a name
 _PIECE = st.one_of(st.sampled_from(_PIECES), st.sampled_from(_PIECES), st.text(_LETTERS, max_size=6))
 _NAME = st.one_of(
     st.lists(_PIECE, min_size=1, max_size=5).map("/".join),
@@ -31,15 +31,15 @@ _MEMBER = st.tuples(_NAME, _KIND, _METHOD)
 
 
 def _zip(members: list) -> bytes:
-    written = io.BytesIO()
-    with zipfile.ZipFile(written, "w") as archive, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # names that come twice
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # duplicate names
         for (name, kind, method), content in members:
             info = zipfile.ZipInfo("x")
-            info.filename = name  # which the constructor would change
+            info.filename = name  # set here, since the constructor would change it
             info.external_attr, info.compress_type = (kind | 0o777) << 16 if kind else 0, method
             archive.writestr(info, content)
-    return written.getvalue()
+    return buffer.getvalue()
 
 
 _INNER = st.lists(st.tuples(_MEMBER, _TEXT), max_size=4).map(_zip)
@@ -54,7 +54,7 @@ _MEMBERS = st.builds(
     st.integers(0, 8),
     st.sampled_from(["", "", "export/"]),
 )
-# A zip as it was written must leave the good student alone; one that was damaged may be refused as a whole.
+# In an intact zip the good student's script must be found; a damaged zip may be refused as a whole.
 CASES = st.one_of(
     _MEMBERS.map(_zip).map(lambda content: Case("archives", {"class.zip": content}, "whole")),
     _MEMBERS.map(_zip).map(lambda content: Case("archives", {"class.zip": content}, "whole")),

@@ -1,4 +1,4 @@
-"""Bags of flights, as rosbag writes them: with odd values, of other types and versions, cut off and damaged."""
+"""Bags of flights, written by rosbag: with odd values, other types and versions, truncated and damaged."""
 
 import functools
 import io
@@ -41,13 +41,13 @@ _times = st.one_of(st.integers(0, 40).map(lambda tenth: 1e8 * tenth), st.sampled
 
 
 @functools.cache
-def _made_up(name: str) -> type:
-    """Return a class of that name that has other fields."""
+def _fake_class(name: str) -> type:
+    """Return a message class of that name with other fields."""
     return genpy.dynamic.generate_dynamic(name, "string data\n")[name]
 
 
 def _set(message: genpy.Message, path: str, value: object) -> None:
-    """Set a field, as far as there is one that takes such a value."""
+    """Set the field at `path`, if the message has it."""
     *parents, name = path.split(".")
     for parent in parents:
         message = getattr(message, parent, None)
@@ -83,7 +83,7 @@ _CHANGE = st.sampled_from(sorted(_FIELDS)).flatmap(lambda path: st.tuples(st.jus
 _WRITTEN = st.tuples(
     st.one_of(st.just("/drone/odom"), st.sampled_from(sorted(_KINDS))),
     st.one_of(*[st.none()] * 15, st.sampled_from(sorted({*_KINDS.values(), *_OTHERS}))),  # another type
-    st.sampled_from([False] * 15 + [True]),  # of that name, with other fields
+    st.sampled_from([False] * 15 + [True]),  # a class of that name with other fields
     _times,
     st.lists(_CHANGE, max_size=2),
 )
@@ -93,14 +93,14 @@ def _bag(written: list, compression: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "one.bag"
         with rosbag.Bag(str(path), "w", compression=compression, chunk_threshold=2000) as bag:
-            for topic, other, made_up, at, changes in written:
-                _write(bag, topic, _KINDS[topic] if other is None else other, made_up, at, changes)
+            for topic, other, is_fake, at, changes in written:
+                _write(bag, topic, _KINDS[topic] if other is None else other, is_fake, at, changes)
         return path.read_bytes()
 
 
-def _write(bag: rosbag.Bag, topic: str, kind: str, made_up: bool, at: float, changes: list) -> None:
-    known = None if kind in _OTHERS or made_up else roslib.message.get_message_class(kind)
-    message = (known or _made_up("nav_msgs/Odometry"))()
+def _write(bag: rosbag.Bag, topic: str, kind: str, is_fake: bool, at: float, changes: list) -> None:
+    known = None if kind in _OTHERS or is_fake else roslib.message.get_message_class(kind)
+    message = (known or _fake_class("nav_msgs/Odometry"))()
     _defaults(message, at)
     for path, value in changes:
         _set(message, path, value)
@@ -112,7 +112,7 @@ def _write(bag: rosbag.Bag, topic: str, kind: str, made_up: bool, at: float, cha
 
 @st.composite
 def _lengths(draw: st.DrawFn, content: bytes) -> bytes:
-    """Return a bag where one of the lengths, or whatever else lies there, is huge."""
+    """Return a bag with a huge number or 0 in four bytes, which may be a length."""
     at = draw(st.integers(13, max(len(content) - 4, 13)))
     return (
         content[:at] + draw(st.sampled_from([b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", bytes(4)])) + content[at + 4 :]

@@ -1,4 +1,4 @@
-"""What comes to the cockpit's port: (requests, messages of our page), all as bytes."""
+"""Input of the cockpit's port: (HTTP requests, messages of our page), all as bytes."""
 
 import json
 
@@ -29,8 +29,8 @@ _HEADERS = st.tuples(
 
 
 def _request(parts):
-    path, headers, lets_in = parts
-    known = [("Host", "127.0.0.1:PORT"), ("Cookie", "drone_sim_PORT=TOKEN")] if lets_in else []
+    path, headers, has_cookie = parts
+    known = [("Host", "127.0.0.1:PORT"), ("Cookie", "drone_sim_PORT=TOKEN")] if has_cookie else []
     lines = [f"GET {path} HTTP/1.1", *(f"{name}: {value}" for name, value in [*known, *headers])]
     return "\r\n".join((*lines, "", "")).encode("utf-8", "surrogatepass")
 
@@ -40,7 +40,7 @@ _REQUEST = st.one_of(_WRITTEN, _WRITTEN, _WRITTEN.flatmap(mutated), st.binary(ma
 
 # ---- our page
 
-_ASKED = (
+_REQUESTS = (
     *("scripts", "open", "look", "save", "save_as", "keep", "revert", "lesson", "run", "graded"),
     *("windows", "answer", "camera", "panel", "call", "request", "speed", "scene", "vehicle", "tune", "plots"),
 )
@@ -57,7 +57,7 @@ _SCRIPTS = st.sampled_from(
 )
 _NAMES = st.sampled_from(["a.py", "link.py", "fifo.py", "d.py", "b.lua", "../x.py", "\ud800.py", "x" * 300 + ".py"])
 _FIELDS = st.fixed_dictionaries(
-    {"ask": mostly(st.sampled_from(_ASKED))},
+    {"ask": mostly(st.sampled_from(_REQUESTS))},
     optional={
         "id": mostly(st.integers(0, 99)),
         "script": mostly(_SCRIPTS),
@@ -91,10 +91,10 @@ _FIELDS = st.fixed_dictionaries(
 )
 
 
-def _said(fields):
+def _encode(fields):
     try:
         return json.dumps(fields, default=str).encode()
-    except (ValueError, TypeError):  # a key that JSON does not have
+    except (ValueError, TypeError):  # a key that JSON does not allow
         return b"{"
 
 
@@ -102,7 +102,7 @@ _DEEP = st.sampled_from(
     [b"[" * 900, b'{"ask":' * 900, b'{"id":1,"ask":"open","script":' + b"[" * 300 + b"]" * 300 + b"}"]
 )
 _MESSAGE = st.one_of(
-    _FIELDS.map(_said), _FIELDS.map(_said), _FIELDS.map(_said).flatmap(mutated), junk.map(_said), _DEEP
+    _FIELDS.map(_encode), _FIELDS.map(_encode), _FIELDS.map(_encode).flatmap(mutated), junk.map(_encode), _DEEP
 )
 
 CASES = st.builds(

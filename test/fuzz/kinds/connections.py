@@ -1,7 +1,7 @@
-"""Whoever connects to the remote API's port: browsers, peers that speak ZMTP (rfc.zeromq.org) of any version, noise.
+"""Connections to the remote API's port: browsers, peers with any version of ZMTP (rfc.zeromq.org), noise.
 
-A case is a list of connections, each a list of what is sent one piece after the other. Only one that begins with the
-whole greeting of ZMTP 3 may call anything, and those here do not ask for what the others try: to start the simulation.
+A case is a list of connections, each a list of pieces that are sent in order. Only a peer that begins with the whole
+greeting of ZMTP 3 may call a function; such peers make harmless calls here, the others try to start the simulation.
 """
 
 import cbor2

@@ -1,6 +1,6 @@
-"""Clients of V-REP's legacy remote API: a list of connections, each a list of what is sent one piece after the other.
+"""Clients of V-REP's legacy remote API: a list of connections, each a list of pieces that are sent in order.
 
-Most of it are messages of commands that the server knows; some are cut, flipped and stuffed, some are noise.
+Most pieces are messages with commands that the server knows; some are mutated, some are noise.
 """
 
 import struct
@@ -28,7 +28,7 @@ def _text(value):
 
 
 def _key(code):
-    """Return keys such as a command has."""
+    """Return a strategy of keys for the command."""
     if code >= 0x3400:
         return st.tuples(_INTEGERS.map(_number), _TEXTS.map(_text), _TEXTS.map(_text)).map(b"".join)
     if code >= 0x3000:
@@ -61,7 +61,7 @@ def _command(draw):
 
 
 def _mostly(strategy):
-    """Return what a strategy gives, some of it mutated."""
+    """Return a strategy's values, some of them mutated."""
     return st.one_of(strategy, strategy, strategy, strategy.flatmap(mutated))
 
 

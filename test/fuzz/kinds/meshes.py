@@ -1,4 +1,4 @@
-"""Mesh files and pictures: whole, damaged, cut off, and made to hurt whoever reads them."""
+"""Mesh files and images: valid, damaged, truncated, and hostile to their readers."""
 
 import struct
 
@@ -35,7 +35,7 @@ _DAE = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/CO
 
 @st.composite
 def _obj(draw):
-    """Lines of an OBJ, some of which no exporter writes."""
+    """An OBJ with lines that no exporter writes."""
     odd = st.sampled_from([*ODD_TEXTS[:-1], "one.mtl", "one.obj", "one.png", "-"])
     index = st.one_of(st.integers(-5, 9), st.sampled_from([0, 2**31, -(2**31), 10**30, 4_000_000])).map(str)
     corner = st.builds("/".join, st.lists(index, min_size=1, max_size=4))
@@ -57,11 +57,11 @@ def _obj(draw):
 
 @st.composite
 def _stl(draw):
-    """A binary STL, whose count of triangles need not be that of its triangles."""
+    """A binary STL whose stated number of triangles may be wrong."""
     triangles = draw(st.lists(st.lists(st.floats(width=32), min_size=12, max_size=12), max_size=4))
-    said = draw(st.one_of(st.just(len(triangles)), st.sampled_from([0, 1, 10**6, 2**31, 2**32 - 1])))
+    stated_count = draw(st.one_of(st.just(len(triangles)), st.sampled_from([0, 1, 10**6, 2**31, 2**32 - 1])))
     body = b"".join(struct.pack("<12fH", *numbers, 0) for numbers in triangles)
-    return draw(st.sampled_from([b"solid", b"binary"])).ljust(80) + struct.pack("<I", said) + body
+    return draw(st.sampled_from([b"solid", b"binary"])).ljust(80) + struct.pack("<I", stated_count) + body
 
 
 @st.composite
@@ -90,7 +90,7 @@ def _dae(draw):
 
 @st.composite
 def _picture(draw):
-    """A PNG's head that promises a size, with what follows missing or odd; or something else."""
+    """The header of a PNG with a stated size and no valid data, or of another format."""
     width, height = (draw(st.sampled_from([1, 16, 4096, 20000, 65535, 2**31 - 1])) for _ in "wh")
     head = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR" + struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0) + b"\x00" * 4
     flat = b"P5 %d %d 255\n" % (width, height) + b"x" * min(width * height, 64)

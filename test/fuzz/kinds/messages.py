@@ -1,4 +1,4 @@
-"""Messages on the drone's topics: a list of (topic, fields), handed to the real callbacks."""
+"""Messages on the drone's topics: lists of (topic, fields) for the real callbacks."""
 
 from case import Case
 from hypothesis import strategies as st

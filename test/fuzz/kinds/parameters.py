@@ -1,4 +1,4 @@
-"""Parameters: config/drone.yaml with some keys overridden by something else, nested as they are there."""
+"""Parameters: some keys of config/drone.yaml, nested as in that file, with other values."""
 
 import copy
 from pathlib import Path
@@ -41,8 +41,8 @@ _WORDS = [
 ]
 
 
-def _alike(value):
-    """Something of the kind that stands there, often near to it."""
+def _similar(value):
+    """Return a strategy of values with the type of `value`, often close to it."""
     if isinstance(value, bool):
         return st.booleans()
     if isinstance(value, (str, dict)):
@@ -64,8 +64,8 @@ def _overrides(draw):
         for key in path[:-1]:
             place = place.setdefault(key, {}) if isinstance(place, dict) else {}
         if isinstance(place, dict):
-            place[path[-1]] = draw(mostly(_alike(value)))
-    if draw(st.integers(0)) == 0:  # another camera, as a user would add one
+            place[path[-1]] = draw(mostly(_similar(value)))
+    if draw(st.integers(0, 3)) == 0:  # another camera, like one that a user adds
         camera = {
             **_CAMERA,
             "topic": draw(st.sampled_from(["odom", "front", "track/camera_info", "new/image", "cmd_vel"])),

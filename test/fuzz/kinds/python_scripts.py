@@ -1,4 +1,4 @@
-"""Python child scripts. They are trusted code: what ends a process on purpose (os._exit, ctypes) is not tried."""
+"""Python child scripts. They are trusted code: calls that end the process (os._exit, ctypes) are not tried."""
 
 import textwrap
 

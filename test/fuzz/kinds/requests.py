@@ -1,4 +1,4 @@
-"""Requests of clients outside: a list of messages, as bytes, most of them calls of what scripts may call."""
+"""Requests of remote API clients: lists of messages as bytes, most of them calls of the scripts' functions."""
 
 import cbor2
 from case import Case
@@ -39,12 +39,12 @@ _FIELDS = st.fixed_dictionaries(
 )
 
 
-def _written(fields):
+def _encode(fields):
     try:
         return cbor2.dumps(fields, default=lambda encoder, value: encoder.encode(str(value)))
-    except ValueError:  # half of a pair of surrogates, a number that is too large
+    except ValueError:  # a lone surrogate, or a number that is too large
         return b"\xff"
 
 
-_MESSAGE = st.one_of(_FIELDS.map(_written), _FIELDS.map(_written).flatmap(mutated), st.binary(max_size=40))
+_MESSAGE = st.one_of(_FIELDS.map(_encode), _FIELDS.map(_encode).flatmap(mutated), st.binary(max_size=40))
 CASES = st.builds(Case, st.just("requests"), st.just({}), st.lists(_MESSAGE, min_size=1, max_size=8))

@@ -1,4 +1,4 @@
-"""Scene files: what a structure says as YAML, that text damaged, and YAML that is an attack by itself."""
+"""Scene files: structures as YAML, damaged YAML, and hostile YAML."""
 
 from case import Case
 from hypothesis import strategies as st
@@ -13,10 +13,10 @@ _COUNT = st.one_of(st.integers(0, 4), st.sampled_from([30]))
 def _object(draw):
     shape = draw(mostly(st.sampled_from(sorted(_SIZES)), junk))
     one = {"shape": shape, "position": draw(vectors())}
-    wanted = _SIZES.get(shape, 3) if isinstance(shape, str) else 3
-    if wanted:
-        good = st.lists(st.floats(0.01, 3), min_size=wanted, max_size=wanted)
-        one["size"] = draw(mostly(good, st.one_of(vectors(wanted), junk)))
+    size_count = _SIZES.get(shape, 3) if isinstance(shape, str) else 3
+    if size_count:
+        good = st.lists(st.floats(0.01, 3), min_size=size_count, max_size=size_count)
+        one["size"] = draw(mostly(good, st.one_of(vectors(size_count), junk)))
     if shape in ("mesh", "urdf"):
         one["file"] = draw(st.sampled_from(["one.obj", "one.urdf", "one.obj", "one.urdf", "none.obj"]))
     optional = {
@@ -36,7 +36,7 @@ def _object(draw):
 
 _NAMES = st.sampled_from(["A", "B", "C", "Quadricopter_base", "FrontVision", ""])
 _POINTS = st.lists(vectors(), min_size=0, max_size=4)
-_OF_KINDS = {
+_KIND_FIELDS = {
     "type": st.sampled_from(["revolute", "prismatic", "spherical", "ray", "cone", "disc", "cylinder", "pyramid"]),
     "mode": st.sampled_from(["kinematic", "passive", "position", "velocity", "force"]),
     "limits": mostly(st.just([-1, 1]), vectors(2)),
@@ -49,8 +49,8 @@ _PARTS = st.lists(
 
 
 @st.composite
-def _of_a_kind(draw):
-    """Return a joint, a sensor, a path, or a shape that hangs on one, by names that may meet."""
+def _typed_object(draw):
+    """Return a joint, a sensor, a path, or a shape with a parent; names may be duplicate."""
     one = {"name": draw(_NAMES), "position": draw(vectors()), "parent": draw(mostly(_NAMES, junk))}
     kind = draw(
         st.sampled_from(["dummy", "joint", "joint", "proximity_sensor", "vision_sensor", "path", "", "compound"])
@@ -61,7 +61,7 @@ def _of_a_kind(draw):
         moments = {"moments": draw(vectors())}
         one.update(shape="sphere", size=[0.1], mass=draw(st.sampled_from([0, 1])), respondable=draw(st.booleans()))
         return {**one, "inertia": moments} if draw(st.integers(0, 3)) == 0 else one
-    return {**one, "kind": kind, **{key: draw(values) for key, values in _OF_KINDS.items() if draw(st.booleans())}}
+    return {**one, "kind": kind, **{key: draw(values) for key, values in _KIND_FIELDS.items() if draw(st.booleans())}}
 
 
 @st.composite
@@ -76,7 +76,7 @@ def _scene(draw):
             "yaw": draw(mostly(small, st.one_of(numbers, junk))),
         }
         scene["drone"] = draw(mostly(st.just(drone), junk))
-    entries = st.one_of(_object(), _of_a_kind())
+    entries = st.one_of(_object(), _typed_object())
     objects = [draw(entries) for _ in range(draw(st.integers(0, 5)))] * draw(_COUNT)
     scene["objects"] = draw(mostly(st.just(objects), junk))
     if draw(st.integers(0, 19)) == 0:
@@ -86,7 +86,7 @@ def _scene(draw):
 
 @st.composite
 def _bomb(draw):
-    """Aliases that double and double, deep nesting, a long list, duplicate keys, foreign tags."""
+    """Aliases that grow exponentially, deep nesting, a long list, duplicate keys, foreign tags."""
     count = draw(st.sampled_from([2, 9, 30, 100, 1000, 20000]))
     box = b"{shape: box, size: [1, 1, 1], position: [0, 0, 5], mass: 1}"
     key = draw(st.sampled_from([b"objects", b"floor", b"drone", b"x"]))

@@ -1,4 +1,4 @@
-"""URDFs, as the drone and as an object of a scene: trees and what is none, odd numbers and names, broken XML."""
+"""URDFs of the drone or an object of a scene: trees and other graphs, odd numbers and names, broken XML."""
 
 from pathlib import Path
 
@@ -56,7 +56,7 @@ def _link(draw, name):
 
 @st.composite
 def _robot(draw):
-    """Some links, joined anyhow: often a tree, at times several, or with a circle in it."""
+    """Links with random joints: often a tree, sometimes several trees, or a graph with a cycle."""
     names = _PROPELLERS + draw(st.lists(st.sampled_from(["a", "b", "c", *_ODD_NAMES]), max_size=3))
     names = ["root", *names] if draw(st.integers(0, 9)) else names
     tree = draw(st.integers(0, 9)) < 7

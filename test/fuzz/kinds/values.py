@@ -1,4 +1,4 @@
-"""Odd numbers, texts and structures, of which the other kinds are made."""
+"""Odd numbers, texts and structures, which the other kinds use."""
 
 import datetime
 import math
@@ -59,18 +59,18 @@ def one_of_words(text: str) -> st.SearchStrategy:
 
 
 def mostly(good: st.SearchStrategy, bad: st.SearchStrategy = junk) -> st.SearchStrategy:
-    """Return `good` most of the time, so that what is made of many values is not refused for the first of them."""
+    """Return `good` most of the time, so that a structure of many values is not refused for its first value."""
     return st.sampled_from([good] * 30 + [bad]).flatmap(lambda one: one)
 
 
 def vectors(count: int = 3) -> st.SearchStrategy:
-    """Return lists of `count` numbers, now and then of others."""
+    """Return lists of `count` numbers, sometimes other lists or junk."""
     return mostly(st.lists(small, min_size=count, max_size=count), st.one_of(st.lists(numbers, max_size=7), junk))
 
 
 @st.composite
 def mutated(draw: st.DrawFn, content: bytes) -> bytes:
-    """Return bytes cut off, flipped, repeated or stuffed with something odd, a few times over."""
+    """Return the bytes after up to three mutations: truncated, flipped, dropped, repeated, or with odd text."""
     for _ in range(draw(st.integers(0, 3))):
         at = draw(st.integers(0, max(len(content), 1)))
         how = draw(st.sampled_from(["cut", "flip", "drop", "repeat", "stuff"]))

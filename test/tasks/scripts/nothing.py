@@ -1,5 +1,5 @@
-"""Does nothing: the propellers stand."""
+"""A script that does nothing: the propellers stand still."""
 
 
 def sysCall_init():
-    """Find nothing to do."""
+    """Do nothing."""
