@@ -284,7 +284,7 @@ def test_late_stop_is_never_raised_outside_the_script():
     limit = TimeLimit(0.02)
     for wait in range(40):
         try:
-            limit.run(time.sleep, 0.04 + 0.001 * wait)
+            limit.run(time.sleep, 0.016 + 0.0002 * wait)
         except ScriptStopped:
             continue
     time.sleep(0.2)

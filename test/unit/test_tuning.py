@@ -188,13 +188,14 @@ def test_external_changes_are_visible_and_unchanged_values_are_ignored(simulate)
 
 def test_tuned_values_survive_every_start_but_faults_do_not(simulate):
     simulation = simulate()
-    for begin in (simulation.start, simulation.stop, lambda: simulation.drone.ask("reset")):
+    begins = (simulation.start, 0), (simulation.stop, 0), (lambda: simulation.drone.ask("reset"), 1)
+    for begin, wind in begins:  # only a start resets the wind
         simulation.start()
         tuning_of(simulation).change({**TUNED, "weather/wind/x": 1.0, "faults/propellers/front_left": 0.9})
         begin()
         values = tuning_of(simulation).values()
         assert {name: values[name] for name in TUNED} == TUNED
-        assert values["faults/propellers/front_left"] == 1
+        assert (values["faults/propellers/front_left"], values["weather/wind/x"]) == (1, wind)
     assert simulation.drone.parameters.cmd_vel_limits.linear == 1 and simulation.drone.parameters.is_alone
 
 
