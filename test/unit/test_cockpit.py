@@ -566,6 +566,16 @@ def test_slow_imports_wait_until_a_page_needs_them():
     assert ran.stdout == "set()\n"
 
 
+@pytest.mark.parametrize("kind", ["dae", "obj", "stl"])
+def test_meshes_are_the_same_without_scipy_which_the_cockpit_does_not_import(tmp_path, kind):
+    file = tmp_path / f"ball.{kind}"
+    trimesh.creation.icosphere().export(file)
+    code = f"import sys; sys.modules['scipy'] = None\nfrom {as_glb.__module__} import as_glb, Path\n"
+    show = f"sys.stdout.buffer.write(as_glb(Path({str(file)!r})))"
+    ran = subprocess.run([sys.executable, "-c", code + show], capture_output=True, check=True)
+    assert ran.stdout == as_glb(file)
+
+
 def test_a_mesh_has_a_metallic_factor_of_zero(tmp_path):
     file = tmp_path / "box.stl"
     trimesh.creation.box().export(file)

@@ -179,6 +179,30 @@ def test_a_failing_script_is_graded_with_the_reason(student):
     wait_until(student, lambda: "of the script" in student.inner_text("#graded"))
 
 
+# Ask for a lesson that does not exist, once, instead of the next one.
+FAIL_A_LESSON = """() => {
+    const send = WebSocket.prototype.send;
+    WebSocket.prototype.send = function (text) {
+        if (!String(text).includes('"ask":"lesson"')) return send.call(this, text);
+        WebSocket.prototype.send = send;
+        return send.call(this, text.replace("tasks/hover", "tasks/none"));
+    };
+}"""
+
+
+def test_a_lesson_that_failed_opens_no_script_and_can_be_chosen_again(student):
+    open_from_start_page(student, "Tutorial")
+    wait_until(student, lambda: student.input_value("#script") == "tutorial/1_thrust.py")
+    student.evaluate(FAIL_A_LESSON)
+    open_from_start_page(student, "Tasks")
+    student.locator("#gallery-tasks button").first.click()
+    wait_until(student, lambda: "none" in student.locator("#flies").text_content())
+    assert student.input_value("#script") == "tutorial/1_thrust.py"
+    open_from_start_page(student, "Tasks")
+    student.locator("#gallery-tasks button").first.click()
+    wait_until(student, lambda: student.input_value("#script") == "tasks/hover.py")
+
+
 def test_the_browsers_back_button_returns_to_the_edited_script(student):
     student.click("#start-close")
     student.select_option("#script", "tutorial/3_yaw.py")

@@ -30,6 +30,7 @@ export class Lesson {
     this.edits = 0; // the store's count of edits when the graded script was saved
     this.all = []; // { lesson, title, task, script } in reading order
     this.name = "";
+    this.hasFailed = false; // whether the request for this lesson failed, so that the text and script are another lesson's
     this.taken = ""; // the lesson that the user has chosen, until it is shown
     this.opened = { script: "", lesson: "" };
     parts.choice.onchange = () => this.take(parts.choice.value);
@@ -59,7 +60,8 @@ export class Lesson {
 
   // Show a lesson; "" shows none. Its script is the open script if that belongs to the lesson.
   async show(name) {
-    if (name === this.name) return;
+    if (name === this.name && !this.hasFailed) return;
+    this.hasFailed = false;
     this.name = name;
     this.parts.choice.value = name;
     this.aim();
@@ -78,7 +80,7 @@ export class Lesson {
 
   go(name) {
     return this.show(name).catch((error) => {
-      if (this.name === name) this.name = ""; // so that the same lesson can be chosen again
+      if (this.name === name) this.hasFailed = true;
       this.parts.flies.textContent = error.message;
     });
   }
@@ -100,7 +102,7 @@ export class Lesson {
     this.taken = name;
     await this.go(name);
     if (this.taken === name) this.taken = "";
-    if (name && name === this.name && this.script && this.opened.lesson !== name) this.open(this.script);
+    if (name && name === this.name && !this.hasFailed && this.script && this.opened.lesson !== name) this.open(this.script);
   }
 
   async turn(way) {

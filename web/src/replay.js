@@ -29,7 +29,7 @@ export class Replay {
     this.scene = scene;
     this.store = store;
     this.flight = null;
-    this.wanted = ""; // the address of the flight that was requested last
+    this.latestAddress = ""; // the address of the flight that was requested last
     this.starts = 0;
     this.second = 0; // s, the time that is shown
     this.ghost = this.group = new THREE.Group(); // the drone, and everything that is drawn for the flight
@@ -46,11 +46,11 @@ export class Replay {
   // Show a flight of a report at `second`, s; `folder` is the folder of the report's page.
   async open(folder, flight, seed, second) {
     const address = `${folder}flights/${flight}.js`;
-    this.wanted = address;
+    this.latestAddress = address;
     if (this.flight?.address !== address) {
       const figures = await valueOf(address);
       const { boxes } = figures.scene ?? (await valueOf(`${folder}files/scene.js`));
-      if (address !== this.wanted) return; // another flight has been requested meanwhile
+      if (address !== this.latestAddress) return; // another flight has been requested meanwhile
       this.close();
       this.begin({ address, seed, ...figures }, boxes);
     }

@@ -18,11 +18,11 @@ export class Drag {
     this.change = { matrix: new THREE.Matrix4(), factors: null };
     this.merge = `${page}-${++drags}`;
     this.from = new Map(roots.map((one) => [one, edit.objects.existing(one).matrix.clone()]));
-    this.shown = roots.flatMap((root) => this.drawn(root));
+    this.shown = roots.flatMap((root) => this.visualsOf(root));
   }
 
   // Return [object of the picture, its matrix in the world, root] for the root and all its descendants.
-  drawn(root) {
+  visualsOf(root) {
     const { objects, scene, glyphs } = this.edit;
     const all = objects.withBelow(root);
     const names = new Set(all.map((one) => objects.existing(one)).filter(({ of }) => of === "scene").map(({ name }) => name));
