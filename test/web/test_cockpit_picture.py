@@ -175,12 +175,14 @@ def test_a_key_held_for_2_s_flies_as_the_same_commands_without_ros(cockpit, pict
     page.locator("#command").click()
     page.keyboard.down("w")
     wait_until(page, lambda: sum(command[0] == 1.0 for command, _ in flight_steps(drone)) >= 2 / STEP)
-    assert drone.velocity.x > 0.9
     page.keyboard.up("w")
     wait_until(page, lambda: drone.command == (0.0, 0.0, 0.0))
     steps = flight_steps(drone)
     cockpit.call("pause", True)
     places = np.array([place for _, place in steps])
+    # After 2 s; later the velocity swings below the command for a while.
+    *_, before_last, last = [place for command, place in steps if command[0] == 1.0][: round(2 / STEP)]
+    assert (last[0] - before_last[0]) / STEP > 0.9
     assert np.abs(fly_without_ros(steps) - places).max() < 1e-9
     assert places[-1][0] - places[0][0] > 1.2
     wait_until(page, lambda: is_drawn_at_odometry(cockpit, picture))
